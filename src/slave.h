@@ -1,0 +1,78 @@
+/* One instance of a unit: its values by reference, its time, and steps from one communication point
+ * to the next. Knows no particular model and no FMI.
+ *
+ * Every function that can fail reports the status it returns, with one line of text that says what
+ * was wrong and what was expected, to the sink given at creation. Functions that set or get values
+ * are all or nothing. One instance serves one thread at a time; instances share nothing. */
+#ifndef SLAVE_H
+#define SLAVE_H
+
+#include "variables.h"
+
+struct slave;
+
+/* Values of the variables with owner = "slave" (src/time_variable.toml, solver_variables.toml). */
+struct slave_values {
+    double time;                         /* s */
+    int solver_steps;                    /* internal steps since initialization */
+    int solver_rhs_evaluations;          /* the integrator's, since initialization */
+    double relative_tolerance;           /* asked for; 0: that of the experiment */
+    int max_internal_steps;              /* per communication step */
+    double effective_relative_tolerance; /* what the integrator runs at */
+};
+
+struct slave_experiment {
+    double start_time; /* s */
+    bool stop_time_defined;
+    double stop_time; /* s; steps past it are refused */
+    bool tolerance_defined;
+    double tolerance; /* relative, > 0 */
+};
+
+/* Allocates all that the instance needs; steps allocate nothing. unit must outlive the instance,
+ * sink is copied. On failure *slave is NULL. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_create(const struct unit *unit, const struct message_sink *sink, struct slave **slave);
+
+/* NULL is allowed. */
+void slave_destroy(struct slave *slave);
+
+/* Back to the state right after slave_create: start values, no experiment. */
+__attribute__((nonnull)) void slave_reset(struct slave *slave);
+
+/* Before initialization; may be repeated. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_setup_experiment(struct slave *slave, const struct slave_experiment *experiment);
+
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_enter_initialization(struct slave *slave);
+
+/* Ends initialization: the parameters must go together. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_exit_initialization(struct slave *slave);
+
+/* count values by reference; the arrays may be NULL where count is 0. Real functions take Real
+ * variables only, Integer functions Integer ones. A set value shows at once in what is calculated
+ * from it. */
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_set_real(struct slave *slave, const unsigned references[], size_t count,
+               const double values[]);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_set_integer(struct slave *slave, const unsigned references[], size_t count,
+                  const int values[]);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_real(struct slave *slave, const unsigned references[], size_t count, double values[]);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_integer(struct slave *slave, const unsigned references[], size_t count, int values[]);
+
+/* Steps from communication_point to communication_point + step (s) with the inputs held.
+ * STATUS_INVALID_TIME: step not > 0, communication_point not where the instance is (clock_slack),
+ * or the end past the stop time. Where the integration ends early (severity discard), slave_time
+ * tells how far the instance got, and its states are those of that time. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_do_step(struct slave *slave, double communication_point, double step);
+
+/* Time that the instance has reached, s. */
+__attribute__((nonnull)) double slave_time(const struct slave *slave);
+
+#endif

@@ -1,0 +1,41 @@
+#include "variables.h"
+
+#include <math.h>
+
+const struct variable *variable_find(const struct unit *unit, unsigned reference) {
+    if (reference >= unit->reference_count || unit->row_of_reference[reference] < 0) {
+        return NULL;
+    }
+    return &unit->variables[unit->row_of_reference[reference]];
+}
+
+bool variable_is_settable(const struct variable *variable, enum phase phase) {
+    if (variable->causality == CAUSALITY_INPUT) {
+        return true;
+    }
+    if (phase == PHASE_STEPPING) {
+        return variable->causality == CAUSALITY_PARAMETER &&
+               variable->variability == VARIABILITY_TUNABLE;
+    }
+    return variable->initial == INITIAL_EXACT;
+}
+
+enum status variable_check_value(const struct variable *variable, double value,
+                                 const struct message_sink *sink) {
+    if (!isfinite(value)) {
+        message_write(sink, STATUS_NOT_FINITE, "%s = %g is refused: a finite value is expected",
+                      variable->name, value);
+        return STATUS_NOT_FINITE;
+    }
+    if (value < variable->min || value > variable->max) {
+        message_write(sink, STATUS_OUT_OF_RANGE,
+                      "%s = %.17g is refused: a value from %g to %g is expected", variable->name,
+                      value, variable->min, variable->max);
+        return STATUS_OUT_OF_RANGE;
+    }
+    return STATUS_OK;
+}
+
+const char *variable_type_name(enum variable_type type) {
+    return type == VARIABLE_REAL ? "Real" : "Integer";
+}

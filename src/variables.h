@@ -1,0 +1,77 @@
+/* Row type of the variable table that fmu/generate.py makes from variables.toml, and what can be
+ * told from a row alone. Terms as in section 2.2.7 of the FMI 2.0 specification. */
+#ifndef VARIABLES_H
+#define VARIABLES_H
+
+#include "message.h"
+#include "model.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum variable_type { VARIABLE_REAL, VARIABLE_INTEGER };
+
+/* The structure that holds the value: the model's own or struct slave_values. */
+enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_SLAVE };
+
+enum causality {
+    CAUSALITY_PARAMETER,
+    CAUSALITY_INPUT,
+    CAUSALITY_OUTPUT,
+    CAUSALITY_LOCAL,
+    CAUSALITY_INDEPENDENT,
+};
+
+enum variability {
+    VARIABILITY_FIXED,
+    VARIABILITY_TUNABLE,
+    VARIABILITY_DISCRETE,
+    VARIABILITY_CONTINUOUS,
+};
+
+enum initial { INITIAL_NONE, INITIAL_EXACT, INITIAL_CALCULATED };
+
+struct variable {
+    unsigned reference;
+    const char *name;
+    enum variable_type type;
+    enum variable_owner owner;
+    size_t offset; /* bytes into the structure of the owner */
+    enum causality causality;
+    enum variability variability;
+    enum initial initial;
+    double start;   /* 0 where the variable has none */
+    double min;     /* -INFINITY where there is none */
+    double max;     /* INFINITY where there is none */
+    double nominal; /* > 0 */
+};
+
+/* One kind of unit: a model and its variables, as declared in variables.toml. */
+struct unit {
+    const char *name; /* model name and identifier */
+    const char *guid;
+    double default_tolerance; /* relative, where neither experiment nor parameter gives one */
+    const struct model *model;
+    const struct variable *variables;
+    size_t variable_count;
+    const short *row_of_reference; /* -1: no such reference */
+    unsigned reference_count;      /* entries of row_of_reference */
+};
+
+/* Where an instance is in its life, as far as it decides what may be set. */
+enum phase { PHASE_INSTANTIATED, PHASE_INITIALIZATION, PHASE_STEPPING };
+
+/* NULL where the unit has no such reference. */
+const struct variable *variable_find(const struct unit *unit, unsigned reference);
+
+/* Before and during initialization: start values and inputs; later: inputs and tunable parameters.
+ */
+bool variable_is_settable(const struct variable *variable, enum phase phase);
+
+/* STATUS_OK, or why value is refused: not finite, or outside [min, max]. Says so through sink. */
+enum status variable_check_value(const struct variable *variable, double value,
+                                 const struct message_sink *sink);
+
+const char *variable_type_name(enum variable_type type);
+
+#endif
