@@ -1,0 +1,187 @@
+#include "component.h"
+
+#include "unit.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const category_names[LOG_CATEGORY_COUNT] = {
+    [LOG_EVENTS] = "logEvents",
+    [LOG_STATUS_WARNING] = "logStatusWarning",
+    [LOG_STATUS_DISCARD] = "logStatusDiscard",
+    [LOG_STATUS_ERROR] = "logStatusError",
+    [LOG_STATUS_FATAL] = "logStatusFatal",
+    [LOG_ALL] = "logAll",
+};
+
+/* ---- Logging -------------------------------------------------------------------------------- */
+
+enum { TEXT_SIZE = 1024 };
+
+/* Importers may pass a text to printf, resolve #r<reference># in it, or do neither: '%' and control
+ * characters are replaced and '#' is doubled. */
+static void harmless(const char *text, char out[TEXT_SIZE]) {
+    size_t length = 0;
+    for (; *text != '\0' && length < TEXT_SIZE - 2; text++) {
+        const unsigned char c = (unsigned char)*text;
+        out[length++] = (c == '%' || c < ' ' || c == 0x7f) ? '?' : *text;
+        if (c == '#') {
+            out[length++] = '#';
+        }
+    }
+    out[length] = '\0';
+}
+
+void component_log(const struct component *component, fmi2Status status, enum log_category category,
+                   const char *format, ...) {
+    if (component->logger == NULL ||
+        !(component->is_logged[category] || component->is_logged[LOG_ALL])) {
+        return;
+    }
+    char raw[TEXT_SIZE];
+    char text[TEXT_SIZE];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(raw, sizeof raw, format, arguments);
+    va_end(arguments);
+    harmless(raw, text);
+    component->logger(component->environment, component->name, status, category_names[category],
+                      text);
+}
+
+void component_log_refusal(const fmi2CallbackFunctions *functions, const char *name,
+                           const char *text) {
+    if (functions == NULL || functions->logger == NULL) {
+        return;
+    }
+    char clean[TEXT_SIZE];
+    harmless(text, clean);
+    functions->logger(functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
+                      category_names[LOG_STATUS_ERROR], clean);
+}
+
+bool component_set_logged(struct component *component, const char *category, bool on) {
+    for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
+        if (strcmp(category, category_names[i]) == 0) {
+            component->is_logged[i] = on;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Status messages are sent even with logging off; what merely tells the course of events is not. */
+static void set_initial_logging(struct component *component, bool logging_on) {
+    for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
+        component->is_logged[i] = logging_on || (i != LOG_EVENTS && i != LOG_ALL);
+    }
+}
+
+/* ---- Status --------------------------------------------------------------------------------- */
+
+static const struct {
+    fmi2Status fmi_status;
+    enum log_category category;
+} of_severity[] = {
+    [SEVERITY_NONE] = {fmi2OK, LOG_EVENTS},
+    [SEVERITY_WARNING] = {fmi2Warning, LOG_STATUS_WARNING},
+    [SEVERITY_DISCARD] = {fmi2Discard, LOG_STATUS_DISCARD},
+    [SEVERITY_ERROR] = {fmi2Error, LOG_STATUS_ERROR},
+};
+
+static void log_slave_text(void *component, enum status status, const char *text) {
+    const enum severity severity = status_severity(status);
+    component_log(component, of_severity[severity].fmi_status, of_severity[severity].category, "%s",
+                  text);
+}
+
+fmi2Status component_status(struct component *component, enum status status) {
+    const fmi2Status fmi_status = of_severity[status_severity(status)].fmi_status;
+    if (fmi_status == fmi2Error) {
+        component->state = STATE_ERROR;
+    }
+    return fmi_status;
+}
+
+fmi2Status component_fail(struct component *component, const char *format, ...) {
+    char text[TEXT_SIZE];
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    component_log(component, fmi2Error, LOG_STATUS_ERROR, "%s", text);
+    component->state = STATE_ERROR;
+    return fmi2Error;
+}
+
+static const char *state_name(enum fmi_state state) {
+    switch (state) {
+    case STATE_INSTANTIATED:
+        return "instantiated";
+    case STATE_INITIALIZATION:
+        return "in initialization mode";
+    case STATE_STEP_COMPLETE:
+        return "between steps";
+    case STATE_STEP_FAILED:
+        return "after a failed step";
+    case STATE_TERMINATED:
+        return "terminated";
+    case STATE_ERROR:
+        return "in the error state";
+    }
+    return "in no known state";
+}
+
+bool component_enter(struct component *component, enum call call) {
+    if (component == NULL) {
+        return false;
+    }
+    const struct call_rule *rule = &call_rules[call];
+    component_log(component, fmi2OK, LOG_ALL, "%s", rule->name);
+    if (((unsigned)component->state & rule->allowed) == 0) {
+        component_fail(component, "%s is not allowed while the instance is %s", rule->name,
+                       state_name(component->state));
+        return false;
+    }
+    return true;
+}
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+struct component *component_create(const char *name, const fmi2CallbackFunctions *functions,
+                                   bool logging_on) {
+    struct component *component = calloc(1, sizeof *component);
+    if (component == NULL) {
+        return NULL;
+    }
+    component->state = STATE_INSTANTIATED;
+    component->logger = functions->logger;
+    component->environment = functions->componentEnvironment;
+    set_initial_logging(component, logging_on);
+
+    const size_t size = strlen(name) + 1;
+    component->name = malloc(size);
+    if (component->name == NULL) {
+        component_destroy(component);
+        return NULL;
+    }
+    memcpy(component->name, name, size);
+
+    const struct message_sink sink = {.write = log_slave_text, .context = component};
+    if (slave_create(&unit, &sink, &component->slave) != STATUS_OK) {
+        component_destroy(component);
+        return NULL;
+    }
+    return component;
+}
+
+void component_destroy(struct component *component) {
+    if (component == NULL) {
+        return;
+    }
+    slave_destroy(component->slave);
+    free(component->name);
+    free(component);
+}

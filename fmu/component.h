@@ -1,0 +1,58 @@
+/* What stands behind an fmi2Component: the slave, the FMI state it is in, and its logger. */
+#ifndef COMPONENT_H
+#define COMPONENT_H
+
+#include "calls.h"
+#include "slave.h"
+
+#include "fmi2Functions.h"
+
+/* Log categories, in the order of their names in component.c. */
+enum log_category {
+    LOG_EVENTS,
+    LOG_STATUS_WARNING,
+    LOG_STATUS_DISCARD,
+    LOG_STATUS_ERROR,
+    LOG_STATUS_FATAL,
+    LOG_ALL,
+    LOG_CATEGORY_COUNT,
+};
+
+struct component {
+    struct slave *slave;
+    enum fmi_state state;
+    fmi2CallbackLogger logger; /* NULL: no log */
+    fmi2ComponentEnvironment environment;
+    char *name;
+    bool is_logged[LOG_CATEGORY_COUNT];
+};
+
+/* Allocates a component; functions and name are copied. NULL where memory is short. */
+struct component *component_create(const char *name, const fmi2CallbackFunctions *functions,
+                                   bool logging_on);
+void component_destroy(struct component *component);
+
+/* A call may run: component is not NULL and in a state that calls.h allows it in. Otherwise says so
+ * in the log, and the component goes into STATE_ERROR. */
+bool component_enter(struct component *component, enum call call);
+
+/* FMI status of a slave's status; an error takes the component into STATE_ERROR. */
+fmi2Status component_status(struct component *component, enum status status);
+
+/* Error that the adapter itself finds; takes the component into STATE_ERROR. */
+__attribute__((format(printf, 2, 3))) fmi2Status component_fail(struct component *component,
+                                                                const char *format, ...);
+
+__attribute__((format(printf, 4, 5))) void component_log(const struct component *component,
+                                                         fmi2Status status,
+                                                         enum log_category category,
+                                                         const char *format, ...);
+
+/* As component_log, for a call that has no component yet; functions and name may be NULL. */
+void component_log_refusal(const fmi2CallbackFunctions *functions, const char *name,
+                           const char *text);
+
+/* Switches one category by name; false where there is none of that name. */
+bool component_set_logged(struct component *component, const char *category, bool on);
+
+#endif
