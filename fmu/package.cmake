@@ -1,0 +1,71 @@
+# add_fmu(NAME FOLDER models/... LIBRARY target)
+#
+# Builds ${PROJECT_BINARY_DIR}/NAME.fmu from the model's folder (variables.toml, README.md, model.png)
+# and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
+# archive), NAME_interface (the generated header with value references and GUID).
+
+set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
+
+function(add_fmu name)
+  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
+  set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
+  set(out ${PROJECT_BINARY_DIR}/fmu/${name})
+  set(generated ${out}/modelDescription.xml ${out}/variables.c ${out}/value_references.h)
+
+  # tables and model description, again whenever a declaration changes
+  file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*.toml)
+  add_custom_command(
+    OUTPUT ${generated}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
+            --output ${out} --version ${PROJECT_VERSION}
+    DEPENDS ${folder}/variables.toml ${shared_variables} ${FMU_SOURCE_DIR}/generate.py
+            ${FMU_SOURCE_DIR}/description.py
+    COMMENT "Generating the interface of ${name}"
+    VERBATIM)
+  add_custom_target(${name}_generated DEPENDS ${generated})
+  add_library(${name}_interface INTERFACE)
+  target_include_directories(${name}_interface INTERFACE ${out})
+  add_dependencies(${name}_interface ${name}_generated)
+
+  # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
+  add_library(${name} MODULE
+    ${FMU_SOURCE_DIR}/component.c
+    ${FMU_SOURCE_DIR}/fmi2.c
+    ${FMU_SOURCE_DIR}/fmi2_unsupported.c
+    ${out}/variables.c)
+  add_dependencies(${name} ${name}_generated)
+  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
+  target_include_directories(${name} PRIVATE ${FMU_SOURCE_DIR})
+  target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
+  target_link_libraries(${name} PRIVATE slave ${ARG_LIBRARY})
+  target_link_options(${name} PRIVATE
+    -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now)
+
+  # the page inside the FMU
+  add_custom_command(
+    OUTPUT ${out}/documentation/index.html
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
+            --readme ${folder}/README.md --model-description ${out}/modelDescription.xml
+            --output ${out}/documentation
+    DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css ${folder}/README.md
+            ${folder}/model.svg ${out}/modelDescription.xml
+    COMMENT "Writing the documentation of ${name}"
+    VERBATIM)
+
+  # the archive
+  set(fmu ${PROJECT_BINARY_DIR}/${name}.fmu)
+  add_custom_command(
+    OUTPUT ${fmu}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
+            modelDescription.xml=${out}/modelDescription.xml
+            model.png=${folder}/model.png
+            binaries/linux64/${name}.so=$<TARGET_FILE:${name}>
+            documentation=${out}/documentation
+            documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
+            documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
+    DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
+            ${folder}/model.png ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
+    COMMENT "Packing ${name}.fmu"
+    VERBATIM)
+  add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
+endfunction()

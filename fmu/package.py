@@ -1,0 +1,60 @@
+"""Packs an FMU: a zip archive whose bytes depend on the contents of its files alone."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import zipfile
+from pathlib import Path
+
+FIXED_DATE = (1980, 1, 1, 0, 0, 0)
+UNIX = 3
+
+
+def collect(entries: list[str]) -> dict[str, Path]:
+    """Map archive names to files; an entry is NAME=PATH, a folder stands for all files below it."""
+    files: dict[str, Path] = {}
+    for entry in entries:
+        name, separator, source = entry.partition("=")
+        path = Path(source)
+        if not (name and separator and path.exists()):
+            raise ValueError(f"'{entry}' is not NAME=PATH with an existing file or folder")
+        if path.is_dir():
+            below = (p for p in path.rglob("*") if p.is_file())
+            files |= {f"{name}/{p.relative_to(path).as_posix()}": p for p in below}
+        else:
+            files[name] = path
+    return files
+
+
+def pack(archive: Path, files: dict[str, Path]) -> None:
+    """Write the archive to a temporary name and rename it, so that a broken one never stays."""
+    temporary = archive.with_name(archive.name + ".part")
+    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target:
+        for name in sorted(files):
+            info = zipfile.ZipInfo(name, FIXED_DATE)
+            info.create_system = UNIX
+            info.compress_type = zipfile.ZIP_DEFLATED
+            executable = name.startswith("binaries/")
+            info.external_attr = (0o100755 if executable else 0o100644) << 16
+            target.writestr(info, files[name].read_bytes())
+    os.replace(temporary, archive)
+
+
+def main() -> int:
+    """Pack; 2 with a line on standard error where a file is missing or cannot be written."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("archive", type=Path)
+    parser.add_argument("entries", nargs="+", metavar="NAME=PATH")
+    arguments = parser.parse_args()
+    try:
+        pack(arguments.archive, collect(arguments.entries))
+    except (OSError, ValueError) as error:
+        print(f"package.py: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+#!/usr/bin/env bash
+# Installs what the project needs: ./setup.sh for building and ./run.sh, ./setup.sh --dev for
+# ./test.sh too. Touches nothing outside this folder but the system's packages; quick when there is
+# nothing to do.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+dev=no
+case "${1-}" in
+  "") ;;
+  --dev) dev=yes ;;
+  *) echo "usage: ./setup.sh [--dev]" >&2; exit 2 ;;
+esac
+
+fail() { echo "setup.sh: $*" >&2; exit 1; }
+
+# ---- system packages
+
+has_venv() { python3 -c 'import ensurepip, venv' 2>/dev/null; }
+missing=()
+need() { "${@:2}" >/dev/null 2>&1 || missing+=("$1"); }
+
+command -v python3 >/dev/null || fail "python3 (3.11 or later) is missing"
+python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
+  fail "Python 3.11 or later is needed, this is $(python3 --version)"
+need cmake command -v cmake
+need make command -v make
+need gcc command -v gcc
+need libc6-dev test -e /usr/include/math.h
+need libsundials-dev test -e /usr/include/cvode/cvode.h
+need python3-venv has_venv
+[ "$dev" = no ] || need clang command -v clang
+
+if [ "${#missing[@]}" -gt 0 ]; then
+  install="apt-get install -y --no-install-recommends ${missing[*]}"
+  sudo=""
+  [ "$(id -u)" -eq 0 ] || sudo="sudo"
+  command -v apt-get >/dev/null && { [ -z "$sudo" ] || command -v sudo >/dev/null; } ||
+    fail "please install ${missing[*]} (on Debian or Ubuntu, as root: $install)"
+  echo "setup.sh: installing ${missing[*]}"
+  $sudo env DEBIAN_FRONTEND=noninteractive sh -c "apt-get update -qq && $install -qq" >/dev/null ||
+    fail "this failed: $sudo $install"
+fi
+
+# ---- Python environment, made again when what it must hold has changed
+
+requirements=requirements.txt
+[ "$dev" = no ] || requirements=requirements-dev.txt
+mkdir -p build
+stamp="build/venv/$requirements.installed"
+wanted=$(cat requirements.txt "$requirements")
+if [ ! -x build/venv/bin/python ] || ! build/venv/bin/python -c '' 2>/dev/null; then
+  python3 -m venv --clear build/venv
+fi
+if [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
+  echo "setup.sh: installing $requirements into build/venv"
+  build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$requirements"
+  printf '%s\n' "$wanted" >"$stamp"
+fi
+
+# ---- Unity: Debian 13 has it in a package; before, that package is unpacked here, not installed
+
+get_unity() (
+  root="$PWD/build/deps/apt"
+  mkdir -p "$root"/{parts,lists/partial,cache/archives/partial,unpacked}
+  distribution=$(. /etc/os-release && echo "${ID-}")
+  sources=$(ls /etc/apt/sources.list.d/debian.sources 2>/dev/null) || return 1
+  [ "$distribution" = debian ] || return 1
+
+  # the machine's own mirror, with the suite that has the package
+  awk -v RS= -v ORS='\n\n' '!/security/' "$sources" |
+    sed -e 's/^Suites:.*/Suites: trixie/' -e '/^Targets:/d' \
+        -e 's/^Types:.*/Types: deb\nTargets: Packages/' >"$root/parts/unity.sources"
+  cat >"$root/apt.conf" <<CONF
+Dir::Etc::sourcelist "/dev/null";
+Dir::Etc::sourceparts "$root/parts";
+Dir::State::lists "$root/lists";
+Dir::Cache "$root/cache";
+APT::Sandbox::User "";
+#clear APT::Update::Pre-Invoke;
+#clear APT::Update::Post-Invoke;
+#clear APT::Update::Post-Invoke-Success;
+CONF
+  apt-get -c "$root/apt.conf" update -qq || return 1
+  cd "$root/unpacked" && apt-get -c "$root/apt.conf" download -qq cmock || return 1
+  dpkg-deb -x cmock_*.deb . || return 1
+  mkdir -p ../../unity && cp -r usr/share/cmock/vendor/unity/src ../../unity/
+)
+
+if [ "$dev" = yes ] && [ ! -e build/deps/unity/src/unity.c ] &&
+   [ ! -e /usr/share/cmock/vendor/unity/src/unity.c ]; then
+  echo "setup.sh: fetching the Unity test framework"
+  get_unity || echo "setup.sh: no package with Unity here, CMake will fetch it from upstream"
+  rm -rf build/deps/apt
+fi
