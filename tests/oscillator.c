@@ -1,0 +1,97 @@
+#include "oscillator.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static enum status derivatives(const void *values_pointer, double t, const double x[],
+                               const double u[], double dx[]) {
+    const struct oscillator_values *values = values_pointer;
+    (void)t;
+    dx[0] = x[1];
+    dx[1] = -values->omega * values->omega * x[0] + values->gain * u[0];
+    return STATUS_OK;
+}
+
+static enum status outputs(void *values_pointer, double t) {
+    struct oscillator_values *values = values_pointer;
+    (void)t;
+    const double stretch = values->omega * values->x;
+    values->energy = 0.5 * (values->v * values->v + stretch * stretch);
+    return STATUS_OK;
+}
+
+static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
+    const struct oscillator_values *values = values_pointer;
+    if (values->omega > 0.0) {
+        return STATUS_OK;
+    }
+    snprintf(text, size, "omega = %g is refused: it must be above 0", values->omega);
+    return STATUS_INVALID_PARAMETERS;
+}
+
+static const struct model model = {
+    .values_size = sizeof(struct oscillator_values),
+    .parameters = {offsetof(struct oscillator_values, omega), 2 * sizeof(double)},
+    .inputs = {offsetof(struct oscillator_values, u), sizeof(double)},
+    .states = {offsetof(struct oscillator_values, x), 2 * sizeof(double)},
+    .derivatives = derivatives,
+    .outputs = outputs,
+    .check_parameters = check_parameters,
+};
+
+#define OF_MODEL(field)       VARIABLE_REAL, VARIABLE_OF_MODEL, offsetof(struct oscillator_values, field)
+#define OF_SLAVE(type, field) type, VARIABLE_OF_SLAVE, offsetof(struct slave_values, field)
+#define PARAMETER             CAUSALITY_PARAMETER, VARIABILITY_TUNABLE, INITIAL_EXACT
+#define FIXED                 CAUSALITY_PARAMETER, VARIABILITY_FIXED, INITIAL_EXACT
+#define STATE                 CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_EXACT
+#define INPUT                 CAUSALITY_INPUT, VARIABILITY_CONTINUOUS, INITIAL_NONE
+#define OUTPUT                CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_CALCULATED
+#define COUNTER               CAUSALITY_LOCAL, VARIABILITY_DISCRETE, INITIAL_CALCULATED
+#define TIME                  CAUSALITY_INDEPENDENT, VARIABILITY_CONTINUOUS, INITIAL_NONE
+#define ANY                   -INFINITY, INFINITY, 1.0
+
+static const struct variable variables[] = {
+    {0, "time", OF_SLAVE(VARIABLE_REAL, time), TIME, 0.0, ANY},
+    {1, "omega", OF_MODEL(omega), PARAMETER, 2.0, -10.0, 100.0, 1.0},
+    {2, "gain", OF_MODEL(gain), FIXED, 1.0, ANY},
+    {10, "x", OF_MODEL(x), STATE, 1.0, ANY},
+    {11, "v", OF_MODEL(v), STATE, 0.0, ANY},
+    {20, "u", OF_MODEL(u), INPUT, 0.0, ANY},
+    {30, "energy", OF_MODEL(energy), OUTPUT, 0.0, ANY},
+    {80, "steps", OF_SLAVE(VARIABLE_INTEGER, solver_steps), COUNTER, 0.0, ANY},
+    {81, "evaluations", OF_SLAVE(VARIABLE_INTEGER, solver_rhs_evaluations), COUNTER, 0.0, ANY},
+    {82, "relative_tolerance", OF_SLAVE(VARIABLE_REAL, relative_tolerance), FIXED, 0.0, 0.0,
+     INFINITY, 1.0},
+    {83, "max_internal_steps", OF_SLAVE(VARIABLE_INTEGER, max_internal_steps), FIXED, 100000.0, 1.0,
+     INFINITY, 1.0},
+    {84, "effective_relative_tolerance", OF_SLAVE(VARIABLE_REAL, effective_relative_tolerance),
+     CAUSALITY_LOCAL, VARIABILITY_FIXED, INITIAL_CALCULATED, 0.0, ANY},
+};
+
+static const short row_of_reference[] = {
+    0,  1,  2,  -1, -1, -1, -1, -1, -1, -1, 3,  4,  -1, -1, -1, -1, -1, -1, -1, -1, 5,  -1,
+    -1, -1, -1, -1, -1, -1, -1, -1, 6,  -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
+    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
+    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 7,  8,  9,  10, 11,
+};
+
+const struct unit oscillator_unit = {
+    .name = "Oscillator",
+    .guid = "{oscillator}",
+    .default_tolerance = 1e-8,
+    .model = &model,
+    .variables = variables,
+    .variable_count = sizeof variables / sizeof variables[0],
+    .row_of_reference = row_of_reference,
+    .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],
+};
+
+void oscillator_solution(double omega, double u, double t, const double start[2], double end[2]) {
+    const double rest = u / (omega * omega);
+    const double c = cos(omega * t);
+    const double s = sin(omega * t);
+    const double x = rest + (start[0] - rest) * c + start[1] / omega * s;
+    const double v = -(start[0] - rest) * omega * s + start[1] * c;
+    end[0] = x;
+    end[1] = v;
+}

@@ -1,0 +1,37 @@
+/* A model for the tests of src/, with a solution that is known in closed form: a mass on a spring,
+ * x'' = -omega^2 x + u, and its unit, declared by hand as fmu/generate.py would. */
+#ifndef OSCILLATOR_H
+#define OSCILLATOR_H
+
+#include "slave.h"
+
+struct oscillator_values {
+    double omega; /* rad/s, tunable, > 0 together with damping */
+    double gain;  /* fixed */
+    double u;     /* m/s2 */
+    double x;     /* m */
+    double v;     /* m/s */
+    double energy;
+};
+
+enum oscillator_reference {
+    OSCILLATOR_TIME = 0,
+    OSCILLATOR_OMEGA = 1,
+    OSCILLATOR_GAIN = 2,
+    OSCILLATOR_X = 10,
+    OSCILLATOR_V = 11,
+    OSCILLATOR_U = 20,
+    OSCILLATOR_ENERGY = 30,
+    OSCILLATOR_STEPS = 80,
+    OSCILLATOR_EVALUATIONS = 81,
+    OSCILLATOR_RELATIVE_TOLERANCE = 82,
+    OSCILLATOR_MAX_STEPS = 83,
+    OSCILLATOR_EFFECTIVE_TOLERANCE = 84,
+};
+
+extern const struct unit oscillator_unit;
+
+/* State at time t after start with omega and u held; start and end may be the same array. */
+void oscillator_solution(double omega, double u, double t, const double start[2], double end[2]);
+
+#endif

@@ -1,0 +1,269 @@
+#include "integrator.h"
+
+#include "allocations.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+/* x' = v, v' = -x, until failing_from, from where on the right-hand side gives NaN. */
+struct circle {
+    double latest; /* s: latest time asked for */
+    double failing_from;
+    long evaluations;
+};
+
+static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
+    struct circle *circle = context;
+    circle->latest = fmax(circle->latest, t);
+    circle->evaluations++;
+    dx[0] = x[1];
+    dx[1] = t >= circle->failing_from ? NAN : -x[0];
+    return STATUS_OK;
+}
+
+static enum status always_failing(double t, const double x[], double dx[], void *context) {
+    (void)t;
+    (void)context;
+    memcpy(dx, x, 2 * sizeof(double));
+    return STATUS_OUT_OF_RANGE;
+}
+
+static struct circle circle;
+static struct integrator *integrator;
+static int message_count;
+static enum status message_status;
+
+static void count_message(void *context, enum status status, const char *text) {
+    TEST_ASSERT_EQUAL_PTR(&circle, context);
+    TEST_ASSERT_TRUE(strlen(text) > 0);
+    message_status = status;
+    message_count++;
+}
+
+static const double start[2] = {1.0, 0.0};
+
+static void create(ode_rhs *rhs) {
+    const struct ode ode = {.state_count = 2, .rhs = rhs, .context = &circle};
+    const struct message_sink sink = {.write = count_message, .context = &circle};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
+}
+
+static void configure(double tolerance, long max_steps) {
+    const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
+    const struct integrator_settings settings = {
+        .relative_tolerance = tolerance, .absolute_tolerances = absolute, .max_steps = max_steps};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+}
+
+static void restart(double span) {
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, span));
+}
+
+static void advance(double t, double x[2]) {
+    double reached;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, &reached, x));
+    TEST_ASSERT_EQUAL_DOUBLE(t, reached);
+}
+
+void setUp(void) {
+    circle = (struct circle){.failing_from = INFINITY};
+    message_count = 0;
+    create(circle_rhs);
+    configure(1e-10, 100000);
+}
+
+void tearDown(void) {
+    integrator_destroy(integrator);
+}
+
+static void test_the_state_is_that_of_the_time_asked_for(void) {
+    double x[2];
+    restart(INFINITY);
+    for (int i = 1; i <= 1000; i++) {
+        const double t = 0.01 * i;
+        advance(t, x);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(t), x[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, -sin(t), x[1]);
+    }
+    TEST_ASSERT_EQUAL_INT(0, message_count);
+}
+
+static void test_the_error_follows_the_tolerance(void) {
+    double coarse = INFINITY;
+    for (int digits = 4; digits <= 12; digits += 2) {
+        double x[2];
+        configure(pow(10.0, -digits), 100000);
+        restart(INFINITY);
+        advance(10.0, x);
+        const double error = hypot(x[0] - cos(10.0), x[1] + sin(10.0));
+        // the circle neither grows nor damps errors: at worst all steps' local errors add up
+        struct integrator_statistics statistics;
+        integrator_get_statistics(integrator, &statistics);
+        TEST_ASSERT_TRUE(error < sqrt(2.0) * (double)statistics.steps * pow(10.0, -digits));
+        TEST_ASSERT_TRUE(error < coarse);
+        coarse = error;
+    }
+}
+
+static void test_asking_for_more_points_costs_no_steps(void) {
+    double x[2];
+    struct integrator_statistics few;
+    struct integrator_statistics many;
+    restart(INFINITY);
+    advance(0.1, x);
+    advance(10.0, x);
+    integrator_get_statistics(integrator, &few);
+
+    configure(1e-10, 100000);
+    restart(INFINITY);
+    for (int i = 1; i <= 100; i++) {
+        advance(0.1 * i, x);
+    }
+    integrator_get_statistics(integrator, &many);
+    TEST_ASSERT_TRUE(labs(many.steps - few.steps) <= 1);
+}
+
+static void test_a_restart_begins_at_time_zero_from_its_state(void) {
+    double first[2];
+    double again[2];
+    restart(INFINITY);
+    advance(3.0, first);
+    restart(INFINITY);
+    advance(3.0, again);
+    TEST_ASSERT_EQUAL_MEMORY(first, again, sizeof first);
+}
+
+static void test_nothing_is_evaluated_beyond_the_span(void) {
+    double x[2];
+    restart(1.0);
+    for (int i = 1; i <= 100; i++) {
+        advance(0.01 * i, x);
+    }
+    TEST_ASSERT_TRUE(circle.latest <= 1.0 + 1e-12);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(1.0), x[0]);
+
+    // a later restart without a span is not bound by the former one
+    restart(INFINITY);
+    advance(2.0, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
+}
+
+static void test_a_span_that_is_passed_grows(void) {
+    double x[2];
+    restart(1.0);
+    advance(1.0, x);
+    advance(1.0 + 1e-6, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(1.0 + 1e-6), x[0]);
+}
+
+static void test_statistics_add_up_over_restarts(void) {
+    double x[2];
+    struct integrator_statistics once;
+    struct integrator_statistics thrice;
+    restart(INFINITY);
+    advance(1.0, x);
+    integrator_get_statistics(integrator, &once);
+    TEST_ASSERT_TRUE(once.steps > 0);
+    TEST_ASSERT_EQUAL_INT(circle.evaluations, once.rhs_evaluations);
+
+    for (int i = 0; i < 2; i++) {
+        restart(INFINITY);
+        advance(1.0, x);
+    }
+    integrator_get_statistics(integrator, &thrice);
+    TEST_ASSERT_EQUAL_INT(3 * once.steps, thrice.steps);
+    TEST_ASSERT_EQUAL_INT(circle.evaluations, thrice.rhs_evaluations);
+
+    configure(1e-10, 100000);
+    integrator_get_statistics(integrator, &once);
+    TEST_ASSERT_EQUAL_INT(0, once.steps);
+}
+
+static void test_too_many_steps_leave_a_valid_state(void) {
+    double x[2];
+    double reached;
+    configure(1e-10, 20);
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, integrator_advance(integrator, 10.0, &reached, x));
+    TEST_ASSERT_TRUE(reached > 0.0 && reached < 10.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(reached), x[0]);
+    TEST_ASSERT_TRUE(message_count > 0);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, message_status);
+}
+
+static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(void) {
+    double x[2];
+    double reached;
+    circle.failing_from = 1.0;
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, integrator_advance(integrator, 2.0, &reached, x));
+    TEST_ASSERT_TRUE(reached > 0.5 && reached <= 1.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(reached), x[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, -sin(reached), x[1]);
+}
+
+static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
+    double x[2];
+    double reached;
+    circle.failing_from = 0.0;
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, integrator_advance(integrator, 2.0, &reached, x));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
+    TEST_ASSERT_EQUAL_MEMORY(start, x, sizeof start);
+
+    integrator_destroy(integrator);
+    create(always_failing);
+    configure(1e-10, 100000);
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, integrator_advance(integrator, 2.0, &reached, x));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
+}
+
+static void test_a_restart_after_a_failure_works(void) {
+    double x[2];
+    double reached;
+    circle.failing_from = 1.0;
+    restart(INFINITY);
+    TEST_ASSERT_TRUE(integrator_advance(integrator, 2.0, &reached, x) != STATUS_OK);
+    circle.failing_from = INFINITY;
+    restart(INFINITY);
+    advance(2.0, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
+}
+
+static void test_nothing_is_allocated_after_creation(void) {
+    double x[2];
+    const long before = allocation_count();
+    configure(1e-8, 1000);
+    for (int i = 0; i < 100; i++) {
+        restart(i % 2 == 0 ? INFINITY : 2.0);
+        advance(1.0, x);
+        advance(2.0, x);
+    }
+    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+    TEST_ASSERT_TRUE(before > 0);
+}
+
+static void test_destroying_nothing_is_allowed(void) {
+    integrator_destroy(NULL);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_the_state_is_that_of_the_time_asked_for);
+    RUN_TEST(test_the_error_follows_the_tolerance);
+    RUN_TEST(test_asking_for_more_points_costs_no_steps);
+    RUN_TEST(test_a_restart_begins_at_time_zero_from_its_state);
+    RUN_TEST(test_nothing_is_evaluated_beyond_the_span);
+    RUN_TEST(test_a_span_that_is_passed_grows);
+    RUN_TEST(test_statistics_add_up_over_restarts);
+    RUN_TEST(test_too_many_steps_leave_a_valid_state);
+    RUN_TEST(test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before);
+    RUN_TEST(test_a_right_hand_side_that_fails_at_once_leaves_the_state);
+    RUN_TEST(test_a_restart_after_a_failure_works);
+    RUN_TEST(test_nothing_is_allocated_after_creation);
+    RUN_TEST(test_destroying_nothing_is_allowed);
+    return UNITY_END();
+}

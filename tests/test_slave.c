@@ -1,0 +1,422 @@
+#include "slave.h"
+
+#include "allocations.h"
+#include "oscillator.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static struct slave *slave;
+static char text[512];
+
+static void keep_text(void *context, enum status status, const char *message) {
+    (void)context;
+    (void)status;
+    strncpy(text, message, sizeof text - 1);
+}
+
+static const struct message_sink sink = {.write = keep_text};
+
+static struct slave *create(void) {
+    struct slave *created = NULL;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&oscillator_unit, &sink, &created));
+    return created;
+}
+
+void setUp(void) {
+    memset(text, 0, sizeof text);
+    slave = create();
+}
+
+void tearDown(void) {
+    slave_destroy(slave);
+}
+
+#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, text)
+
+static double get(struct slave *from, unsigned reference) {
+    double value = NAN;
+    ASSERT_OK(slave_get_real(from, &reference, 1, &value));
+    return value;
+}
+
+static int get_integer(unsigned reference) {
+    int value = -1;
+    ASSERT_OK(slave_get_integer(slave, &reference, 1, &value));
+    return value;
+}
+
+static enum status set(struct slave *to, unsigned reference, double value) {
+    return slave_set_real(to, &reference, 1, &value);
+}
+
+static void setup(struct slave *started, double start) {
+    const struct slave_experiment experiment = {.start_time = start};
+    ASSERT_OK(slave_setup_experiment(started, &experiment));
+}
+
+static void initialize(struct slave *started, double start) {
+    setup(started, start);
+    ASSERT_OK(slave_enter_initialization(started));
+    ASSERT_OK(slave_exit_initialization(started));
+}
+
+/* An experiment whose input changes at every step but every third. */
+static void run(struct slave *stepped, int steps, double states[2]) {
+    for (int i = 0; i < steps; i++) {
+        ASSERT_OK(set(stepped, OSCILLATOR_U, sin((i / 3) * 0.1)));
+        ASSERT_OK(slave_do_step(stepped, i * 0.01, 0.01));
+    }
+    states[0] = get(stepped, OSCILLATOR_X);
+    states[1] = get(stepped, OSCILLATOR_V);
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static void test_held_inputs_give_the_exact_piecewise_solution(void) {
+    double exact[2] = {1.0, 0.0};
+    initialize(slave, 0.0);
+    for (int i = 0; i < 300; i++) {
+        const double u = cos(0.3 * i);
+        ASSERT_OK(set(slave, OSCILLATOR_U, u));
+        ASSERT_OK(slave_do_step(slave, 0.02 * i, 0.02));
+        oscillator_solution(2.0, u, 0.02, exact, exact);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(slave, OSCILLATOR_V));
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(slave, OSCILLATOR_TIME));
+}
+
+static void test_setting_the_same_values_again_changes_nothing(void) {
+    struct slave *untouched = create();
+    initialize(slave, 0.0);
+    initialize(untouched, 0.0);
+    for (int i = 0; i < 100; i++) {
+        ASSERT_OK(set(slave, OSCILLATOR_U, 5.0)); // set and taken back before the step
+        ASSERT_OK(set(slave, OSCILLATOR_U, 0.0));
+        ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 2.0));
+        (void)get(slave, OSCILLATOR_ENERGY);
+        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(slave_do_step(untouched, 0.01 * i, 0.01));
+        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_X), get(slave, OSCILLATOR_X));
+        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_V), get(slave, OSCILLATOR_V));
+    }
+    slave_destroy(untouched);
+}
+
+static void test_a_restart_happens_only_where_something_changed(void) {
+    double states[2];
+    initialize(slave, 0.0);
+    for (int i = 0; i < 100; i++) {
+        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+    }
+    const int held = get_integer(OSCILLATOR_STEPS);
+
+    slave_reset(slave);
+    initialize(slave, 0.0);
+    run(slave, 100, states);
+    TEST_ASSERT_TRUE(get_integer(OSCILLATOR_STEPS) > 3 * held);
+    TEST_ASSERT_TRUE(get_integer(OSCILLATOR_EVALUATIONS) > get_integer(OSCILLATOR_STEPS));
+}
+
+static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
+    double exact[2] = {1.0, 0.0};
+    initialize(slave, 0.0);
+    ASSERT_OK(slave_do_step(slave, 0.0, 0.5));
+    oscillator_solution(2.0, 0.0, 0.5, exact, exact);
+    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 3.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+    ASSERT_OK(slave_do_step(slave, 0.5, 0.5));
+    oscillator_solution(3.0, 0.0, 0.5, exact, exact);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+}
+
+static void test_outputs_follow_what_was_set_last(void) {
+    initialize(slave, 0.0);
+    TEST_ASSERT_EQUAL_DOUBLE(2.0, get(slave, OSCILLATOR_ENERGY));
+    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 4.0));
+    TEST_ASSERT_EQUAL_DOUBLE(8.0, get(slave, OSCILLATOR_ENERGY));
+}
+
+static void test_the_start_time_does_not_change_the_motion(void) {
+    const double starts[] = {-0.5, 1000.0, 1e6};
+    double reference[2];
+    double states[2];
+    initialize(slave, 0.0);
+    run(slave, 100, reference);
+    for (int k = 0; k < 3; k++) {
+        slave_reset(slave);
+        initialize(slave, starts[k]);
+        for (int i = 0; i < 100; i++) {
+            ASSERT_OK(set(slave, OSCILLATOR_U, sin((i / 3) * 0.1)));
+            ASSERT_OK(slave_do_step(slave, starts[k] + i * 0.01, 0.01));
+        }
+        states[0] = get(slave, OSCILLATOR_X);
+        states[1] = get(slave, OSCILLATOR_V);
+        // the communication points of this master are rounded to 1e-10 s at 1e6 s
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, reference[0], states[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, reference[1], states[1]);
+    }
+}
+
+static void test_a_master_that_accumulates_its_time_reaches_the_stop_time(void) {
+    const struct slave_experiment experiment = {.stop_time_defined = true, .stop_time = 600.0};
+    ASSERT_OK(slave_setup_experiment(slave, &experiment));
+    ASSERT_OK(slave_enter_initialization(slave));
+    ASSERT_OK(slave_exit_initialization(slave));
+    double t = 0.0;
+    for (int i = 0; i < 600000; i++) {
+        ASSERT_OK(slave_do_step(slave, t, 1e-3));
+        t += 1e-3;
+    }
+    double exact[2] = {1.0, 0.0};
+    oscillator_solution(2.0, 0.0, t, exact, exact);
+    TEST_ASSERT_EQUAL_DOUBLE(t, slave_time(slave));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, exact[0], get(slave, OSCILLATOR_X));
+}
+
+static void test_a_small_mismatch_of_the_time_is_integrated(void) {
+    double exact[2] = {1.0, 0.0};
+    initialize(slave, 0.0);
+    ASSERT_OK(slave_do_step(slave, 0.0, 1.0));
+    ASSERT_OK(slave_do_step(slave, 1.0 + 1e-10, 0.5));
+    oscillator_solution(2.0, 0.0, 1.5 + 1e-10, exact, exact);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_DOUBLE(1.5 + 1e-10, slave_time(slave));
+}
+
+static void test_times_that_do_not_fit_are_refused(void) {
+    const struct {
+        double t, h;
+        const char *expected;
+    } cases[] = {
+        {0.0, 0.0, "a step of 0 s"},
+        {0.0, -0.1, "a step of -0.1 s"},
+        {0.0, NAN, "nan s from t = 0"},
+        {0.0, INFINITY, "inf s"},
+        {NAN, 0.1, "from t = nan"},
+        {0.01, 0.1, "a step from t = 0.01 is refused: the instance is at t = 0"},
+        {-0.01, 0.1, "the instance is at t = 0"},
+        {1e9, 1e-9, "does not change the time"},
+        {0.0, 2.5, "the stop time is 2"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct slave_experiment experiment = {.stop_time_defined = true, .stop_time = 2.0};
+        slave_reset(slave);
+        ASSERT_OK(slave_setup_experiment(slave, &experiment));
+        ASSERT_OK(slave_enter_initialization(slave));
+        ASSERT_OK(slave_exit_initialization(slave));
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, slave_do_step(slave, cases[i].t, cases[i].h));
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, cases[i].expected), text);
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, slave_time(slave));
+        ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
+    }
+}
+
+static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
+    const unsigned reference = OSCILLATOR_MAX_STEPS;
+    const int limit = 20;
+    double exact[2] = {1.0, 0.0};
+    ASSERT_OK(slave_set_integer(slave, &reference, 1, &limit));
+    initialize(slave, 5.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, slave_do_step(slave, 5.0, 100.0));
+    const double t = slave_time(slave);
+    TEST_ASSERT_TRUE(t > 5.0 && t < 105.0);
+    TEST_ASSERT_EQUAL_DOUBLE(t, get(slave, OSCILLATOR_TIME));
+    oscillator_solution(2.0, 0.0, t - 5.0, exact, exact);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_INT(20, get_integer(OSCILLATOR_STEPS));
+}
+
+static void test_steps_allocate_nothing(void) {
+    double states[2];
+    initialize(slave, 0.0);
+    const long before = allocation_count();
+    run(slave, 100, states);
+    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+}
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+static void test_reset_gives_a_fresh_instance(void) {
+    struct slave *fresh = create();
+    double expected[2];
+    double states[2];
+    initialize(fresh, 0.0);
+    run(fresh, 50, expected);
+
+    ASSERT_OK(set(slave, OSCILLATOR_X, 7.0));
+    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e-3));
+    initialize(slave, 10.0);
+    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 9.0));
+    ASSERT_OK(slave_do_step(slave, 10.0, 1.0));
+    slave_reset(slave);
+    initialize(slave, 0.0);
+    run(slave, 50, states);
+    TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
+    slave_destroy(fresh);
+}
+
+static void test_instances_do_not_disturb_each_other(void) {
+    enum { COUNT = 20 };
+    struct slave *many[COUNT];
+    double expected[2];
+    initialize(slave, 0.0);
+    run(slave, 30, expected);
+
+    for (int k = 0; k < COUNT; k++) {
+        many[k] = create();
+        initialize(many[k], 0.0);
+    }
+    for (int i = 0; i < 30; i++) {
+        for (int k = 0; k < COUNT; k++) {
+            ASSERT_OK(set(many[k], OSCILLATOR_U, sin((i / 3) * 0.1)));
+            ASSERT_OK(slave_do_step(many[k], i * 0.01, 0.01));
+        }
+    }
+    for (int k = 0; k < COUNT; k++) {
+        TEST_ASSERT_EQUAL_DOUBLE(expected[0], get(many[k], OSCILLATOR_X));
+        TEST_ASSERT_EQUAL_DOUBLE(expected[1], get(many[k], OSCILLATOR_V));
+        slave_destroy(many[k]);
+    }
+}
+
+static void test_initialization_needs_an_experiment(void) {
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_enter_initialization(slave));
+    TEST_ASSERT_NOT_NULL(strstr(text, "the experiment must be set up first"));
+}
+
+static void test_an_experiment_that_makes_no_sense_is_refused(void) {
+    const struct slave_experiment cases[] = {
+        {.start_time = NAN},
+        {.start_time = INFINITY},
+        {.start_time = 1.0, .stop_time_defined = true, .stop_time = 0.5},
+        {.stop_time_defined = true, .stop_time = NAN},
+        {.tolerance_defined = true, .tolerance = 0.0},
+        {.tolerance_defined = true, .tolerance = -1e-6},
+        {.tolerance_defined = true, .tolerance = NAN},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_setup_experiment(slave, &cases[i]));
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "is refused"), text);
+    }
+    const struct slave_experiment undefined = {.stop_time = NAN, .tolerance = NAN};
+    ASSERT_OK(slave_setup_experiment(slave, &undefined));
+}
+
+static void test_parameters_must_go_together_at_initialization_and_at_a_step(void) {
+    setup(slave, 0.0);
+    ASSERT_OK(slave_enter_initialization(slave));
+    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, -1.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_exit_initialization(slave));
+    TEST_ASSERT_EQUAL_STRING("omega = -1 is refused: it must be above 0", text);
+
+    slave_reset(slave);
+    initialize(slave, 0.0);
+    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 0.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_do_step(slave, 0.0, 0.1));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, slave_time(slave));
+}
+
+/* ---- Values --------------------------------------------------------------------------------- */
+
+static void test_the_parameter_wins_over_the_experiment_over_the_default(void) {
+    const struct slave_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-6};
+    const double by_default = get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE);
+    TEST_ASSERT_TRUE(by_default > 0.0 && by_default <= 1e-8);
+
+    ASSERT_OK(slave_setup_experiment(slave, &experiment));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e2 * by_default, get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE));
+    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e-9));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e-1 * by_default, get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE));
+
+    // what cannot be kept is not promised
+    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e-300));
+    TEST_ASSERT_TRUE(get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE) >= 1e-15);
+    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e300));
+    TEST_ASSERT_TRUE(get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE) < 1.0);
+}
+
+static void test_a_vector_is_set_as_a_whole_or_not_at_all(void) {
+    const unsigned references[] = {OSCILLATOR_X, OSCILLATOR_OMEGA, 99};
+    const double values[] = {3.0, 1e6, 1.0};
+    TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, slave_set_real(slave, references, 2, values));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get(slave, OSCILLATOR_X));
+
+    const unsigned unknown_last[] = {OSCILLATOR_X, 99};
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_real(slave, unknown_last, 2, values));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get(slave, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_STRING("value reference 99 is unknown: Oscillator has no such variable",
+                             text);
+}
+
+static void test_a_vector_is_read_as_a_whole_or_not_at_all(void) {
+    const unsigned references[] = {OSCILLATOR_X, OSCILLATOR_STEPS};
+    double values[] = {-7.0, -7.0};
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_get_real(slave, references, 2, values));
+    TEST_ASSERT_EQUAL_DOUBLE(-7.0, values[0]);
+    TEST_ASSERT_EQUAL_STRING(
+        "steps (value reference 80) is accessed as Real: it is of type Integer", text);
+
+    int integers[] = {-7, -7};
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          slave_get_integer(slave, references, 1, integers));
+    TEST_ASSERT_EQUAL_INT(-7, integers[0]);
+}
+
+static void test_a_result_that_is_not_finite_is_not_given(void) {
+    const unsigned reference = OSCILLATOR_ENERGY;
+    double value = -7.0;
+    ASSERT_OK(set(slave, OSCILLATOR_V, 1e200));
+    initialize(slave, 0.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_get_real(slave, &reference, 1, &value));
+    TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
+    TEST_ASSERT_NOT_NULL(strstr(text, "energy"));
+    TEST_ASSERT_EQUAL_DOUBLE(1e200, get(slave, OSCILLATOR_V));
+}
+
+static void test_settings_are_closed_after_initialization(void) {
+    const unsigned limit = OSCILLATOR_MAX_STEPS;
+    const int value = 5;
+    initialize(slave, 0.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_integer(slave, &limit, 1, &value));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(slave, OSCILLATOR_X, 2.0));
+    TEST_ASSERT_NOT_NULL(strstr(text, "only inputs and tunable parameters can"));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(slave, OSCILLATOR_GAIN, 2.0));
+}
+
+static void test_no_values_are_fine(void) {
+    ASSERT_OK(slave_set_real(slave, NULL, 0, NULL));
+    ASSERT_OK(slave_get_real(slave, NULL, 0, NULL));
+    ASSERT_OK(slave_set_integer(slave, NULL, 0, NULL));
+    ASSERT_OK(slave_get_integer(slave, NULL, 0, NULL));
+    slave_destroy(NULL);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_held_inputs_give_the_exact_piecewise_solution);
+    RUN_TEST(test_setting_the_same_values_again_changes_nothing);
+    RUN_TEST(test_a_restart_happens_only_where_something_changed);
+    RUN_TEST(test_a_tunable_parameter_acts_from_the_next_step_on);
+    RUN_TEST(test_outputs_follow_what_was_set_last);
+    RUN_TEST(test_the_start_time_does_not_change_the_motion);
+    RUN_TEST(test_a_master_that_accumulates_its_time_reaches_the_stop_time);
+    RUN_TEST(test_a_small_mismatch_of_the_time_is_integrated);
+    RUN_TEST(test_times_that_do_not_fit_are_refused);
+    RUN_TEST(test_a_step_that_ends_early_tells_how_far_it_got);
+    RUN_TEST(test_steps_allocate_nothing);
+    RUN_TEST(test_reset_gives_a_fresh_instance);
+    RUN_TEST(test_instances_do_not_disturb_each_other);
+    RUN_TEST(test_initialization_needs_an_experiment);
+    RUN_TEST(test_an_experiment_that_makes_no_sense_is_refused);
+    RUN_TEST(test_parameters_must_go_together_at_initialization_and_at_a_step);
+    RUN_TEST(test_the_parameter_wins_over_the_experiment_over_the_default);
+    RUN_TEST(test_a_vector_is_set_as_a_whole_or_not_at_all);
+    RUN_TEST(test_a_vector_is_read_as_a_whole_or_not_at_all);
+    RUN_TEST(test_a_result_that_is_not_finite_is_not_given);
+    RUN_TEST(test_settings_are_closed_after_initialization);
+    RUN_TEST(test_no_values_are_fine);
+    return UNITY_END();
+}
