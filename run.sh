@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Sets up, builds RPManipulator.fmu, simulates scenarios with fmpy and checks them against their
+# references. ./run.sh: all scenarios; ./run.sh NAME ...: these; ./run.sh --list: their names;
+# ./run.sh --help: more.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+
+"$root/setup.sh"
+python="$root/build/venv/bin/python"
+log="$root/build/build.log"
+
+build() {
+  cmake -S "$root" -B "$root/build" -DBUILD_TESTING=OFF &&
+    cmake --build "$root/build" --parallel 2
+}
+
+export PYTHONPATH="$root${PYTHONPATH:+:$PYTHONPATH}"
+if [ "${1-}" = --list ]; then
+  exec "$python" -m cosim list
+fi
+build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
+exec "$python" -m cosim run "$@"
