@@ -2,7 +2,8 @@
 #
 # Builds ${PROJECT_BINARY_DIR}/NAME.fmu from the model's folder (variables.toml, README.md, model.png)
 # and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
-# archive), NAME_interface (the generated header with value references and GUID).
+# archive), NAME_unit (struct unit as a library), NAME_interface (the generated header with value
+# references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 
@@ -27,17 +28,19 @@ function(add_fmu name)
   target_include_directories(${name}_interface INTERFACE ${out})
   add_dependencies(${name}_interface ${name}_generated)
 
+  # the unit: the model with its table of variables, run by the slave
+  add_library(${name}_unit STATIC ${out}/variables.c)
+  target_include_directories(${name}_unit PUBLIC ${FMU_SOURCE_DIR})
+  target_link_libraries(${name}_unit PUBLIC slave ${ARG_LIBRARY} ${name}_interface)
+
   # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
   add_library(${name} MODULE
     ${FMU_SOURCE_DIR}/component.c
     ${FMU_SOURCE_DIR}/fmi2.c
-    ${FMU_SOURCE_DIR}/fmi2_unsupported.c
-    ${out}/variables.c)
-  add_dependencies(${name} ${name}_generated)
+    ${FMU_SOURCE_DIR}/fmi2_unsupported.c)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
-  target_include_directories(${name} PRIVATE ${FMU_SOURCE_DIR})
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${name} PRIVATE slave ${ARG_LIBRARY})
+  target_link_libraries(${name} PRIVATE ${name}_unit)
   target_link_options(${name} PRIVATE
     -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now)
 
@@ -47,7 +50,8 @@ function(add_fmu name)
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
             --readme ${folder}/README.md --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
-    DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css ${folder}/README.md
+    DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
+            ${FMU_SOURCE_DIR}/formula.py ${folder}/README.md
             ${folder}/model.svg ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)

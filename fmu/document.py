@@ -1,0 +1,215 @@
+"""Makes the page documentation/index.html of an FMU.
+
+The page is the model's README.md as HTML, followed by tables of the variables that
+modelDescription.xml declares. It is one file with its style sheet inside, without scripts, and
+needs no network: formulas become MathML, local images are copied next to the page, and links to
+files that are not in the FMU become plain text. Equal input gives equal bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import html
+import shutil
+import sys
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+from formula import FormulaError, mathml
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+from mdit_py_plugins.anchors import anchors_plugin
+from mdit_py_plugins.dollarmath import dollarmath_plugin
+
+STYLE_SHEET = Path(__file__).with_suffix(".css")
+
+# headings of the tables of variables by causality, in the order of the page
+GROUPS = {
+    "parameter": "Parameters",
+    "calculatedParameter": "Calculated parameters",
+    "input": "Inputs",
+    "output": "Outputs",
+    "local": "Local variables",
+    "independent": "Independent variable",
+}
+
+# their columns, attributes of a ScalarVariable and of its type element
+COLUMNS = ("valueReference", "name", "type", "causality", "variability", "initial", "unit")
+COLUMNS += ("start", "min", "max", "description")
+NUMBERS = ("valueReference", "start", "min", "max")
+
+
+class DocumentError(Exception):
+    """A page that cannot be made: file and reason in one line."""
+
+
+def is_remote(address: str) -> bool:
+    """Tell whether a link leads out of the folder of the page."""
+    parts = urlsplit(address)
+    return bool(parts.scheme or parts.netloc)
+
+
+def without_local_links(tokens: Iterable[Token]) -> list[Token]:
+    """Drop links to files, keep their text, and keep links to the web and within the page."""
+    kept: list[Token] = []
+    dropping = False
+    for token in tokens:
+        if token.type == "link_open":
+            address = str(token.attrs["href"])
+            dropping = not (is_remote(address) or address.startswith("#"))
+        if not (dropping and token.type in ("link_open", "link_close")):
+            kept.append(token)
+        if token.type == "link_close":
+            dropping = False
+    return kept
+
+
+def readme_page(readme: Path) -> tuple[str, list[Path]]:
+    """Convert README.md to the inside of an HTML body.
+
+    Returns
+    -------
+    tuple of str and list of Path
+        the HTML, and the local images it refers to by their name alone.
+    """
+
+    def formula(latex: str, options: dict[str, bool]) -> str:
+        try:
+            return mathml(latex, "block" if options["display_mode"] else "inline")
+        except FormulaError as error:
+            line = " ".join(latex.split())
+            raise DocumentError(f"{readme}: formula ${line}$ does not convert: {error}") from None
+
+    markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
+    markdown.use(dollarmath_plugin, allow_space=False, allow_labels=False, renderer=formula)
+    markdown.use(anchors_plugin, max_level=3)
+    renderers = markdown.renderer.rules
+    renderers["table_open"] = lambda *_: '<div class="table"><table>\n'
+    renderers["table_close"] = lambda *_: "</table></div>\n"
+
+    tokens = markdown.parse(read_text(readme))
+    images: list[Path] = []
+    for block in tokens:
+        block.children = without_local_links(block.children or [])
+        for token in block.children:
+            address = str(token.attrs.get("src", ""))
+            if token.type != "image" or is_remote(address):
+                continue
+            image = readme.parent / unquote(address)
+            if not image.is_file():
+                raise DocumentError(f"{readme}: the image {address} does not exist")
+            token.attrs["src"] = image.name
+            images.append(image)
+    return markdown.renderer.render(tokens, markdown.options, {}), images
+
+
+def read_text(path: Path) -> str:
+    """Read a UTF-8 text file."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise DocumentError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise DocumentError(f"{path}: is not UTF-8: {error}") from None
+
+
+def read_model_description(path: Path) -> ET.Element:
+    """Read modelDescription.xml of FMI 2.0."""
+    try:
+        root = ET.fromstring(read_text(path))
+    except ET.ParseError as error:
+        raise DocumentError(f"{path}: is not valid XML: {error}") from None
+    if root.tag != "fmiModelDescription" or root.get("fmiVersion") != "2.0":
+        raise DocumentError(f"{path}: is not a model description of FMI 2.0")
+    for variable in root.iterfind("ModelVariables/ScalarVariable"):
+        for key in ("name", "valueReference"):
+            if key not in variable.attrib:
+                raise DocumentError(f"{path}: a ScalarVariable lacks {key}")
+    return root
+
+
+def variable_row(variable: ET.Element) -> dict[str, str]:
+    """Collect what a ScalarVariable and its type element say."""
+    row = {"causality": "local", "variability": "continuous", **variable.attrib}
+    for kind in variable:
+        if kind.tag != "Annotations":
+            row = {**kind.attrib, **row, "type": kind.tag}
+    return row
+
+
+def variable_cell(row: dict[str, str], key: str) -> str:
+    """One cell of a table of variables."""
+    text = html.escape(row.get(key, ""))
+    if key == "name":
+        text = f"<code>{text}</code>"
+    return f'<td class="number">{text}</td>' if key in NUMBERS else f"<td>{text}</td>"
+
+
+def variable_tables(root: ET.Element) -> str:
+    """Describe the default experiment and list the variables, one table per causality."""
+    lines = ['<section class="variables">', '<h2 id="variables">Variables of the FMU</h2>']
+    experiment = root.find("DefaultExperiment")
+    if experiment is not None:
+        units = {"startTime": " s", "stopTime": " s", "stepSize": " s"}
+        values = (f"{k} {html.escape(v)}{units.get(k, '')}" for k, v in experiment.items())
+        lines.append(f"<p>Default experiment: {', '.join(values)}.</p>")
+    rows = [variable_row(v) for v in root.iterfind("ModelVariables/ScalarVariable")]
+    titles = {"valueReference": "VR"}
+    head = "".join(f"<th>{titles.get(key, key.capitalize())}</th>" for key in COLUMNS)
+    for causality, heading in GROUPS.items():
+        group = [row for row in rows if row["causality"] == causality]
+        if group:
+            lines += [f"<h3>{heading}</h3>", '<div class="table"><table>']
+            lines += [f"<thead><tr>{head}</tr></thead>", "<tbody>"]
+            lines += [f"<tr>{''.join(variable_cell(row, key) for key in COLUMNS)}</tr>"
+                      for row in group]  # fmt: skip
+            lines += ["</tbody>", "</table></div>"]
+    return "\n".join([*lines, "</section>"])
+
+
+def document(readme: Path, model_description: Path, output: Path) -> None:
+    """Write output/index.html and copy the images of the page next to it."""
+    content, images = readme_page(readme)
+    root = read_model_description(model_description)
+    title = ": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib)
+    page = f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{html.escape(title)}</title>
+<style>
+{read_text(STYLE_SHEET)}</style>
+</head>
+<body>
+<main>
+{content}{variable_tables(root)}
+</main>
+</body>
+</html>
+"""
+    output.mkdir(parents=True, exist_ok=True)
+    (output / "index.html").write_text(page, encoding="utf-8", newline="\n")
+    for image in images:
+        shutil.copyfile(image, output / image.name)
+
+
+def main() -> int:
+    """Make the page; 2 with a line on standard error where that is not possible."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--readme", type=Path, required=True, help="README.md of the model")
+    parser.add_argument("--model-description", type=Path, required=True)
+    parser.add_argument("--output", type=Path, required=True, help="folder for the page")
+    arguments = parser.parse_args()
+    try:
+        document(arguments.readme, arguments.model_description, arguments.output)
+    except (DocumentError, OSError) as error:
+        print(f"document.py: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
