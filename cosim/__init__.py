@@ -1,0 +1,1 @@
+"""Runs co-simulation units through fmpy and checks them against reference trajectories."""
