@@ -1,0 +1,226 @@
+"""Makes the reference trajectories of the RP manipulator, apart from the code that they check.
+
+The Lagrangian is written from the positions of both centers of mass, sympy turns it into equations
+of motion, and heyoka's Taylor method integrates them in long double at its precision. No closed
+form of "Example of dynamics computation (Euler-Lagrange and Newton-Euler formulations):
+Revolute-Prismatic (RP) manipulator (Problem 7.8)" goes in.
+"""
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import heyoka as hy
+import numpy as np
+import sympy as sp
+
+MODEL_FOLDER = Path(__file__).resolve().parents[1]
+ROOT = MODEL_FOLDER.parents[1]
+sys.path.insert(0, str(ROOT))
+
+from cosim import scenario as scenarios
+from cosim import variables
+from cosim.errors import UserError
+from cosim.scenario import Scenario
+
+UNIT = "RPManipulator"
+PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
+INPUTS = ("tau1", "f2")
+STATES = ("q1", "q2", "dq1", "dq2")
+
+
+@dataclass(frozen=True)
+class Equations:
+    """What the integrator and the outputs evaluate: sympy expressions in the names above."""
+
+    accelerations: tuple[sp.Expr, sp.Expr]  # ddq1 in rad/s2, ddq2 in m/s2
+    outputs: dict[str, sp.Expr]
+
+
+def derive() -> Equations:
+    """Equations of motion by Euler-Lagrange from positions in frame 0, and every Real output."""
+    m1, m2, I1z, I2z, l1, lc1, a, g = sp.symbols(PARAMETERS)
+    tau1, f2 = sp.symbols(INPUTS)
+    t = sp.Symbol("t")
+    angle, slide = sp.Function("angle")(t), sp.Function("slide")(t)
+    along = sp.Matrix([sp.cos(angle), sp.sin(angle)])  # long side of link 1
+    across = sp.Matrix([-sp.sin(angle), sp.cos(angle)])  # its short side
+
+    center1 = lc1 * along
+    center2 = (l1 + slide) * along + a * across  # also the end effector
+    velocity1, velocity2 = center1.diff(t), center2.diff(t)
+    spin = angle.diff(t)
+    kinetic = (
+        m1 * velocity1.dot(velocity1) + m2 * velocity2.dot(velocity2) + (I1z + I2z) * spin**2
+    ) / 2
+    potential = g * (m1 * center1[1] + m2 * center2[1])
+
+    coordinates = sp.Matrix([angle, slide])
+    rates = coordinates.diff(t)
+    lagrangian = sp.Matrix([kinetic - potential])
+    momenta = lagrangian.jacobian(rates).T
+    balance = momenta.diff(t) - lagrangian.jacobian(coordinates).T - sp.Matrix([tau1, f2])
+
+    q, dq, ddq = (sp.symbols(names) for names in (STATES[:2], STATES[2:], ("ddq1", "ddq2")))
+    plain = [
+        *zip(coordinates.diff(t, 2), ddq, strict=True),
+        *zip(rates, dq, strict=True),
+        *zip(coordinates, q, strict=True),
+    ]
+    balance = balance.subs(plain)
+    inertia = balance.jacobian(ddq).applyfunc(sp.simplify)
+    bias = balance.subs(dict.fromkeys(ddq, 0)).applyfunc(sp.simplify)
+    solved = -inertia.adjugate() * bias / sp.simplify(inertia.det())
+
+    kinetic, potential = sp.simplify(kinetic.subs(plain)), potential.subs(plain)
+    position, velocity = center2.subs(plain), velocity2.subs(plain)
+    outputs = {
+        **{name: sp.Symbol(name) for name in STATES},
+        "ddq1": solved[0],
+        "ddq2": solved[1],
+        "ee_x": position[0],
+        "ee_y": position[1],
+        "ee_vx": velocity[0],
+        "ee_vy": velocity[1],
+        "kinetic_energy": kinetic,
+        "potential_energy": potential,
+        "total_energy": kinetic + potential,
+        "actuator_power": tau1 * dq[0] + f2 * dq[1],
+    }
+    return Equations((solved[0], solved[1]), outputs)
+
+
+class Reference:
+    """Compiled equations; evaluates scenarios in the floating-point type `real`."""
+
+    def __init__(self, real: type = np.longdouble) -> None:
+        if real is np.longdouble and np.finfo(real).eps > 2e-19:
+            raise UserError(
+                "long double is no wider than double here: make the references elsewhere"
+            )
+        self.real = real
+        self.declared = variables.load(MODEL_FOLDER)
+        equations = derive()
+        self.outputs = [
+            name
+            for name, variable in self.declared.items()
+            if variable["causality"] == "output" and variable["type"] == "Real"
+        ]
+        unknown = [name for name in self.outputs if name not in equations.outputs]
+        if unknown:
+            raise UserError(f"{Path(__file__).name}: no expression for the output {unknown[0]!r}")
+
+        states = hy.make_vars(*STATES)
+        runtime = {name: hy.par[i] for i, name in enumerate((*PARAMETERS, *INPUTS))}
+        names = {sp.Symbol(name): par for name, par in runtime.items()}
+        ddq1, ddq2 = (hy.from_sympy(e, names) for e in equations.accelerations)
+        self.integrator = hy.taylor_adaptive(
+            list(zip(states, (states[2], states[3], ddq1, ddq2), strict=True)),
+            np.zeros(len(STATES), dtype=real),
+            pars=np.zeros(len(runtime), dtype=real),
+            fp_type=real,
+        )
+        self.evaluate = hy.cfunc(
+            [hy.from_sympy(equations.outputs[name], names) for name in self.outputs],
+            vars=states,
+            fp_type=real,
+        )
+
+    def inputs(self, scenario: Scenario) -> np.ndarray:
+        """Values of tau1 (N.m) and f2 (N) at every communication point, (n + 1, 2)."""
+        start = (np.full(len(scenario.times), self.declared[name]["start"]) for name in INPUTS)
+        return np.stack(
+            [scenario.inputs.get(name, value) for name, value in zip(INPUTS, start, strict=True)], 1
+        )
+
+    def simulate(self, scenario: Scenario) -> np.ndarray:
+        """Real outputs at every communication point, (n + 1, outputs), in order of value reference.
+
+        The inputs of row i are those of the step that ends there; row 0 has those of the start.
+        """
+        given = scenario.parameters | scenario.initial
+        value = {name: given.get(name, self.declared[name].get("start")) for name in self.declared}
+        # time counts from the start; the differences of the communication points are exact
+        elapsed = scenario.times.astype(self.real) - self.real(scenario.start)
+        inputs = self.inputs(scenario)
+        held = np.concatenate((inputs[:1], inputs[:-1])).astype(self.real)
+
+        integrator = self.integrator
+        integrator.time = self.real(0)
+        integrator.pars[: len(PARAMETERS)] = np.array(
+            [value[name] for name in PARAMETERS], self.real
+        )
+        integrator.state[:] = np.array([value[name] for name in STATES], self.real)
+        states = np.empty((len(elapsed), len(STATES)), self.real)
+        states[0] = integrator.state
+        for i in range(1, len(elapsed)):
+            integrator.pars[len(PARAMETERS) :] = held[i]
+            outcome = integrator.propagate_until(elapsed[i])[0]
+            if outcome != hy.taylor_outcome.time_limit:
+                raise UserError(
+                    f"{scenario.path}: the motion blows up near {scenario.times[i]!r} s"
+                )
+            states[i] = integrator.state
+
+        runtime = np.tile(integrator.pars, (len(elapsed), 1))
+        runtime[:, len(PARAMETERS) :] = held
+        return self.evaluate(np.ascontiguousarray(states.T), pars=np.ascontiguousarray(runtime.T)).T
+
+    def write(self, scenario: Scenario, folder: Path) -> None:
+        """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
+        folder.mkdir(parents=True, exist_ok=True)
+        rows = scenario.reference_rows
+        outputs = self.simulate(scenario).astype(np.float64)
+        constant_step = scenario.steps[0] if len(scenario.steps) == 1 else 0.0  # 0: variable
+        options = {
+            "StartTime": scenario.start,
+            "StopTime": scenario.stop,
+            "StepSize": constant_step,
+            "RelTol": scenario.tolerance,
+        }
+        _write(folder / f"{UNIT}_ref.csv", _csv(self.outputs, scenario.times[rows], outputs[rows]))
+        _write(folder / f"{UNIT}_in.csv", _csv(INPUTS, scenario.times, self.inputs(scenario)))
+        _write(folder / f"{UNIT}_ref.opt", "".join(f"{k},{v!r}\n" for k, v in options.items()))
+
+
+def _csv(names: list[str] | tuple[str, ...], times: np.ndarray, values: np.ndarray) -> str:
+    """Text of a CSV file with `times` (rows,) and `values` (rows, names)."""
+    header = ",".join(f'"{name}"' for name in ("time", *names))
+    table = np.column_stack((times, values))
+    return "\n".join([header, *(",".join(f"{x + 0.0:.17g}" for x in row) for row in table)]) + "\n"
+
+
+def _write(path: Path, text: str) -> None:
+    """Write `text` whole or not at all."""
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text, encoding="utf-8", newline="\n")
+    temporary.replace(path)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
+    arguments = parser.parse_args()
+    try:
+        known = {
+            name: path
+            for name, path in scenarios.find_all(ROOT).items()
+            if path.parent.parent == MODEL_FOLDER
+        }
+        for name in arguments.names:
+            if name not in known:
+                raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
+        reference = Reference()
+        for name in arguments.names or known:
+            scenario = scenarios.load(known[name])
+            folder = arguments.output / name if arguments.output else scenario.reference_folder
+            reference.write(scenario, folder)
+            print(f"{name}: {len(scenario.reference_rows)} rows")
+    except UserError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main()
