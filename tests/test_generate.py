@@ -182,9 +182,7 @@ def test_a_wrong_field_does_not_compile(model_copy: Path, tmp_path: Path, field:
         compile_table(tmp_path / "out")
 
 
-def test_the_guid_follows_the_interface_and_not_the_texts(
-    model_copy: Path, tmp_path: Path
-) -> None:
+def test_the_guid_follows_the_interface_and_not_the_texts(model_copy: Path, tmp_path: Path) -> None:
     original = model_copy.read_text()
     guids = {}
     for name, old, new in (
@@ -239,9 +237,7 @@ REFUSED["start_not_allowed"] = (
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_a_wrong_file_is_refused_with_a_reason(
-    model_copy: Path, tmp_path: Path, case: str
-) -> None:
+def test_a_wrong_file_is_refused_with_a_reason(model_copy: Path, tmp_path: Path, case: str) -> None:
     old, new, words = REFUSED[case]
     original = model_copy.read_text()
     assert old in original

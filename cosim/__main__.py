@@ -1,0 +1,244 @@
+"""Command line: runs scenarios on an FMU, checks them against their references, writes a report."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from cosim.errors import UserError
+
+# What takes long to import is imported where it is used: Ctrl-C meanwhile leaves no traceback, and
+# `list` is quick.
+if TYPE_CHECKING:
+    from cosim.accuracy import Run, Runs, Sweep
+    from cosim.scenario import Scenario
+    from cosim.simulation import Fmu
+
+ROOT = Path(__file__).resolve().parents[1]
+QUICK = 20.0  # s, longest sweep that comes with a scenario asked for by name
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """One line, like every other mistake of the user."""
+        raise UserError(f"{message} (--help explains)")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 passed, 1 a bound exceeded, 2 a user's mistake."""
+    try:
+        options = _parser().parse_args(arguments)
+        return options.command(options)
+    except UserError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # whoever read the output has left
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="python -m cosim",
+        description="Simulates scenarios on a co-simulation FMU, checks them against references.",
+    )
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    run = commands.add_parser(
+        "run",
+        help="simulate, check against the references, write a report",
+        description="Simulates each scenario at its own tolerance and at 1e-11, and over the "
+        "tolerances 1e-4 to 1e-11; compares all outputs with the reference, and prints the errors "
+        "and their bounds. Exit code: 0 all within bounds, 1 not, 2 wrong use.",
+    )
+    run.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
+    run.add_argument(
+        "--fmu", type=Path, metavar="PATH", help="the FMU (default: that of the model, in build/)"
+    )
+    run.add_argument(
+        "--report",
+        type=Path,
+        metavar="DIR",
+        default=ROOT / "build" / "report",
+        help="folder for pictures and results (default: build/report)",
+    )
+    run.add_argument(
+        "--tolerance",
+        type=_tolerance,
+        metavar="X",
+        help="run at this relative tolerance only, without the sweep",
+    )
+    run.set_defaults(command=_run)
+    listing = commands.add_parser(
+        "list",
+        help="name the scenarios",
+        description="Prints the name and the title of every scenario.",
+    )
+    listing.set_defaults(command=_list)
+    return parser
+
+
+def _tolerance(text: str) -> float:
+    try:
+        tolerance = float(text)
+    except ValueError:
+        tolerance = 0.0
+    if not 0 < tolerance < 1:
+        raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, got {text!r}")
+    return tolerance
+
+
+def _list(_: argparse.Namespace) -> int:
+    from cosim import scenario as scenarios
+
+    found = [scenarios.load(path) for path in scenarios.find_all(ROOT).values()]
+    width = max((len(scenario.name) for scenario in found), default=0)
+    for scenario in found:
+        print(f"{scenario.name:<{width}}  {scenario.title}")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    # keeps matplotlib's font cache in the project
+    os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
+    from cosim import report
+    from cosim.accuracy import TIGHTEST, Runs
+    from cosim.simulation import Progress
+
+    chosen = _choose(options.names)
+    with ExitStack() as stack:
+        runs = Runs(_open_fmus(chosen, options.fmu, stack))
+        for scenario in chosen:
+            runs.reference(scenario)  # a missing one shows before anything has run
+        if options.tolerance is not None:
+            done, sweeps = _print_runs(runs, chosen, options.tolerance), []
+        else:
+            done = _print_runs(runs, chosen, None, TIGHTEST)
+            sweeps = _print_sweeps(runs, _to_sweep(done) if options.names else chosen)
+        try:
+            with Progress("report", len(done), "runs") as progress:
+                index = report.write(options.report, done, sweeps, progress)
+        except OSError as error:
+            raise UserError(f"{options.report}: the report cannot be written: {error}") from error
+    print(f"\nreport: {_from_here(index)}")
+    failed = dict.fromkeys(x.scenario.name for x in (*done, *sweeps) if not x.passed)
+    print(f"FAILED: {', '.join(failed)}" if failed else f"passed: {_count(chosen, 'scenario')}")
+    return 1 if failed else 0
+
+
+def _choose(names: Sequence[str]) -> list[Scenario]:
+    """Scenarios called `names`, or all of them."""
+    from cosim import scenario as scenarios
+
+    if names:
+        paths = [scenarios.find(ROOT, name) for name in dict.fromkeys(names)]
+    else:
+        paths = list(scenarios.find_all(ROOT).values())
+    if not paths:
+        raise UserError(f"{ROOT / 'models'}: has no scenarios")
+    return [scenarios.load(path) for path in paths]
+
+
+def _open_fmus(chosen: Sequence[Scenario], path: Path | None, stack: ExitStack) -> dict[str, Fmu]:
+    """FMU of each model, by the model's folder name: the one at `path`, or those in build/."""
+    from cosim import reference
+    from cosim.simulation import Fmu
+
+    fmus: dict[str, Fmu] = {}
+    for scenario in chosen:
+        if scenario.model not in fmus:
+            file = path or ROOT / "build" / f"{reference.model_name(scenario)}.fmu"
+            if path is None and not file.exists():
+                raise UserError(f"{file}: no such file, ./run.sh builds it")
+            fmus[scenario.model] = stack.enter_context(Fmu(file))
+    return fmus
+
+
+def _print_runs(runs: Runs, chosen: Sequence[Scenario], *tolerances: float | None) -> list[Run]:
+    """Run `chosen` at `tolerances`, None being each one's own; a row appears as a run ends."""
+    from cosim.simulation import Progress
+
+    width = max(len("scenario"), *(len(scenario.name) for scenario in chosen))
+    head = f"{'scenario':<{width}}  tolerance    steps      error    bound  wall time  result"
+    print(head, "-" * len(head), sep="\n", flush=True)
+    done = []
+    for scenario in chosen:
+        for tolerance in dict.fromkeys(t or scenario.tolerance for t in tolerances):
+            label = f"{scenario.name} at {tolerance:g}"
+            with Progress(label, runs.steps_ahead(scenario, [tolerance])) as progress:
+                run = runs.run(scenario, tolerance, progress)
+            result = run.result
+            verdict = "passed" if run.passed else f"FAILED ({run.worst})"
+            print(
+                f"{scenario.name:<{width}}  {tolerance:>9.0e} {result.steps:>8} {run.error:>10.2e} "
+                f"{run.bound:>8.0e} {result.wall_time:>8.3f} s  {verdict}",
+                flush=True,
+            )
+            for message in result.messages:
+                print(f"{label}: the FMU says: {message}", file=sys.stderr)
+            done.append(run)
+    return done
+
+
+def _to_sweep(done: Sequence[Run]) -> list[Scenario]:
+    """Scenarios of `done` whose sweep is a matter of seconds, which the slower ones are told."""
+    from cosim.accuracy import TOLERANCES
+
+    slowest: dict[Scenario, float] = {}
+    for run in done:
+        slowest[run.scenario] = max(slowest.get(run.scenario, 0.0), run.result.wall_time)
+    quick = []
+    for scenario, wall_time in slowest.items():
+        seconds = wall_time * len(TOLERANCES)
+        if seconds <= QUICK:
+            quick.append(scenario)
+        else:
+            print(f"{scenario.name}: no sweep, it would take {seconds:.0f} s (run all: with sweep)")
+    return quick
+
+
+def _print_sweeps(runs: Runs, chosen: Sequence[Scenario]) -> list[Sweep]:
+    """Run `chosen` over the tolerances; a row of errors appears as a scenario ends."""
+    from cosim.accuracy import TOLERANCES, sweep
+    from cosim.simulation import Progress
+
+    if not chosen:
+        return []
+    width = max(len("error at tolerance"), *(len(scenario.name) for scenario in chosen))
+    columns = " ".join(f"{tolerance:>8.0e}" for tolerance in TOLERANCES)
+    head = f"{'error at tolerance':<{width}} {columns}  result"
+    print("", head, "-" * len(head), sep="\n", flush=True)
+    sweeps = []
+    for scenario in chosen:
+        ahead = runs.steps_ahead(scenario, TOLERANCES)
+        with Progress(f"{scenario.name}, all tolerances", ahead) as progress:
+            swept = sweep(runs, scenario, progress)
+        errors = " ".join(f"{error:>8.1e}" for error in swept.errors)
+        verdict = "passed" if swept.passed else "FAILED"
+        print(f"{scenario.name:<{width}} {errors}  {verdict}", flush=True)
+        sweeps.append(swept)
+    for swept in sweeps:
+        for text in swept.violations:
+            print(f"{swept.scenario.name}: {text}")
+    return sweeps
+
+
+def _count(things: Sequence[object], name: str) -> str:
+    return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")
+
+
+def _from_here(path: Path) -> Path:
+    """`path` as short as it can be given from the current folder."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+if __name__ == "__main__":
+    sys.exit(main())
