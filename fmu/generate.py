@@ -1,4 +1,7 @@
-"""Makes modelDescription.xml and the C tables of a unit from its variables.toml (description.py)."""
+"""Makes modelDescription.xml and the C tables of a unit from its variables.toml.
+
+The keys of that file are told in description.py, which reads and checks it.
+"""
 
 from __future__ import annotations
 

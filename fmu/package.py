@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import zipfile
 from pathlib import Path
@@ -39,7 +38,7 @@ def pack(archive: Path, files: dict[str, Path]) -> None:
             executable = name.startswith("binaries/")
             info.external_attr = (0o100755 if executable else 0o100644) << 16
             target.writestr(info, files[name].read_bytes())
-    os.replace(temporary, archive)
+    temporary.replace(archive)
 
 
 def main() -> int:

@@ -356,6 +356,7 @@ static void test_inverse_kinematics_refuses_what_it_cannot_reach(void) {
         expect_refused(6.0, bad[i]);
         expect_refused(bad[i], INFINITY); /* hypot(NAN, INFINITY) is INFINITY */
     }
+    expect_refused(DBL_MAX, DBL_MAX); /* finite, but its distance is not */
 }
 
 int main(void) {
