@@ -42,35 +42,39 @@ if [ "${#missing[@]}" -gt 0 ]; then
     fail "this failed: $sudo $install"
 fi
 
-# ---- Python environment, made again when what it must hold has changed
+# ---- Python environment, filled again when what it must hold has changed
 
-requirements=requirements.txt
-[ "$dev" = no ] || requirements=requirements-dev.txt
 mkdir -p build
-stamp="build/venv/$requirements.installed"
-wanted=$(cat requirements.txt "$requirements")
-if [ ! -x build/venv/bin/python ] || ! build/venv/bin/python -c '' 2>/dev/null; then
+if ! build/venv/bin/python -c 'import pip' 2>/dev/null; then
   python3 -m venv --clear build/venv
 fi
-if [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
-  echo "setup.sh: installing $requirements into build/venv"
-  build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$requirements"
-  printf '%s\n' "$wanted" >"$stamp"
-fi
+install_requirements() {
+  local stamp="build/venv/$1.installed"
+  cmp -s "$1" "$stamp" && return
+  echo "setup.sh: installing $1 into build/venv"
+  build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$1" || return 1
+  cp "$1" "$stamp"
+}
+install_requirements requirements.txt
+[ "$dev" = no ] || install_requirements requirements-dev.txt
 
 # ---- Unity: Debian 13 has it in a package; before, that package is unpacked here, not installed
 
 get_unity() (
   root="$PWD/build/deps/apt"
   mkdir -p "$root"/{parts,lists/partial,cache/archives/partial,unpacked}
-  distribution=$(. /etc/os-release && echo "${ID-}")
-  sources=$(ls /etc/apt/sources.list.d/debian.sources 2>/dev/null) || return 1
-  [ "$distribution" = debian ] || return 1
-
-  # the machine's own mirror, with the suite that has the package
-  awk -v RS= -v ORS='\n\n' '!/security/' "$sources" |
-    sed -e 's/^Suites:.*/Suites: trixie/' -e '/^Targets:/d' \
-        -e 's/^Types:.*/Types: deb\nTargets: Packages/' >"$root/parts/unity.sources"
+  # the machine's own mirror of Debian, with the suite that has the package
+  mirror=$(apt-get indextargets 'Created-By: Packages' \
+             --format '$(LABEL) $(COMPONENT) $(REPO_URI)' | awk '/^Debian main / { print $3; exit }')
+  [ -n "$mirror" ] || return 1
+  cat >"$root/parts/unity.sources" <<SOURCES
+Types: deb
+Targets: Packages
+URIs: $mirror
+Suites: trixie
+Components: main
+Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg
+SOURCES
   cat >"$root/apt.conf" <<CONF
 Dir::Etc::sourcelist "/dev/null";
 Dir::Etc::sourceparts "$root/parts";

@@ -34,32 +34,39 @@ static void harmless(const char *text, char out[TEXT_SIZE]) {
     out[length] = '\0';
 }
 
+static void send(fmi2CallbackLogger logger, fmi2ComponentEnvironment environment, const char *name,
+                 fmi2Status status, enum log_category category, const char *format,
+                 va_list arguments) {
+    char raw[TEXT_SIZE];
+    char text[TEXT_SIZE];
+    vsnprintf(raw, sizeof raw, format, arguments);
+    harmless(raw, text);
+    logger(environment, name, status, category_names[category], text);
+}
+
 void component_log(const struct component *component, fmi2Status status, enum log_category category,
                    const char *format, ...) {
     if (component->logger == NULL ||
         !(component->is_logged[category] || component->is_logged[LOG_ALL])) {
         return;
     }
-    char raw[TEXT_SIZE];
-    char text[TEXT_SIZE];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(raw, sizeof raw, format, arguments);
+    send(component->logger, component->environment, component->name, status, category, format,
+         arguments);
     va_end(arguments);
-    harmless(raw, text);
-    component->logger(component->environment, component->name, status, category_names[category],
-                      text);
 }
 
 void component_log_refusal(const fmi2CallbackFunctions *functions, const char *name,
-                           const char *text) {
+                           const char *format, ...) {
     if (functions == NULL || functions->logger == NULL) {
         return;
     }
-    char clean[TEXT_SIZE];
-    harmless(text, clean);
-    functions->logger(functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
-                      category_names[LOG_STATUS_ERROR], clean);
+    va_list arguments;
+    va_start(arguments, format);
+    send(functions->logger, functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
+         LOG_STATUS_ERROR, format, arguments);
+    va_end(arguments);
 }
 
 bool component_set_logged(struct component *component, const char *category, bool on) {

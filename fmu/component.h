@@ -48,9 +48,10 @@ __attribute__((format(printf, 4, 5))) void component_log(const struct component 
                                                          enum log_category category,
                                                          const char *format, ...);
 
-/* As component_log, for a call that has no component yet; functions and name may be NULL. */
-void component_log_refusal(const fmi2CallbackFunctions *functions, const char *name,
-                           const char *text);
+/* Logs an error of a call that has no component yet; functions and name may be NULL. */
+__attribute__((format(printf, 3, 4))) void
+component_log_refusal(const fmi2CallbackFunctions *functions, const char *name, const char *format,
+                      ...);
 
 /* Switches one category by name; false where there is none of that name. */
 bool component_set_logged(struct component *component, const char *category, bool on);

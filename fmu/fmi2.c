@@ -31,18 +31,29 @@ const char *fmi2GetVersion(void) {
     return fmi2Version;
 }
 
-static const char *instantiation_fault(fmi2String name, fmi2Type type, fmi2String guid) {
+/* Says in the log why there is no instance; functions may be NULL. */
+static bool may_instantiate(fmi2String name, fmi2Type type, fmi2String guid,
+                            const fmi2CallbackFunctions *functions) {
     if (name == NULL || name[0] == '\0') {
-        return "the instance name is missing: a name that is not empty is expected";
+        component_log_refusal(functions, name,
+                              "the instance name is missing: a name that is not empty is expected");
+        return false;
     }
     if (type != fmi2CoSimulation) {
-        return "the FMU type is refused: co-simulation is expected";
+        component_log_refusal(functions, name,
+                              "FMU type %d is refused: co-simulation, %d, is expected", (int)type,
+                              (int)fmi2CoSimulation);
+        return false;
     }
     if (guid == NULL || strcmp(guid, unit.guid) != 0) {
-        return "the GUID is refused: it does not match this binary; the model description belongs "
-               "to another build";
+        component_log_refusal(
+            functions, name,
+            "the GUID '%.100s' is refused: '%s' is expected, the model description "
+            "belongs to another build",
+            guid != NULL ? guid : "", unit.guid);
+        return false;
     }
-    return NULL;
+    return functions != NULL;
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
@@ -51,14 +62,12 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2Boolean loggingOn) {
     (void)fmuResourceLocation;
     (void)visible;
-    const char *fault = instantiation_fault(instanceName, fmuType, fmuGUID);
-    if (fault != NULL || functions == NULL) {
-        component_log_refusal(functions, instanceName, fault);
+    if (!may_instantiate(instanceName, fmuType, fmuGUID, functions)) {
         return NULL;
     }
     struct component *component = component_create(instanceName, functions, loggingOn != fmi2False);
     if (component == NULL) {
-        component_log_refusal(functions, instanceName, status_text(STATUS_OUT_OF_MEMORY));
+        component_log_refusal(functions, instanceName, "%s", status_text(STATUS_OUT_OF_MEMORY));
     }
     return component;
 }

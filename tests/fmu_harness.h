@@ -1,0 +1,166 @@
+/* What the tests of the built FMU share: they see it as an importer does, as a shared object with
+ * the functions of the standard header, and link none of its code. FMI 2.0 is cited by section. */
+#ifndef FMU_HARNESS_H
+#define FMU_HARNESS_H
+
+#include "value_references.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <fmi2TypesPlatform.h>
+
+#include <fmi2FunctionTypes.h>
+
+/* Every function of fmi2Functions.h (section 2.1), without its prefix. */
+#define FMU_FUNCTION_LIST(X)                                                                       \
+    X(GetTypesPlatform)                                                                            \
+    X(GetVersion)                                                                                  \
+    X(SetDebugLogging)                                                                             \
+    X(Instantiate)                                                                                 \
+    X(FreeInstance)                                                                                \
+    X(SetupExperiment)                                                                             \
+    X(EnterInitializationMode)                                                                     \
+    X(ExitInitializationMode)                                                                      \
+    X(Terminate)                                                                                   \
+    X(Reset)                                                                                       \
+    X(GetReal)                                                                                     \
+    X(GetInteger)                                                                                  \
+    X(GetBoolean)                                                                                  \
+    X(GetString)                                                                                   \
+    X(SetReal)                                                                                     \
+    X(SetInteger)                                                                                  \
+    X(SetBoolean)                                                                                  \
+    X(SetString)                                                                                   \
+    X(GetFMUstate)                                                                                 \
+    X(SetFMUstate)                                                                                 \
+    X(FreeFMUstate)                                                                                \
+    X(SerializedFMUstateSize)                                                                      \
+    X(SerializeFMUstate)                                                                           \
+    X(DeSerializeFMUstate)                                                                         \
+    X(GetDirectionalDerivative)                                                                    \
+    /* Model Exchange */                                                                           \
+    X(EnterEventMode)                                                                              \
+    X(NewDiscreteStates)                                                                           \
+    X(EnterContinuousTimeMode)                                                                     \
+    X(CompletedIntegratorStep)                                                                     \
+    X(SetTime)                                                                                     \
+    X(SetContinuousStates)                                                                         \
+    X(GetDerivatives)                                                                              \
+    X(GetEventIndicators)                                                                          \
+    X(GetContinuousStates)                                                                         \
+    X(GetNominalsOfContinuousStates)                                                               \
+    /* Co-Simulation */                                                                            \
+    X(SetRealInputDerivatives)                                                                     \
+    X(GetRealOutputDerivatives)                                                                    \
+    X(DoStep)                                                                                      \
+    X(CancelStep)                                                                                  \
+    X(GetStatus)                                                                                   \
+    X(GetRealStatus)                                                                               \
+    X(GetIntegerStatus)                                                                            \
+    X(GetBooleanStatus)                                                                            \
+    X(GetStringStatus)
+
+#define FMU_CODE(name) FMU_##name,
+enum fmu_function { FMU_FUNCTION_LIST(FMU_CODE) FMU_FUNCTION_COUNT };
+#undef FMU_CODE
+
+#define FMU_POINTER(name) fmi2##name##TYPE *name;
+struct fmu_functions {
+    FMU_FUNCTION_LIST(FMU_POINTER)
+};
+#undef FMU_POINTER
+
+#define FMU_COUNT(array) (sizeof(array) / sizeof(array)[0])
+
+/* ---- The loaded FMU ------------------------------------------------------------------------- */
+
+extern struct fmu_functions fmu;
+
+/* As the standard spells it: "fmi2GetReal". */
+extern const char *const fmu_function_names[FMU_FUNCTION_COUNT];
+
+/* Text of modelDescription.xml. */
+extern char *fmu_description;
+
+struct fmu_variable {
+    fmi2ValueReference reference;
+    bool is_real; /* otherwise Integer */
+};
+
+/* All variables, in the order of modelDescription.xml. */
+enum { FMU_VARIABLE_CAPACITY = 96 };
+extern struct fmu_variable fmu_variables[FMU_VARIABLE_CAPACITY];
+extern size_t fmu_variable_count;
+
+/* argv[1]: path of the shared object, argv[2]: of its modelDescription.xml. Says what is missing
+ * and returns false where one cannot be used. */
+bool fmu_load(int argc, char **argv);
+
+/* ---- Messages ------------------------------------------------------------------------------- */
+
+/* Receives what the FMU logs; passed to it as the component environment. */
+struct fmu_log {
+    unsigned count[fmi2Pending + 1]; /* messages by status */
+    struct {
+        char name[32];
+        unsigned count;
+    } categories[16];
+    char text[1024];        /* the last message */
+    char texts[16384];      /* all messages, one a line, as far as they fit */
+    char instance_name[64]; /* of the last message */
+    unsigned malformed;     /* NULL or empty strings, a '%', a '#' that is not doubled */
+};
+
+fmi2CallbackFunctions fmu_callbacks(struct fmu_log *log);
+void fmu_log_clear(struct fmu_log *log);
+unsigned fmu_log_count(const struct fmu_log *log, const char *category);
+unsigned fmu_log_total(const struct fmu_log *log);
+
+/* Fails the test unless one message contains text. */
+void fmu_assert_logged(const struct fmu_log *log, const char *text);
+
+/* ---- Instances ------------------------------------------------------------------------------ */
+
+/* An instance named "manipulator"; fmu_tear_down frees it where the test did not. */
+fmi2Component fmu_instantiate(struct fmu_log *log, bool logging_on);
+void fmu_free(fmi2Component component);
+
+/* Frees what is open and fails the test if a message was malformed. */
+void fmu_tear_down(const struct fmu_log *log);
+
+/* SetupExperiment to ExitInitializationMode; tolerance 0: not defined. No stop time. */
+void fmu_initialize(fmi2Component component, double start, double tolerance);
+
+/* An instance between steps, at time start. */
+fmi2Component fmu_initialized(struct fmu_log *log, double start);
+
+/* One Real; the test fails unless the status is fmi2OK. */
+void fmu_set(fmi2Component component, fmi2ValueReference reference, double value);
+double fmu_get(fmi2Component component, fmi2ValueReference reference);
+
+fmi2Status fmu_try_set(fmi2Component component, fmi2ValueReference reference, double value);
+
+/* The next calls are refused as after an fmi2Error (section 4.2.4), and the message says so. */
+void fmu_assert_in_error(fmi2Component component);
+
+/* ---- A run to compare bit for bit ----------------------------------------------------------- */
+
+enum { FMU_RUN_STEPS = 20 };
+
+/* All variables after every step. */
+struct fmu_run {
+    double reals[FMU_RUN_STEPS][FMU_VARIABLE_CAPACITY];
+    int integers[FMU_RUN_STEPS][FMU_VARIABLE_CAPACITY];
+};
+
+/* From an instance that was just made or reset. The variant decides the start values. Nothing is
+ * asserted, so that threads may call these: they return the worst status of all calls. */
+fmi2Status fmu_run_start(fmi2Component component, unsigned variant);
+fmi2Status fmu_run_step(fmi2Component component, unsigned step, struct fmu_run *run);
+fmi2Status fmu_run(fmi2Component component, unsigned variant, struct fmu_run *run);
+
+/* Resets the instance; its run then has the bits of a fresh instance's. */
+void fmu_assert_reset_is_fresh(fmi2Component component, const char *message);
+
+#endif
