@@ -17,6 +17,7 @@ struct integrator {
     SUNContext context;
     void *cvode;
     N_Vector x;
+    N_Vector last_x; /* state at reached */
     N_Vector absolute_tolerances;
     SUNNonlinearSolver solver;
 
@@ -25,7 +26,7 @@ struct integrator {
     double reached;   /* where the last advance ended */
     double failed_at; /* the last time that the right-hand side failed at */
 
-    struct integrator_statistics before_restart;
+    struct integrator_statistics before_restart; /* CVODE counts from each restart on */
 };
 
 static int evaluate_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *integrator_pointer) {
@@ -51,8 +52,6 @@ static enum status status_of_flag(const struct integrator *integrator, int flag)
     case CV_SUCCESS:
     case CV_TSTOP_RETURN:
         return STATUS_OK;
-    case CV_WARNING:
-        return STATUS_SOLVER_WARNING;
     case CV_FIRST_RHSFUNC_ERR:
     case CV_REPTD_RHSFUNC_ERR:
     case CV_UNREC_RHSFUNC_ERR:
@@ -62,6 +61,10 @@ static enum status status_of_flag(const struct integrator *integrator, int flag)
     case CV_TOO_MUCH_ACC:
     case CV_ERR_FAILURE:
     case CV_CONV_FAILURE:
+    // values so extreme that steps, weights or times underflow or overflow
+    case CV_BAD_T:
+    case CV_TOO_CLOSE:
+    case CV_ILL_INPUT:
         return stuck ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
     case CV_MEM_FAIL:
         return STATUS_OUT_OF_MEMORY;
@@ -82,10 +85,11 @@ static enum status setup(struct integrator *integrator) {
         return STATUS_OUT_OF_MEMORY;
     }
     integrator->x = N_VNew_Serial(n, integrator->context);
+    integrator->last_x = N_VNew_Serial(n, integrator->context);
     integrator->absolute_tolerances = N_VNew_Serial(n, integrator->context);
     integrator->cvode = CVodeCreate(CV_ADAMS, integrator->context);
-    if (integrator->x == NULL || integrator->absolute_tolerances == NULL ||
-        integrator->cvode == NULL) {
+    if (integrator->x == NULL || integrator->last_x == NULL ||
+        integrator->absolute_tolerances == NULL || integrator->cvode == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     N_VConst(0.0, integrator->x);
@@ -97,6 +101,8 @@ static enum status setup(struct integrator *integrator) {
     if (sundials_redirect_texts(integrator->context, integrator->cvode, &integrator->texts) != 0 ||
         CVodeInit(integrator->cvode, evaluate_rhs, 0.0, integrator->x) != CV_SUCCESS ||
         CVodeSetUserData(integrator->cvode, integrator) != CV_SUCCESS ||
+        // warnings of steps too short to change the time: SUNDIALS 7 prints them
+        CVodeSetMaxHnilWarns(integrator->cvode, -1) != CV_SUCCESS ||
         CVodeSetNonlinearSolver(integrator->cvode, integrator->solver) != CV_SUCCESS) {
         return STATUS_OUT_OF_MEMORY;
     }
@@ -136,6 +142,9 @@ void integrator_destroy(struct integrator *integrator) {
     if (integrator->absolute_tolerances != NULL) {
         N_VDestroy(integrator->absolute_tolerances);
     }
+    if (integrator->last_x != NULL) {
+        N_VDestroy(integrator->last_x);
+    }
     if (integrator->x != NULL) {
         N_VDestroy(integrator->x);
     }
@@ -152,9 +161,6 @@ enum status integrator_configure(struct integrator *integrator,
     int flag = CVodeSVtolerances(integrator->cvode, settings->relative_tolerance,
                                  integrator->absolute_tolerances);
     if (flag == CV_SUCCESS) {
-        flag = CVodeSetMaxNumSteps(integrator->cvode, settings->max_steps);
-    }
-    if (flag == CV_SUCCESS) {
         flag = CVodeReInit(integrator->cvode, 0.0, integrator->x);
     }
     integrator->before_restart = (struct integrator_statistics){0};
@@ -162,46 +168,85 @@ enum status integrator_configure(struct integrator *integrator,
 }
 
 enum status integrator_restart(struct integrator *integrator, const double x[], double span) {
-    // CVodeReInit clears CVODE's counters
     integrator_get_statistics(integrator, &integrator->before_restart);
+    integrator->before_restart.restarts++;
     memcpy(N_VGetArrayPointer(integrator->x), x, integrator->ode.state_count * sizeof(double));
+    N_VScale(1.0, integrator->x, integrator->last_x);
     integrator->span = span;
     integrator->reached = 0.0;
     integrator->failed_at = -INFINITY;
     return status_of_flag(integrator, CVodeReInit(integrator->cvode, 0.0, integrator->x));
 }
 
-enum status integrator_advance(struct integrator *integrator, double t, double *reached,
-                               double x[]) {
-    double *x_data = N_VGetArrayPointer(integrator->x);
-    const size_t size = integrator->ode.state_count * sizeof(double);
-
-    // set at every call: CVODE forgets a stop time that it has reached and keeps one across
-    // restarts
-    integrator->span = fmax(integrator->span, t);
-    int flag = CVodeSetStopTime(integrator->cvode, integrator->span);
-    if (flag == CV_SUCCESS) {
-        double stopped_at = integrator->reached;
-        flag = CVode(integrator->cvode, t, integrator->x, &stopped_at, CV_NORMAL);
-        const bool has_moved = flag != CV_FIRST_RHSFUNC_ERR && flag != CV_ILL_INPUT;
-        if (flag >= 0) {
-            integrator->reached = t;
-        } else if (has_moved) {
-            integrator->reached = stopped_at;
+/* What CVODE left in x can be used: with extreme values it ends with success where its step has
+ * underflowed to nothing, or with a state that is not finite. */
+static bool has_reached(const struct integrator *integrator, double t) {
+    const double *x = N_VGetArrayPointer(integrator->x);
+    double internal_time = 0.0;
+    (void)CVodeGetCurrentTime(integrator->cvode, &internal_time);
+    for (size_t i = 0; i < integrator->ode.state_count; i++) {
+        if (!isfinite(x[i])) {
+            return false;
         }
     }
+    // at a stop time CVODE may be short of it by its own rounding
+    return internal_time >= t * (1.0 - 1e-12);
+}
+
+enum status integrator_advance(struct integrator *integrator, double t, long max_steps,
+                               double *reached, double x[]) {
+    double stopped_at = integrator->reached;
+    int flag = CVodeSetMaxNumSteps(integrator->cvode, max_steps);
+    if (flag == CV_SUCCESS) {
+        // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
+        flag = CVodeSetStopTime(integrator->cvode, integrator->span);
+    }
+    if (flag == CV_SUCCESS) {
+        flag = CVode(integrator->cvode, t, integrator->x, &stopped_at, CV_NORMAL);
+    }
+    enum status status = status_of_flag(integrator, flag);
+    if (status == STATUS_OK) {
+        stopped_at = t;
+    }
+    if (has_reached(integrator, stopped_at)) {
+        integrator->reached = stopped_at;
+        N_VScale(1.0, integrator->x, integrator->last_x);
+    } else if (status == STATUS_OK) {
+        status = STATUS_NO_CONVERGENCE;
+    }
     *reached = integrator->reached;
-    memcpy(x, x_data, size);
-    return status_of_flag(integrator, flag);
+    memcpy(x, N_VGetArrayPointer(integrator->last_x), integrator->ode.state_count * sizeof(double));
+    return status;
 }
 
 void integrator_get_statistics(const struct integrator *integrator,
                                struct integrator_statistics *statistics) {
     long steps = 0;
     long evaluations = 0;
-    // both fail only without CVODE's memory
+    long error_failures = 0;
+    long iteration_failures = 0;
+    *statistics = integrator->before_restart;
+    // these calls fail only without CVODE's memory
     (void)CVodeGetNumSteps(integrator->cvode, &steps);
     (void)CVodeGetNumRhsEvals(integrator->cvode, &evaluations);
-    statistics->steps = integrator->before_restart.steps + steps;
-    statistics->rhs_evaluations = integrator->before_restart.rhs_evaluations + evaluations;
+    (void)CVodeGetNumErrTestFails(integrator->cvode, &error_failures);
+    (void)CVodeGetNumStepSolveFails(integrator->cvode, &iteration_failures);
+    statistics->steps += steps;
+    statistics->rhs_evaluations += evaluations;
+    statistics->failed_steps += error_failures + iteration_failures;
+    if (steps > 0) {
+        (void)CVodeGetLastStep(integrator->cvode, &statistics->last_step);
+        (void)CVodeGetLastOrder(integrator->cvode, &statistics->last_order);
+    }
+}
+
+void integrator_set_statistics(struct integrator *integrator,
+                               const struct integrator_statistics *statistics) {
+    struct integrator_statistics counted;
+    integrator->before_restart = (struct integrator_statistics){0};
+    integrator_get_statistics(integrator, &counted);
+    integrator->before_restart = *statistics;
+    integrator->before_restart.steps -= counted.steps;
+    integrator->before_restart.rhs_evaluations -= counted.rhs_evaluations;
+    integrator->before_restart.failed_steps -= counted.failed_steps;
 }

@@ -15,18 +15,27 @@ struct span {
 };
 
 struct model {
-    size_t values_size;     /* bytes of the value structure */
-    struct span parameters; /* all fields that parameters are bound to */
-    struct span inputs;     /* double[], all inputs */
-    struct span states;     /* double[], all continuous states */
+    size_t values_size;      /* bytes of the value structure */
+    struct span parameters;  /* all fields that parameters are bound to */
+    struct span inputs;      /* double[], all inputs */
+    struct span states;      /* double[], all continuous states */
+    struct span derivatives; /* double[], time derivative of each state in the order of states; may
+                                overlap states */
 
     /* Writes x' = f(t, x, u, p) to dx. A pure function: parameters are read from values, states and
      * inputs from x and u alone. t in s, the rest in the units of variables.toml. */
-    enum status (*derivatives)(const void *values, double t, const double x[], const double u[],
-                               double dx[]);
+    enum status (*right_hand_side)(const void *values, double t, const double x[], const double u[],
+                                   double dx[]);
 
     /* Writes all calculated fields of values from its parameters, inputs and states at time t. */
     enum status (*outputs)(void *values, double t);
+
+    /* Derivatives of the calculated fields along a curve in the space of parameters, inputs, states
+     * and time. values: a point of the curve, its calculated fields up to date. first, second:
+     * value structures whose parameters, inputs and states hold the first and second derivatives of
+     * these along the curve; their calculated fields are written. second may be NULL. t in s; dt:
+     * the derivative of time along the curve, which is straight in time. */
+    enum status (*propagate)(const void *values, double t, double dt, void *first, void *second);
 
     /* STATUS_OK where the parameters go together; otherwise STATUS_INVALID_PARAMETERS with one line
      * in text (size bytes) that says what is wrong and what is expected. */

@@ -19,6 +19,10 @@ struct slave_values {
     double relative_tolerance;           /* asked for; 0: that of the experiment */
     int max_internal_steps;              /* per communication step */
     double effective_relative_tolerance; /* what the integrator runs at */
+    int solver_restarts;                 /* since initialization */
+    double solver_last_step;             /* s: length of the last internal step */
+    int solver_last_order;
+    int solver_failed_steps; /* refused attempts since initialization */
 };
 
 struct slave_experiment {
@@ -65,7 +69,27 @@ slave_get_real(struct slave *slave, const unsigned references[], size_t count, d
 __attribute__((nonnull(1), warn_unused_result)) enum status
 slave_get_integer(struct slave *slave, const unsigned references[], size_t count, int values[]);
 
-/* Steps from communication_point to communication_point + step (s) with the inputs held.
+/* Derivatives of inputs with respect to time, of orders 1 to 3, at the beginning of the next step:
+ * over it the inputs are Taylor polynomials. They apply to that step alone. All or nothing. */
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_set_input_derivatives(struct slave *slave, const unsigned references[], size_t count,
+                            const int orders[], const double values[]);
+
+/* Derivatives of Real outputs with respect to time, of orders 1 and 2, at the current time, inputs
+ * being the polynomials that apply there. All or nothing. */
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_output_derivatives(struct slave *slave, const unsigned references[], size_t count,
+                             const int orders[], double values[]);
+
+/* Writes J v: J the derivatives of unknowns (Real variables of the model that are not parameters or
+ * inputs) with respect to knowns (inputs, states; before the first step parameters too). */
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_directional_derivative(struct slave *slave, const unsigned unknowns[],
+                                 size_t unknown_count, const unsigned knowns[], size_t known_count,
+                                 const double v[], double result[]);
+
+/* Steps from communication_point to communication_point + step (s) with the inputs held, or as
+ * polynomials where derivatives were set.
  * STATUS_INVALID_TIME: step not > 0, communication_point not where the instance is (clock_slack),
  * or the end past the stop time. Where the integration ends early (severity discard), slave_time
  * tells how far the instance got, and its states are those of that time. */
@@ -74,5 +98,26 @@ slave_do_step(struct slave *slave, double communication_point, double step);
 
 /* Time that the instance has reached, s. */
 __attribute__((nonnull)) double slave_time(const struct slave *slave);
+
+/* ---- Integration from outside (Model Exchange) ---------------------------------------------- */
+
+/* While the time is continuous only continuous inputs may be set. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_enter_continuous_time(struct slave *slave);
+__attribute__((nonnull)) void slave_enter_event_mode(struct slave *slave);
+
+__attribute__((nonnull, warn_unused_result)) enum status slave_set_time(struct slave *slave,
+                                                                        double time);
+
+/* count must be slave_state_count; the arrays may be NULL where it is 0. All or nothing. */
+__attribute__((nonnull)) size_t slave_state_count(const struct slave *slave);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_set_states(struct slave *slave, const double x[], size_t count);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_states(struct slave *slave, double x[], size_t count);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_derivatives(struct slave *slave, double dx[], size_t count);
+__attribute__((nonnull(1), warn_unused_result)) enum status
+slave_get_nominals(struct slave *slave, double nominals[], size_t count);
 
 #endif

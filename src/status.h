@@ -5,14 +5,12 @@
 /* Severity of a status, in rising order. */
 enum severity {
     SEVERITY_NONE,
-    SEVERITY_WARNING, /* done, with something to look at */
     SEVERITY_DISCARD, /* refused or only partly done, nothing is spoilt: the instance goes on */
     SEVERITY_ERROR,   /* the instance must be reset or restored before it goes on */
 };
 
 #define STATUS_LIST(X)                                                                             \
     X(STATUS_OK, SEVERITY_NONE, "ok")                                                              \
-    X(STATUS_SOLVER_WARNING, SEVERITY_WARNING, "the integrator warns")                             \
     X(STATUS_NOT_FINITE, SEVERITY_DISCARD, "a value is not finite")                                \
     X(STATUS_OUT_OF_RANGE, SEVERITY_DISCARD, "a value is out of its range")                        \
     X(STATUS_TOO_MANY_STEPS, SEVERITY_DISCARD, "the integrator took all internal steps allowed")   \

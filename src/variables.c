@@ -10,14 +10,20 @@ const struct variable *variable_find(const struct unit *unit, unsigned reference
 }
 
 bool variable_is_settable(const struct variable *variable, enum phase phase) {
-    if (variable->causality == CAUSALITY_INPUT) {
-        return true;
+    const bool is_input = variable->causality == CAUSALITY_INPUT;
+    switch (phase) {
+    case PHASE_INSTANTIATED:
+    case PHASE_INITIALIZATION:
+        return is_input || variable->initial == INITIAL_EXACT;
+    case PHASE_STEPPING:
+        return is_input || (variable->causality == CAUSALITY_PARAMETER &&
+                            variable->variability == VARIABILITY_TUNABLE);
+    case PHASE_CONTINUOUS_TIME:
+        return is_input && variable->variability == VARIABILITY_CONTINUOUS;
+    case PHASE_COUNT:
+        break;
     }
-    if (phase == PHASE_STEPPING) {
-        return variable->causality == CAUSALITY_PARAMETER &&
-               variable->variability == VARIABILITY_TUNABLE;
-    }
-    return variable->initial == INITIAL_EXACT;
+    return false;
 }
 
 enum status variable_check_value(const struct variable *variable, double value,

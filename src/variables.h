@@ -59,7 +59,13 @@ struct unit {
 };
 
 /* Where an instance is in its life, as far as it decides what may be set. */
-enum phase { PHASE_INSTANTIATED, PHASE_INITIALIZATION, PHASE_STEPPING };
+enum phase {
+    PHASE_INSTANTIATED,
+    PHASE_INITIALIZATION,
+    PHASE_STEPPING,        /* between steps; in Model Exchange: event mode */
+    PHASE_CONTINUOUS_TIME, /* Model Exchange: time is integrated from outside */
+    PHASE_COUNT,
+};
 
 /* NULL where the unit has no such reference. */
 const struct variable *variable_find(const struct unit *unit, unsigned reference);

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdio.h>
 
-static enum status derivatives(const void *values_pointer, double t, const double x[],
-                               const double u[], double dx[]) {
+static enum status right_hand_side(const void *values_pointer, double t, const double x[],
+                                   const double u[], double dx[]) {
     const struct oscillator_values *values = values_pointer;
     (void)t;
     dx[0] = x[1];
@@ -16,7 +16,27 @@ static enum status outputs(void *values_pointer, double t) {
     struct oscillator_values *values = values_pointer;
     (void)t;
     const double stretch = values->omega * values->x;
+    values->a = -values->omega * stretch + values->gain * values->u;
     values->energy = 0.5 * (values->v * values->v + stretch * stretch);
+    return STATUS_OK;
+}
+
+/* Product rule, twice, for a = -omega^2 x + gain u and energy = (v^2 + omega^2 x^2) / 2 with omega
+ * and gain constant along the curve. */
+static enum status propagate(const void *values_pointer, double t, double dt, void *first_pointer,
+                             void *second_pointer) {
+    const struct oscillator_values *p = values_pointer;
+    struct oscillator_values *d = first_pointer;
+    struct oscillator_values *dd = second_pointer;
+    const double omega2 = p->omega * p->omega;
+    (void)t;
+    (void)dt;
+    d->a = -omega2 * d->x + p->gain * d->u;
+    d->energy = p->v * d->v + omega2 * p->x * d->x;
+    if (dd != NULL) {
+        dd->a = -omega2 * dd->x + p->gain * dd->u;
+        dd->energy = d->v * d->v + p->v * dd->v + omega2 * (d->x * d->x + p->x * dd->x);
+    }
     return STATUS_OK;
 }
 
@@ -34,8 +54,10 @@ static const struct model model = {
     .parameters = {offsetof(struct oscillator_values, omega), 2 * sizeof(double)},
     .inputs = {offsetof(struct oscillator_values, u), sizeof(double)},
     .states = {offsetof(struct oscillator_values, x), 2 * sizeof(double)},
-    .derivatives = derivatives,
+    .derivatives = {offsetof(struct oscillator_values, v), 2 * sizeof(double)},
+    .right_hand_side = right_hand_side,
     .outputs = outputs,
+    .propagate = propagate,
     .check_parameters = check_parameters,
 };
 
@@ -58,6 +80,7 @@ static const struct variable variables[] = {
     {11, "v", OF_MODEL(v), STATE, 0.0, ANY},
     {20, "u", OF_MODEL(u), INPUT, 0.0, ANY},
     {30, "energy", OF_MODEL(energy), OUTPUT, 0.0, ANY},
+    {31, "a", OF_MODEL(a), OUTPUT, 0.0, ANY},
     {80, "steps", OF_SLAVE(VARIABLE_INTEGER, solver_steps), COUNTER, 0.0, ANY},
     {81, "evaluations", OF_SLAVE(VARIABLE_INTEGER, solver_rhs_evaluations), COUNTER, 0.0, ANY},
     {82, "relative_tolerance", OF_SLAVE(VARIABLE_REAL, relative_tolerance), FIXED, 0.0, 0.0,
@@ -70,9 +93,9 @@ static const struct variable variables[] = {
 
 static const short row_of_reference[] = {
     0,  1,  2,  -1, -1, -1, -1, -1, -1, -1, 3,  4,  -1, -1, -1, -1, -1, -1, -1, -1, 5,  -1,
-    -1, -1, -1, -1, -1, -1, -1, -1, 6,  -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
+    -1, -1, -1, -1, -1, -1, -1, -1, 6,  7,  -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
     -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
-    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 7,  8,  9,  10, 11,
+    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 8,  9,  10, 11, 12,
 };
 
 const struct unit oscillator_unit = {

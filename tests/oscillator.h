@@ -11,6 +11,7 @@ struct oscillator_values {
     double u;     /* m/s2 */
     double x;     /* m */
     double v;     /* m/s */
+    double a;     /* m/s2, calculated */
     double energy;
 };
 
@@ -22,6 +23,7 @@ enum oscillator_reference {
     OSCILLATOR_V = 11,
     OSCILLATOR_U = 20,
     OSCILLATOR_ENERGY = 30,
+    OSCILLATOR_A = 31,
     OSCILLATOR_STEPS = 80,
     OSCILLATOR_EVALUATIONS = 81,
     OSCILLATOR_RELATIVE_TOLERANCE = 82,

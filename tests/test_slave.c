@@ -105,6 +105,21 @@ static void test_setting_the_same_values_again_changes_nothing(void) {
     slave_destroy(untouched);
 }
 
+static void test_the_sign_of_zero_is_no_change(void) {
+    initialize(slave, 0.0);
+    for (int i = 0; i < 50; i++) {
+        ASSERT_OK(set(slave, OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0));
+        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+    }
+    const int alternating = get_integer(OSCILLATOR_STEPS);
+    slave_reset(slave);
+    initialize(slave, 0.0);
+    for (int i = 0; i < 50; i++) {
+        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+    }
+    TEST_ASSERT_EQUAL_INT(get_integer(OSCILLATOR_STEPS), alternating);
+}
+
 static void test_a_restart_happens_only_where_something_changed(void) {
     double states[2];
     initialize(slave, 0.0);
@@ -282,6 +297,23 @@ static void test_instances_do_not_disturb_each_other(void) {
     }
 }
 
+/* As if variables.toml named a calculated field for the input: it compiles and would do nothing. */
+static void test_a_field_of_another_kind_is_refused(void) {
+    struct variable variables[16];
+    struct unit wrong = oscillator_unit;
+    struct slave *none = slave;
+    TEST_ASSERT_TRUE(oscillator_unit.variable_count <= 16);
+    for (size_t i = 0; i < oscillator_unit.variable_count; i++) {
+        variables[i] = oscillator_unit.variables[i];
+        if (variables[i].reference == OSCILLATOR_U) {
+            variables[i].offset = offsetof(struct oscillator_values, energy);
+        }
+    }
+    wrong.variables = variables;
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, slave_create(&wrong, &sink, &none));
+    TEST_ASSERT_NULL(none);
+}
+
 static void test_initialization_needs_an_experiment(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_enter_initialization(slave));
     TEST_ASSERT_NOT_NULL(strstr(text, "the experiment must be set up first"));
@@ -398,6 +430,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_held_inputs_give_the_exact_piecewise_solution);
     RUN_TEST(test_setting_the_same_values_again_changes_nothing);
+    RUN_TEST(test_the_sign_of_zero_is_no_change);
     RUN_TEST(test_a_restart_happens_only_where_something_changed);
     RUN_TEST(test_a_tunable_parameter_acts_from_the_next_step_on);
     RUN_TEST(test_outputs_follow_what_was_set_last);
@@ -409,6 +442,7 @@ int main(void) {
     RUN_TEST(test_steps_allocate_nothing);
     RUN_TEST(test_reset_gives_a_fresh_instance);
     RUN_TEST(test_instances_do_not_disturb_each_other);
+    RUN_TEST(test_a_field_of_another_kind_is_refused);
     RUN_TEST(test_initialization_needs_an_experiment);
     RUN_TEST(test_an_experiment_that_makes_no_sense_is_refused);
     RUN_TEST(test_parameters_must_go_together_at_initialization_and_at_a_step);

@@ -1,0 +1,37 @@
+/* Reads, writes or counts the fields of a serialized state, by one sequence of calls for all three.
+ * The format is told in snapshot.h. */
+#ifndef CODEC_H
+#define CODEC_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct codec {
+    enum { CODEC_COUNTING, CODEC_WRITING, CODEC_READING } mode;
+    unsigned char *to;         /* CODEC_WRITING */
+    const unsigned char *from; /* CODEC_READING */
+    size_t size;               /* bytes there are */
+    size_t at;                 /* bytes done */
+    bool failed;               /* reading: too few bytes, or a value that its type does not have */
+};
+
+struct codec codec_counting(void);
+struct codec codec_writing(unsigned char *to, size_t size);
+struct codec codec_reading(const unsigned char *from, size_t size);
+
+/* Counting and writing: what stands before the fields, and after them. */
+void codec_begin(struct codec *codec, const char *guid);
+void codec_end(struct codec *codec);
+
+/* Reading: checks all but the fields and goes to the first of them. NULL, or what is wrong;
+ * length: bytes that are expected in all. */
+const char *codec_check(struct codec *codec, const char *guid, size_t length);
+
+/* One field, 8 bytes. */
+void codec_real(struct codec *codec, double *value);
+void codec_long(struct codec *codec, long *value);
+void codec_int(struct codec *codec, int *value);
+void codec_unsigned(struct codec *codec, unsigned *value);
+void codec_bool(struct codec *codec, bool *value);
+
+#endif

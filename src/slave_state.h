@@ -1,0 +1,105 @@
+/* Inside of an instance, shared by the files that make it up: slave.c (life), stepping.c (from one
+ * communication point to the next), access.c (values), derivatives.c, snapshot.c. */
+#ifndef SLAVE_STATE_H
+#define SLAVE_STATE_H
+
+#include "clock.h"
+#include "integrator.h"
+#include "polynomial.h"
+#include "slave.h"
+
+/* All that later results depend on, but for the values in struct slave_memory. A plain value: a
+ * snapshot is a copy of it. */
+struct slave_state {
+    enum phase phase;
+    bool experiment_defined;
+    struct slave_experiment experiment;
+    struct slave_values own;
+    struct clock_time time;
+
+    /* The integrator's history, from which it goes on while nothing changes. It follows from the
+     * restart and the first and the last time asked for since then (integrator_advance). */
+    bool has_history;
+    struct clock_time restart_time;
+    double span;        /* s since the restart that the integrator may not pass */
+    double first_time;  /* s since the restart */
+    double latest_time; /* s since the restart */
+    struct integrator_statistics statistics;
+    long steps_before_restart; /* internal steps */
+};
+
+/* Parts of one block of memory, of which a snapshot is a copy. */
+struct slave_memory {
+    char *block;
+    size_t size;                /* bytes */
+    char *values;               /* the model's value structure, as set and read from outside; its
+                                   inputs are those at the current time */
+    char *held;                 /* the value structure at the last restart: what the integrator runs
+                                   with */
+    struct polynomial *pending; /* inputs of the next step: last value set, and derivatives */
+    struct polynomial *current; /* inputs at the current time */
+    struct polynomial *running; /* inputs since the last restart */
+};
+
+struct slave {
+    const struct unit *unit;
+    const struct model *model;
+    struct message_sink sink;
+    struct slave_state state;
+    struct slave_memory memory;
+
+    bool outputs_are_valid;        /* the calculated values belong to the others */
+    bool history_is_lost;          /* the integrator is not where state says: replay first */
+    struct integrator *integrator; /* NULL where the model has no states */
+    double configured_tolerance;   /* relative tolerance that the integrator was configured with */
+    double *work;                  /* one value per input: those that the right-hand side sees */
+    char *first;                   /* value structures for derivatives */
+    char *second;
+    struct slave_snapshot *snapshots; /* those that belong to the instance, latest first */
+};
+
+static inline size_t count_of(struct span span) {
+    return span.size / sizeof(double);
+}
+
+/* The doubles of a value structure that a span tells. */
+static inline double *doubles_of(char *values, struct span span) {
+    return (double *)(void *)(values + span.offset);
+}
+
+/* The place of a variable's value. */
+void *slave_field(struct slave *slave, const struct variable *variable);
+
+void slave_write_field(struct slave *slave, const struct variable *variable, double value);
+
+/* Index of an input variable among the inputs. */
+size_t slave_input_index(const struct slave *slave, const struct variable *variable);
+
+/* The variable with this reference and type, or NULL with a text. */
+const struct variable *slave_find(const struct slave *slave, unsigned reference,
+                                  enum variable_type type);
+
+/* Says that what cannot be computed; STATUS_NOT_FINITE. */
+enum status slave_not_finite(const struct slave *slave, const char *what);
+
+/* Brings the calculated values up to date; says why where that fails. */
+enum status slave_update_outputs(struct slave *slave);
+
+/* Settings that follow from values: the tolerance that the integrator runs at. */
+void slave_update_tolerance(struct slave *slave);
+
+void slave_set_clock(struct slave *slave, struct clock_time time);
+
+/* The parameters go together; says why where they do not. */
+enum status slave_check_parameters(const struct slave *slave);
+
+/* Gives the integrator the tolerance it has to run at. */
+enum status slave_configure_integrator(struct slave *slave);
+
+/* Right-hand side of the integrator; context: the slave. */
+ode_rhs slave_rhs;
+
+/* Prepares an instance whose state and memory were overwritten to go on from them. */
+enum status slave_resume(struct slave *slave);
+
+#endif

@@ -1,0 +1,294 @@
+#include "snapshot.h"
+
+#include "codec.h"
+#include "slave_state.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct slave_snapshot {
+    struct slave_snapshot *previous;
+    struct slave_snapshot *next;
+    unsigned tag;
+    struct slave_state state;
+    max_align_t memory[]; /* copy of slave_memory.block */
+};
+
+/* ---- In memory ------------------------------------------------------------------------------ */
+
+static enum status check_own(const struct slave *slave, const struct slave_snapshot *snapshot) {
+    for (const struct slave_snapshot *own = slave->snapshots; own != NULL; own = own->next) {
+        if (own == snapshot) {
+            return STATUS_OK;
+        }
+    }
+    message_write(&slave->sink, STATUS_INVALID_ARGUMENT,
+                  "the saved state is refused: it is none of this instance's");
+    return STATUS_INVALID_ARGUMENT;
+}
+
+static struct slave_snapshot *new_snapshot(struct slave *slave) {
+    struct slave_snapshot *created = malloc(sizeof *created + slave->memory.size);
+    if (created == NULL) {
+        message_write(&slave->sink, STATUS_OUT_OF_MEMORY, "the state is not saved: %s",
+                      status_text(STATUS_OUT_OF_MEMORY));
+        return NULL;
+    }
+    created->previous = NULL;
+    created->next = slave->snapshots;
+    if (slave->snapshots != NULL) {
+        slave->snapshots->previous = created;
+    }
+    slave->snapshots = created;
+    return created;
+}
+
+enum status slave_save(struct slave *slave, unsigned tag, struct slave_snapshot **snapshot) {
+    if (*snapshot == NULL) {
+        struct slave_snapshot *created = new_snapshot(slave);
+        if (created == NULL) {
+            return STATUS_OUT_OF_MEMORY;
+        }
+        *snapshot = created;
+    } else if (check_own(slave, *snapshot) != STATUS_OK) {
+        return STATUS_INVALID_ARGUMENT;
+    }
+    (*snapshot)->tag = tag;
+    (*snapshot)->state = slave->state;
+    memcpy((*snapshot)->memory, slave->memory.block, slave->memory.size);
+    return STATUS_OK;
+}
+
+enum status slave_restore(struct slave *slave, struct slave_snapshot *snapshot) {
+    const enum status status = check_own(slave, snapshot);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    slave->state = snapshot->state;
+    memcpy(slave->memory.block, snapshot->memory, slave->memory.size);
+    return slave_resume(slave);
+}
+
+enum status slave_forget(struct slave *slave, struct slave_snapshot **snapshot) {
+    const enum status status = check_own(slave, *snapshot);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    struct slave_snapshot *gone = *snapshot;
+    if (gone->next != NULL) {
+        gone->next->previous = gone->previous;
+    }
+    if (gone->previous != NULL) {
+        gone->previous->next = gone->next;
+    } else {
+        slave->snapshots = gone->next;
+    }
+    free(gone);
+    *snapshot = NULL;
+    return STATUS_OK;
+}
+
+enum status slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot,
+                               unsigned *tag) {
+    const enum status status = check_own(slave, snapshot);
+    if (status == STATUS_OK) {
+        *tag = snapshot->tag;
+    }
+    return status;
+}
+
+/* ---- As bytes ------------------------------------------------------------------------------- */
+
+static void transfer_experiment(struct codec *codec, struct slave_experiment *experiment) {
+    codec_real(codec, &experiment->start_time);
+    codec_bool(codec, &experiment->stop_time_defined);
+    codec_real(codec, &experiment->stop_time);
+    codec_bool(codec, &experiment->tolerance_defined);
+    codec_real(codec, &experiment->tolerance);
+}
+
+static void transfer_own(struct codec *codec, struct slave_values *own) {
+    codec_real(codec, &own->time);
+    codec_int(codec, &own->solver_steps);
+    codec_int(codec, &own->solver_rhs_evaluations);
+    codec_real(codec, &own->relative_tolerance);
+    codec_int(codec, &own->max_internal_steps);
+    codec_real(codec, &own->effective_relative_tolerance);
+    codec_int(codec, &own->solver_restarts);
+    codec_real(codec, &own->solver_last_step);
+    codec_int(codec, &own->solver_last_order);
+    codec_int(codec, &own->solver_failed_steps);
+}
+
+static void transfer_statistics(struct codec *codec, struct integrator_statistics *statistics) {
+    codec_long(codec, &statistics->steps);
+    codec_long(codec, &statistics->rhs_evaluations);
+    codec_long(codec, &statistics->failed_steps);
+    codec_long(codec, &statistics->restarts);
+    codec_real(codec, &statistics->last_step);
+    codec_int(codec, &statistics->last_order);
+}
+
+/* Values of the model that are not calculated: parameters, inputs and states. */
+static void transfer_values(struct codec *codec, const struct unit *unit, char *values) {
+    for (size_t i = 0; i < unit->variable_count; i++) {
+        const struct variable *variable = &unit->variables[i];
+        void *field = values + variable->offset;
+        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
+            continue;
+        }
+        if (variable->type == VARIABLE_REAL) {
+            codec_real(codec, field);
+        } else {
+            codec_int(codec, field);
+        }
+    }
+}
+
+static void transfer_polynomials(struct codec *codec, struct polynomial polynomials[],
+                                 size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+            codec_real(codec, &polynomials[i].d[k]);
+        }
+    }
+}
+
+/* All fields, in one order for reading, writing and counting. */
+static void transfer_state(struct codec *codec, const struct slave *slave, unsigned *tag,
+                           struct slave_state *state, char *block) {
+    const struct slave_memory *memory = &slave->memory;
+    const size_t input_count = count_of(slave->model->inputs);
+    int phase = (int)state->phase;
+    codec_unsigned(codec, tag);
+    codec_int(codec, &phase);
+    state->phase = (enum phase)phase;
+    codec_bool(codec, &state->experiment_defined);
+    transfer_experiment(codec, &state->experiment);
+    transfer_own(codec, &state->own);
+    codec_real(codec, &state->time.s);
+    codec_real(codec, &state->time.rest);
+    codec_bool(codec, &state->has_history);
+    codec_real(codec, &state->restart_time.s);
+    codec_real(codec, &state->restart_time.rest);
+    codec_real(codec, &state->span);
+    codec_real(codec, &state->first_time);
+    codec_real(codec, &state->latest_time);
+    transfer_statistics(codec, &state->statistics);
+    codec_long(codec, &state->steps_before_restart);
+    transfer_values(codec, slave->unit, block + (memory->values - memory->block));
+    transfer_values(codec, slave->unit, block + (memory->held - memory->block));
+    // pending, current and running lie side by side
+    transfer_polynomials(
+        codec, (struct polynomial *)(void *)(block + ((char *)memory->pending - memory->block)),
+        3 * input_count);
+}
+
+size_t slave_serialized_size(const struct slave *slave) {
+    // counting writes nothing, so that any state serves
+    struct slave_state state = slave->state;
+    unsigned tag = 0;
+    struct codec codec = codec_counting();
+    codec_begin(&codec, slave->unit->guid);
+    transfer_state(&codec, slave, &tag, &state, slave->memory.block);
+    codec_end(&codec);
+    return codec.at;
+}
+
+enum status slave_serialize(struct slave *slave, struct slave_snapshot *snapshot,
+                            unsigned char bytes[], size_t size) {
+    const enum status status = check_own(slave, snapshot);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (size < slave_serialized_size(slave)) {
+        message_write(&slave->sink, STATUS_INVALID_ARGUMENT,
+                      "%zu bytes are too few for the saved state: %zu are expected", size,
+                      slave_serialized_size(slave));
+        return STATUS_INVALID_ARGUMENT;
+    }
+    struct codec codec = codec_writing(bytes, slave_serialized_size(slave));
+    codec_begin(&codec, slave->unit->guid);
+    transfer_state(&codec, slave, &snapshot->tag, &snapshot->state, (char *)snapshot->memory);
+    codec_end(&codec);
+    return STATUS_OK;
+}
+
+static bool are_finite(const double values[], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(values[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Parameters, inputs and states that could have been set. */
+static bool are_settable(const struct slave *slave, const char *values) {
+    const struct message_sink quiet = {0};
+    for (size_t i = 0; i < slave->unit->variable_count; i++) {
+        const struct variable *variable = &slave->unit->variables[i];
+        const void *field = values + variable->offset;
+        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
+            continue;
+        }
+        const double value =
+            variable->type == VARIABLE_REAL ? *(const double *)field : *(const int *)field;
+        if (variable_check_value(variable, value, &quiet) != STATUS_OK) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* A state that an instance can be in: a hash that fits does not prove it. */
+static bool is_plausible(const struct slave *slave, const struct slave_state *state,
+                         const char *block) {
+    const struct slave_memory *memory = &slave->memory;
+    const double times[] = {state->time.s, state->time.rest, state->own.time, state->restart_time.s,
+                            state->restart_time.rest};
+    const double *polynomials =
+        (const double *)(const void *)(block + ((char *)memory->pending - memory->block));
+    const size_t coefficients = 3 * count_of(slave->model->inputs) * (POLYNOMIAL_DEGREE + 1);
+    const double tolerance = state->own.effective_relative_tolerance;
+
+    if ((int)state->phase < 0 || state->phase >= PHASE_COUNT ||
+        !are_finite(times, sizeof times / sizeof times[0]) ||
+        !are_finite(polynomials, coefficients) || !(tolerance > 0.0 && tolerance < 1.0) ||
+        !(state->own.relative_tolerance >= 0.0) || !isfinite(state->own.solver_last_step) ||
+        state->own.max_internal_steps < 1 || state->statistics.steps < 0 ||
+        state->steps_before_restart < 0 || state->steps_before_restart > state->statistics.steps ||
+        !are_settable(slave, block + (memory->values - memory->block))) {
+        return false;
+    }
+    return !state->has_history ||
+           (state->first_time > 0.0 && state->latest_time >= state->first_time &&
+            isfinite(state->latest_time) && state->span >= state->latest_time &&
+            are_settable(slave, block + (memory->held - memory->block)));
+}
+
+enum status slave_deserialize(struct slave *slave, const unsigned char bytes[], size_t size,
+                              struct slave_snapshot **snapshot) {
+    struct slave_snapshot *read = NULL;
+    struct codec codec = codec_reading(bytes, size);
+    const char *fault = codec_check(&codec, slave->unit->guid, slave_serialized_size(slave));
+    if (fault == NULL) {
+        const enum status status = slave_save(slave, 0, &read);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        transfer_state(&codec, slave, &read->tag, &read->state, (char *)read->memory);
+        if (codec.failed || !is_plausible(slave, &read->state, (const char *)read->memory)) {
+            fault = "a value in it is impossible";
+            slave_forget(slave, &read);
+        }
+    }
+    if (fault != NULL) {
+        message_write(&slave->sink, STATUS_INVALID_ARGUMENT, "the serialized state is refused: %s",
+                      fault);
+        return STATUS_INVALID_ARGUMENT;
+    }
+    *snapshot = read;
+    return STATUS_OK;
+}

@@ -1,0 +1,56 @@
+/* Snapshots of an instance: all that later results depend on, in memory and as bytes.
+ *
+ * A restored instance gives the same bits as the one saved would have given. The integrator's own
+ * history is not in a snapshot: it follows from the last restart and is replayed at the first step,
+ * and only where that step goes on from it.
+ *
+ * Bytes, all numbers little-endian, reals as IEEE 754 double:
+ *
+ *     8 bytes      "COSIMSTA"
+ *     u32          version of the format, 1
+ *     u32          length of the whole in bytes
+ *     u32, bytes   length of the GUID of the unit, GUID
+ *     8 bytes each fields, in the order of transfer_state() in snapshot.c
+ *     u64          FNV-1a hash of all bytes before it
+ *
+ * Functions return STATUS_INVALID_ARGUMENT with a text where a snapshot is not the instance's own
+ * or bytes are not what is expected; the instance is then as it was. */
+#ifndef SNAPSHOT_H
+#define SNAPSHOT_H
+
+#include "slave.h"
+
+struct slave_snapshot;
+
+/* Saves the instance into *snapshot: a new one where that is NULL, otherwise over that one. tag: a
+ * number that the caller wants back. A snapshot is owned by its instance: slave_destroy frees it.
+ */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_save(struct slave *slave, unsigned tag, struct slave_snapshot **snapshot);
+
+/* The snapshot stays valid. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_restore(struct slave *slave, struct slave_snapshot *snapshot);
+
+/* Frees *snapshot and sets it to NULL. */
+__attribute__((nonnull)) enum status slave_forget(struct slave *slave,
+                                                  struct slave_snapshot **snapshot);
+
+/* The tag that the snapshot was saved with. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot, unsigned *tag);
+
+/* Bytes that slave_serialize writes. */
+__attribute__((nonnull)) size_t slave_serialized_size(const struct slave *slave);
+
+/* bytes: size bytes, size at least slave_serialized_size. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_serialize(struct slave *slave, struct slave_snapshot *snapshot, unsigned char bytes[],
+                size_t size);
+
+/* A new snapshot from what slave_serialize of any instance of the same unit wrote. */
+__attribute__((nonnull, warn_unused_result)) enum status
+slave_deserialize(struct slave *slave, const unsigned char bytes[], size_t size,
+                  struct slave_snapshot **snapshot);
+
+#endif

@@ -1,0 +1,229 @@
+/* From one communication point to the next. */
+#include "slave_state.h"
+
+#include <limits.h>
+#include <math.h>
+#include <string.h>
+
+/* Internal steps after which the integrator restarts though nothing has changed: what a restored
+ * snapshot has to replay at most, beside the steps of one communication step. Larger: fewer
+ * restarts, slower rollback. */
+static const long longest_history = 1000;
+
+enum status slave_rhs(double t, const double x[], double dx[], void *slave_pointer) {
+    const struct slave *slave = slave_pointer;
+    const size_t input_count = count_of(slave->model->inputs);
+    for (size_t i = 0; i < input_count; i++) {
+        slave->work[i] = polynomial_value(&slave->memory.running[i], t);
+    }
+    return slave->model->right_hand_side(slave->memory.held, slave->state.restart_time.s + t, x,
+                                         slave->work, dx);
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static enum status refuse_times(const struct slave *slave, double t, double h) {
+    const struct slave_experiment *experiment = &slave->state.experiment;
+    const struct clock_time now = slave->state.time;
+    if (!isfinite(t) || !isfinite(h) || !(h > 0.0) || !isfinite(t + h)) {
+        message_write(&slave->sink, STATUS_INVALID_TIME,
+                      "a step of %g s from t = %.17g is refused: a finite time and a step above 0 "
+                      "are expected",
+                      h, t);
+        return STATUS_INVALID_TIME;
+    }
+    if (t + h == t) {
+        message_write(&slave->sink, STATUS_INVALID_TIME,
+                      "a step of %g s from t = %.17g is refused: it does not change the time", h,
+                      t);
+        return STATUS_INVALID_TIME;
+    }
+    const double mismatch = clock_difference((struct clock_time){.s = t}, now);
+    if (!(fabs(mismatch) <= clock_slack(t, h)) || !(mismatch + h > 0.0)) {
+        message_write(&slave->sink, STATUS_INVALID_TIME,
+                      "a step from t = %.17g is refused: the instance is at t = %.17g", t, now.s);
+        return STATUS_INVALID_TIME;
+    }
+    if (experiment->stop_time_defined && t + h - experiment->stop_time > clock_slack(t + h, h)) {
+        message_write(&slave->sink, STATUS_INVALID_TIME,
+                      "a step from t = %.17g to t = %.17g is refused: the stop time is %.17g", t,
+                      t + h, experiment->stop_time);
+        return STATUS_INVALID_TIME;
+    }
+    return STATUS_OK;
+}
+
+static bool is_moving(const struct polynomial inputs[], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
+            if (inputs[i].d[k] != 0.0) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static bool are_equal(const struct polynomial first[], const struct polynomial second[],
+                      size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+            if (first[i].d[k] != second[i].d[k]) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* The integrator may go on from where it is to target. A pure function of what is set now and what
+ * the integrator runs with: how often and in what order values were set does not matter. */
+static bool can_go_on(const struct slave *slave, double target) {
+    const struct slave_memory *memory = &slave->memory;
+    const struct slave_state *state = &slave->state;
+    const struct span parameters = slave->model->parameters;
+    const size_t input_count = count_of(slave->model->inputs);
+    return state->has_history && target <= state->span &&
+           state->statistics.steps - state->steps_before_restart < longest_history &&
+           memcmp(memory->held + parameters.offset, memory->values + parameters.offset,
+                  parameters.size) == 0 &&
+           are_equal(memory->running, memory->pending, input_count) &&
+           !is_moving(memory->pending, input_count);
+}
+
+static enum status restart(struct slave *slave, struct clock_time end) {
+    struct slave_memory *memory = &slave->memory;
+    struct slave_state *state = &slave->state;
+    const size_t input_count = count_of(slave->model->inputs);
+    memcpy(memory->held, memory->values, slave->model->values_size);
+    memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
+
+    const double target = clock_difference(end, state->time);
+    state->span = INFINITY;
+    if (is_moving(memory->pending, input_count)) {
+        state->span = target;
+    } else if (state->experiment.stop_time_defined) {
+        const struct clock_time stop = {.s = state->experiment.stop_time};
+        state->span = fmax(clock_difference(stop, state->time), target);
+    }
+    state->has_history = true;
+    state->restart_time = state->time;
+    state->first_time = target;
+    state->steps_before_restart = state->statistics.steps;
+    slave->history_is_lost = false;
+    return integrator_restart(slave->integrator, doubles_of(memory->held, slave->model->states),
+                              state->span);
+}
+
+/* Brings the integrator to where the restored state says it is. */
+static enum status replay(struct slave *slave) {
+    const struct slave_state *state = &slave->state;
+    const struct span states = slave->model->states;
+    double *x = doubles_of(slave->first, states);
+    double reached;
+    enum status status =
+        integrator_restart(slave->integrator, doubles_of(slave->memory.held, states), state->span);
+    if (status == STATUS_OK) {
+        status = integrator_advance(slave->integrator, state->first_time, LONG_MAX, &reached, x);
+    }
+    if (status == STATUS_OK && state->latest_time > state->first_time) {
+        status = integrator_advance(slave->integrator, state->latest_time, LONG_MAX, &reached, x);
+    }
+    integrator_set_statistics(slave->integrator, &state->statistics);
+    slave->history_is_lost = false;
+    return status;
+}
+
+static int saturated(long count) {
+    return count > INT_MAX ? INT_MAX : (int)count;
+}
+
+static void update_statistics(struct slave *slave) {
+    struct slave_values *own = &slave->state.own;
+    struct integrator_statistics *statistics = &slave->state.statistics;
+    integrator_get_statistics(slave->integrator, statistics);
+    own->solver_steps = saturated(statistics->steps);
+    own->solver_rhs_evaluations = saturated(statistics->rhs_evaluations);
+    own->solver_restarts = saturated(statistics->restarts);
+    own->solver_failed_steps = saturated(statistics->failed_steps);
+    own->solver_last_step = statistics->last_step;
+    own->solver_last_order = statistics->last_order;
+}
+
+/* Inputs at the end of a step of the length elapsed (s); their derivatives applied to it alone. */
+static void end_inputs(struct slave *slave, double elapsed) {
+    struct slave_memory *memory = &slave->memory;
+    const size_t input_count = count_of(slave->model->inputs);
+    double *u = doubles_of(memory->values, slave->model->inputs);
+    for (size_t i = 0; i < input_count; i++) {
+        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
+        memory->pending[i] = (struct polynomial){{memory->pending[i].d[0]}};
+        u[i] = memory->current[i].d[0];
+    }
+}
+
+static enum status integrate_to(struct slave *slave, struct clock_time end) {
+    struct slave_state *state = &slave->state;
+    const struct clock_time begin = state->time;
+    enum status status = STATUS_OK;
+    if (!can_go_on(slave, clock_difference(end, state->restart_time))) {
+        status = restart(slave, end);
+    } else if (slave->history_is_lost) {
+        status = replay(slave);
+    }
+    if (status != STATUS_OK) {
+        return status;
+    }
+
+    const double target = clock_difference(end, state->restart_time);
+    status = integrator_advance(slave->integrator, target, state->own.max_internal_steps,
+                                &state->latest_time,
+                                doubles_of(slave->memory.values, slave->model->states));
+    state->has_history = status == STATUS_OK;
+    slave_set_clock(slave,
+                    status == STATUS_OK ? end : clock_add(state->restart_time, state->latest_time));
+    end_inputs(slave, clock_difference(state->time, begin));
+    update_statistics(slave);
+    return status;
+}
+
+enum status slave_do_step(struct slave *slave, double communication_point, double step) {
+    enum status status = refuse_times(slave, communication_point, step);
+    if (status == STATUS_OK) {
+        status = slave_check_parameters(slave);
+    }
+    if (status != STATUS_OK) {
+        return status;
+    }
+
+    const struct clock_time end = clock_add((struct clock_time){.s = communication_point}, step);
+    if (slave->integrator == NULL) {
+        const double elapsed = clock_difference(end, slave->state.time);
+        slave_set_clock(slave, end);
+        end_inputs(slave, elapsed);
+        return STATUS_OK;
+    }
+    status = integrate_to(slave, end);
+    if (status != STATUS_OK) {
+        message_write(&slave->sink, status,
+                      "the step from t = %.17g to t = %.17g ended at %.17g: %s",
+                      communication_point, end.s, slave->state.time.s, status_text(status));
+    }
+    return status;
+}
+
+/* ---- Restored states ------------------------------------------------------------------------ */
+
+enum status slave_resume(struct slave *slave) {
+    slave->outputs_are_valid = false;
+    slave->history_is_lost = true;
+    if (slave->integrator == NULL) {
+        return STATUS_OK;
+    }
+    enum status status = STATUS_OK;
+    if (slave->configured_tolerance != slave->state.own.effective_relative_tolerance) {
+        status = slave_configure_integrator(slave);
+    }
+    integrator_set_statistics(slave->integrator, &slave->state.statistics);
+    return status;
+}

@@ -1,0 +1,209 @@
+#include "oscillator.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static struct slave *slave;
+static char text[512];
+
+static void keep_text(void *context, enum status status, const char *message) {
+    (void)context;
+    (void)status;
+    strncpy(text, message, sizeof text - 1);
+}
+
+#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, text)
+
+void setUp(void) {
+    const struct message_sink sink = {.write = keep_text};
+    const struct slave_experiment experiment = {.start_time = 0.0};
+    ASSERT_OK(slave_create(&oscillator_unit, &sink, &slave));
+    ASSERT_OK(slave_setup_experiment(slave, &experiment));
+    ASSERT_OK(slave_enter_initialization(slave));
+}
+
+void tearDown(void) {
+    slave_destroy(slave);
+}
+
+static double get(unsigned reference) {
+    double value = NAN;
+    ASSERT_OK(slave_get_real(slave, &reference, 1, &value));
+    return value;
+}
+
+static void set_derivative(int order, double value) {
+    const unsigned input = OSCILLATOR_U;
+    ASSERT_OK(slave_set_input_derivatives(slave, &input, 1, &order, &value));
+}
+
+static double derivative(unsigned reference, int order) {
+    double value = NAN;
+    ASSERT_OK(slave_get_output_derivatives(slave, &reference, 1, &order, &value));
+    return value;
+}
+
+/* x'' = -omega^2 x + u with u = b t + c t^2 / 2 + e t^3 / 6 has the particular solution
+ * (u - u'' / omega^2) / omega^2, and so a solution in closed form. */
+static void test_a_step_follows_the_polynomial(void) {
+    const double b = 3.0;
+    const double c = -8.0;
+    const double e = 20.0;
+    const double w = 2.0;
+    const double t = 0.7;
+    ASSERT_OK(slave_exit_initialization(slave));
+    set_derivative(3, e);
+    set_derivative(1, b);
+    set_derivative(2, c);
+    ASSERT_OK(slave_do_step(slave, 0.0, t));
+
+    const double particular =
+        (b * t + c * t * t / 2.0 + e * t * t * t / 6.0) / (w * w) - (c + e * t) / (w * w * w * w);
+    const double x0 = 1.0 + c / (w * w * w * w);
+    const double v0 = -b / (w * w) + e / (w * w * w * w);
+    const double x = particular + x0 * cos(w * t) + v0 / w * sin(w * t);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, x, get(OSCILLATOR_X));
+
+    // outputs use the input at the end of the step, reading it gives the value set last
+    const double u = b * t + c * t * t / 2.0 + e * t * t * t / 6.0;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_X) + u, get(OSCILLATOR_A));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get(OSCILLATOR_U));
+}
+
+static void test_derivatives_apply_to_one_step(void) {
+    double exact[2];
+    ASSERT_OK(slave_exit_initialization(slave));
+    set_derivative(1, 100.0);
+    ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
+    const double start[2] = {get(OSCILLATOR_X), get(OSCILLATOR_V)};
+    ASSERT_OK(slave_do_step(slave, 0.1, 0.4));
+    oscillator_solution(2.0, 0.0, 0.4, start, exact);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[0], get(OSCILLATOR_X));
+}
+
+static void test_output_derivatives_along_the_motion(void) {
+    const double w = 2.0;
+    ASSERT_OK(slave_exit_initialization(slave));
+    set_derivative(1, 3.0);
+    set_derivative(2, -8.0);
+    ASSERT_OK(slave_do_step(slave, 0.0, 0.5));
+    const double x = get(OSCILLATOR_X);
+    const double v = get(OSCILLATOR_V);
+    const double a = get(OSCILLATOR_A);
+    const double du = 3.0 - 8.0 * 0.5;
+    const double jerk = -w * w * v + du;
+    TEST_ASSERT_EQUAL_DOUBLE(v, derivative(OSCILLATOR_X, 1));
+    TEST_ASSERT_EQUAL_DOUBLE(a, derivative(OSCILLATOR_X, 2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, jerk, derivative(OSCILLATOR_V, 2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -w * w * a - 8.0, derivative(OSCILLATOR_A, 2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, v * (a + w * w * x), derivative(OSCILLATOR_ENERGY, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, a * a + v * jerk + w * w * (v * v + x * a),
+                              derivative(OSCILLATOR_ENERGY, 2));
+}
+
+static void test_orders_and_variables_that_have_no_derivative_are_refused(void) {
+    const unsigned wrong[] = {OSCILLATOR_TIME, OSCILLATOR_OMEGA, OSCILLATOR_U, OSCILLATOR_STEPS,
+                              99};
+    const int orders[] = {0, 3, -1};
+    const unsigned x = OSCILLATOR_X;
+    const unsigned u = OSCILLATOR_U;
+    const int first = 1;
+    const double one = 1.0;
+    double value = -7.0;
+    ASSERT_OK(slave_exit_initialization(slave));
+    for (int i = 0; i < 5; i++) {
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              slave_get_output_derivatives(slave, &wrong[i], 1, &first, &value));
+    }
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              slave_get_output_derivatives(slave, &x, 1, &orders[i], &value));
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
+
+    const int fourth = 4;
+    const double nan = NAN;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          slave_set_input_derivatives(slave, &u, 1, &fourth, &one));
+    TEST_ASSERT_NOT_NULL(strstr(text, "an order from 1 to 3 is expected"));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          slave_set_input_derivatives(slave, &x, 1, &first, &one));
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
+                          slave_set_input_derivatives(slave, &u, 1, &first, &nan));
+}
+
+static void test_directional_derivatives(void) {
+    const unsigned unknowns[] = {OSCILLATOR_A, OSCILLATOR_V, OSCILLATOR_X};
+    const unsigned knowns[] = {OSCILLATOR_X, OSCILLATOR_U, OSCILLATOR_V};
+    const double v[] = {0.5, 3.0, 7.0};
+    double result[3];
+    ASSERT_OK(slave_get_directional_derivative(slave, unknowns, 3, knowns, 3, v, result));
+    TEST_ASSERT_EQUAL_DOUBLE(-4.0 * 0.5 + 3.0, result[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(7.0, result[1]);
+    TEST_ASSERT_EQUAL_DOUBLE(0.5, result[2]);
+}
+
+static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
+    const unsigned x = OSCILLATOR_X;
+    const unsigned omega = OSCILLATOR_OMEGA;
+    const unsigned energy = OSCILLATOR_ENERGY;
+    const unsigned counter_settings = OSCILLATOR_EFFECTIVE_TOLERANCE;
+    const double one = 1.0;
+    double value = -7.0;
+    ASSERT_OK(slave_get_directional_derivative(slave, &x, 1, &omega, 1, &one, &value));
+    ASSERT_OK(slave_exit_initialization(slave));
+    value = -7.0;
+    const struct {
+        const unsigned *unknown, *known;
+    } cases[] = {{&x, &omega}, {&x, &energy}, {&omega, &x}, {&counter_settings, &x}};
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              slave_get_directional_derivative(slave, cases[i].unknown, 1,
+                                                               cases[i].known, 1, &one, &value));
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "is refused"), text);
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
+}
+
+static void test_states_from_outside(void) {
+    const double x[2] = {0.25, -1.5};
+    double read[2];
+    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(slave_enter_continuous_time(slave));
+    ASSERT_OK(slave_set_time(slave, 3.0));
+    ASSERT_OK(slave_set_states(slave, x, 2));
+    ASSERT_OK(slave_get_states(slave, read, 2));
+    TEST_ASSERT_EQUAL_MEMORY(x, read, sizeof x);
+    ASSERT_OK(slave_get_derivatives(slave, read, 2));
+    TEST_ASSERT_EQUAL_DOUBLE(-1.5, read[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(-1.0, read[1]);
+    ASSERT_OK(slave_get_nominals(slave, read, 2));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, read[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(3.0, get(OSCILLATOR_TIME));
+
+    const double wrong[2] = {0.0, NAN};
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_set_states(slave, wrong, 2));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_states(slave, x, 1));
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_set_time(slave, INFINITY));
+    TEST_ASSERT_EQUAL_DOUBLE(0.25, get(OSCILLATOR_X));
+
+    const unsigned omega = OSCILLATOR_OMEGA;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_real(slave, &omega, 1, x));
+    slave_enter_event_mode(slave);
+    const double negative = -1.0;
+    ASSERT_OK(slave_set_real(slave, &omega, 1, &negative));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_enter_continuous_time(slave));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_step_follows_the_polynomial);
+    RUN_TEST(test_derivatives_apply_to_one_step);
+    RUN_TEST(test_output_derivatives_along_the_motion);
+    RUN_TEST(test_orders_and_variables_that_have_no_derivative_are_refused);
+    RUN_TEST(test_directional_derivatives);
+    RUN_TEST(test_knowns_and_unknowns_that_are_none_are_refused);
+    RUN_TEST(test_states_from_outside);
+    return UNITY_END();
+}

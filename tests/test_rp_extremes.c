@@ -1,0 +1,105 @@
+/* Values so extreme that the integrator's own arithmetic underflows or overflows: a step is then
+ * right or refused, never wrong. */
+#include "slave.h"
+#include "unit.h"
+#include "value_references.h"
+
+#include <float.h>
+#include <math.h>
+#include <unity.h>
+
+static struct slave *slave;
+
+void setUp(void) {
+    const struct message_sink quiet = {0};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&unit, &quiet, &slave));
+}
+
+void tearDown(void) {
+    slave_destroy(slave);
+}
+
+static void set(unsigned reference, double value) {
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_set_real(slave, &reference, 1, &value));
+}
+
+static double get(unsigned reference) {
+    double value = NAN;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_get_real(slave, &reference, 1, &value));
+    return value;
+}
+
+/* The horizontal plane without offset: link 2 alone slides uniformly or uniformly accelerated. */
+static void start_sliding(double dq2, double f2) {
+    const struct slave_experiment experiment = {.start_time = 0.0};
+    slave_reset(slave);
+    set(RP_MANIPULATOR_g, 0.0);
+    set(RP_MANIPULATOR_a, 0.0);
+    set(RP_MANIPULATOR_dq2, dq2);
+    set(RP_MANIPULATOR_f2, f2);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+}
+
+static void test_a_huge_speed_is_integrated_or_refused(void) {
+    for (int exponent = 0; exponent <= 304; exponent += 4) {
+        const double dq2 = pow(10.0, exponent);
+        const double h = 1e-3;
+        start_sliding(dq2, 0.0);
+        const enum status status = slave_do_step(slave, 0.0, h);
+        TEST_ASSERT_TRUE(status_severity(status) <= SEVERITY_DISCARD);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7 * dq2 * h, dq2 * slave_time(slave), get(RP_MANIPULATOR_q2));
+        TEST_ASSERT_TRUE(status == STATUS_OK || exponent > 100);
+    }
+}
+
+static void test_a_huge_force_is_integrated_or_refused(void) {
+    for (int exponent = 0; exponent <= 304; exponent += 4) {
+        const double f2 = pow(10.0, exponent);
+        start_sliding(0.0, f2);
+        for (int i = 0; i < 3; i++) {
+            const enum status status = slave_do_step(slave, slave_time(slave), 2e-3);
+            const double t = slave_time(slave);
+            TEST_ASSERT_TRUE(status_severity(status) <= SEVERITY_DISCARD);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-7 * f2 * 4e-6, 0.5 * f2 * t * t, get(RP_MANIPULATOR_q2));
+            if (status != STATUS_OK) {
+                break;
+            }
+        }
+    }
+}
+
+static void test_tiny_steps_are_done_or_refused(void) {
+    for (int exponent = -323; exponent <= -1; exponent++) {
+        const double h = pow(10.0, exponent);
+        start_sliding(1.0, 0.0);
+        const enum status status = slave_do_step(slave, 0.0, h);
+        TEST_ASSERT_TRUE(status_severity(status) <= SEVERITY_DISCARD);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7 * h + DBL_TRUE_MIN, slave_time(slave),
+                                  get(RP_MANIPULATOR_q2));
+        // CVODE squares its step: below 1e-150 s that underflows
+        TEST_ASSERT_TRUE(status == STATUS_OK || exponent < -150);
+    }
+}
+
+static void test_after_a_refused_step_the_state_is_that_of_the_time_reached(void) {
+    const struct slave_experiment experiment = {.start_time = 0.0};
+    set(RP_MANIPULATOR_l1, 1e212);
+    set(RP_MANIPULATOR_g, -9e-20);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+    const enum status status = slave_do_step(slave, 0.0, 4e209);
+    TEST_ASSERT_EQUAL_INT(SEVERITY_DISCARD, status_severity(status));
+    TEST_ASSERT_TRUE(isfinite(get(RP_MANIPULATOR_q1)) && isfinite(get(RP_MANIPULATOR_q2)));
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_huge_speed_is_integrated_or_refused);
+    RUN_TEST(test_a_huge_force_is_integrated_or_refused);
+    RUN_TEST(test_tiny_steps_are_done_or_refused);
+    RUN_TEST(test_after_a_refused_step_the_state_is_that_of_the_time_reached);
+    return UNITY_END();
+}

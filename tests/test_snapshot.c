@@ -1,0 +1,238 @@
+#include "snapshot.h"
+
+#include "oscillator.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+static struct slave *slave;
+static char text[512];
+
+static void keep_text(void *context, enum status status, const char *message) {
+    (void)context;
+    (void)status;
+    strncpy(text, message, sizeof text - 1);
+}
+
+static const struct message_sink sink = {.write = keep_text};
+
+#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, text)
+
+static struct slave *started(void) {
+    struct slave *created = NULL;
+    const struct slave_experiment experiment = {.stop_time_defined = true, .stop_time = 1000.0};
+    ASSERT_OK(slave_create(&oscillator_unit, &sink, &created));
+    ASSERT_OK(slave_setup_experiment(created, &experiment));
+    ASSERT_OK(slave_enter_initialization(created));
+    ASSERT_OK(slave_exit_initialization(created));
+    return created;
+}
+
+void setUp(void) {
+    memset(text, 0, sizeof text);
+    slave = started();
+}
+
+void tearDown(void) {
+    slave_destroy(slave);
+}
+
+/* Everything that can be read, to be compared as bytes. */
+struct readings {
+    double reals[9];
+    int integers[3];
+};
+
+static struct readings read(struct slave *from) {
+    static const unsigned reals[] = {0, 1, 2, 10, 11, 20, 30, 82, 84};
+    static const unsigned integers[] = {80, 81, 83};
+    struct readings readings;
+    memset(&readings, 0, sizeof readings);
+    ASSERT_OK(slave_get_real(from, reals, 9, readings.reals));
+    ASSERT_OK(slave_get_integer(from, integers, 3, readings.integers));
+    return readings;
+}
+
+static void assert_equal(struct slave *expected, struct slave *actual) {
+    const struct readings first = read(expected);
+    const struct readings second = read(actual);
+    TEST_ASSERT_EQUAL_MEMORY(&first, &second, sizeof first);
+}
+
+static void set(struct slave *to, unsigned reference, double value) {
+    ASSERT_OK(slave_set_real(to, &reference, 1, &value));
+}
+
+static void step(struct slave *stepped, double h) {
+    ASSERT_OK(slave_do_step(stepped, slave_time(stepped), h));
+}
+
+static void test_a_run_goes_on_from_its_history_bit_for_bit(void) {
+    struct slave *other = started();
+    struct slave_snapshot *snapshot = NULL;
+    for (int i = 0; i < 137; i++) {
+        step(slave, 0.01);
+        step(other, 0.01);
+    }
+    ASSERT_OK(slave_save(slave, 7, &snapshot));
+    set(slave, OSCILLATOR_U, 3.0);
+    step(slave, 1.0);
+    ASSERT_OK(slave_restore(slave, snapshot));
+    assert_equal(other, slave);
+    for (int i = 0; i < 50; i++) {
+        step(slave, 0.013);
+        step(other, 0.013);
+        assert_equal(other, slave);
+    }
+    slave_destroy(other);
+}
+
+static void test_saving_at_every_step_changes_nothing(void) {
+    struct slave *other = started();
+    struct slave_snapshot *snapshot = NULL;
+    for (int i = 0; i < 200; i++) {
+        ASSERT_OK(slave_save(slave, 0, &snapshot));
+        step(slave, 0.02);
+        step(other, 0.02);
+        assert_equal(other, slave);
+    }
+    slave_destroy(other);
+}
+
+/* Long enough for restarts without any change; wherever it is restored, they come at the same step.
+ */
+static void test_restarts_without_a_change_are_part_of_the_state(void) {
+    struct slave *other = started();
+    struct slave_snapshot *snapshot = NULL;
+    for (int i = 0; i < 400; i++) {
+        if (i % 17 == 0) {
+            ASSERT_OK(slave_save(slave, 0, &snapshot));
+            step(slave, 1.7);
+            ASSERT_OK(slave_restore(slave, snapshot));
+        }
+        step(slave, 1.0);
+        step(other, 1.0);
+        assert_equal(other, slave);
+    }
+    TEST_ASSERT_TRUE(read(slave).integers[0] > 3000);
+    slave_destroy(other);
+}
+
+static void test_bytes_carry_a_state_to_another_instance(void) {
+    struct slave *other = started();
+    struct slave_snapshot *snapshot = NULL;
+    struct slave_snapshot *copy = NULL;
+    const size_t size = slave_serialized_size(slave);
+    unsigned char *bytes = malloc(size);
+    unsigned char *again = malloc(size);
+    unsigned tag = 0;
+    set(slave, OSCILLATOR_U, 0.5);
+    for (int i = 0; i < 33; i++) {
+        step(slave, 0.1);
+    }
+    ASSERT_OK(slave_save(slave, 42, &snapshot));
+    ASSERT_OK(slave_serialize(slave, snapshot, bytes, size));
+
+    ASSERT_OK(slave_deserialize(other, bytes, size, &copy));
+    ASSERT_OK(slave_snapshot_tag(other, copy, &tag));
+    TEST_ASSERT_EQUAL_UINT(42, tag);
+    ASSERT_OK(slave_restore(other, copy));
+    ASSERT_OK(slave_serialize(other, copy, again, size));
+    TEST_ASSERT_EQUAL_MEMORY(bytes, again, size);
+    for (int i = 0; i < 20; i++) {
+        assert_equal(slave, other);
+        step(slave, 0.1);
+        step(other, 0.1);
+    }
+    free(bytes);
+    free(again);
+    slave_destroy(other);
+}
+
+static void test_input_derivatives_are_part_of_the_state(void) {
+    struct slave_snapshot *snapshot = NULL;
+    const unsigned input = OSCILLATOR_U;
+    const int order = 2;
+    const double value = 4.0;
+    ASSERT_OK(slave_set_input_derivatives(slave, &input, 1, &order, &value));
+    ASSERT_OK(slave_save(slave, 0, &snapshot));
+    step(slave, 0.5);
+    const struct readings expected = read(slave);
+    ASSERT_OK(slave_restore(slave, snapshot));
+    step(slave, 0.5);
+    const struct readings repeated = read(slave);
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &repeated, sizeof expected);
+}
+
+static void test_snapshots_of_others_are_refused(void) {
+    struct slave *other = started();
+    struct slave_snapshot *foreign = NULL;
+    unsigned char bytes[4096];
+    unsigned tag;
+    ASSERT_OK(slave_save(other, 0, &foreign));
+    struct slave_snapshot *handle = foreign;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_restore(slave, foreign));
+    TEST_ASSERT_NOT_NULL(strstr(text, "none of this instance's"));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_save(slave, 0, &handle));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_forget(slave, &handle));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_snapshot_tag(slave, foreign, &tag));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          slave_serialize(slave, foreign, bytes, sizeof bytes));
+    TEST_ASSERT_EQUAL_PTR(foreign, handle);
+    slave_destroy(other);
+}
+
+static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
+    struct slave_snapshot *snapshots[5] = {NULL};
+    static const int order[] = {2, 4, 0, 3, 1};
+    for (int i = 0; i < 5; i++) {
+        step(slave, 0.1);
+        ASSERT_OK(slave_save(slave, (unsigned)i, &snapshots[i]));
+    }
+    for (int i = 0; i < 5; i++) {
+        unsigned tag = 99;
+        ASSERT_OK(slave_snapshot_tag(slave, snapshots[order[i]], &tag));
+        TEST_ASSERT_EQUAL_UINT(order[i], tag);
+        ASSERT_OK(slave_forget(slave, &snapshots[order[i]]));
+        TEST_ASSERT_NULL(snapshots[order[i]]);
+    }
+}
+
+static void test_bytes_that_are_not_sound_are_refused(void) {
+    struct slave_snapshot *snapshot = NULL;
+    struct slave_snapshot *read_back = NULL;
+    unsigned char bytes[4096];
+    const size_t size = slave_serialized_size(slave);
+    TEST_ASSERT_TRUE(size < sizeof bytes);
+    ASSERT_OK(slave_save(slave, 0, &snapshot));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          slave_serialize(slave, snapshot, bytes, size - 1));
+    ASSERT_OK(slave_serialize(slave, snapshot, bytes, size));
+    const struct readings before = read(slave);
+    for (size_t i = 0; i < size; i++) {
+        bytes[i] ^= 0x10;
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              slave_deserialize(slave, bytes, size, &read_back));
+        bytes[i] ^= 0x10;
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              slave_deserialize(slave, bytes, i, &read_back));
+    }
+    const struct readings after = read(slave);
+    TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
+    TEST_ASSERT_NULL(read_back);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_a_run_goes_on_from_its_history_bit_for_bit);
+    RUN_TEST(test_saving_at_every_step_changes_nothing);
+    RUN_TEST(test_restarts_without_a_change_are_part_of_the_state);
+    RUN_TEST(test_bytes_carry_a_state_to_another_instance);
+    RUN_TEST(test_input_derivatives_are_part_of_the_state);
+    RUN_TEST(test_snapshots_of_others_are_refused);
+    RUN_TEST(test_a_snapshot_can_be_forgotten_in_any_order);
+    RUN_TEST(test_bytes_that_are_not_sound_are_refused);
+    return UNITY_END();
+}
