@@ -16,7 +16,7 @@ build() {
 
 export PYTHONPATH="$root${PYTHONPATH:+:$PYTHONPATH}"
 if [ "${1-}" = --list ]; then
-  exec "$python" -m cosim list
+  exec "$python" -m cosim list "${@:2}"
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 exec "$python" -m cosim run "$@"

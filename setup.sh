@@ -14,6 +14,14 @@ esac
 
 fail() { echo "setup.sh: $*" >&2; exit 1; }
 
+# a folder that was moved or copied: what CMake and venv keep in build/ names the old place
+home=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' build/CMakeCache.txt 2>/dev/null || true)
+if [ -n "$home" ] && [ ! "$home" -ef "$PWD" ]; then
+  echo "setup.sh: build/ belongs to $home, making it anew"
+  rm -rf build
+fi
+mkdir -p build 2>/dev/null && [ -w build ] || fail "the folder $PWD cannot be written"
+
 # ---- system packages
 
 has_venv() { python3 -c 'import ensurepip, venv' 2>/dev/null; }
@@ -44,7 +52,6 @@ fi
 
 # ---- Python environment, filled again when what it must hold has changed
 
-mkdir -p build
 if ! build/venv/bin/python -c 'import pip' 2>/dev/null; then
   python3 -m venv --clear build/venv
 fi

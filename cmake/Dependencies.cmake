@@ -6,6 +6,17 @@ if(NOT TARGET SUNDIALS::cvode_static)
                       "it runs. Install libsundials-dev, or build SUNDIALS with "
                       "-DBUILD_STATIC_LIBS=ON and position independent code.")
 endif()
+find_file(sundials_config sundials/sundials_config.h NO_CACHE
+          HINTS ${SUNDIALS_INCLUDE_DIR} ${SUNDIALS_DIR}/../../../../include)
+if(sundials_config)
+  file(STRINGS ${sundials_config} with_mpi REGEX "^#define SUNDIALS_MPI_ENABLED +1")
+  file(STRINGS ${sundials_config} before_7 REGEX "^#define SUNDIALS_VERSION_MAJOR +[456]$")
+  if(with_mpi AND NOT before_7)
+    message(FATAL_ERROR "SUNDIALS at ${SUNDIALS_DIR} is built with MPI (Debian 13's is), which from version 7 on the FMU "
+                        "would need where it runs. Build SUNDIALS with -DENABLE_MPI=OFF and give its "
+                        "place with -DSUNDIALS_DIR=")
+  endif()
+endif()
 find_file(SUNDIALS_LICENSE NAMES copyright LICENSE NO_DEFAULT_PATH
           PATHS /usr/share/doc/libsundials-dev ${SUNDIALS_DIR}/../../.. ${SUNDIALS_DIR}/../../../..
                 ${SUNDIALS_DIR}/../../../include/sundials

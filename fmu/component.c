@@ -46,8 +46,7 @@ static void send(fmi2CallbackLogger logger, fmi2ComponentEnvironment environment
 
 void component_log(const struct component *component, fmi2Status status, enum log_category category,
                    const char *format, ...) {
-    if (component->logger == NULL ||
-        !(component->is_logged[category] || component->is_logged[LOG_ALL])) {
+    if (component->logger == NULL || !component->is_logged[category]) {
         return;
     }
     va_list arguments;
@@ -70,13 +69,15 @@ void component_log_refusal(const fmi2CallbackFunctions *functions, const char *n
 }
 
 bool component_set_logged(struct component *component, const char *category, bool on) {
+    bool found = false;
+    const bool all = strcmp(category, category_names[LOG_ALL]) == 0;
     for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
-        if (strcmp(category, category_names[i]) == 0) {
+        if (all || strcmp(category, category_names[i]) == 0) {
             component->is_logged[i] = on;
-            return true;
+            found = true;
         }
     }
-    return false;
+    return found;
 }
 
 /* Status messages are sent even with logging off; what merely tells the course of events is not. */
@@ -93,7 +94,6 @@ static const struct {
     enum log_category category;
 } of_severity[] = {
     [SEVERITY_NONE] = {fmi2OK, LOG_EVENTS},
-    [SEVERITY_WARNING] = {fmi2Warning, LOG_STATUS_WARNING},
     [SEVERITY_DISCARD] = {fmi2Discard, LOG_STATUS_DISCARD},
     [SEVERITY_ERROR] = {fmi2Error, LOG_STATUS_ERROR},
 };
@@ -129,27 +129,50 @@ static const char *state_name(enum fmi_state state) {
         return "instantiated";
     case STATE_INITIALIZATION:
         return "in initialization mode";
-    case STATE_STEP_COMPLETE:
-        return "between steps";
-    case STATE_STEP_FAILED:
-        return "after a failed step";
     case STATE_TERMINATED:
         return "terminated";
     case STATE_ERROR:
         return "in the error state";
+    case STATE_STEP_COMPLETE:
+        return "between steps";
+    case STATE_STEP_FAILED:
+        return "after a failed step";
+    case STATE_EVENT:
+        return "in event mode";
+    case STATE_CONTINUOUS_TIME:
+        return "in continuous-time mode";
     }
     return "in no known state";
 }
 
-bool component_enter(struct component *component, enum call call) {
+struct component *component_enter(fmi2Component c, enum call call) {
+    static const char *const kind_names[] = {"any kind", "Co-Simulation", "Model Exchange"};
+    struct component *component = c;
     if (component == NULL) {
-        return false;
+        return NULL;
     }
     const struct call_rule *rule = &call_rules[call];
+    const enum call_kind kind =
+        component->kind == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE;
     component_log(component, fmi2OK, LOG_ALL, "%s", rule->name);
+    if (rule->kind != ANY_KIND && rule->kind != kind) {
+        component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
+                       kind_names[rule->kind], kind_names[kind]);
+        return NULL;
+    }
     if (((unsigned)component->state & rule->allowed) == 0) {
         component_fail(component, "%s is not allowed while the instance is %s", rule->name,
                        state_name(component->state));
+        return NULL;
+    }
+    return component;
+}
+
+bool component_has_arrays(struct component *component, enum call call, size_t count,
+                          const void *references, const void *values) {
+    if (count > 0 && (references == NULL || values == NULL)) {
+        component_fail(component, "%s: an array is NULL, %zu values are expected",
+                       call_rules[call].name, count);
         return false;
     }
     return true;
@@ -157,13 +180,14 @@ bool component_enter(struct component *component, enum call call) {
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-struct component *component_create(const char *name, const fmi2CallbackFunctions *functions,
-                                   bool logging_on) {
+struct component *component_create(const char *name, fmi2Type kind,
+                                   const fmi2CallbackFunctions *functions, bool logging_on) {
     struct component *component = calloc(1, sizeof *component);
     if (component == NULL) {
         return NULL;
     }
     component->state = STATE_INSTANTIATED;
+    component->kind = kind;
     component->logger = functions->logger;
     component->environment = functions->componentEnvironment;
     set_initial_logging(component, logging_on);

@@ -14,13 +14,14 @@ enum log_category {
     LOG_STATUS_DISCARD,
     LOG_STATUS_ERROR,
     LOG_STATUS_FATAL,
-    LOG_ALL,
+    LOG_ALL, /* of calls, which have no category of their own */
     LOG_CATEGORY_COUNT,
 };
 
 struct component {
     struct slave *slave;
     enum fmi_state state;
+    fmi2Type kind;
     fmi2CallbackLogger logger; /* NULL: no log */
     fmi2ComponentEnvironment environment;
     char *name;
@@ -28,13 +29,18 @@ struct component {
 };
 
 /* Allocates a component; functions and name are copied. NULL where memory is short. */
-struct component *component_create(const char *name, const fmi2CallbackFunctions *functions,
-                                   bool logging_on);
+struct component *component_create(const char *name, fmi2Type kind,
+                                   const fmi2CallbackFunctions *functions, bool logging_on);
 void component_destroy(struct component *component);
 
-/* A call may run: component is not NULL and in a state that calls.h allows it in. Otherwise says so
- * in the log, and the component goes into STATE_ERROR. */
-bool component_enter(struct component *component, enum call call);
+/* The component, where the call may run: c is not NULL, of the kind that the call belongs to and in
+ * a state that calls.h allows it in. Otherwise NULL: it is said in the log, and the component is in
+ * STATE_ERROR. */
+struct component *component_enter(fmi2Component c, enum call call);
+
+/* count values may be accessed: neither array is NULL where there are any. Otherwise fails. */
+bool component_has_arrays(struct component *component, enum call call, size_t count,
+                          const void *references, const void *values);
 
 /* FMI status of a slave's status; an error takes the component into STATE_ERROR. */
 fmi2Status component_status(struct component *component, enum status status);
@@ -53,7 +59,7 @@ __attribute__((format(printf, 3, 4))) void
 component_log_refusal(const fmi2CallbackFunctions *functions, const char *name, const char *format,
                       ...);
 
-/* Switches one category by name; false where there is none of that name. */
+/* Switches a category by name, logAll all of them; false where there is none of that name. */
 bool component_set_logged(struct component *component, const char *category, bool on);
 
 #endif

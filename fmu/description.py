@@ -22,6 +22,7 @@ Keys of variables.toml:
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,9 @@ Table = dict[str, Any]
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 LARGEST_REFERENCE = 9999
+INTEGERS = (-(2**31), 2**31 - 1)  # of the C type int
+IDENTIFIER = re.compile("[A-Za-z_][A-Za-z0-9_]*")
+RESERVED_NAMES = ("GUID", "NAME")  # with the prefix of the unit these are macros
 
 # allowed values of initial, the default first (table in section 2.2.7 of the specification)
 INITIALS = {
@@ -76,17 +80,28 @@ class DescriptionError(Exception):
     """A variables.toml that cannot be used: file, variable and reason in one line."""
 
 
+def is_finite_number(value: object) -> bool:
+    """Tell whether a value is a number that a double can hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
 def check_keys(where: str, table: Table, kinds: dict[str, type]) -> None:
     """Refuse keys that are unknown or whose value is of another type."""
     for key, value in table.items():
         if key not in kinds:
             raise DescriptionError(f"{where}: unknown key '{key}', expected {', '.join(kinds)}")
-        number = isinstance(value, int | float) and not isinstance(value, bool)
         if kinds[key] is float:
-            if not (number and math.isfinite(value)):
-                raise DescriptionError(f"{where}: {key} = {value!r} is not a finite number")
+            if not is_finite_number(value):
+                raise DescriptionError(f"{where}: {key} = {value!r:.40} is not a finite number")
         elif not isinstance(value, kinds[key]) or isinstance(value, bool):
             raise DescriptionError(f"{where}: {key} = {value!r} is not a {kinds[key].__name__}")
+        elif isinstance(value, list) and not all(isinstance(item, str) for item in value):
+            raise DescriptionError(f"{where}: {key} = {value!r} is not a list of strings")
 
 
 def read_toml(path: Path) -> Table:
@@ -125,6 +140,10 @@ def load(path: Path) -> Table:
                 raise DescriptionError(f"{where}: is not a table")
             if name in variables:
                 raise DescriptionError(f"{where}: is declared twice")
+            if not IDENTIFIER.fullmatch(name):
+                raise DescriptionError(f"{where}: the name must be a C identifier")
+            if name in RESERVED_NAMES:
+                raise DescriptionError(f"{where}: the name is reserved for the generated header")
             variables[name] = checked_variable(where, variable) | {"where": where}
     for section in ("model", "experiment"):
         check_keys(f"{path}: [{section}]", description[section], KEYS[section])
@@ -134,6 +153,7 @@ def load(path: Path) -> Table:
     if not description["model"]["name"].isidentifier():
         raise DescriptionError(f"{path}: [model] name must be a C identifier")
 
+    check_experiment(path, description["experiment"])
     check_units(path, units)
     check_together(variables, units)
     by_reference = sorted(variables.items(), key=lambda item: item[1]["reference"])
@@ -168,8 +188,8 @@ def checked_variable(where: str, variable: Table) -> Table:
         if v["variability"] == "continuous" or "unit" in v:
             raise DescriptionError(f"{where}: an Integer is not continuous and has no unit")
         for key in ("start", "min", "max"):
-            if key in v and v[key] != int(v[key]):
-                raise DescriptionError(f"{where}: {key} = {v[key]} is not an integer")
+            if key in v and not (v[key] == int(v[key]) and INTEGERS[0] <= v[key] <= INTEGERS[1]):
+                raise DescriptionError(f"{where}: {key} = {v[key]} is not an integer of 32 bits")
     elif "unit" not in v:
         raise DescriptionError(f"{where}: lacks unit")
     if needs_start and not v.get("min", -math.inf) <= v["start"] <= v.get("max", math.inf):
@@ -177,6 +197,17 @@ def checked_variable(where: str, variable: Table) -> Table:
     if v.get("nominal", 1.0) <= 0.0:
         raise DescriptionError(f"{where}: nominal must be above 0")
     return v
+
+
+def check_experiment(path: Path, experiment: Table) -> None:
+    """Check that the default experiment can be run."""
+    for key, possible in (
+        ("stop", experiment["stop"] > experiment["start"]),
+        ("tolerance", 0.0 < experiment["tolerance"] < 1.0),
+        ("step", 0.0 < experiment["step"] <= experiment["stop"] - experiment["start"]),
+    ):
+        if not possible:
+            raise DescriptionError(f"{path}: [experiment] {key} = {experiment[key]} is impossible")
 
 
 def check_units(path: Path, units: Table) -> None:
@@ -209,6 +240,10 @@ def check_together(variables: Table, units: Table) -> None:
         for other in v.get("parameters", []):
             if variables[other]["causality"] != "parameter":
                 raise DescriptionError(f"{where}: '{other}' is not a parameter")
+    independent = [n for n, v in variables.items() if v["causality"] == "independent"]
+    if len(independent) > 1:
+        where = variables[independent[1]]["where"]
+        raise DescriptionError(f"{where}: there is an independent variable already, time")
     knowns = [*states(variables), *inputs(variables), "time"]
     for v in variables.values():
         if is_unknown(v) and "dependencies" not in v:

@@ -1,25 +1,10 @@
-/* The functions of FMI 2.0 for co-simulation: checks of arguments that only FMI has, conversion of
- * types and status, and nothing else. What each does is told in the specification, section 4.2. */
+/* The functions that Model Exchange and Co-Simulation share (FMI 2.0, section 2.1): checks of
+ * arguments that only FMI has, conversion of types and status, and nothing else. */
 #include "component.h"
+#include "snapshot.h"
 #include "unit.h"
 
 #include <string.h>
-
-/* The component, or NULL where the call is refused: the caller then returns fmi2Error. */
-static struct component *enter(fmi2Component c, enum call call) {
-    struct component *component = c;
-    return component_enter(component, call) ? component : NULL;
-}
-
-static bool has_arrays(struct component *component, enum call call, size_t count,
-                       const void *references, const void *values) {
-    if (count > 0 && (references == NULL || values == NULL)) {
-        component_fail(component, "%s: an array is NULL, %zu values are expected",
-                       call_rules[call].name, count);
-        return false;
-    }
-    return true;
-}
 
 /* ---- Versions, life and logging -------------------------------------------------------------- */
 
@@ -39,10 +24,12 @@ static bool may_instantiate(fmi2String name, fmi2Type type, fmi2String guid,
                               "the instance name is missing: a name that is not empty is expected");
         return false;
     }
-    if (type != fmi2CoSimulation) {
-        component_log_refusal(functions, name,
-                              "FMU type %d is refused: co-simulation, %d, is expected", (int)type,
-                              (int)fmi2CoSimulation);
+    if (type != fmi2CoSimulation && type != fmi2ModelExchange) {
+        component_log_refusal(
+            functions, name,
+            "FMU type %d is refused: Model Exchange, %d, or co-simulation, %d, is "
+            "expected",
+            (int)type, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
         return false;
     }
     if (guid == NULL || strcmp(guid, unit.guid) != 0) {
@@ -65,7 +52,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (!may_instantiate(instanceName, fmuType, fmuGUID, functions)) {
         return NULL;
     }
-    struct component *component = component_create(instanceName, functions, loggingOn != fmi2False);
+    struct component *component =
+        component_create(instanceName, fmuType, functions, loggingOn != fmi2False);
     if (component == NULL) {
         component_log_refusal(functions, instanceName, "%s", status_text(STATUS_OUT_OF_MEMORY));
     }
@@ -78,9 +66,9 @@ void fmi2FreeInstance(fmi2Component c) {
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-    struct component *component = enter(c, CALL_fmi2SetDebugLogging);
-    if (component == NULL ||
-        !has_arrays(component, CALL_fmi2SetDebugLogging, nCategories, categories, categories)) {
+    struct component *component = component_enter(c, CALL_fmi2SetDebugLogging);
+    if (component == NULL || !component_has_arrays(component, CALL_fmi2SetDebugLogging, nCategories,
+                                                   categories, categories)) {
         return fmi2Error;
     }
 
@@ -106,7 +94,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-    struct component *component = enter(c, CALL_fmi2SetupExperiment);
+    struct component *component = component_enter(c, CALL_fmi2SetupExperiment);
     if (component == NULL) {
         return fmi2Error;
     }
@@ -121,7 +109,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    struct component *component = enter(c, CALL_fmi2EnterInitializationMode);
+    struct component *component = component_enter(c, CALL_fmi2EnterInitializationMode);
     if (component == NULL) {
         return fmi2Error;
     }
@@ -133,13 +121,13 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    struct component *component = enter(c, CALL_fmi2ExitInitializationMode);
+    struct component *component = component_enter(c, CALL_fmi2ExitInitializationMode);
     if (component == NULL) {
         return fmi2Error;
     }
     const enum status status = slave_exit_initialization(component->slave);
     if (status == STATUS_OK) {
-        component->state = STATE_STEP_COMPLETE;
+        component->state = component->kind == fmi2CoSimulation ? STATE_STEP_COMPLETE : STATE_EVENT;
         component_log(component, fmi2OK, LOG_EVENTS, "initialized at t = %.17g",
                       slave_time(component->slave));
     }
@@ -147,7 +135,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    struct component *component = enter(c, CALL_fmi2Terminate);
+    struct component *component = component_enter(c, CALL_fmi2Terminate);
     if (component == NULL) {
         return fmi2Error;
     }
@@ -158,7 +146,7 @@ fmi2Status fmi2Terminate(fmi2Component c) {
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    struct component *component = enter(c, CALL_fmi2Reset);
+    struct component *component = component_enter(c, CALL_fmi2Reset);
     if (component == NULL) {
         return fmi2Error;
     }
@@ -172,8 +160,8 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        fmi2Real value[]) {
-    struct component *component = enter(c, CALL_fmi2GetReal);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetReal, nvr, vr, value)) {
+    struct component *component = component_enter(c, CALL_fmi2GetReal);
+    if (component == NULL || !component_has_arrays(component, CALL_fmi2GetReal, nvr, vr, value)) {
         return fmi2Error;
     }
     return component_status(component, slave_get_real(component->slave, vr, nvr, value));
@@ -181,8 +169,9 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Integer value[]) {
-    struct component *component = enter(c, CALL_fmi2GetInteger);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetInteger, nvr, vr, value)) {
+    struct component *component = component_enter(c, CALL_fmi2GetInteger);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetInteger, nvr, vr, value)) {
         return fmi2Error;
     }
     return component_status(component, slave_get_integer(component->slave, vr, nvr, value));
@@ -190,8 +179,8 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        const fmi2Real value[]) {
-    struct component *component = enter(c, CALL_fmi2SetReal);
-    if (component == NULL || !has_arrays(component, CALL_fmi2SetReal, nvr, vr, value)) {
+    struct component *component = component_enter(c, CALL_fmi2SetReal);
+    if (component == NULL || !component_has_arrays(component, CALL_fmi2SetReal, nvr, vr, value)) {
         return fmi2Error;
     }
     return component_status(component, slave_set_real(component->slave, vr, nvr, value));
@@ -199,8 +188,9 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           const fmi2Integer value[]) {
-    struct component *component = enter(c, CALL_fmi2SetInteger);
-    if (component == NULL || !has_arrays(component, CALL_fmi2SetInteger, nvr, vr, value)) {
+    struct component *component = component_enter(c, CALL_fmi2SetInteger);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2SetInteger, nvr, vr, value)) {
         return fmi2Error;
     }
     return component_status(component, slave_set_integer(component->slave, vr, nvr, value));
@@ -209,8 +199,8 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 /* Units have no Boolean and no String variables: only an access to none of them succeeds. */
 static fmi2Status access_none(fmi2Component c, enum call call, const char *type,
                               const fmi2ValueReference vr[], size_t nvr, const void *value) {
-    struct component *component = enter(c, call);
-    if (component == NULL || !has_arrays(component, call, nvr, vr, value)) {
+    struct component *component = component_enter(c, call);
+    if (component == NULL || !component_has_arrays(component, call, nvr, vr, value)) {
         return fmi2Error;
     }
     if (nvr > 0) {
@@ -242,83 +232,145 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return access_none(c, CALL_fmi2SetString, "String", vr, nvr, value);
 }
 
-/* ---- Steps ---------------------------------------------------------------------------------- */
+/* ---- FMU state ------------------------------------------------------------------------------ */
 
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
-                      fmi2Real communicationStepSize,
-                      fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
-    (void)noSetFMUStatePriorToCurrentPoint; // importers say true and roll back all the same
-    struct component *component = enter(c, CALL_fmi2DoStep);
-    if (component == NULL) {
+/* A saved state carries the FMI state and the kind of its instance. */
+enum { TAG_KIND_SHIFT = 16, TAG_STATE_MASK = 0xffff };
+
+static unsigned tag_of(const struct component *component) {
+    return (unsigned)component->state | (unsigned)component->kind << TAG_KIND_SHIFT;
+}
+
+static bool has_pointer(struct component *component, enum call call, const void *pointer) {
+    return component_has_arrays(component, call, 1, pointer, pointer);
+}
+
+/* The state in a tag, where it is one that an instance of this kind can be in; otherwise 0. */
+static unsigned state_in(const struct component *component, unsigned tag) {
+    const unsigned common =
+        STATE_INSTANTIATED | STATE_INITIALIZATION | STATE_TERMINATED | STATE_ERROR;
+    const unsigned possible = component->kind == fmi2CoSimulation
+                                  ? common | STATE_STEP_COMPLETE | STATE_STEP_FAILED
+                                  : common | STATE_EVENT | STATE_CONTINUOUS_TIME;
+    const unsigned state = tag & TAG_STATE_MASK;
+    const bool is_one_bit = state != 0 && (state & (state - 1)) == 0;
+    return tag >> TAG_KIND_SHIFT == (unsigned)component->kind && is_one_bit ? state & possible : 0;
+}
+
+static fmi2Status refuse_kind(struct component *component, enum call call) {
+    return component_fail(component, "%s: the saved state is refused: it is of an instance for %s",
+                          call_rules[call].name,
+                          component->kind == fmi2CoSimulation ? "Model Exchange" : "Co-Simulation");
+}
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
+    struct component *component = component_enter(c, CALL_fmi2GetFMUstate);
+    if (component == NULL || !has_pointer(component, CALL_fmi2GetFMUstate, FMUstate)) {
         return fmi2Error;
     }
-    const enum status status =
-        slave_do_step(component->slave, currentCommunicationPoint, communicationStepSize);
-    if (status_severity(status) == SEVERITY_DISCARD) {
-        component->state = STATE_STEP_FAILED;
+    struct slave_snapshot *snapshot = *FMUstate;
+    const enum status status = slave_save(component->slave, tag_of(component), &snapshot);
+    *FMUstate = snapshot;
+    return component_status(component, status);
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
+    struct component *component = component_enter(c, CALL_fmi2SetFMUstate);
+    if (component == NULL || !has_pointer(component, CALL_fmi2SetFMUstate, FMUstate)) {
+        return fmi2Error;
+    }
+    unsigned tag = 0;
+    enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag);
+    if (status != STATUS_OK) {
+        return component_status(component, status);
+    }
+    const unsigned state = state_in(component, tag);
+    if (state == 0) {
+        return refuse_kind(component, CALL_fmi2SetFMUstate);
+    }
+    status = slave_restore(component->slave, FMUstate);
+    if (status == STATUS_OK) {
+        component->state = (enum fmi_state)state;
     }
     return component_status(component, status);
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) {
-    enter(c, CALL_fmi2CancelStep);
-    return fmi2Error;
-}
-
-static fmi2Status status_unknown(struct component *component, enum call call) {
-    component_log(component, fmi2Discard, LOG_STATUS_DISCARD,
-                  "%s: this status cannot be known, no step is ever pending",
-                  call_rules[call].name);
-    return fmi2Discard;
-}
-
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
-    (void)s;
-    struct component *component = enter(c, CALL_fmi2GetStatus);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetStatus, 1, value, value)) {
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
+    struct component *component = component_enter(c, CALL_fmi2FreeFMUstate);
+    if (component == NULL) {
         return fmi2Error;
     }
-    return status_unknown(component, CALL_fmi2GetStatus);
+    if (FMUstate == NULL || *FMUstate == NULL) {
+        return fmi2OK;
+    }
+    struct slave_snapshot *snapshot = *FMUstate;
+    const enum status status = slave_forget(component->slave, &snapshot);
+    *FMUstate = snapshot;
+    return component_status(component, status);
 }
 
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
-    struct component *component = enter(c, CALL_fmi2GetRealStatus);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetRealStatus, 1, value, value)) {
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
+    struct component *component = component_enter(c, CALL_fmi2SerializedFMUstateSize);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2SerializedFMUstateSize, 1, FMUstate, size)) {
         return fmi2Error;
     }
-    if (s != fmi2LastSuccessfulTime) {
-        return status_unknown(component, CALL_fmi2GetRealStatus);
+    unsigned tag = 0;
+    const enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag);
+    if (status == STATUS_OK) {
+        *size = slave_serialized_size(component->slave);
     }
-    *value = slave_time(component->slave);
+    return component_status(component, status);
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
+                                 size_t size) {
+    struct component *component = component_enter(c, CALL_fmi2SerializeFMUstate);
+    if (component == NULL || !component_has_arrays(component, CALL_fmi2SerializeFMUstate, 1,
+                                                   FMUstate, serializedState)) {
+        return fmi2Error;
+    }
+    return component_status(component, slave_serialize(component->slave, FMUstate,
+                                                       (unsigned char *)serializedState, size));
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
+                                   fmi2FMUstate *FMUstate) {
+    struct component *component = component_enter(c, CALL_fmi2DeSerializeFMUstate);
+    if (component == NULL || !component_has_arrays(component, CALL_fmi2DeSerializeFMUstate, 1,
+                                                   serializedState, FMUstate)) {
+        return fmi2Error;
+    }
+    struct slave_snapshot *snapshot = NULL;
+    enum status status = slave_deserialize(component->slave, (const unsigned char *)serializedState,
+                                           size, &snapshot);
+    if (status != STATUS_OK) {
+        return component_status(component, status);
+    }
+    unsigned tag = 0;
+    status = slave_snapshot_tag(component->slave, snapshot, &tag);
+    if (status != STATUS_OK || state_in(component, tag) == 0) {
+        slave_forget(component->slave, &snapshot);
+        return refuse_kind(component, CALL_fmi2DeSerializeFMUstate);
+    }
+    *FMUstate = snapshot;
     return fmi2OK;
 }
 
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
-    (void)s;
-    struct component *component = enter(c, CALL_fmi2GetIntegerStatus);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetIntegerStatus, 1, value, value)) {
-        return fmi2Error;
-    }
-    return status_unknown(component, CALL_fmi2GetIntegerStatus);
-}
+/* ---- Directional derivatives ----------------------------------------------------------------- */
 
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
-    struct component *component = enter(c, CALL_fmi2GetBooleanStatus);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetBooleanStatus, 1, value, value)) {
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
+                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[],
+                                        size_t nKnown, const fmi2Real dvKnown[],
+                                        fmi2Real dvUnknown[]) {
+    const enum call call = CALL_fmi2GetDirectionalDerivative;
+    struct component *component = component_enter(c, call);
+    if (component == NULL ||
+        !component_has_arrays(component, call, nUnknown, vUnknown_ref, dvUnknown) ||
+        !component_has_arrays(component, call, nKnown, vKnown_ref, dvKnown)) {
         return fmi2Error;
     }
-    if (s != fmi2Terminated) {
-        return status_unknown(component, CALL_fmi2GetBooleanStatus);
-    }
-    *value = fmi2False; // the unit never ends a simulation by itself
-    return fmi2OK;
-}
-
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
-    (void)s;
-    struct component *component = enter(c, CALL_fmi2GetStringStatus);
-    if (component == NULL || !has_arrays(component, CALL_fmi2GetStringStatus, 1, value, value)) {
-        return fmi2Error;
-    }
-    return status_unknown(component, CALL_fmi2GetStringStatus);
+    return component_status(
+        component, slave_get_directional_derivative(component->slave, vUnknown_ref, nUnknown,
+                                                    vKnown_ref, nKnown, dvKnown, dvUnknown));
 }

@@ -62,12 +62,21 @@ def model_description(description: Table, version: str) -> str:
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
     )
+    shared_flags = {
+        "modelIdentifier": model["name"],
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    }
+    ET.SubElement(root, "ModelExchange", shared_flags)
     ET.SubElement(
         root,
         "CoSimulation",
-        modelIdentifier=model["name"],
+        shared_flags,
         canHandleVariableCommunicationStepSize="true",
-        canNotUseMemoryManagementFunctions="true",
+        canInterpolateInputs="true",
+        maxOutputDerivativeOrder="2",
     )
     add_units(ET.SubElement(root, "UnitDefinitions"), description["units"])
     categories = ET.SubElement(root, "LogCategories")

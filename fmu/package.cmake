@@ -37,7 +37,8 @@ function(add_fmu name)
   add_library(${name} MODULE
     ${FMU_SOURCE_DIR}/component.c
     ${FMU_SOURCE_DIR}/fmi2.c
-    ${FMU_SOURCE_DIR}/fmi2_unsupported.c)
+    ${FMU_SOURCE_DIR}/fmi2_co_simulation.c
+    ${FMU_SOURCE_DIR}/fmi2_model_exchange.c)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${name} PRIVATE ${name}_unit)

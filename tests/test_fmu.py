@@ -10,6 +10,7 @@ import fmpy
 import numpy as np
 import pytest
 from conftest import ROOT
+from fmpy.util import create_plotly_figure
 from fmpy.validation import validate_fmu
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -123,6 +124,23 @@ def test_inputs_of_a_user_drive_it(fmu: Path) -> None:
     np.testing.assert_allclose(result["q2"], 0.5 * 2.0 * result["time"] ** 2, rtol=0, atol=1e-9)
     np.testing.assert_allclose(result["dq2"], 2.0 * result["time"], rtol=0, atol=1e-9)
     assert np.all(result["q1"] == 0.0)
+
+
+def test_the_sample_of_the_readme_runs(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = []
+    monkeypatch.setattr(fmpy, "plot_result", shown.append)
+    monkeypatch.chdir(ROOT)
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert len(blocks) == 1
+    exec(blocks[0].replace("build/RPManipulator.fmu", str(fmu)), {})
+    assert shown[0]["time"][-1] == 2.0
+
+
+def test_fmpy_can_plot(fmu: Path) -> None:
+    """`fmpy simulate --show-plot` draws with plotly, which fmpy does not bring by itself."""
+    result = fmpy.simulate_fmu(str(fmu), stop_time=0.1)
+    figure = create_plotly_figure(result)
+    assert len(figure.data) >= 14
 
 
 def test_the_page_names_the_fraction_of_the_tolerance_that_is_used(fmu: Path) -> None:

@@ -1,9 +1,11 @@
 #include "rp_model.h"
 
+#include "rp_propagation.h"
+
 #include <stdio.h>
 
-static enum status derivatives(const void *values_pointer, double t, const double x[],
-                               const double u[], double dx[]) {
+static enum status right_hand_side(const void *values_pointer, double t, const double x[],
+                                   const double u[], double dx[]) {
     const struct rp_values *values = values_pointer;
     (void)t;
     dx[0] = x[2];
@@ -33,6 +35,14 @@ static enum status outputs(void *values_pointer, double t) {
     return STATUS_OK;
 }
 
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    // no field depends on the time itself
+    (void)t;
+    (void)dt;
+    rp_propagate(values, first, second);
+    return STATUS_OK;
+}
+
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
     if (rp_parameters_check(p)) {
@@ -50,10 +60,15 @@ const struct model rp_model = {
     .parameters = {offsetof(struct rp_values, parameters), sizeof(struct rp_parameters)},
     .inputs = {offsetof(struct rp_values, tau), sizeof(double[2])},
     .states = {offsetof(struct rp_values, q), sizeof(double[4])},
-    .derivatives = derivatives,
+    .derivatives = {offsetof(struct rp_values, dq), sizeof(double[4])},
+    .right_hand_side = right_hand_side,
     .outputs = outputs,
+    .propagate = propagate,
     .check_parameters = check_parameters,
 };
 
 _Static_assert(offsetof(struct rp_values, dq) == offsetof(struct rp_values, q) + sizeof(double[2]),
                "the states are one array: q, then dq");
+_Static_assert(offsetof(struct rp_values, ddq) ==
+                   offsetof(struct rp_values, dq) + sizeof(double[2]),
+               "their derivatives are one array: dq, then ddq");

@@ -1,0 +1,114 @@
+/* The functions of FMI 2.0 that Co-Simulation has of its own (section 4.2). */
+#include "component.h"
+
+/* ---- Derivatives of inputs and outputs ------------------------------------------------------- */
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    const enum call call = CALL_fmi2SetRealInputDerivatives;
+    struct component *component = component_enter(c, call);
+    if (component == NULL || !component_has_arrays(component, call, nvr, vr, value) ||
+        !component_has_arrays(component, call, nvr, order, order)) {
+        return fmi2Error;
+    }
+    return component_status(component,
+                            slave_set_input_derivatives(component->slave, vr, nvr, order, value));
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    const enum call call = CALL_fmi2GetRealOutputDerivatives;
+    struct component *component = component_enter(c, call);
+    if (component == NULL || !component_has_arrays(component, call, nvr, vr, value) ||
+        !component_has_arrays(component, call, nvr, order, order)) {
+        return fmi2Error;
+    }
+    return component_status(component,
+                            slave_get_output_derivatives(component->slave, vr, nvr, order, value));
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
+                      fmi2Real communicationStepSize,
+                      fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
+    (void)noSetFMUStatePriorToCurrentPoint; // importers say true and roll back all the same
+    struct component *component = component_enter(c, CALL_fmi2DoStep);
+    if (component == NULL) {
+        return fmi2Error;
+    }
+    const enum status status =
+        slave_do_step(component->slave, currentCommunicationPoint, communicationStepSize);
+    if (status_severity(status) == SEVERITY_DISCARD) {
+        component->state = STATE_STEP_FAILED;
+    }
+    return component_status(component, status);
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+    component_enter(c, CALL_fmi2CancelStep);
+    return fmi2Error;
+}
+
+static fmi2Status status_unknown(struct component *component, enum call call) {
+    component_log(component, fmi2Discard, LOG_STATUS_DISCARD,
+                  "%s: this status cannot be known, no step is ever pending",
+                  call_rules[call].name);
+    return fmi2Discard;
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
+    (void)s;
+    struct component *component = component_enter(c, CALL_fmi2GetStatus);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetStatus, 1, value, value)) {
+        return fmi2Error;
+    }
+    return status_unknown(component, CALL_fmi2GetStatus);
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
+    struct component *component = component_enter(c, CALL_fmi2GetRealStatus);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetRealStatus, 1, value, value)) {
+        return fmi2Error;
+    }
+    if (s != fmi2LastSuccessfulTime) {
+        return status_unknown(component, CALL_fmi2GetRealStatus);
+    }
+    *value = slave_time(component->slave);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
+    (void)s;
+    struct component *component = component_enter(c, CALL_fmi2GetIntegerStatus);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetIntegerStatus, 1, value, value)) {
+        return fmi2Error;
+    }
+    return status_unknown(component, CALL_fmi2GetIntegerStatus);
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
+    struct component *component = component_enter(c, CALL_fmi2GetBooleanStatus);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetBooleanStatus, 1, value, value)) {
+        return fmi2Error;
+    }
+    if (s != fmi2Terminated) {
+        return status_unknown(component, CALL_fmi2GetBooleanStatus);
+    }
+    *value = fmi2False; // the unit never ends a simulation by itself
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
+    (void)s;
+    struct component *component = component_enter(c, CALL_fmi2GetStringStatus);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetStringStatus, 1, value, value)) {
+        return fmi2Error;
+    }
+    return status_unknown(component, CALL_fmi2GetStringStatus);
+}

@@ -1,0 +1,118 @@
+/* The functions of FMI 2.0 that Model Exchange has of its own (section 3.2). Units have no events
+ * of their own and no event indicators. */
+#include "component.h"
+
+/* ---- Modes ---------------------------------------------------------------------------------- */
+
+fmi2Status fmi2EnterEventMode(fmi2Component c) {
+    struct component *component = component_enter(c, CALL_fmi2EnterEventMode);
+    if (component == NULL) {
+        return fmi2Error;
+    }
+    slave_enter_event_mode(component->slave);
+    component->state = STATE_EVENT;
+    return fmi2OK;
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
+    const enum call call = CALL_fmi2NewDiscreteStates;
+    struct component *component = component_enter(c, call);
+    if (component == NULL ||
+        !component_has_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
+        return fmi2Error;
+    }
+    *fmi2eventInfo = (fmi2EventInfo){
+        .newDiscreteStatesNeeded = fmi2False,
+        .terminateSimulation = fmi2False,
+        .nominalsOfContinuousStatesChanged = fmi2False,
+        .valuesOfContinuousStatesChanged = fmi2False,
+        .nextEventTimeDefined = fmi2False,
+    };
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+    struct component *component = component_enter(c, CALL_fmi2EnterContinuousTimeMode);
+    if (component == NULL) {
+        return fmi2Error;
+    }
+    const enum status status = slave_enter_continuous_time(component->slave);
+    if (status == STATUS_OK) {
+        component->state = STATE_CONTINUOUS_TIME;
+    }
+    return component_status(component, status);
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
+                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode,
+                                       fmi2Boolean *terminateSimulation) {
+    (void)noSetFMUStatePriorToCurrentPoint;
+    const enum call call = CALL_fmi2CompletedIntegratorStep;
+    struct component *component = component_enter(c, call);
+    if (component == NULL ||
+        !component_has_arrays(component, call, 1, enterEventMode, terminateSimulation)) {
+        return fmi2Error;
+    }
+    *enterEventMode = fmi2False;
+    *terminateSimulation = fmi2False;
+    return fmi2OK;
+}
+
+/* ---- Time and states ------------------------------------------------------------------------ */
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
+    struct component *component = component_enter(c, CALL_fmi2SetTime);
+    if (component == NULL) {
+        return fmi2Error;
+    }
+    return component_status(component, slave_set_time(component->slave, time));
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
+    struct component *component = component_enter(c, CALL_fmi2SetContinuousStates);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2SetContinuousStates, nx, x, x)) {
+        return fmi2Error;
+    }
+    return component_status(component, slave_set_states(component->slave, x, nx));
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
+    struct component *component = component_enter(c, CALL_fmi2GetDerivatives);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetDerivatives, nx, derivatives, derivatives)) {
+        return fmi2Error;
+    }
+    return component_status(component, slave_get_derivatives(component->slave, derivatives, nx));
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
+    (void)eventIndicators;
+    struct component *component = component_enter(c, CALL_fmi2GetEventIndicators);
+    if (component == NULL) {
+        return fmi2Error;
+    }
+    if (ni > 0) {
+        return component_fail(component, "%zu event indicators are accessed: there are none", ni);
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
+    struct component *component = component_enter(c, CALL_fmi2GetContinuousStates);
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetContinuousStates, nx, x, x)) {
+        return fmi2Error;
+    }
+    return component_status(component, slave_get_states(component->slave, x, nx));
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
+    const enum call call = CALL_fmi2GetNominalsOfContinuousStates;
+    struct component *component = component_enter(c, call);
+    if (component == NULL || !component_has_arrays(component, call, nx, x_nominal, x_nominal)) {
+        return fmi2Error;
+    }
+    return component_status(component, slave_get_nominals(component->slave, x_nominal, nx));
+}
