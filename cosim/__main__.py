@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
@@ -16,6 +16,7 @@ from cosim.errors import UserError
 # `list` is quick.
 if TYPE_CHECKING:
     from cosim.accuracy import Run, Runs, Sweep
+    from cosim.convergence import Convergence
     from cosim.scenario import Scenario
     from cosim.simulation import Fmu
 
@@ -56,7 +57,8 @@ def _parser() -> argparse.ArgumentParser:
         help="simulate, check against the references, write a report",
         description="Simulates each scenario at its own tolerance and at 1e-11, and over the "
         "tolerances 1e-4 to 1e-11; compares all outputs with the reference, and prints the errors "
-        "and their bounds. Exit code: 0 all within bounds, 1 not, 2 wrong use.",
+        "and their bounds. Without names, measures the order of convergence in the communication "
+        "step too. Exit code: 0 all within bounds, 1 not, 2 wrong use.",
     )
     run.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
     run.add_argument(
@@ -108,13 +110,15 @@ def _list(_: argparse.Namespace) -> int:
 def _run(options: argparse.Namespace) -> int:
     # keeps matplotlib's font cache in the project
     os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
-    from cosim import report
+    from cosim import convergence, report
     from cosim.accuracy import TIGHTEST, Runs
     from cosim.simulation import Progress
 
     chosen = _choose(options.names)
+    studies: list[Convergence] = []
     with ExitStack() as stack:
-        runs = Runs(_open_fmus(chosen, options.fmu, stack))
+        fmus = _open_fmus(chosen, options.fmu, stack)
+        runs = Runs(fmus)
         for scenario in chosen:
             runs.reference(scenario)  # a missing one shows before anything has run
         if options.tolerance is not None:
@@ -122,13 +126,20 @@ def _run(options: argparse.Namespace) -> int:
         else:
             done = _print_runs(runs, chosen, None, TIGHTEST)
             sweeps = _print_sweeps(runs, _to_sweep(done) if options.names else chosen)
+            studies = [] if options.names else _print_convergence(fmus)
+        sections = [
+            convergence.section(
+                study, "convergence" if i == 0 else f"convergence_{study.scenario.name}"
+            )
+            for i, study in enumerate(studies)
+        ]
         try:
             with Progress("report", len(done), "runs") as progress:
-                index = report.write(options.report, done, sweeps, progress)
+                index = report.write(options.report, done, sweeps, progress, sections)
         except OSError as error:
             raise UserError(f"{options.report}: the report cannot be written: {error}") from error
     print(f"\nreport: {_from_here(index)}")
-    failed = dict.fromkeys(x.scenario.name for x in (*done, *sweeps) if not x.passed)
+    failed = dict.fromkeys(x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
     print(f"FAILED: {', '.join(failed)}" if failed else f"passed: {_count(chosen, 'scenario')}")
     return 1 if failed else 0
 
@@ -228,6 +239,28 @@ def _print_sweeps(runs: Runs, chosen: Sequence[Scenario]) -> list[Sweep]:
         for text in swept.violations:
             print(f"{swept.scenario.name}: {text}")
     return sweeps
+
+
+def _print_convergence(fmus: Mapping[str, Fmu]) -> list[Convergence]:
+    """Study the order of convergence of each model; a table appears as a study ends."""
+    from cosim import convergence
+    from cosim.simulation import Progress
+
+    studies = []
+    for path in convergence.find_all(ROOT):
+        problem = convergence.load(path)
+        fmu = fmus.get(problem.scenario.model)
+        if fmu is None:
+            continue
+        if not fmu.description.coSimulation.canInterpolateInputs:
+            print(f"\n{problem.scenario.name}: left out, the FMU does not interpolate inputs")
+            continue
+        label = f"{problem.scenario.name}, all steps"
+        with Progress(label, convergence.steps_ahead(problem)) as progress:
+            study = convergence.study(fmu, problem, progress)
+        print("", *convergence.lines(study), sep="\n", flush=True)
+        studies.append(study)
+    return studies
 
 
 def _count(things: Sequence[object], name: str) -> str:

@@ -3,6 +3,7 @@
 import html
 import textwrap
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib as mpl
@@ -87,11 +88,25 @@ a {{ color: #1d4e79; }}
 """
 
 
+@dataclass(frozen=True, eq=False)
+class Section:
+    """A further part of the page: a table and a picture, made elsewhere."""
+
+    name: str  # of the picture's file
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]  # cells in HTML
+    notes: Sequence[str]  # what is wrong
+    figure: Figure
+    alternative: str  # text in place of the picture
+
+
 def write(
     folder: Path,
     runs: Sequence[Run],
     sweeps: Sequence[Sweep],
     progress: Callable[[int], object] = lambda _: None,
+    sections: Sequence[Section] = (),
 ) -> Path:
     """Write index.html and all pictures and results to `folder`; return the path of index.html.
 
@@ -105,6 +120,8 @@ def write(
         May be empty.
     progress : callable, optional
         Called with 1 after each of `runs`.
+    sections : sequence of Section, optional
+        Shown behind the sweeps.
     """
     folder.mkdir(parents=True, exist_ok=True)
     grouped: dict[str, list[Run]] = {}
@@ -117,8 +134,10 @@ def write(
         progress(len(group))
     if sweeps:
         _save(accuracy_figure(sweeps), folder / "accuracy.png")
+    for section in sections:
+        _save(section.figure, folder / f"{section.name}.png")
     index = folder / "index.html"
-    index.write_text(_page(grouped, sweeps), encoding="utf-8")
+    index.write_text(_page(grouped, sweeps, sections), encoding="utf-8")
     return index
 
 
@@ -194,7 +213,7 @@ def accuracy_figure(sweeps: Sequence[Sweep]) -> Figure:
         drawn = np.array([sweep.errors for sweep in sweeps])
         limit = reference.ERROR_PER_TOLERANCE * tolerances.max()
         finite = drawn[np.isfinite(drawn)]
-        _error_axis(axes, finite.min(initial=limit), finite.max(initial=limit))
+        error_axis(axes, finite.min(initial=limit), finite.max(initial=limit))
         axes.set_xlabel("relative tolerance")
         axes.set_ylabel("largest relative error of all outputs")
         axes.set_title("Error against tolerance", loc="left", fontsize=14, weight="bold", pad=12)
@@ -222,10 +241,10 @@ def _head(figure: Figure, runs: Sequence[Run]) -> None:
     )
     handles = [
         Line2D([], [], color=REFERENCE, linewidth=5, label="reference"),
-        Line2D([], [], color=RUN, linewidth=1.3, label=f"FMU, tolerance {_short(first.tolerance)}"),
+        Line2D([], [], color=RUN, linewidth=1.3, label=f"FMU, tolerance {short(first.tolerance)}"),
     ]
     for run, color in zip(runs, ERRORS, strict=False):
-        tolerance = _short(run.result.tolerance)
+        tolerance = short(run.result.tolerance)
         handles.append(
             Line2D([], [], color=color, linewidth=1.3, label=f"error, tolerance {tolerance}")
         )
@@ -281,12 +300,12 @@ def _draw_errors(axes: Axes, runs: Sequence[Run], name: str) -> None:
         )
         axes.axhline(run.bound, color=color, linestyle=DASHED, linewidth=1.0, alpha=0.8)
         largest = max(largest, run.bound, error[np.isfinite(error)].max(initial=0.0))
-    _error_axis(axes, 0.0, largest)
+    error_axis(axes, 0.0, largest)
     axes.set_ylabel(f"error of {name}")
     axes.margins(x=0.02)
 
 
-def _error_axis(axes: Axes, smallest: float, largest: float) -> None:
+def error_axis(axes: Axes, smallest: float, largest: float) -> None:
     """Logarithmic axis to a decade above `largest`, from `smallest` or the floor, marked 0."""
     bottom, top = np.log10(max(smallest, FLOOR)) - 0.5, np.log10(largest) + 1
     if bottom < FLOOR_DECADE + TICK_DECADES:
@@ -316,7 +335,7 @@ def _time_label(scenario: Scenario) -> str:
     return f"time since t = {grouped} s (s)"
 
 
-def _short(number: float) -> str:
+def short(number: float) -> str:
     """1e-8 for 1e-08."""
     mantissa, exponent = f"{number:.3e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
@@ -327,7 +346,9 @@ def _save(figure: Figure, path: Path) -> None:
         figure.savefig(path, metadata={"Software": None})
 
 
-def _page(grouped: dict[str, list[Run]], sweeps: Sequence[Sweep]) -> str:
+def _page(
+    grouped: dict[str, list[Run]], sweeps: Sequence[Sweep], sections: Sequence[Section]
+) -> str:
     """Text of index.html."""
     models = dict.fromkeys(group[0].fmu.description.modelName for group in grouped.values())
     title = f"{', '.join(models)}: runs against their references"
@@ -335,6 +356,11 @@ def _page(grouped: dict[str, list[Run]], sweeps: Sequence[Sweep]) -> str:
     if sweeps:
         parts += ["<h2>Error against tolerance</h2>", _sweeps_table(sweeps)]
         parts.append('<figure><img src="accuracy.png" alt="Error over tolerance"></figure>')
+    for section in sections:
+        parts += [f"<h2>{html.escape(section.title)}</h2>", _table(section.head, section.rows)]
+        parts += _notes(section.notes)
+        file, text = (html.escape(x, quote=True) for x in (section.name, section.alternative))
+        parts.append(f'<figure><img src="{file}.png" alt="{text}"></figure>')
     for name, group in grouped.items():
         scenario, file = group[0].scenario, html.escape(name, quote=True)
         text = html.escape(f"{scenario.title}: {scenario.description}", quote=True)
@@ -354,15 +380,15 @@ def _runs_table(runs: Sequence[Run]) -> str:
         rows.append(
             [
                 f'<a href="#{name}">{name}</a>',
-                _short(result.tolerance),
+                short(result.tolerance),
                 str(result.steps),
                 f"{run.error:.2e}",
-                _short(run.bound),
+                short(run.bound),
                 html.escape(run.worst),
                 "" if result.solver_steps is None else str(result.solver_steps),
                 "" if result.solver_rhs_evaluations is None else str(result.solver_rhs_evaluations),
                 f"{result.wall_time:.3f} s",
-                _verdict(run.passed),
+                verdict(run.passed),
             ]
         )
     return _table(head, rows)
@@ -373,17 +399,20 @@ def _sweeps_table(sweeps: Sequence[Sweep]) -> str:
         [
             html.escape(sweep.scenario.name),
             *(f"{error:.1e}" for error in sweep.errors),
-            _verdict(sweep.passed),
+            verdict(sweep.passed),
         ]
         for sweep in sweeps
     ]
-    table = _table(["scenario", *map(_short, sweeps[0].tolerances), "result"], rows)
-    broken = [(s.scenario.name, text) for s in sweeps for text in s.violations]
-    notes = [f'<p class="failed">{html.escape(f"{name}: {text}")}</p>' for name, text in broken]
-    return "\n".join([table, *notes])
+    table = _table(["scenario", *map(short, sweeps[0].tolerances), "result"], rows)
+    broken = [f"{s.scenario.name}: {text}" for s in sweeps for text in s.violations]
+    return "\n".join([table, *_notes(broken)])
 
 
-def _verdict(passed: bool) -> str:
+def _notes(texts: Sequence[str]) -> list[str]:
+    return [f'<p class="failed">{html.escape(text)}</p>' for text in texts]
+
+
+def verdict(passed: bool) -> str:
     return "passed" if passed else '<span class="failed">FAILED</span>'
 
 

@@ -179,9 +179,11 @@ class Reference:
             "StepSize": constant_step,
             "RelTol": scenario.tolerance,
         }
-        _write(folder / f"{UNIT}_ref.csv", _csv(self.outputs, scenario.times[rows], outputs[rows]))
-        _write(folder / f"{UNIT}_in.csv", _csv(INPUTS, scenario.times, self.inputs(scenario)))
-        _write(folder / f"{UNIT}_ref.opt", "".join(f"{k},{v!r}\n" for k, v in options.items()))
+        write_whole(
+            folder / f"{UNIT}_ref.csv", _csv(self.outputs, scenario.times[rows], outputs[rows])
+        )
+        write_whole(folder / f"{UNIT}_in.csv", _csv(INPUTS, scenario.times, self.inputs(scenario)))
+        write_whole(folder / f"{UNIT}_ref.opt", "".join(f"{k},{v!r}\n" for k, v in options.items()))
 
 
 def _csv(names: list[str] | tuple[str, ...], times: np.ndarray, values: np.ndarray) -> str:
@@ -191,7 +193,7 @@ def _csv(names: list[str] | tuple[str, ...], times: np.ndarray, values: np.ndarr
     return "\n".join([header, *(",".join(f"{x + 0.0:.17g}" for x in row) for row in table)]) + "\n"
 
 
-def _write(path: Path, text: str) -> None:
+def write_whole(path: Path, text: str) -> None:
     """Write `text` whole or not at all."""
     temporary = path.with_name(path.name + ".part")
     temporary.write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,132 @@
+"""Instances of the built FMU as fmpy drives them: variables by name, messages kept."""
+
+import struct
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import fmpy
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+
+OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
+STATES = ("q1", "q2", "dq1", "dq2")
+INPUTS = ("tau1", "f2")
+
+
+class Message(NamedTuple):
+    """One call of the logger."""
+
+    status: int
+    category: str
+    text: str
+
+
+class Unit:
+    """An unpacked FMU."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        if path.is_file():
+            fmpy.extract(path, folder)
+        self.folder = folder
+        self.description = fmpy.read_model_description(folder)
+        variables = self.description.modelVariables
+        self.references = {variable.name: variable.valueReference for variable in variables}
+        self.reals = [v.valueReference for v in variables if v.type == "Real"]
+        self.integers = [v.valueReference for v in variables if v.type == "Integer"]
+
+
+class Instance:
+    """One instance; a context manager that frees it. `fmi` is fmpy's object."""
+
+    def __init__(
+        self,
+        unit: Unit,
+        kind: type = fmi2.FMU2Slave,
+        logging_on: bool = False,
+        calls: Callable[[str], object] | None = None,
+    ) -> None:
+        self.unit = unit
+        self.messages: list[Message] = []
+        element = unit.description.coSimulation or unit.description.modelExchange
+        self.fmi = kind(
+            guid=unit.description.guid,
+            modelIdentifier=element.modelIdentifier,
+            unzipDirectory=str(unit.folder),
+            instanceName="arm",
+            fmiCallLogger=calls,
+        )
+        # as sent: fmpy's own logger has one proxy for the whole process
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+        self.fmi.instantiate(callbacks=callbacks, loggingOn=logging_on)
+
+    def __enter__(self) -> "Instance":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.fmi.freeInstance()
+
+    def _log(
+        self, _environment: int, _name: bytes, status: int, category: bytes, text: bytes
+    ) -> None:
+        self.messages.append(Message(status, category.decode(), text.decode()))
+
+    def initialize(
+        self,
+        start: float = 0.0,
+        stop: float | None = None,
+        tolerance: float | None = None,
+        **values: float,
+    ) -> "Instance":
+        """From instantiated to the first communication point, or the first event mode."""
+        self.fmi.setupExperiment(tolerance=tolerance, startTime=start, stopTime=stop)
+        self.set(**values)
+        self.fmi.enterInitializationMode()
+        self.fmi.exitInitializationMode()
+        return self
+
+    def set(self, **values: float) -> None:
+        """Set Real variables."""
+        if values:
+            self.fmi.setReal([self.unit.references[name] for name in values], values.values())
+
+    def set_input_derivatives(self, **values: Iterable[float]) -> None:
+        """Set derivatives of inputs, each from order 1 on."""
+        rows = [
+            (self.unit.references[name], order, value)
+            for name, derivatives in values.items()
+            for order, value in enumerate(derivatives, start=1)
+        ]
+        if rows:
+            self.fmi.setRealInputDerivatives(*zip(*rows, strict=True))
+
+    def get(self, *names: str) -> list[float]:
+        """Values of Real variables."""
+        return self.fmi.getReal([self.unit.references[name] for name in names])
+
+    def count(self, name: str) -> int:
+        """Value of an Integer variable."""
+        return self.fmi.getInteger([self.unit.references[name]])[0]
+
+    def everything(self) -> bytes:
+        """All Real and all Integer variables, bit for bit."""
+        reals = self.fmi.getReal(self.unit.reals)
+        integers = self.fmi.getInteger(self.unit.integers)
+        return struct.pack(f"<{len(reals)}d{len(integers)}i", *reals, *integers)
+
+    def step(self, t: float, h: float) -> float:
+        """Make a step from `t`; return the time at its end."""
+        self.fmi.doStep(t, h)
+        return t + h
+
+
+def status_of(call: Callable, *arguments: object) -> int:
+    """Status of a call through fmpy, which raises where it is not OK."""
+    try:
+        call(*arguments)
+    except FMICallException as error:
+        return error.status
+    return OK
