@@ -26,7 +26,9 @@ struct integrator {
     double reached;   /* where the last advance ended */
     double failed_at; /* the last time that the right-hand side failed at */
 
-    struct integrator_statistics before_restart; /* CVODE counts from each restart on */
+    struct integrator_statistics statistics;
+    struct integrator_statistics counted; /* what CVODE, which counts from the last restart on, had
+                                             counted when statistics was brought up to date */
 };
 
 static int evaluate_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *integrator_pointer) {
@@ -163,19 +165,41 @@ enum status integrator_configure(struct integrator *integrator,
     if (flag == CV_SUCCESS) {
         flag = CVodeReInit(integrator->cvode, 0.0, integrator->x);
     }
-    integrator->before_restart = (struct integrator_statistics){0};
+    integrator->statistics = (struct integrator_statistics){0};
+    integrator->counted = (struct integrator_statistics){0};
     return status_of_flag(integrator, flag);
 }
 
 enum status integrator_restart(struct integrator *integrator, const double x[], double span) {
-    integrator_get_statistics(integrator, &integrator->before_restart);
-    integrator->before_restart.restarts++;
+    integrator->statistics.restarts++;
+    integrator->counted = (struct integrator_statistics){0};
     memcpy(N_VGetArrayPointer(integrator->x), x, integrator->ode.state_count * sizeof(double));
     N_VScale(1.0, integrator->x, integrator->last_x);
     integrator->span = span;
     integrator->reached = 0.0;
     integrator->failed_at = -INFINITY;
     return status_of_flag(integrator, CVodeReInit(integrator->cvode, 0.0, integrator->x));
+}
+
+static void update_statistics(struct integrator *integrator) {
+    struct integrator_statistics now = {0};
+    long iteration_failures = 0;
+    // these calls fail only without CVODE's memory
+    (void)CVodeGetNumSteps(integrator->cvode, &now.steps);
+    (void)CVodeGetNumRhsEvals(integrator->cvode, &now.rhs_evaluations);
+    (void)CVodeGetNumErrTestFails(integrator->cvode, &now.failed_steps);
+    (void)CVodeGetNumStepSolveFails(integrator->cvode, &iteration_failures);
+    now.failed_steps += iteration_failures;
+
+    struct integrator_statistics *totals = &integrator->statistics;
+    totals->steps += now.steps - integrator->counted.steps;
+    totals->rhs_evaluations += now.rhs_evaluations - integrator->counted.rhs_evaluations;
+    totals->failed_steps += now.failed_steps - integrator->counted.failed_steps;
+    if (now.steps > 0) {
+        (void)CVodeGetLastStep(integrator->cvode, &totals->last_step);
+        (void)CVodeGetLastOrder(integrator->cvode, &totals->last_order);
+    }
+    integrator->counted = now;
 }
 
 /* What CVODE left in x can be used: with extreme values it ends with success where its step has
@@ -204,6 +228,7 @@ enum status integrator_advance(struct integrator *integrator, double t, long max
     if (flag == CV_SUCCESS) {
         flag = CVode(integrator->cvode, t, integrator->x, &stopped_at, CV_NORMAL);
     }
+    update_statistics(integrator);
     enum status status = status_of_flag(integrator, flag);
     if (status == STATUS_OK) {
         stopped_at = t;
@@ -221,32 +246,10 @@ enum status integrator_advance(struct integrator *integrator, double t, long max
 
 void integrator_get_statistics(const struct integrator *integrator,
                                struct integrator_statistics *statistics) {
-    long steps = 0;
-    long evaluations = 0;
-    long error_failures = 0;
-    long iteration_failures = 0;
-    *statistics = integrator->before_restart;
-    // these calls fail only without CVODE's memory
-    (void)CVodeGetNumSteps(integrator->cvode, &steps);
-    (void)CVodeGetNumRhsEvals(integrator->cvode, &evaluations);
-    (void)CVodeGetNumErrTestFails(integrator->cvode, &error_failures);
-    (void)CVodeGetNumStepSolveFails(integrator->cvode, &iteration_failures);
-    statistics->steps += steps;
-    statistics->rhs_evaluations += evaluations;
-    statistics->failed_steps += error_failures + iteration_failures;
-    if (steps > 0) {
-        (void)CVodeGetLastStep(integrator->cvode, &statistics->last_step);
-        (void)CVodeGetLastOrder(integrator->cvode, &statistics->last_order);
-    }
+    *statistics = integrator->statistics;
 }
 
 void integrator_set_statistics(struct integrator *integrator,
                                const struct integrator_statistics *statistics) {
-    struct integrator_statistics counted;
-    integrator->before_restart = (struct integrator_statistics){0};
-    integrator_get_statistics(integrator, &counted);
-    integrator->before_restart = *statistics;
-    integrator->before_restart.steps -= counted.steps;
-    integrator->before_restart.rhs_evaluations -= counted.rhs_evaluations;
-    integrator->before_restart.failed_steps -= counted.failed_steps;
+    integrator->statistics = *statistics;
 }

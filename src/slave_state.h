@@ -8,6 +8,11 @@
 #include "polynomial.h"
 #include "slave.h"
 
+/* Internal steps after which the integrator restarts though nothing has changed: what a restored
+ * snapshot has to replay at most, beside the steps of one communication step. Larger: fewer
+ * restarts, slower rollback. */
+enum { SLAVE_LONGEST_HISTORY = 1000 };
+
 /* All that later results depend on, but for the values in struct slave_memory. A plain value: a
  * snapshot is a copy of it. */
 struct slave_state {

@@ -262,8 +262,10 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
         !are_settable(slave, block + (memory->values - memory->block))) {
         return false;
     }
+    const long history = state->statistics.steps - state->steps_before_restart;
     return !state->has_history ||
-           (state->first_time > 0.0 && state->latest_time >= state->first_time &&
+           (history > 0 && history <= SLAVE_LONGEST_HISTORY + (long)state->own.max_internal_steps &&
+            state->first_time > 0.0 && state->latest_time >= state->first_time &&
             isfinite(state->latest_time) && state->span >= state->latest_time &&
             are_settable(slave, block + (memory->held - memory->block)));
 }

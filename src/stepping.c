@@ -5,11 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Internal steps after which the integrator restarts though nothing has changed: what a restored
- * snapshot has to replay at most, beside the steps of one communication step. Larger: fewer
- * restarts, slower rollback. */
-static const long longest_history = 1000;
-
 enum status slave_rhs(double t, const double x[], double dx[], void *slave_pointer) {
     const struct slave *slave = slave_pointer;
     const size_t input_count = count_of(slave->model->inputs);
@@ -84,7 +79,7 @@ static bool can_go_on(const struct slave *slave, double target) {
     const struct span parameters = slave->model->parameters;
     const size_t input_count = count_of(slave->model->inputs);
     return state->has_history && target <= state->span &&
-           state->statistics.steps - state->steps_before_restart < longest_history &&
+           state->statistics.steps - state->steps_before_restart < SLAVE_LONGEST_HISTORY &&
            memcmp(memory->held + parameters.offset, memory->values + parameters.offset,
                   parameters.size) == 0 &&
            are_equal(memory->running, memory->pending, input_count) &&
@@ -115,23 +110,30 @@ static enum status restart(struct slave *slave, struct clock_time end) {
                               state->span);
 }
 
-/* Brings the integrator to where the restored state says it is. */
+/* Brings the integrator to where the restored state says it is, in the internal steps that it says
+ * this took: a state whose bytes were forged ends here. */
 static enum status replay(struct slave *slave) {
     const struct slave_state *state = &slave->state;
     const struct span states = slave->model->states;
+    const long steps = state->statistics.steps - state->steps_before_restart;
     double *x = doubles_of(slave->first, states);
     double reached;
     enum status status =
         integrator_restart(slave->integrator, doubles_of(slave->memory.held, states), state->span);
     if (status == STATUS_OK) {
-        status = integrator_advance(slave->integrator, state->first_time, LONG_MAX, &reached, x);
+        status = integrator_advance(slave->integrator, state->first_time, steps, &reached, x);
     }
     if (status == STATUS_OK && state->latest_time > state->first_time) {
-        status = integrator_advance(slave->integrator, state->latest_time, LONG_MAX, &reached, x);
+        status = integrator_advance(slave->integrator, state->latest_time, steps, &reached, x);
     }
     integrator_set_statistics(slave->integrator, &state->statistics);
     slave->history_is_lost = false;
-    return status;
+    if (status != STATUS_OK) {
+        message_write(&slave->sink, STATUS_INVALID_ARGUMENT,
+                      "the restored state cannot be continued: it contradicts itself");
+        return STATUS_INVALID_ARGUMENT;
+    }
+    return STATUS_OK;
 }
 
 static int saturated(long count) {
