@@ -18,6 +18,9 @@ step "AddressSanitizer and UndefinedBehaviorSanitizer; C tests"
 build asan
 ctest --preset asan --progress -j 2
 
+step "other importers, each in an environment of its own"
+tests/importers/install.sh
+
 step "gcc, optimized; all tests"
 build default
 ctest --preset default -j 2 "$@"

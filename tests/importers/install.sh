@@ -1,0 +1,134 @@
+#!/usr/bin/env bash
+# Installs importers other than fmpy for tests/test_importers.py, each into a folder of its own,
+# build/importers/TOOL. Quick when there is nothing to do. A tool that cannot be installed is named,
+# the others are installed all the same, and the exit code is 1.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+
+ci_tools=(ecospy libcosimpy fmu-manipulation-toolbox)
+heavy_tools=(fmi-sim cofmupy pathsim-fmi gemseo-fmu) # minutes, up to 1 GB each
+
+usage() {
+  cat >&2 <<USAGE
+usage: tests/importers/install.sh [--all | TOOL ...]
+       tests/importers/install.sh --check TOOL    installs nothing; exit code 0: it is installed
+tools: ${ci_tools[*]} (these without an argument)
+       ${heavy_tools[*]}
+USAGE
+  exit 2
+}
+
+# Exact versions: the tool first, then what its results or its working depend on.
+pins() {
+  case "$1" in
+    ecospy) echo ecospy==0.7.2 ;;
+    libcosimpy) echo libcosimpy==0.0.6 ;;
+    fmu-manipulation-toolbox)
+      echo fmu-manipulation-toolbox==2.0 xmlschema==4.3.2 elementpath==5.1.4 colorama==0.4.6 ;;
+    fmi-sim) echo fmi-sim@0.7.0 ;; # crates.io; its dependencies are in its Cargo.lock
+    cofmupy) echo cofmupy==1.0.0 fmpy==0.3.20 numpy==2.4.6 pandas==3.1.1 scipy==1.17.1 ;;
+    pathsim-fmi) echo pathsim-fmi==0.1.1 pathsim==0.27.1 fmpy==0.3.32 numpy==2.4.6 ;;
+    gemseo-fmu) echo gemseo-fmu==3.1.1 gemseo==6.3.3 fmpy==0.3.19 numpy==2.3.3 ;;
+    *) return 1 ;;
+  esac
+}
+
+# Python module that must load once the tool is installed
+module() {
+  case "$1" in
+    fmu-manipulation-toolbox) echo fmu_manipulation_toolbox ;;
+    *) echo "${1//-/_}" ;;
+  esac
+}
+
+complain() { echo "install.sh: $*" >&2; }
+
+# ---- system packages
+
+# system_package NAME CHECK ...: NAME is installed where CHECK fails
+system_package() {
+  local name=$1
+  "${@:2}" >/dev/null 2>&1 && return
+  local install="apt-get install -y --no-install-recommends $name" sudo=""
+  [ "$(id -u)" -eq 0 ] || sudo="sudo"
+  command -v apt-get >/dev/null && { [ -z "$sudo" ] || command -v sudo >/dev/null; } || {
+    complain "please install $name (on Debian or Ubuntu, as root: $install)"; return 1; }
+  echo "install.sh: installing $name"
+  $sudo env DEBIAN_FRONTEND=noninteractive sh -c "apt-get update -qq && $install -qq" >/dev/null ||
+    { complain "this failed: $sudo $install"; return 1; }
+}
+
+has_libclang() { compgen -G '/usr/lib/llvm-*/lib/libclang.so'; }
+has_libtbb() { compgen -G '/usr/lib/*/libtbb.so.12'; }
+
+# ---- tools
+
+# What the folder was made from: another pin or another Python makes it again.
+stamp() {
+  pins "$1"
+  [ "$1" = fmi-sim ] || python3 -c 'import sys; print("Python %d.%d" % sys.version_info[:2])'
+}
+
+is_installed() {
+  local file=build/importers/$1/installed
+  [ -e "$file" ] && [ "$(stamp "$1")" = "$(cat "$file")" ]
+}
+
+with_pip() {
+  local tool=$1 folder=build/importers/$1
+  python3 -m venv --clear "$folder" || return 1
+  # shellcheck disable=SC2046 # one word a pin
+  "$folder/bin/python" -m pip install --quiet --disable-pip-version-check $(pins "$tool") ||
+    return 1
+  if [ "$tool" = ecospy ]; then
+    # its wheel has the programs without their run bits
+    chmod +x "$folder"/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu} || return 1
+  fi
+  "$folder/bin/python" -c "import $(module "$tool")" >/dev/null
+}
+
+with_cargo() {
+  local folder=$PWD/build/importers/$1
+  command -v cargo >/dev/null || { echo "cargo, of Rust, is missing"; return 1; }
+  system_package libclang-dev has_libclang || return 1
+  rm -rf "$folder" && mkdir -p "$folder" || return 1
+  CARGO_TARGET_DIR="$folder/target" \
+    cargo install --quiet --locked --root "$folder" "$(pins "$1")" || return 1
+  rm -rf "$folder/target"
+}
+
+install_tool() {
+  local tool=$1 log=build/importers/$1.log how=with_pip
+  [ "$tool" != fmi-sim ] || how=with_cargo
+  [ "$tool" != ecospy ] || system_package libtbb12 has_libtbb || return 1
+  is_installed "$tool" && return
+  echo "install.sh: installing $(pins "$tool" | cut -d ' ' -f 1) into build/importers/$tool"
+  rm -f "build/importers/$tool/installed"
+  mkdir -p build/importers
+  "$how" "$tool" >"$log" 2>&1 || { tail -n 20 "$log" >&2; return 1; }
+  stamp "$tool" >"build/importers/$tool/installed"
+}
+
+tools=("${ci_tools[@]}")
+case "${1-}" in
+  "") ;;
+  --all) [ $# -eq 1 ] || usage; tools+=("${heavy_tools[@]}") ;;
+  --check) [ $# -eq 2 ] && pins "$2" >/dev/null || usage; is_installed "$2"; exit ;;
+  *) tools=("$@") ;;
+esac
+for tool in "${tools[@]}"; do pins "$tool" >/dev/null || usage; done
+
+failed=()
+for tool in "${tools[@]}"; do
+  install_tool "$tool" || failed+=("$tool")
+done
+if [ "${#failed[@]}" -gt 0 ]; then
+  complain "could not be installed: ${failed[*]}"
+  exit 1
+fi
+missing=()
+for tool in "${ci_tools[@]}" "${heavy_tools[@]}"; do
+  is_installed "$tool" || missing+=("$tool")
+done
+[ "${#missing[@]}" -eq 0 ] ||
+  echo "install.sh: not installed, so their tests are skipped: ${missing[*]} (--all installs them)"
