@@ -104,7 +104,4 @@ enum status slave_configure_integrator(struct slave *slave);
 /* Right-hand side of the integrator; context: the slave. */
 ode_rhs slave_rhs;
 
-/* Prepares an instance whose state and memory were overwritten to go on from them. */
-enum status slave_resume(struct slave *slave);
-
 #endif

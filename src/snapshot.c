@@ -3,6 +3,7 @@
 #include "codec.h"
 #include "slave_state.h"
 
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -60,6 +61,21 @@ enum status slave_save(struct slave *slave, unsigned tag, struct slave_snapshot 
     return STATUS_OK;
 }
 
+/* Prepares the instance to go on from what was written into its state and memory. */
+static enum status resume(struct slave *slave) {
+    slave->outputs_are_valid = false;
+    slave->history_is_lost = true;
+    if (slave->integrator == NULL) {
+        return STATUS_OK;
+    }
+    enum status status = STATUS_OK;
+    if (slave->configured_tolerance != slave->state.own.effective_relative_tolerance) {
+        status = slave_configure_integrator(slave);
+    }
+    integrator_set_statistics(slave->integrator, &slave->state.statistics);
+    return status;
+}
+
 enum status slave_restore(struct slave *slave, struct slave_snapshot *snapshot) {
     const enum status status = check_own(slave, snapshot);
     if (status != STATUS_OK) {
@@ -67,7 +83,7 @@ enum status slave_restore(struct slave *slave, struct slave_snapshot *snapshot) 
     }
     slave->state = snapshot->state;
     memcpy(slave->memory.block, snapshot->memory, slave->memory.size);
-    return slave_resume(slave);
+    return resume(slave);
 }
 
 enum status slave_forget(struct slave *slave, struct slave_snapshot **snapshot) {
@@ -242,6 +258,18 @@ static bool are_settable(const struct slave *slave, const char *values) {
     return true;
 }
 
+/* Counts that can be counted on from without overflow. */
+static bool are_counts(const struct integrator_statistics *statistics) {
+    const long counts[] = {statistics->steps, statistics->rhs_evaluations, statistics->failed_steps,
+                           statistics->restarts};
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++) {
+        if (counts[i] < 0 || counts[i] > LONG_MAX / 2) {
+            return false;
+        }
+    }
+    return isfinite(statistics->last_step);
+}
+
 /* A state that an instance can be in: a hash that fits does not prove it. */
 static bool is_plausible(const struct slave *slave, const struct slave_state *state,
                          const char *block) {
@@ -257,7 +285,7 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
         !are_finite(times, sizeof times / sizeof times[0]) ||
         !are_finite(polynomials, coefficients) || !(tolerance > 0.0 && tolerance < 1.0) ||
         !(state->own.relative_tolerance >= 0.0) || !isfinite(state->own.solver_last_step) ||
-        state->own.max_internal_steps < 1 || state->statistics.steps < 0 ||
+        state->own.max_internal_steps < 1 || !are_counts(&state->statistics) ||
         state->steps_before_restart < 0 || state->steps_before_restart > state->statistics.steps ||
         !are_settable(slave, block + (memory->values - memory->block))) {
         return false;

@@ -213,19 +213,3 @@ enum status slave_do_step(struct slave *slave, double communication_point, doubl
     }
     return status;
 }
-
-/* ---- Restored states ------------------------------------------------------------------------ */
-
-enum status slave_resume(struct slave *slave) {
-    slave->outputs_are_valid = false;
-    slave->history_is_lost = true;
-    if (slave->integrator == NULL) {
-        return STATUS_OK;
-    }
-    enum status status = STATUS_OK;
-    if (slave->configured_tolerance != slave->state.own.effective_relative_tolerance) {
-        status = slave_configure_integrator(slave);
-    }
-    integrator_set_statistics(slave->integrator, &slave->state.statistics);
-    return status;
-}
