@@ -8,11 +8,16 @@ static fmi2Status ok_if(bool condition) {
 }
 
 static fmi2Status call_instantiate(void) {
+    static const fmi2Type types[] = {fmi2CoSimulation, fmi2ModelExchange};
     const fmi2CallbackFunctions callbacks = {0};
-    const fmi2Component other = fmu.Instantiate("other", fmi2CoSimulation, RP_MANIPULATOR_GUID, "",
-                                                &callbacks, fmi2False, fmi2False);
-    fmu.FreeInstance(other);
-    return ok_if(other != NULL);
+    bool instantiated = true;
+    for (size_t i = 0; i < FMU_COUNT(types); i++) {
+        const fmi2Component other = fmu.Instantiate("other", types[i], RP_MANIPULATOR_GUID, "",
+                                                    &callbacks, fmi2False, fmi2False);
+        instantiated = instantiated && other != NULL;
+        fmu.FreeInstance(other);
+    }
+    return ok_if(instantiated);
 }
 
 /* The status of the last call, made with a state that the instance has given out. */

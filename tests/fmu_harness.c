@@ -161,11 +161,11 @@ void fmu_assert_logged(const struct fmu_log *log, const char *text) {
 
 static fmi2Component open_instances[128];
 
-fmi2Component fmu_instantiate(struct fmu_log *log, bool logging_on) {
+fmi2Component fmu_instantiate_as(fmi2Type type, struct fmu_log *log, bool logging_on) {
     const fmi2CallbackFunctions callbacks = fmu_callbacks(log);
     const fmi2Component component =
-        fmu.Instantiate("manipulator", fmi2CoSimulation, RP_MANIPULATOR_GUID, "", &callbacks,
-                        fmi2False, logging_on ? fmi2True : fmi2False);
+        fmu.Instantiate("manipulator", type, RP_MANIPULATOR_GUID, "", &callbacks, fmi2False,
+                        logging_on ? fmi2True : fmi2False);
     TEST_ASSERT_NOT_NULL_MESSAGE(component, log->text);
     for (size_t i = 0; i < FMU_COUNT(open_instances); i++) {
         if (open_instances[i] == NULL) {
@@ -175,6 +175,10 @@ fmi2Component fmu_instantiate(struct fmu_log *log, bool logging_on) {
     }
     TEST_FAIL_MESSAGE("more instances than the harness has room for");
     return NULL;
+}
+
+fmi2Component fmu_instantiate(struct fmu_log *log, bool logging_on) {
+    return fmu_instantiate_as(fmi2CoSimulation, log, logging_on);
 }
 
 void fmu_free(fmi2Component component) {
@@ -221,6 +225,37 @@ double fmu_get(fmi2Component component, fmi2ValueReference reference) {
     return value;
 }
 
+static fmi2Status worse(fmi2Status a, fmi2Status b) {
+    return a > b ? a : b;
+}
+
+fmi2Status fmu_get_all(fmi2Component component, struct fmu_values *values) {
+    memset(values, 0, sizeof *values);
+    fmi2Status status = fmi2OK;
+    for (size_t i = 0; i < fmu_variable_count; i++) {
+        const fmi2ValueReference reference = fmu_variables[i].reference;
+        status =
+            worse(status, fmu_variables[i].is_real
+                              ? fmu.GetReal(component, &reference, 1, &values->reals[i])
+                              : fmu.GetInteger(component, &reference, 1, &values->integers[i]));
+    }
+    return status;
+}
+
+void fmu_assert_same_values(const struct fmu_values *expected, const struct fmu_values *actual,
+                            const char *message) {
+    for (size_t i = 0; i < fmu_variable_count; i++) {
+        if (memcmp(&expected->reals[i], &actual->reals[i], sizeof(double)) != 0 ||
+            expected->integers[i] != actual->integers[i]) {
+            char text[512];
+            snprintf(text, sizeof text, "%.300s: reference %u: %.17g or %d, expected %.17g or %d",
+                     message, fmu_variables[i].reference, actual->reals[i], actual->integers[i],
+                     expected->reals[i], expected->integers[i]);
+            TEST_FAIL_MESSAGE(text);
+        }
+    }
+}
+
 void fmu_assert_in_error(fmi2Component component) {
     const double time = fmu_get(component, RP_MANIPULATOR_time);
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(component, time, 0.01, fmi2True));
@@ -232,10 +267,6 @@ void fmu_assert_in_error(fmi2Component component) {
 
 static const double run_start = 0.5;
 static const double run_step = 0.01;
-
-static fmi2Status worse(fmi2Status a, fmi2Status b) {
-    return a > b ? a : b;
-}
 
 fmi2Status fmu_run_start(fmi2Component component, unsigned variant) {
     const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
@@ -253,14 +284,7 @@ fmi2Status fmu_run_step(fmi2Component component, unsigned step, struct fmu_run *
     const double values[] = {step / 3 % 5 - 2.0, 0.5 * (step / 3)};
     fmi2Status status = fmu.SetReal(component, references, 2, values);
     status = worse(status, fmu.DoStep(component, run_start + step * run_step, run_step, fmi2True));
-    for (size_t i = 0; i < fmu_variable_count; i++) {
-        const fmi2ValueReference reference = fmu_variables[i].reference;
-        status =
-            worse(status, fmu_variables[i].is_real
-                              ? fmu.GetReal(component, &reference, 1, &run->reals[step][i])
-                              : fmu.GetInteger(component, &reference, 1, &run->integers[step][i]));
-    }
-    return status;
+    return worse(status, fmu_get_all(component, &run->after[step]));
 }
 
 fmi2Status fmu_run(fmi2Component component, unsigned variant, struct fmu_run *run) {

@@ -122,7 +122,9 @@ void fmu_assert_logged(const struct fmu_log *log, const char *text);
 
 /* ---- Instances ------------------------------------------------------------------------------ */
 
-/* An instance named "manipulator"; fmu_tear_down frees it where the test did not. */
+/* An instance named "manipulator"; fmu_tear_down frees it where the test did not. Tests that say
+ * nothing about the kind are about Co-Simulation. */
+fmi2Component fmu_instantiate_as(fmi2Type type, struct fmu_log *log, bool logging_on);
 fmi2Component fmu_instantiate(struct fmu_log *log, bool logging_on);
 void fmu_free(fmi2Component component);
 
@@ -141,6 +143,19 @@ double fmu_get(fmi2Component component, fmi2ValueReference reference);
 
 fmi2Status fmu_try_set(fmi2Component component, fmi2ValueReference reference, double value);
 
+/* All variables, each in the place of its row in fmu_variables. */
+struct fmu_values {
+    double reals[FMU_VARIABLE_CAPACITY];
+    int integers[FMU_VARIABLE_CAPACITY];
+};
+
+/* The worst status of all variables; what cannot be read, or is of the other type, is 0. */
+fmi2Status fmu_get_all(fmi2Component component, struct fmu_values *values);
+
+/* Fails the test at the first variable whose bits differ, and names it. */
+void fmu_assert_same_values(const struct fmu_values *expected, const struct fmu_values *actual,
+                            const char *message);
+
 /* The next calls are refused as after an fmi2Error (section 4.2.4), and the message says so. */
 void fmu_assert_in_error(fmi2Component component);
 
@@ -148,10 +163,8 @@ void fmu_assert_in_error(fmi2Component component);
 
 enum { FMU_RUN_STEPS = 20 };
 
-/* All variables after every step. */
 struct fmu_run {
-    double reals[FMU_RUN_STEPS][FMU_VARIABLE_CAPACITY];
-    int integers[FMU_RUN_STEPS][FMU_VARIABLE_CAPACITY];
+    struct fmu_values after[FMU_RUN_STEPS];
 };
 
 /* From an instance that was just made or reset. The variant decides the start values. Nothing is

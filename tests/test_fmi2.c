@@ -61,12 +61,13 @@ static void test_instantiate_says_what_it_refuses(void) {
     } cases[] = {
         {NULL, fmi2CoSimulation, guid, "name", "not empty"},
         {"", fmi2CoSimulation, guid, "name", "not empty"},
-        {"m", fmi2ModelExchange, guid, "type", "co-simulation"},
-        {"m", (fmi2Type)7, guid, "type", "co-simulation"},
+        {"m", (fmi2Type)7, guid, "type", "7"},
+        {"m", (fmi2Type)-1, guid, "type", "-1"},
         {"m", fmi2CoSimulation, NULL, "GUID", guid},
         {"m", fmi2CoSimulation, "", "GUID", guid},
         {"m", fmi2CoSimulation, "{another}", "{another}", guid},
         {"m", fmi2CoSimulation, "{%s%n#}", "GUID", guid},
+        {"m", fmi2ModelExchange, "{another}", "{another}", guid},
     };
     for (size_t i = 0; i < FMU_COUNT(cases); i++) {
         fmu_log_clear(&messages);

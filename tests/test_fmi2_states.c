@@ -1,8 +1,9 @@
-/* Which function works in which state of a co-simulation slave: section 4.2.4 of FMI 2.0. */
+/* Which function works in which state: sections 4.2.4 (Co-Simulation) and 3.2.3 (Model Exchange) of
+ * FMI 2.0. */
 #include "fmu_calls.h"
-#include "fmu_harness.h"
+#include "fmu_model_exchange.h"
+#include "fmu_states.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unity.h>
@@ -16,79 +17,63 @@ void tearDown(void) {
     fmu_tear_down(&messages);
 }
 
-/* The table of section 4.2.4. I: instantiated, M: initialization mode, C: step complete, F: step
- * failed, T: terminated, E: error. No step is ever pending, so that CancelStep never fits. */
-static const char *const allowed[FMU_FUNCTION_COUNT] = {
-    [FMU_GetTypesPlatform] = "IMCFTE",
-    [FMU_GetVersion] = "IMCFTE",
-    [FMU_SetDebugLogging] = "IMCFTE",
-    [FMU_Instantiate] = "IMCFTE",
-    [FMU_FreeInstance] = "IMCFTE",
-    [FMU_SetupExperiment] = "I-----",
-    [FMU_EnterInitializationMode] = "I-----",
-    [FMU_ExitInitializationMode] = "-M----",
-    [FMU_Terminate] = "--CF--",
-    [FMU_Reset] = "IMCFTE",
-    [FMU_GetReal] = "-MCFTE",
-    [FMU_GetInteger] = "-MCFTE",
-    [FMU_GetBoolean] = "-MCFTE",
-    [FMU_GetString] = "-MCFTE",
-    [FMU_SetReal] = "IMC---",
-    [FMU_SetInteger] = "IMC---",
-    [FMU_SetBoolean] = "IMC---",
-    [FMU_SetString] = "IMC---",
-    [FMU_GetFMUstate] = "IMCFTE",
-    [FMU_SetFMUstate] = "IMCFTE",
-    [FMU_FreeFMUstate] = "IMCFTE",
-    [FMU_SerializedFMUstateSize] = "IMCFTE",
-    [FMU_SerializeFMUstate] = "IMCFTE",
-    [FMU_DeSerializeFMUstate] = "IMCFTE",
-    [FMU_GetDirectionalDerivative] = "-MCFTE",
-    [FMU_SetRealInputDerivatives] = "IMC---",
-    [FMU_GetRealOutputDerivatives] = "--CFTE",
-    [FMU_DoStep] = "--C---",
-    [FMU_CancelStep] = "------",
-    [FMU_GetStatus] = "--CFT-",
-    [FMU_GetRealStatus] = "--CFT-",
-    [FMU_GetIntegerStatus] = "--CFT-",
-    [FMU_GetBooleanStatus] = "--CFT-",
-    [FMU_GetStringStatus] = "--CFT-",
-    // Model Exchange, on a co-simulation instance
-    [FMU_EnterEventMode] = "------",
-    [FMU_NewDiscreteStates] = "------",
-    [FMU_EnterContinuousTimeMode] = "------",
-    [FMU_CompletedIntegratorStep] = "------",
-    [FMU_SetTime] = "------",
-    [FMU_SetContinuousStates] = "------",
-    [FMU_GetDerivatives] = "------",
-    [FMU_GetEventIndicators] = "------",
-    [FMU_GetContinuousStates] = "------",
-    [FMU_GetNominalsOfContinuousStates] = "------",
+/* The tables of the standard; the letters are those of fmu_states.h. No step is ever pending, so
+ * that CancelStep never fits. */
+static const struct {
+    const char *co_simulation, *model_exchange;
+} allowed[FMU_FUNCTION_COUNT] = {
+    [FMU_GetTypesPlatform] = {"IMCFTE", "IMVNTE"},
+    [FMU_GetVersion] = {"IMCFTE", "IMVNTE"},
+    [FMU_SetDebugLogging] = {"IMCFTE", "IMVNTE"},
+    [FMU_Instantiate] = {"IMCFTE", "IMVNTE"},
+    [FMU_FreeInstance] = {"IMCFTE", "IMVNTE"},
+    [FMU_SetupExperiment] = {"I-----", "I-----"},
+    [FMU_EnterInitializationMode] = {"I-----", "I-----"},
+    [FMU_ExitInitializationMode] = {"-M----", "-M----"},
+    [FMU_Terminate] = {"--CF--", "--VN--"},
+    [FMU_Reset] = {"IMCFTE", "IMVNTE"},
+    [FMU_GetReal] = {"-MCFTE", "-MVNTE"},
+    [FMU_GetInteger] = {"-MCFTE", "-MVNTE"},
+    [FMU_GetBoolean] = {"-MCFTE", "-MVNTE"},
+    [FMU_GetString] = {"-MCFTE", "-MVNTE"},
+    [FMU_SetReal] = {"IMC---", "IMVN--"}, // which variables: test_fmi2_values.c, _modes.c
+    [FMU_SetInteger] = {"IMC---", "IMV---"},
+    [FMU_SetBoolean] = {"IMC---", "IMV---"},
+    [FMU_SetString] = {"IMC---", "IMV---"},
+    [FMU_GetFMUstate] = {"IMCFTE", "IMVNTE"},
+    [FMU_SetFMUstate] = {"IMCFTE", "IMVNTE"},
+    [FMU_FreeFMUstate] = {"IMCFTE", "IMVNTE"},
+    [FMU_SerializedFMUstateSize] = {"IMCFTE", "IMVNTE"},
+    [FMU_SerializeFMUstate] = {"IMCFTE", "IMVNTE"},
+    [FMU_DeSerializeFMUstate] = {"IMCFTE", "IMVNTE"},
+    [FMU_GetDirectionalDerivative] = {"-MCFTE", "-MVNTE"},
+    // Co-Simulation alone
+    [FMU_SetRealInputDerivatives] = {"IMC---", "------"},
+    [FMU_GetRealOutputDerivatives] = {"--CFTE", "------"},
+    [FMU_DoStep] = {"--C---", "------"},
+    [FMU_CancelStep] = {"------", "------"},
+    [FMU_GetStatus] = {"--CFT-", "------"},
+    [FMU_GetRealStatus] = {"--CFT-", "------"},
+    [FMU_GetIntegerStatus] = {"--CFT-", "------"},
+    [FMU_GetBooleanStatus] = {"--CFT-", "------"},
+    [FMU_GetStringStatus] = {"--CFT-", "------"},
+    // Model Exchange alone
+    [FMU_EnterEventMode] = {"------", "--VN--"},
+    [FMU_NewDiscreteStates] = {"------", "--V---"},
+    [FMU_EnterContinuousTimeMode] = {"------", "--V---"},
+    [FMU_CompletedIntegratorStep] = {"------", "---N--"},
+    [FMU_SetTime] = {"------", "--VN--"},
+    [FMU_SetContinuousStates] = {"------", "---N--"},
+    [FMU_GetDerivatives] = {"------", "--VNTE"},
+    [FMU_GetEventIndicators] = {"------", "-MVNTE"},
+    [FMU_GetContinuousStates] = {"------", "-MVNTE"},
+    [FMU_GetNominalsOfContinuousStates] = {"------", "I-VNTE"},
 };
 
-/* What the model description does not declare yet: fmi2Error where the table would allow it. */
-static const enum fmu_function not_supported[] = {
-    FMU_GetFMUstate,
-    FMU_SetFMUstate,
-    FMU_SerializedFMUstateSize,
-    FMU_SerializeFMUstate,
-    FMU_DeSerializeFMUstate,
-    FMU_GetDirectionalDerivative,
-    FMU_SetRealInputDerivatives,
-    FMU_GetRealOutputDerivatives,
-};
-
-static bool is_supported(enum fmu_function function) {
-    for (size_t i = 0; i < FMU_COUNT(not_supported); i++) {
-        if (not_supported[i] == function) {
-            return false;
-        }
-    }
-    return true;
+static const char *allowed_states(fmi2Type type, enum fmu_function function) {
+    return type == fmi2CoSimulation ? allowed[function].co_simulation
+                                    : allowed[function].model_exchange;
 }
-
-static const double step = 0.01;
-static double now; /* communication point of the instance under test */
 
 static fmi2Status expected_where_allowed(enum fmu_function function) {
     switch (function) {
@@ -101,158 +86,158 @@ static fmi2Status expected_where_allowed(enum fmu_function function) {
     }
 }
 
-static fmi2Status call(enum fmu_function function, fmi2Component c) {
-    const fmi2Status status = fmu_call(function, c, now, step);
-    now += function == FMU_DoStep && status == fmi2OK ? step : 0.0;
-    return status;
-}
-
-/* ---- States --------------------------------------------------------------------------------- */
-
-struct state {
-    char letter;
-    const char *name;
-    enum fmu_function proof; /* works here, but not in the error state */
-};
-
-static const struct state states[] = {
-    {'I', "instantiated", FMU_SetupExperiment},
-    {'M', "in initialization mode", FMU_ExitInitializationMode},
-    {'C', "between steps", FMU_DoStep},
-    {'F', "after a failed step", FMU_Terminate},
-    {'T', "terminated", FMU_GetRealStatus},
-    {'E', "in the error state", FMU_FUNCTION_COUNT},
-};
-
-static const struct state *state_of(char letter) {
-    size_t i = 0;
-    while (states[i].letter != letter) {
-        i++;
-    }
-    return &states[i];
-}
-
-static const struct state *state_after(enum fmu_function function, const struct state *state) {
+static char letter_after(fmi2Type type, enum fmu_function function, char letter) {
     switch (function) {
     case FMU_EnterInitializationMode:
-        return state_of('M');
+        return 'M';
     case FMU_ExitInitializationMode:
-        return state_of('C');
+        return type == fmi2CoSimulation ? 'C' : 'V';
+    case FMU_EnterEventMode:
+        return 'V';
+    case FMU_EnterContinuousTimeMode:
+        return 'N';
     case FMU_Terminate:
-        return state_of('T');
+        return 'T';
     case FMU_Reset:
-        return state_of('I');
+        return 'I';
     default:
-        return state;
+        return letter;
     }
 }
 
-/* The slave takes the one internal step that it may, and gives up. */
-static void fail_step(fmi2Component c, double start, double length) {
-    TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, start, length, fmi2True));
-}
+/* ---- One function in one state -------------------------------------------------------------- */
 
-static fmi2Component reach(char letter) {
-    const fmi2ValueReference max_steps = RP_MANIPULATOR_max_internal_steps;
-    const fmi2Integer one = 1;
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    now = 0.0;
-    if (letter == 'F') {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(c, &max_steps, 1, &one));
-    }
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, 0, now, fmi2False, 0));
-    if (letter != 'I') {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
-    }
-    if (strchr("CFTE", letter) != NULL) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
-    }
-    if (letter == 'F') {
-        fail_step(c, now, 10.0);
-    } else if (letter == 'T') {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Terminate(c));
-    } else if (letter == 'E') {
-        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.ExitInitializationMode(c));
-    }
-    fmu_log_clear(&messages);
-    return c;
-}
-
-static void assert_in_state(fmi2Component c, const struct state *state, const char *text) {
-    if (state->letter == 'E') {
-        fmu_assert_in_error(c);
-    } else {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, call(state->proof, c), text);
-    }
-}
-
-static void assert_refused(enum fmu_function function, fmi2Status status, fmi2Component c,
-                           const struct state *state, const char *text) {
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, status, text);
-    TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, messages.count[fmi2Error], text);
-    fmu_assert_logged(&messages, fmu_function_names[function]);
-    if (state->letter != 'E') {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call(state->proof, c), text);
-    }
-    fmu_assert_in_error(c);
-}
-
-static void check(enum fmu_function function, const struct state *state) {
+struct pair {
+    fmi2Type type;
+    enum fmu_function function;
+    const struct fmu_state *state;
     char text[128];
-    snprintf(text, sizeof text, "%s while %s", fmu_function_names[function], state->name);
-    TEST_ASSERT_NOT_NULL_MESSAGE(allowed[function], text);
-    const bool is_allowed = strchr(allowed[function], state->letter) != NULL;
+};
 
-    const fmi2Component c = reach(state->letter);
-    const fmi2Status status = call(function, c);
-    if (function == FMU_FreeInstance) {
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&messages), text);
+static const double step = 0.01;
+
+static fmi2Status call(const struct pair *pair, fmi2Component c) {
+    fmu_log_clear(&messages);
+    return fmu_call(pair->function, c, 0.0, step);
+}
+
+static void assert_works(const struct pair *pair, fmi2Component c) {
+    const fmi2Status expected = expected_where_allowed(pair->function);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected, call(pair, c), pair->text);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, messages.count[fmi2Error], pair->text);
+    const char after = letter_after(pair->type, pair->function, pair->state->letter);
+    fmu_assert_in_state(c, fmu_state_of(pair->type, after),
+                        pair->function == FMU_DoStep ? step : 0.0, &messages, pair->text);
+}
+
+static void assert_refused(const struct pair *pair, fmi2Component c) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call(pair, c), pair->text);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], pair->text);
+    fmu_assert_logged(&messages, fmu_function_names[pair->function]);
+    fmu_assert_in_state(c, fmu_state_of(pair->type, 'E'), 0.0, &messages, pair->text);
+}
+
+/* A refused call is undone by what was saved before it. */
+static void assert_saved_state_leads_back(const struct pair *pair, fmi2Component c,
+                                          fmi2FMUstate saved) {
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, saved), pair->text);
+    fmu_assert_in_state(c, pair->state, 0.0, &messages, pair->text);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, saved), pair->text);
+    assert_refused(pair, c);
+}
+
+static void assert_reset_is_fresh(const struct pair *pair, fmi2Component c) {
+    if (pair->type == fmi2CoSimulation) {
+        fmu_assert_reset_is_fresh(c, pair->text);
+    } else {
+        fmu_me_assert_reset_is_fresh(c, pair->text);
+    }
+}
+
+static void check(const struct pair *pair) {
+    const char *states = allowed_states(pair->type, pair->function);
+    TEST_ASSERT_NOT_NULL_MESSAGE(states, pair->text);
+    fmi2FMUstate saved = NULL;
+    const fmi2Component c = fmu_reach(pair->type, pair->state, &messages);
+    if (pair->function == FMU_FreeInstance) {
+        (void)call(pair, c);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&messages), pair->text);
         return;
     }
-    if (is_allowed && is_supported(function)) {
-        TEST_ASSERT_EQUAL_INT_MESSAGE(expected_where_allowed(function), status, text);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, messages.count[fmi2Error], text);
-        assert_in_state(c, state_after(function, state), text);
+    if (strchr(states, pair->state->letter) != NULL) {
+        assert_works(pair, c);
     } else {
-        assert_refused(function, status, c, state, text);
-        if (is_allowed) {
-            fmu_assert_logged(&messages, "not supported");
-        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.GetFMUstate(c, &saved), pair->text);
+        assert_refused(pair, c);
+        assert_saved_state_leads_back(pair, c, saved);
     }
-    fmu_assert_reset_is_fresh(c, text);
+    assert_reset_is_fresh(pair, c);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.FreeFMUstate(c, &saved), pair->text);
     fmu_free(c);
 }
 
-static void check_all(char letter) {
+static void check_all(fmi2Type type, char letter) {
     for (int function = 0; function < FMU_FUNCTION_COUNT; function++) {
-        check((enum fmu_function)function, state_of(letter));
+        struct pair pair = {
+            .type = type,
+            .function = (enum fmu_function)function,
+            .state = fmu_state_of(type, letter),
+        };
+        snprintf(pair.text, sizeof pair.text, "%s of a %s instance %s",
+                 fmu_function_names[function],
+                 type == fmi2CoSimulation ? "Co-Simulation" : "Model Exchange", pair.state->name);
+        check(&pair);
     }
 }
 
 /* ---- Tests ---------------------------------------------------------------------------------- */
 
-static void test_instantiated(void) {
-    check_all('I');
+static void test_co_simulation_instantiated(void) {
+    check_all(fmi2CoSimulation, 'I');
 }
 
-static void test_initialization_mode(void) {
-    check_all('M');
+static void test_co_simulation_initialization_mode(void) {
+    check_all(fmi2CoSimulation, 'M');
 }
 
-static void test_step_complete(void) {
-    check_all('C');
+static void test_co_simulation_step_complete(void) {
+    check_all(fmi2CoSimulation, 'C');
 }
 
-static void test_step_failed(void) {
-    check_all('F');
+static void test_co_simulation_step_failed(void) {
+    check_all(fmi2CoSimulation, 'F');
 }
 
-static void test_terminated(void) {
-    check_all('T');
+static void test_co_simulation_terminated(void) {
+    check_all(fmi2CoSimulation, 'T');
 }
 
-static void test_error(void) {
-    check_all('E');
+static void test_co_simulation_error(void) {
+    check_all(fmi2CoSimulation, 'E');
+}
+
+static void test_model_exchange_instantiated(void) {
+    check_all(fmi2ModelExchange, 'I');
+}
+
+static void test_model_exchange_initialization_mode(void) {
+    check_all(fmi2ModelExchange, 'M');
+}
+
+static void test_model_exchange_event_mode(void) {
+    check_all(fmi2ModelExchange, 'V');
+}
+
+static void test_model_exchange_continuous_time_mode(void) {
+    check_all(fmi2ModelExchange, 'N');
+}
+
+static void test_model_exchange_terminated(void) {
+    check_all(fmi2ModelExchange, 'T');
+}
+
+static void test_model_exchange_error(void) {
+    check_all(fmi2ModelExchange, 'E');
 }
 
 static void test_no_instance_is_an_error_and_no_crash(void) {
@@ -261,38 +246,10 @@ static void test_no_instance_is_an_error_and_no_crash(void) {
             function == FMU_Instantiate || function == FMU_FreeInstance) {
             continue;
         }
-        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call((enum fmu_function)function, NULL),
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error,
+                                      fmu_call((enum fmu_function)function, NULL, 0.0, step),
                                       fmu_function_names[function]);
     }
-}
-
-/* fmi2Discard of fmi2DoStep: section 4.2.2; fmi2LastSuccessfulTime: 4.2.3. */
-static void test_a_failed_step_tells_how_far_it_got(void) {
-    const fmi2ValueReference max_steps = RP_MANIPULATOR_max_internal_steps;
-    const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
-                                             RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
-    const double start = 2.0;
-    const double length = 10.0;
-    const fmi2Integer one = 1;
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(c, &max_steps, 1, &one));
-    fmu_initialize(c, start, 0.0);
-    fail_step(c, start, length);
-    TEST_ASSERT_GREATER_THAN_UINT(0, messages.count[fmi2Discard]);
-
-    double reached = NAN;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
-    TEST_ASSERT_TRUE(reached >= start && reached < start + length);
-    TEST_ASSERT_EQUAL_DOUBLE(reached, fmu_get(c, RP_MANIPULATOR_time));
-
-    double x[4] = {NAN, NAN, NAN, NAN};
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(c, references, 4, x));
-    for (size_t i = 0; i < 4; i++) {
-        TEST_ASSERT_TRUE(isfinite(x[i]));
-    }
-    fmi2Boolean terminated = fmi2True;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
-    TEST_ASSERT_EQUAL_INT(fmi2False, terminated);
 }
 
 int main(int argc, char **argv) {
@@ -300,13 +257,18 @@ int main(int argc, char **argv) {
         return 2;
     }
     UNITY_BEGIN();
-    RUN_TEST(test_instantiated);
-    RUN_TEST(test_initialization_mode);
-    RUN_TEST(test_step_complete);
-    RUN_TEST(test_step_failed);
-    RUN_TEST(test_terminated);
-    RUN_TEST(test_error);
+    RUN_TEST(test_co_simulation_instantiated);
+    RUN_TEST(test_co_simulation_initialization_mode);
+    RUN_TEST(test_co_simulation_step_complete);
+    RUN_TEST(test_co_simulation_step_failed);
+    RUN_TEST(test_co_simulation_terminated);
+    RUN_TEST(test_co_simulation_error);
+    RUN_TEST(test_model_exchange_instantiated);
+    RUN_TEST(test_model_exchange_initialization_mode);
+    RUN_TEST(test_model_exchange_event_mode);
+    RUN_TEST(test_model_exchange_continuous_time_mode);
+    RUN_TEST(test_model_exchange_terminated);
+    RUN_TEST(test_model_exchange_error);
     RUN_TEST(test_no_instance_is_an_error_and_no_crash);
-    RUN_TEST(test_a_failed_step_tells_how_far_it_got);
     return UNITY_END();
 }

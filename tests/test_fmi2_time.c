@@ -242,6 +242,35 @@ static void test_an_endless_step_is_discarded(void) {
     fmu_assert_reset_is_fresh(c, "after an endless step");
 }
 
+/* fmi2Discard of fmi2DoStep: section 4.2.2; fmi2LastSuccessfulTime: 4.2.3. */
+static void test_a_failed_step_tells_how_far_it_got(void) {
+    const fmi2ValueReference max_steps = RP_MANIPULATOR_max_internal_steps;
+    const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
+                                             RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
+    const double start = 2.0;
+    const double length = 10.0;
+    const fmi2Integer one = 1;
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(c, &max_steps, 1, &one));
+    fmu_initialize(c, start, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, start, length, fmi2True));
+    TEST_ASSERT_GREATER_THAN_UINT(0, messages.count[fmi2Discard]);
+
+    double reached = NAN;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
+    TEST_ASSERT_TRUE(reached >= start && reached < start + length);
+    TEST_ASSERT_EQUAL_DOUBLE(reached, fmu_get(c, RP_MANIPULATOR_time));
+
+    double x[4] = {NAN, NAN, NAN, NAN};
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(c, references, 4, x));
+    for (size_t i = 0; i < 4; i++) {
+        TEST_ASSERT_TRUE(isfinite(x[i]));
+    }
+    fmi2Boolean terminated = fmi2True;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
+    TEST_ASSERT_EQUAL_INT(fmi2False, terminated);
+}
+
 /* ---- Status --------------------------------------------------------------------------------- */
 
 static void test_status_tells_what_can_be_known(void) {
@@ -319,6 +348,7 @@ int main(int argc, char **argv) {
     RUN_TEST(test_the_start_time_does_not_matter);
     RUN_TEST(test_the_rollback_hint_changes_nothing);
     RUN_TEST(test_an_endless_step_is_discarded);
+    RUN_TEST(test_a_failed_step_tells_how_far_it_got);
     RUN_TEST(test_status_tells_what_can_be_known);
     RUN_TEST(test_status_into_nothing_is_an_error);
     return UNITY_END();
