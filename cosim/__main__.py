@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cosim.accuracy import Run, Runs, Sweep
     from cosim.convergence import Convergence
     from cosim.scenario import Scenario
-    from cosim.simulation import Fmu
+    from cosim.unit import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = 20.0  # s, longest sweep that comes with a scenario asked for by name
@@ -160,7 +160,7 @@ def _choose(names: Sequence[str]) -> list[Scenario]:
 def _open_fmus(chosen: Sequence[Scenario], path: Path | None, stack: ExitStack) -> dict[str, Fmu]:
     """FMU of each model, by the model's folder name: the one at `path`, or those in build/."""
     from cosim import reference
-    from cosim.simulation import Fmu
+    from cosim.unit import Fmu
 
     fmus: dict[str, Fmu] = {}
     for scenario in chosen:

@@ -8,7 +8,8 @@ import numpy as np
 from cosim import reference, simulation
 from cosim.reference import Reference
 from cosim.scenario import Scenario
-from cosim.simulation import Fmu, Result
+from cosim.simulation import Result
+from cosim.unit import Fmu
 
 TOLERANCES = tuple(float(f"1e-{exponent}") for exponent in range(4, 12))  # loosest first
 TIGHTEST = TOLERANCES[-1]

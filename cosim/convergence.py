@@ -8,15 +8,14 @@ scenario; the exact final state of each is models/<model>/references/<name>/exac
 
 import json
 import math
-from collections.abc import Callable, Sequence
-from ctypes import c_double
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-from fmpy import calloc, fmi2, free
+from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -27,7 +26,7 @@ from cosim import scenario as scenarios
 from cosim.errors import UserError
 from cosim.report import Section
 from cosim.scenario import Scenario
-from cosim.simulation import Fmu
+from cosim.unit import Fmu, Instance
 
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: inputs are held
@@ -221,73 +220,41 @@ def final_state(fmu: Fmu, problem: Problem, order: int, factor: int) -> dict[str
     factor : int
         Communication step, in shortest steps of the problem.
     """
-    messages: list[str] = []
-
-    def log(_environment: int, _name: bytes, _status: int, _category: bytes, text: bytes) -> None:
-        messages.append(text.decode("utf-8", errors="replace"))
-
-    callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
-    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-    slave = fmi2.FMU2Slave(
-        guid=fmu.description.guid,
-        modelIdentifier=fmu.description.coSimulation.modelIdentifier,
-        unzipDirectory=str(fmu.folder),
-        instanceName=problem.scenario.name,
-    )
-    slave.instantiate(callbacks=callbacks)
-    try:
-        _initialize(slave, fmu, problem)
-        _step_through(slave, fmu, problem, order, factor)
-        names = list(problem.exact)
-        return dict(zip(names, slave.getReal(_references(fmu, names)), strict=True))
-    except FMICallException as error:
-        reason = messages[-1] if messages else "no message"
-        raise UserError(f"{problem.scenario.name}: {error.function} failed: {reason}") from error
-    finally:
-        slave.freeInstance()
+    names = list(problem.exact)
+    with Instance(fmu, problem.scenario.name) as instance:
+        instance.initialize(problem.scenario, problem.scenario.tolerance)
+        references, values, view = instance.buffers(names)
+        try:
+            _step_through(instance, problem, order, factor)
+            instance.slave.fmi2GetReal(instance.slave.component, references, len(names), values)
+        except FMICallException as error:
+            raise instance.failure(error, f"with steps of {factor} times the shortest") from error
+        return dict(zip(names, view.tolist(), strict=True))
 
 
-def _references(fmu: Fmu, names: Sequence[str]) -> list[int]:
-    return [fmu.variables[name].valueReference for name in names]
-
-
-def _initialize(slave: fmi2.FMU2Slave, fmu: Fmu, problem: Problem) -> None:
-    scenario = problem.scenario
-    slave.setupExperiment(
-        tolerance=scenario.tolerance, startTime=scenario.start, stopTime=scenario.stop
-    )
-    given = {**scenario.parameters, **scenario.initial}
-    slave.setReal(_references(fmu, list(given)), list(given.values()))
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
-
-
-def _step_through(
-    slave: fmi2.FMU2Slave, fmu: Fmu, problem: Problem, order: int, factor: int
-) -> None:
+def _step_through(instance: Instance, problem: Problem, order: int, factor: int) -> None:
     """All steps, with the inputs' values and derivatives at the beginning of each."""
-    component, scenario = slave.component, problem.scenario
+    slave, component, scenario = instance.slave, instance.slave.component, problem.scenario
     times = scenario.times[::factor]
     elapsed = (times - scenario.start)[:-1]
     sines = list(problem.inputs.values())
-    inputs = _references(fmu, list(problem.inputs))
-    n, k = len(inputs), len(inputs) * order
+    names = list(problem.inputs)
+    n, k = len(names), len(names) * order
 
     # by order, and within an order by input
     known = np.array([[s.derivative(elapsed, i) for s in sines] for i in range(order + 1)])
     known = known.reshape(n * (order + 1), -1).T
-    value_references = (fmi2.fmi2ValueReference * n)(*inputs)
-    references = (fmi2.fmi2ValueReference * k)(*(inputs * order))
+    references, values, view = instance.buffers(names)
+    references_of_derivatives, derivatives, view_of_derivatives = instance.buffers(names * order)
     orders = (fmi2.fmi2Integer * k)(*np.repeat(np.arange(1, order + 1), n).tolist())
-    values, derivatives = (c_double * n)(), (c_double * k)()
-    for t, h, row in zip(times, np.diff(times), known.tolist(), strict=False):
-        values[:] = row[:n]
-        slave.fmi2SetReal(component, value_references, n, values)
+    for t, h, row in zip(times, np.diff(times), known, strict=False):
+        view[:] = row[:n]
+        slave.fmi2SetReal(component, references, n, values)
         if k:
-            derivatives[:] = row[n:]
-            slave.fmi2SetRealInputDerivatives(component, references, k, orders, derivatives)
+            view_of_derivatives[:] = row[n:]
+            slave.fmi2SetRealInputDerivatives(
+                component, references_of_derivatives, k, orders, derivatives
+            )
         slave.fmi2DoStep(component, t, h, fmi2.fmi2True)
 
 

@@ -21,7 +21,7 @@ from cosim import convergence, report
 from cosim import scenario as scenarios
 from cosim.convergence import FACTORS, ORDERS, Convergence, Problem, Sines
 from cosim.errors import UserError
-from cosim.simulation import Fmu
+from cosim.unit import Fmu
 
 MODEL = ROOT / "models" / "rp_manipulator"
 SCRIPT = MODEL / "references" / "make_smooth_inputs.py"

@@ -24,7 +24,7 @@ from cosim.accuracy import Runs, Sweep
 from cosim.errors import UserError
 from cosim.reference import Reference
 from cosim.scenario import Scenario
-from cosim.simulation import Fmu
+from cosim.unit import Fmu
 
 NAMES = list(scenarios.find_all(ROOT))
 SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion

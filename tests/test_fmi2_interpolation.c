@@ -204,19 +204,18 @@ static void test_a_polynomial_is_what_many_held_values_tend_to(void) {
     TEST_ASSERT_TRUE(fabs(difference) > 0.05); // the derivatives matter
 }
 
-/* What lies beyond the step is nobody's input: the integrator does not go there. */
+/* What lies beyond the step is nobody's input: the integrator does not go there, though it could
+ * with one large internal step. */
 static void test_no_internal_step_passes_the_end(void) {
-    static const double lengths[] = {1e-3, 0.01, 0.1};
-    for (size_t i = 0; i < FMU_COUNT(lengths); i++) {
-        const double h = lengths[i];
-        const fmi2Component c = fmu_initialized(&messages, 0.0);
-        step(c, 0.0, h);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, derive(c, RP_MANIPULATOR_f2, 1, 1e-3));
-        step(c, h, h);
-        const double length = fmu_get(c, RP_MANIPULATOR_solver_last_step);
-        TEST_ASSERT_TRUE(0.0 < length && length < h);
-        fmu_free(c);
-    }
+    const double h = 0.01;
+    const fmi2Component c = fmu_slide(&messages, 0.0);
+    fmu_set(c, RP_MANIPULATOR_relative_tolerance, 1e-4);
+    fmu_slide_begin(c);
+    step(c, 0.0, h);
+    TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_solver_last_step) > h);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, derive(c, RP_MANIPULATOR_f2, 1, 1e-6));
+    step(c, h, h);
+    TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_solver_last_step) <= h);
 }
 
 /* ---- Outputs after such a step -------------------------------------------------------------- */
