@@ -64,8 +64,12 @@ enum status slave_set_input_derivatives(struct slave *slave, const unsigned refe
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable = variable_find(slave->unit, references[i]);
         const size_t input = slave_input_index(slave, variable);
-        slave->memory.pending[input].d[orders[i]] = values[i];
-        slave->memory.current[input].d[orders[i]] = values[i];
+        struct polynomial *pending = &slave->memory.pending[input];
+        pending->d[orders[i]] = values[i];
+        // from now on outputs answer for the input of the next step, as after slave_set_real
+        slave->memory.current[input] = *pending;
+        doubles_of(slave->memory.values, slave->model->inputs)[input] = pending->d[0];
+        slave->outputs_are_valid = false;
     }
     return STATUS_OK;
 }

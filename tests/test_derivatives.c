@@ -102,6 +102,20 @@ static void test_output_derivatives_along_the_motion(void) {
                               derivative(OSCILLATOR_ENERGY, 2));
 }
 
+/* Once anything of an input is set after a step over which it moved, outputs answer for the input
+ * that the next step will have: the value set last with the new derivatives. */
+static void test_new_derivatives_start_from_the_value_set_last(void) {
+    ASSERT_OK(slave_exit_initialization(slave));
+    set_derivative(1, 3.0);
+    set_derivative(2, -8.0);
+    ASSERT_OK(slave_do_step(slave, 0.0, 0.5));
+    set_derivative(1, 5.0);
+    const double x = get(OSCILLATOR_X);
+    TEST_ASSERT_EQUAL_DOUBLE(-4.0 * x, get(OSCILLATOR_A));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_V) + 5.0, derivative(OSCILLATOR_A, 1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -4.0 * get(OSCILLATOR_A), derivative(OSCILLATOR_A, 2));
+}
+
 static void test_orders_and_variables_that_have_no_derivative_are_refused(void) {
     const unsigned wrong[] = {OSCILLATOR_TIME, OSCILLATOR_OMEGA, OSCILLATOR_U, OSCILLATOR_STEPS,
                               99};
@@ -201,6 +215,7 @@ int main(void) {
     RUN_TEST(test_a_step_follows_the_polynomial);
     RUN_TEST(test_derivatives_apply_to_one_step);
     RUN_TEST(test_output_derivatives_along_the_motion);
+    RUN_TEST(test_new_derivatives_start_from_the_value_set_last);
     RUN_TEST(test_orders_and_variables_that_have_no_derivative_are_refused);
     RUN_TEST(test_directional_derivatives);
     RUN_TEST(test_knowns_and_unknowns_that_are_none_are_refused);
