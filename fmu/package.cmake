@@ -1,7 +1,7 @@
 # add_fmu(NAME FOLDER models/... LIBRARY target)
 #
-# Builds ${PROJECT_BINARY_DIR}/NAME.fmu from the model's folder (variables.toml, README.md, model.png)
-# and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
+# Builds NAME.fmu in the current build folder from the model's folder (variables.toml, README.md; model.png
+# and pictures of the README where there are any) and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
 # archive), NAME_unit (struct unit as a library), NAME_interface (the generated header with value
 # references and GUID).
 
@@ -10,7 +10,7 @@ set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 function(add_fmu name)
   cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
-  set(out ${PROJECT_BINARY_DIR}/fmu/${name})
+  set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
   set(generated ${out}/modelDescription.xml ${out}/variables.c ${out}/value_references.h)
 
   # tables and model description, again whenever a declaration changes
@@ -46,6 +46,8 @@ function(add_fmu name)
     -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now)
 
   # the page inside the FMU
+  file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
+  file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
   add_custom_command(
     OUTPUT ${out}/documentation/index.html
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
@@ -53,24 +55,24 @@ function(add_fmu name)
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
             ${FMU_SOURCE_DIR}/formula.py ${folder}/README.md
-            ${folder}/model.svg ${out}/modelDescription.xml
+            ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
   # the archive
-  set(fmu ${PROJECT_BINARY_DIR}/${name}.fmu)
+  set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${name}.fmu)
   add_custom_command(
     OUTPUT ${fmu}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
             modelDescription.xml=${out}/modelDescription.xml
-            model.png=${folder}/model.png
+            $<$<BOOL:${icon}>:model.png=${icon}>
             binaries/linux64/${name}.so=$<TARGET_FILE:${name}>
             documentation=${out}/documentation
             documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
             documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
     DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
-            ${folder}/model.png ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
+            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
     COMMENT "Packing ${name}.fmu"
-    VERBATIM)
+    COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
 endfunction()

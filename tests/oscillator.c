@@ -49,7 +49,7 @@ static enum status check_parameters(const void *values_pointer, char *text, size
     return STATUS_INVALID_PARAMETERS;
 }
 
-static const struct model model = {
+const struct model oscillator_model = {
     .values_size = sizeof(struct oscillator_values),
     .parameters = {offsetof(struct oscillator_values, omega), 2 * sizeof(double)},
     .inputs = {offsetof(struct oscillator_values, u), sizeof(double)},
@@ -102,7 +102,7 @@ const struct unit oscillator_unit = {
     .name = "Oscillator",
     .guid = "{oscillator}",
     .default_tolerance = 1e-8,
-    .model = &model,
+    .model = &oscillator_model,
     .variables = variables,
     .variable_count = sizeof variables / sizeof variables[0],
     .row_of_reference = row_of_reference,

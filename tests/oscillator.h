@@ -1,5 +1,7 @@
-/* A model for the tests of src/, with a solution that is known in closed form: a mass on a spring,
- * x'' = -omega^2 x + u, and its unit, declared by hand as fmu/generate.py would. */
+/* A model with a solution that is known in closed form, for the tests of src/ and for the test that
+ * a model needs nothing but a folder: a mass on a spring, x'' = -omega^2 x + gain u.
+ * oscillator_unit is declared by hand; oscillator/variables.toml declares the same for
+ * fmu/generate.py. */
 #ifndef OSCILLATOR_H
 #define OSCILLATOR_H
 
@@ -31,6 +33,7 @@ enum oscillator_reference {
     OSCILLATOR_EFFECTIVE_TOLERANCE = 84,
 };
 
+extern const struct model oscillator_model;
 extern const struct unit oscillator_unit;
 
 /* State at time t after start with omega and u held; start and end may be the same array. */

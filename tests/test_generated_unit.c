@@ -1,0 +1,53 @@
+/* The table that fmu/generate.py makes from oscillator/variables.toml is the one written by hand.
+ */
+#include "oscillator.h"
+#include "unit.h"
+#include "value_references.h"
+
+#include <string.h>
+#include <unity.h>
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void test_rows_are_those_written_by_hand(void) {
+    for (size_t i = 0; i < oscillator_unit.variable_count; i++) {
+        const struct variable *expected = &oscillator_unit.variables[i];
+        const struct variable *row = variable_find(&unit, expected->reference);
+        TEST_ASSERT_NOT_NULL(row);
+        TEST_ASSERT_EQUAL_INT(expected->type, row->type);
+        TEST_ASSERT_EQUAL_INT(expected->owner, row->owner);
+        TEST_ASSERT_EQUAL_UINT64(expected->offset, row->offset);
+        TEST_ASSERT_EQUAL_INT(expected->causality, row->causality);
+        TEST_ASSERT_EQUAL_INT(expected->variability, row->variability);
+        TEST_ASSERT_EQUAL_INT(expected->initial, row->initial);
+        TEST_ASSERT_TRUE(expected->start == row->start && expected->min == row->min &&
+                         expected->max == row->max && expected->nominal == row->nominal);
+    }
+}
+
+static void test_every_row_is_found_by_its_reference(void) {
+    for (size_t i = 0; i < unit.variable_count; i++) {
+        TEST_ASSERT_EQUAL_PTR(&unit.variables[i],
+                              variable_find(&unit, unit.variables[i].reference));
+    }
+    TEST_ASSERT_NULL(variable_find(&unit, unit.reference_count));
+}
+
+static void test_names_and_references_of_the_header(void) {
+    TEST_ASSERT_EQUAL_STRING("Oscillator", unit.name);
+    TEST_ASSERT_EQUAL_STRING(OSCILLATOR_NAME, unit.name);
+    TEST_ASSERT_EQUAL_STRING(OSCILLATOR_GUID, unit.guid);
+    TEST_ASSERT_EQUAL_PTR(&oscillator_model, unit.model);
+    TEST_ASSERT_EQUAL_INT(OSCILLATOR_ENERGY, OSCILLATOR_energy);
+    TEST_ASSERT_EQUAL_STRING("energy", variable_find(&unit, OSCILLATOR_energy)->name);
+    TEST_ASSERT_TRUE(unit.default_tolerance == 1e-8);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_rows_are_those_written_by_hand);
+    RUN_TEST(test_every_row_is_found_by_its_reference);
+    RUN_TEST(test_names_and_references_of_the_header);
+    return UNITY_END();
+}
