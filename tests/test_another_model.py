@@ -1,4 +1,4 @@
-"""Another model, built by the same generator, slave and adapter: a folder of its own and no code here."""
+"""Another model, built by the same generator, slave and adapter from a folder of its own."""
 
 import os
 from pathlib import Path
