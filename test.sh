@@ -19,7 +19,8 @@ build asan
 ctest --preset asan --progress -j 2
 
 step "other importers, each in an environment of its own"
-tests/importers/install.sh
+# without network the tests of those that are missing are skipped; CI must have them
+tests/importers/install.sh || [ -z "${CI-}" ]
 
 step "gcc, optimized; all tests"
 build default

@@ -56,11 +56,16 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         component_create(instanceName, fmuType, functions, loggingOn != fmi2False);
     if (component == NULL) {
         component_log_refusal(functions, instanceName, "%s", status_text(STATUS_OUT_OF_MEMORY));
+        return NULL;
     }
+    component_log(component, fmi2OK, LOG_ALL, "fmi2Instantiate");
     return component;
 }
 
 void fmi2FreeInstance(fmi2Component c) {
+    if (c != NULL) {
+        component_log(c, fmi2OK, LOG_ALL, "fmi2FreeInstance");
+    }
     component_destroy(c);
 }
 
@@ -245,22 +250,38 @@ static bool has_pointer(struct component *component, enum call call, const void 
     return component_has_arrays(component, call, 1, pointer, pointer);
 }
 
-/* The state in a tag, where it is one that an instance of this kind can be in; otherwise 0. */
-static unsigned state_in(const struct component *component, unsigned tag) {
-    const unsigned common =
-        STATE_INSTANTIATED | STATE_INITIALIZATION | STATE_TERMINATED | STATE_ERROR;
-    const unsigned possible = component->kind == fmi2CoSimulation
-                                  ? common | STATE_STEP_COMPLETE | STATE_STEP_FAILED
-                                  : common | STATE_EVENT | STATE_CONTINUOUS_TIME;
+/* FMI states that an instance of a kind can be in while its slave is in a phase. */
+static unsigned states_of(fmi2Type kind, enum phase phase) {
+    const bool steps = kind == fmi2CoSimulation;
+    switch (phase) {
+    case PHASE_INSTANTIATED:
+        return STATE_INSTANTIATED | STATE_ERROR;
+    case PHASE_INITIALIZATION:
+        return STATE_INITIALIZATION | STATE_ERROR;
+    case PHASE_STEPPING:
+        return STATE_TERMINATED | STATE_ERROR |
+               (steps ? STATE_STEP_COMPLETE | STATE_STEP_FAILED : STATE_EVENT);
+    case PHASE_CONTINUOUS_TIME:
+        return steps ? 0 : STATE_CONTINUOUS_TIME | STATE_TERMINATED | STATE_ERROR;
+    case PHASE_COUNT:
+        break;
+    }
+    return 0;
+}
+
+/* The FMI state of a snapshot, where an instance of this kind can be in it; otherwise 0. */
+static unsigned state_in(const struct component *component, unsigned tag, enum phase phase) {
     const unsigned state = tag & TAG_STATE_MASK;
     const bool is_one_bit = state != 0 && (state & (state - 1)) == 0;
-    return tag >> TAG_KIND_SHIFT == (unsigned)component->kind && is_one_bit ? state & possible : 0;
+    const bool is_same_kind = tag >> TAG_KIND_SHIFT == (unsigned)component->kind;
+    return is_one_bit && is_same_kind ? state & states_of(component->kind, phase) : 0;
 }
 
 static fmi2Status refuse_kind(struct component *component, enum call call) {
-    return component_fail(component, "%s: the saved state is refused: it is of an instance for %s",
+    return component_fail(component,
+                          "%s: the saved state is refused: it is none of an instance for %s",
                           call_rules[call].name,
-                          component->kind == fmi2CoSimulation ? "Model Exchange" : "Co-Simulation");
+                          component->kind == fmi2CoSimulation ? "Co-Simulation" : "Model Exchange");
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
@@ -280,11 +301,12 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
         return fmi2Error;
     }
     unsigned tag = 0;
-    enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag);
+    enum phase phase = PHASE_COUNT;
+    enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag, &phase);
     if (status != STATUS_OK) {
         return component_status(component, status);
     }
-    const unsigned state = state_in(component, tag);
+    const unsigned state = state_in(component, tag, phase);
     if (state == 0) {
         return refuse_kind(component, CALL_fmi2SetFMUstate);
     }
@@ -316,7 +338,8 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
         return fmi2Error;
     }
     unsigned tag = 0;
-    const enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag);
+    enum phase phase = PHASE_COUNT;
+    const enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag, &phase);
     if (status == STATUS_OK) {
         *size = slave_serialized_size(component->slave);
     }
@@ -348,8 +371,9 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
         return component_status(component, status);
     }
     unsigned tag = 0;
-    status = slave_snapshot_tag(component->slave, snapshot, &tag);
-    if (status != STATUS_OK || state_in(component, tag) == 0) {
+    enum phase phase = PHASE_COUNT;
+    status = slave_snapshot_tag(component->slave, snapshot, &tag, &phase);
+    if (status != STATUS_OK || state_in(component, tag, phase) == 0) {
         slave_forget(component->slave, &snapshot);
         return refuse_kind(component, CALL_fmi2DeSerializeFMUstate);
     }

@@ -107,8 +107,8 @@ void slave_destroy(struct slave *slave) {
     if (slave == NULL) {
         return;
     }
-    while (slave->snapshots != NULL) {
-        struct slave_snapshot *snapshot = slave->snapshots;
+    while (slave->newest != NULL) {
+        struct slave_snapshot *snapshot = slave->newest;
         slave_forget(slave, &snapshot);
     }
     integrator_destroy(slave->integrator);
@@ -147,8 +147,8 @@ void slave_reset(struct slave *slave) {
     slave_update_tolerance(slave);
 }
 
-static enum status refuse_experiment(const struct slave *slave,
-                                     const struct slave_experiment *experiment) {
+enum status slave_check_experiment(const struct slave *slave,
+                                   const struct slave_experiment *experiment) {
     const double start = experiment->start_time;
     if (!isfinite(start)) {
         message_write(&slave->sink, STATUS_INVALID_ARGUMENT,
@@ -174,7 +174,7 @@ static enum status refuse_experiment(const struct slave *slave,
 }
 
 enum status slave_setup_experiment(struct slave *slave, const struct slave_experiment *experiment) {
-    const enum status status = refuse_experiment(slave, experiment);
+    const enum status status = slave_check_experiment(slave, experiment);
     if (status == STATUS_OK) {
         slave->state.experiment = *experiment;
         slave->state.experiment_defined = true;

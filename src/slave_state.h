@@ -9,8 +9,7 @@
 #include "slave.h"
 
 /* Internal steps after which the integrator restarts though nothing has changed: what a restored
- * snapshot has to replay at most, beside the steps of one communication step. Larger: fewer
- * restarts, slower rollback. */
+ * snapshot has to replay at most. Larger: fewer restarts, slower rollback. */
 enum { SLAVE_LONGEST_HISTORY = 1000 };
 
 /* All that later results depend on, but for the values in struct slave_memory. A plain value: a
@@ -60,7 +59,8 @@ struct slave {
     double *work;                  /* one value per input: those that the right-hand side sees */
     char *first;                   /* value structures for derivatives */
     char *second;
-    struct slave_snapshot *snapshots; /* those that belong to the instance, latest first */
+    struct slave_snapshot *newest; /* snapshots that belong to the instance, a list */
+    struct slave_snapshot *oldest;
 };
 
 static inline size_t count_of(struct span span) {
@@ -94,6 +94,10 @@ enum status slave_update_outputs(struct slave *slave);
 void slave_update_tolerance(struct slave *slave);
 
 void slave_set_clock(struct slave *slave, struct clock_time time);
+
+/* An experiment that can be run; says why where it cannot. */
+enum status slave_check_experiment(const struct slave *slave,
+                                   const struct slave_experiment *experiment);
 
 /* The parameters go together; says why where they do not. */
 enum status slave_check_parameters(const struct slave *slave);

@@ -9,8 +9,8 @@
 #include <string.h>
 
 struct slave_snapshot {
-    struct slave_snapshot *previous;
-    struct slave_snapshot *next;
+    struct slave_snapshot *newer;
+    struct slave_snapshot *older;
     unsigned tag;
     struct slave_state state;
     max_align_t memory[]; /* copy of slave_memory.block */
@@ -18,11 +18,23 @@ struct slave_snapshot {
 
 /* ---- In memory ------------------------------------------------------------------------------ */
 
-static enum status check_own(const struct slave *slave, const struct slave_snapshot *snapshot) {
-    for (const struct slave_snapshot *own = slave->snapshots; own != NULL; own = own->next) {
-        if (own == snapshot) {
-            return STATUS_OK;
+/* Searches from both ends: masters free in the order of saving or in the reverse one. */
+static bool is_own(const struct slave *slave, const struct slave_snapshot *snapshot) {
+    const struct slave_snapshot *from_newest = slave->newest;
+    const struct slave_snapshot *from_oldest = slave->oldest;
+    while (from_newest != NULL) {
+        if (from_newest == snapshot || from_oldest == snapshot) {
+            return true;
         }
+        from_newest = from_newest->older;
+        from_oldest = from_oldest->newer;
+    }
+    return false;
+}
+
+static enum status check_own(const struct slave *slave, const struct slave_snapshot *snapshot) {
+    if (is_own(slave, snapshot)) {
+        return STATUS_OK;
     }
     message_write(&slave->sink, STATUS_INVALID_ARGUMENT,
                   "the saved state is refused: it is none of this instance's");
@@ -36,12 +48,14 @@ static struct slave_snapshot *new_snapshot(struct slave *slave) {
                       status_text(STATUS_OUT_OF_MEMORY));
         return NULL;
     }
-    created->previous = NULL;
-    created->next = slave->snapshots;
-    if (slave->snapshots != NULL) {
-        slave->snapshots->previous = created;
+    created->newer = NULL;
+    created->older = slave->newest;
+    if (slave->newest != NULL) {
+        slave->newest->newer = created;
+    } else {
+        slave->oldest = created;
     }
-    slave->snapshots = created;
+    slave->newest = created;
     return created;
 }
 
@@ -92,24 +106,19 @@ enum status slave_forget(struct slave *slave, struct slave_snapshot **snapshot) 
         return status;
     }
     struct slave_snapshot *gone = *snapshot;
-    if (gone->next != NULL) {
-        gone->next->previous = gone->previous;
-    }
-    if (gone->previous != NULL) {
-        gone->previous->next = gone->next;
-    } else {
-        slave->snapshots = gone->next;
-    }
+    *(gone->older != NULL ? &gone->older->newer : &slave->oldest) = gone->newer;
+    *(gone->newer != NULL ? &gone->newer->older : &slave->newest) = gone->older;
     free(gone);
     *snapshot = NULL;
     return STATUS_OK;
 }
 
-enum status slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot,
-                               unsigned *tag) {
+enum status slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot, unsigned *tag,
+                               enum phase *phase) {
     const enum status status = check_own(slave, snapshot);
     if (status == STATUS_OK) {
         *tag = snapshot->tag;
+        *phase = snapshot->state.phase;
     }
     return status;
 }
@@ -276,17 +285,22 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
     const struct slave_memory *memory = &slave->memory;
     const double times[] = {state->time.s, state->time.rest, state->own.time, state->restart_time.s,
                             state->restart_time.rest};
-    const double *polynomials =
+    // inputs at the current time may have overflowed on their way; they were not set
+    const size_t coefficients = count_of(slave->model->inputs) * (POLYNOMIAL_DEGREE + 1);
+    const double *pending =
         (const double *)(const void *)(block + ((char *)memory->pending - memory->block));
-    const size_t coefficients = 3 * count_of(slave->model->inputs) * (POLYNOMIAL_DEGREE + 1);
+    const double *running = pending + 2 * coefficients;
     const double tolerance = state->own.effective_relative_tolerance;
 
     if ((int)state->phase < 0 || state->phase >= PHASE_COUNT ||
-        !are_finite(times, sizeof times / sizeof times[0]) ||
-        !are_finite(polynomials, coefficients) || !(tolerance > 0.0 && tolerance < 1.0) ||
-        !(state->own.relative_tolerance >= 0.0) || !isfinite(state->own.solver_last_step) ||
-        state->own.max_internal_steps < 1 || !are_counts(&state->statistics) ||
-        state->steps_before_restart < 0 || state->steps_before_restart > state->statistics.steps ||
+        !are_finite(times, sizeof times / sizeof times[0]) || !are_finite(pending, coefficients) ||
+        !are_finite(running, coefficients) || !(tolerance > 0.0 && tolerance < 1.0) ||
+        !(state->own.relative_tolerance >= 0.0 && isfinite(state->own.relative_tolerance)) ||
+        (state->experiment_defined &&
+         slave_check_experiment(slave, &state->experiment) != STATUS_OK) ||
+        !isfinite(state->own.solver_last_step) || state->own.max_internal_steps < 1 ||
+        !are_counts(&state->statistics) || state->steps_before_restart < 0 ||
+        state->steps_before_restart > state->statistics.steps ||
         !are_settable(slave, block + (memory->values - memory->block))) {
         return false;
     }

@@ -36,9 +36,10 @@ slave_restore(struct slave *slave, struct slave_snapshot *snapshot);
 __attribute__((nonnull)) enum status slave_forget(struct slave *slave,
                                                   struct slave_snapshot **snapshot);
 
-/* The tag that the snapshot was saved with. */
+/* The tag that the snapshot was saved with, and the phase the instance was in. */
 __attribute__((nonnull, warn_unused_result)) enum status
-slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot, unsigned *tag);
+slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot, unsigned *tag,
+                   enum phase *phase);
 
 /* Bytes that slave_serialize writes. */
 __attribute__((nonnull)) size_t slave_serialized_size(const struct slave *slave);

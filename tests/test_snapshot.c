@@ -128,6 +128,7 @@ static void test_bytes_carry_a_state_to_another_instance(void) {
     unsigned char *bytes = malloc(size);
     unsigned char *again = malloc(size);
     unsigned tag = 0;
+    enum phase phase = PHASE_COUNT;
     set(slave, OSCILLATOR_U, 0.5);
     for (int i = 0; i < 33; i++) {
         step(slave, 0.1);
@@ -136,8 +137,9 @@ static void test_bytes_carry_a_state_to_another_instance(void) {
     ASSERT_OK(slave_serialize(slave, snapshot, bytes, size));
 
     ASSERT_OK(slave_deserialize(other, bytes, size, &copy));
-    ASSERT_OK(slave_snapshot_tag(other, copy, &tag));
+    ASSERT_OK(slave_snapshot_tag(other, copy, &tag, &phase));
     TEST_ASSERT_EQUAL_UINT(42, tag);
+    TEST_ASSERT_EQUAL_INT(PHASE_STEPPING, phase);
     ASSERT_OK(slave_restore(other, copy));
     ASSERT_OK(slave_serialize(other, copy, again, size));
     TEST_ASSERT_EQUAL_MEMORY(bytes, again, size);
@@ -171,13 +173,15 @@ static void test_snapshots_of_others_are_refused(void) {
     struct slave_snapshot *foreign = NULL;
     unsigned char bytes[4096];
     unsigned tag;
+    enum phase phase;
     ASSERT_OK(slave_save(other, 0, &foreign));
     struct slave_snapshot *handle = foreign;
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_restore(slave, foreign));
     TEST_ASSERT_NOT_NULL(strstr(text, "none of this instance's"));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_save(slave, 0, &handle));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_forget(slave, &handle));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_snapshot_tag(slave, foreign, &tag));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          slave_snapshot_tag(slave, foreign, &tag, &phase));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                           slave_serialize(slave, foreign, bytes, sizeof bytes));
     TEST_ASSERT_EQUAL_PTR(foreign, handle);
@@ -193,7 +197,8 @@ static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
     }
     for (int i = 0; i < 5; i++) {
         unsigned tag = 99;
-        ASSERT_OK(slave_snapshot_tag(slave, snapshots[order[i]], &tag));
+        enum phase phase = PHASE_COUNT;
+        ASSERT_OK(slave_snapshot_tag(slave, snapshots[order[i]], &tag, &phase));
         TEST_ASSERT_EQUAL_UINT(order[i], tag);
         ASSERT_OK(slave_forget(slave, &snapshots[order[i]]));
         TEST_ASSERT_NULL(snapshots[order[i]]);

@@ -287,6 +287,26 @@ def test_new_parameters_are_those_of_a_new_instance(
             assert found == expected
 
 
+def test_new_parameters_at_a_time_that_is_rounded(unit: Unit) -> None:
+    """The new instance knows the time as a double, the old one what rounding left over as well.
+
+    Its first step is shorter or longer by that, so that the integrator may take other internal
+    steps: equal to what the integration is accurate to.
+    """
+    step, tolerance = 1 / 60, 1e-9
+    with Instance(unit) as instance, Instance(unit) as fresh:
+        instance.initialize(tolerance=tolerance, **START)
+        for i in range(60):
+            instance.step(i * step, step)
+        states = dict(zip(STATES, instance.get(*STATES), strict=True))
+        instance.set(m2=1.6)
+        fresh.initialize(60 * step, tolerance=tolerance, m2=1.6, **states)
+        for i in range(60, 120):
+            for one in (instance, fresh):
+                one.step(i * step, step)
+            assert instance.get(*STATES) == pytest.approx(fresh.get(*STATES), rel=tolerance)
+
+
 def test_parameters_set_to_what_they_are_change_nothing(unit: Unit) -> None:
     with Instance(unit) as instance, Instance(unit) as other:
         for one in (instance, other):
@@ -325,12 +345,13 @@ def test_debug_run_shows_every_call(unit: Unit, how: str) -> None:
     def prepare(instance: Instance) -> None:
         if how != "instantiate":
             instance.fmi.setDebugLogging(True, [] if how == "all" else [how])
-        instance.messages.clear()
-        calls.clear()
+            instance.messages.clear()
+            calls.clear()
 
     instance = debug_run(unit, prepare, logging_on=how == "instantiate", calls=calls.append)
     made = [re.match(r"fmi2\w+", call).group() for call in calls]
-    made.remove("fmi2FreeInstance")
+    assert made[-1] == "fmi2FreeInstance"
+    assert (made[0] == "fmi2Instantiate") == (how == "instantiate")
     assert made.count("fmi2DoStep") == 1000
     told = [m.text for m in instance.messages if m.category == "logAll"]
     assert [text[: len(name)] for text, name in zip(told, made, strict=True)] == made
