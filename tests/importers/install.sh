@@ -25,7 +25,7 @@ pins() {
     libcosimpy) echo libcosimpy==0.0.6 ;;
     fmu-manipulation-toolbox)
       echo fmu-manipulation-toolbox==2.0 xmlschema==4.3.2 elementpath==5.1.4 colorama==0.4.6 ;;
-    fmi-sim) echo fmi-sim@0.7.0 ;; # crates.io; its dependencies are in its Cargo.lock
+    fmi-sim) echo fmi-sim@0.7.0 ;; # its dependencies are in its Cargo.lock
     cofmupy) echo cofmupy==1.0.0 fmpy==0.3.20 numpy==2.4.6 pandas==3.1.1 scipy==1.17.1 ;;
     pathsim-fmi) echo pathsim-fmi==0.1.1 pathsim==0.27.1 fmpy==0.3.32 numpy==2.4.6 ;;
     gemseo-fmu) echo gemseo-fmu==3.1.1 gemseo==6.3.3 fmpy==0.3.19 numpy==2.3.3 ;;
