@@ -100,7 +100,8 @@ with_cargo() {
 install_tool() {
   local tool=$1 log=build/importers/$1.log how=with_pip
   [ "$tool" != fmi-sim ] || how=with_cargo
-  [ "$tool" != ecospy ] || system_package libtbb12 has_libtbb || return 1
+  # Ecos links to the first and unpacks FMUs by the command of the second
+  [ "$tool" != ecospy ] || { system_package libtbb12 has_libtbb && system_package unzip command -v unzip; } || return 1
   is_installed "$tool" && return
   echo "install.sh: installing $(pins "$tool" | cut -d ' ' -f 1) into build/importers/$tool"
   rm -f "build/importers/$tool/installed"
