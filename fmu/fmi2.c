@@ -246,10 +246,6 @@ static unsigned tag_of(const struct component *component) {
     return (unsigned)component->state | (unsigned)component->kind << TAG_KIND_SHIFT;
 }
 
-static bool has_pointer(struct component *component, enum call call, const void *pointer) {
-    return component_has_arrays(component, call, 1, pointer, pointer);
-}
-
 /* FMI states that an instance of a kind can be in while its slave is in a phase. */
 static unsigned states_of(fmi2Type kind, enum phase phase) {
     const bool steps = kind == fmi2CoSimulation;
@@ -286,7 +282,8 @@ static fmi2Status refuse_kind(struct component *component, enum call call) {
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     struct component *component = component_enter(c, CALL_fmi2GetFMUstate);
-    if (component == NULL || !has_pointer(component, CALL_fmi2GetFMUstate, FMUstate)) {
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2GetFMUstate, 1, FMUstate, FMUstate)) {
         return fmi2Error;
     }
     struct slave_snapshot *snapshot = *FMUstate;
@@ -297,7 +294,8 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
     struct component *component = component_enter(c, CALL_fmi2SetFMUstate);
-    if (component == NULL || !has_pointer(component, CALL_fmi2SetFMUstate, FMUstate)) {
+    if (component == NULL ||
+        !component_has_arrays(component, CALL_fmi2SetFMUstate, 1, FMUstate, FMUstate)) {
         return fmi2Error;
     }
     unsigned tag = 0;

@@ -1,3 +1,4 @@
+#include "last_text.h"
 #include "oscillator.h"
 
 #include <math.h>
@@ -5,20 +6,10 @@
 #include <unity.h>
 
 static struct slave *slave;
-static char text[512];
-
-static void keep_text(void *context, enum status status, const char *message) {
-    (void)context;
-    (void)status;
-    strncpy(text, message, sizeof text - 1);
-}
-
-#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, text)
 
 void setUp(void) {
-    const struct message_sink sink = {.write = keep_text};
     const struct slave_experiment experiment = {.start_time = 0.0};
-    ASSERT_OK(slave_create(&oscillator_unit, &sink, &slave));
+    ASSERT_OK(slave_create(&oscillator_unit, &last_text_sink, &slave));
     ASSERT_OK(slave_setup_experiment(slave, &experiment));
     ASSERT_OK(slave_enter_initialization(slave));
 }
@@ -140,7 +131,7 @@ static void test_orders_and_variables_that_have_no_derivative_are_refused(void) 
     const double nan = NAN;
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                           slave_set_input_derivatives(slave, &u, 1, &fourth, &one));
-    TEST_ASSERT_NOT_NULL(strstr(text, "an order from 1 to 3 is expected"));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "an order from 1 to 3 is expected"));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                           slave_set_input_derivatives(slave, &x, 1, &first, &one));
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
@@ -175,7 +166,7 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
         TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                               slave_get_directional_derivative(slave, cases[i].unknown, 1,
                                                                cases[i].known, 1, &one, &value));
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "is refused"), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "is refused"), last_text);
     }
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
 }

@@ -1,6 +1,7 @@
 #include "slave.h"
 
 #include "allocations.h"
+#include "last_text.h"
 #include "oscillator.h"
 
 #include <math.h>
@@ -8,32 +9,21 @@
 #include <unity.h>
 
 static struct slave *slave;
-static char text[512];
-
-static void keep_text(void *context, enum status status, const char *message) {
-    (void)context;
-    (void)status;
-    strncpy(text, message, sizeof text - 1);
-}
-
-static const struct message_sink sink = {.write = keep_text};
 
 static struct slave *create(void) {
     struct slave *created = NULL;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&oscillator_unit, &sink, &created));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&oscillator_unit, &last_text_sink, &created));
     return created;
 }
 
 void setUp(void) {
-    memset(text, 0, sizeof text);
+    memset(last_text, 0, sizeof last_text);
     slave = create();
 }
 
 void tearDown(void) {
     slave_destroy(slave);
 }
-
-#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, text)
 
 static double get(struct slave *from, unsigned reference) {
     double value = NAN;
@@ -223,7 +213,7 @@ static void test_times_that_do_not_fit_are_refused(void) {
         ASSERT_OK(slave_enter_initialization(slave));
         ASSERT_OK(slave_exit_initialization(slave));
         TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, slave_do_step(slave, cases[i].t, cases[i].h));
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, cases[i].expected), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, cases[i].expected), last_text);
         TEST_ASSERT_EQUAL_DOUBLE(0.0, slave_time(slave));
         ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
     }
@@ -310,13 +300,13 @@ static void test_a_field_of_another_kind_is_refused(void) {
         }
     }
     wrong.variables = variables;
-    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, slave_create(&wrong, &sink, &none));
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, slave_create(&wrong, &last_text_sink, &none));
     TEST_ASSERT_NULL(none);
 }
 
 static void test_initialization_needs_an_experiment(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_enter_initialization(slave));
-    TEST_ASSERT_NOT_NULL(strstr(text, "the experiment must be set up first"));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "the experiment must be set up first"));
 }
 
 static void test_an_experiment_that_makes_no_sense_is_refused(void) {
@@ -331,7 +321,7 @@ static void test_an_experiment_that_makes_no_sense_is_refused(void) {
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_setup_experiment(slave, &cases[i]));
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, "is refused"), text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "is refused"), last_text);
     }
     const struct slave_experiment undefined = {.stop_time = NAN, .tolerance = NAN};
     ASSERT_OK(slave_setup_experiment(slave, &undefined));
@@ -342,7 +332,7 @@ static void test_parameters_must_go_together_at_initialization_and_at_a_step(voi
     ASSERT_OK(slave_enter_initialization(slave));
     ASSERT_OK(set(slave, OSCILLATOR_OMEGA, -1.0));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_exit_initialization(slave));
-    TEST_ASSERT_EQUAL_STRING("omega = -1 is refused: it must be above 0", text);
+    TEST_ASSERT_EQUAL_STRING("omega = -1 is refused: it must be above 0", last_text);
 
     slave_reset(slave);
     initialize(slave, 0.0);
@@ -380,7 +370,7 @@ static void test_a_vector_is_set_as_a_whole_or_not_at_all(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_real(slave, unknown_last, 2, values));
     TEST_ASSERT_EQUAL_DOUBLE(1.0, get(slave, OSCILLATOR_X));
     TEST_ASSERT_EQUAL_STRING("value reference 99 is unknown: Oscillator has no such variable",
-                             text);
+                             last_text);
 }
 
 static void test_a_vector_is_read_as_a_whole_or_not_at_all(void) {
@@ -389,7 +379,7 @@ static void test_a_vector_is_read_as_a_whole_or_not_at_all(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_get_real(slave, references, 2, values));
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, values[0]);
     TEST_ASSERT_EQUAL_STRING(
-        "steps (value reference 80) is accessed as Real: it is of type Integer", text);
+        "steps (value reference 80) is accessed as Real: it is of type Integer", last_text);
 
     int integers[] = {-7, -7};
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
@@ -404,7 +394,7 @@ static void test_a_result_that_is_not_finite_is_not_given(void) {
     initialize(slave, 0.0);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_get_real(slave, &reference, 1, &value));
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
-    TEST_ASSERT_NOT_NULL(strstr(text, "energy"));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "energy"));
     TEST_ASSERT_EQUAL_DOUBLE(1e200, get(slave, OSCILLATOR_V));
 }
 
@@ -414,7 +404,7 @@ static void test_settings_are_closed_after_initialization(void) {
     initialize(slave, 0.0);
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_integer(slave, &limit, 1, &value));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(slave, OSCILLATOR_X, 2.0));
-    TEST_ASSERT_NOT_NULL(strstr(text, "only inputs and tunable parameters can"));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "only inputs and tunable parameters can"));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(slave, OSCILLATOR_GAIN, 2.0));
 }
 

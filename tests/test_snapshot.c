@@ -1,5 +1,6 @@
 #include "snapshot.h"
 
+#include "last_text.h"
 #include "oscillator.h"
 
 #include <math.h>
@@ -8,22 +9,11 @@
 #include <unity.h>
 
 static struct slave *slave;
-static char text[512];
-
-static void keep_text(void *context, enum status status, const char *message) {
-    (void)context;
-    (void)status;
-    strncpy(text, message, sizeof text - 1);
-}
-
-static const struct message_sink sink = {.write = keep_text};
-
-#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, text)
 
 static struct slave *started(void) {
     struct slave *created = NULL;
     const struct slave_experiment experiment = {.stop_time_defined = true, .stop_time = 1000.0};
-    ASSERT_OK(slave_create(&oscillator_unit, &sink, &created));
+    ASSERT_OK(slave_create(&oscillator_unit, &last_text_sink, &created));
     ASSERT_OK(slave_setup_experiment(created, &experiment));
     ASSERT_OK(slave_enter_initialization(created));
     ASSERT_OK(slave_exit_initialization(created));
@@ -31,7 +21,7 @@ static struct slave *started(void) {
 }
 
 void setUp(void) {
-    memset(text, 0, sizeof text);
+    memset(last_text, 0, sizeof last_text);
     slave = started();
 }
 
@@ -177,7 +167,7 @@ static void test_snapshots_of_others_are_refused(void) {
     ASSERT_OK(slave_save(other, 0, &foreign));
     struct slave_snapshot *handle = foreign;
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_restore(slave, foreign));
-    TEST_ASSERT_NOT_NULL(strstr(text, "none of this instance's"));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "none of this instance's"));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_save(slave, 0, &handle));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_forget(slave, &handle));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,

@@ -1,22 +1,14 @@
+#include "last_text.h"
 #include "oscillator.h"
 
 #include <math.h>
 #include <string.h>
 #include <unity.h>
 
-static char text[512];
-static const struct message_sink sink;
-static struct message_sink keeping;
-
-static void keep(void *context, enum status status, const char *message) {
-    (void)context;
-    (void)status;
-    strncpy(text, message, sizeof text - 1);
-}
+static const struct message_sink quiet;
 
 void setUp(void) {
-    text[0] = '\0';
-    keeping = (struct message_sink){.write = keep};
+    last_text[0] = '\0';
 }
 void tearDown(void) {}
 
@@ -64,21 +56,22 @@ static void test_what_may_be_set_when(void) {
 
 static void test_bounds_belong_to_the_range(void) {
     const struct variable *omega = get(OSCILLATOR_OMEGA);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, variable_check_value(omega, -10.0, &sink));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, variable_check_value(omega, 100.0, &sink));
-    TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, variable_check_value(omega, 100.5, &keeping));
-    TEST_ASSERT_EQUAL_STRING("omega = 100.5 is refused: a value from -10 to 100 is expected", text);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, variable_check_value(omega, -10.0, &quiet));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, variable_check_value(omega, 100.0, &quiet));
+    TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, variable_check_value(omega, 100.5, &last_text_sink));
+    TEST_ASSERT_EQUAL_STRING("omega = 100.5 is refused: a value from -10 to 100 is expected",
+                             last_text);
     TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE,
-                          variable_check_value(omega, nextafter(-10.0, -11.0), &sink));
+                          variable_check_value(omega, nextafter(-10.0, -11.0), &quiet));
 }
 
 static void test_values_that_are_not_finite_are_refused_without_a_range_too(void) {
     const double values[] = {NAN, INFINITY, -INFINITY};
     for (size_t i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
-                              variable_check_value(get(OSCILLATOR_X), values[i], &keeping));
-        TEST_ASSERT_NOT_NULL(strstr(text, "x = "));
-        TEST_ASSERT_NOT_NULL(strstr(text, "a finite value is expected"));
+                              variable_check_value(get(OSCILLATOR_X), values[i], &last_text_sink));
+        TEST_ASSERT_NOT_NULL(strstr(last_text, "x = "));
+        TEST_ASSERT_NOT_NULL(strstr(last_text, "a finite value is expected"));
     }
 }
 
