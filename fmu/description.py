@@ -11,9 +11,12 @@ Keys of variables.toml:
         reference     value reference, unique, 0 to 9999
         owner         "model" (default) or "slave": the structure that holds the value
         field         C designator of the value in that structure
-        type          "Real" (default) or "Integer"
+        type          "Real" (default), "Integer" or "Enumeration"
         causality, variability, initial, unit, start, min, max, nominal, description
                       as in section 2.2.7 of the FMI 2.0 specification
+        items         of an Enumeration: [variables.NAME.items.ITEM] with description and constant,
+                      the C constant of that value; the values are 1, 2, ... in the order of the
+                      file, start is the name of an item
         derivative_of name of the variable that this one is the time derivative of
         dependencies  of outputs and derivatives: the inputs, states and time they depend on
         parameters    of calculated outputs and derivatives: the parameters they depend on
@@ -68,12 +71,15 @@ KEYS = {
         "max": float,
         "nominal": float,
         "description": str,
+        "items": dict,
         "derivative_of": str,
         "dependencies": list,
         "parameters": list,
     },
+    "item": {"description": str, "constant": str},
 }
 REQUIRED = ("reference", "field", "causality", "variability", "description")
+TYPES = ("Real", "Integer", "Enumeration")
 
 
 class DescriptionError(Exception):
@@ -162,6 +168,8 @@ def load(path: Path) -> Table:
 
 def checked_variable(where: str, variable: Table) -> Table:
     """Check one variable by itself and fill in its defaults."""
+    if variable.get("type") == "Enumeration":
+        variable = numbered(where, variable)
     check_keys(where, variable, KEYS["variable"])
     for key in REQUIRED:
         if key not in variable:
@@ -169,7 +177,7 @@ def checked_variable(where: str, variable: Table) -> Table:
     v = {"owner": "model", "type": "Real", **variable}
     if not 0 <= v["reference"] <= LARGEST_REFERENCE:
         raise DescriptionError(f"{where}: reference must be from 0 to {LARGEST_REFERENCE}")
-    for key, allowed in (("owner", ("model", "slave")), ("type", ("Real", "Integer"))):
+    for key, allowed in (("owner", ("model", "slave")), ("type", TYPES)):
         if v[key] not in allowed:
             raise DescriptionError(f"{where}: {key} '{v[key]}' is not one of {', '.join(allowed)}")
 
@@ -184,9 +192,11 @@ def checked_variable(where: str, variable: Table) -> Table:
     needs_start = v["initial"] == "exact" or v["causality"] == "input"
     if needs_start != ("start" in v):
         raise DescriptionError(f"{where}: start is {'missing' if needs_start else 'not allowed'}")
-    if v["type"] == "Integer":
+    if ("items" in v) != (v["type"] == "Enumeration"):
+        raise DescriptionError(f"{where}: items belong to an Enumeration, and to nothing else")
+    if v["type"] != "Real":
         if v["variability"] == "continuous" or "unit" in v:
-            raise DescriptionError(f"{where}: an Integer is not continuous and has no unit")
+            raise DescriptionError(f"{where}: an {v['type']} is not continuous and has no unit")
         for key in ("start", "min", "max"):
             if key in v and not (v[key] == int(v[key]) and INTEGERS[0] <= v[key] <= INTEGERS[1]):
                 raise DescriptionError(f"{where}: {key} = {v[key]} is not an integer of 32 bits")
@@ -197,6 +207,37 @@ def checked_variable(where: str, variable: Table) -> Table:
     if v.get("nominal", 1.0) <= 0.0:
         raise DescriptionError(f"{where}: nominal must be above 0")
     return v
+
+
+def numbered(where: str, variable: Table) -> Table:
+    """Check the items of an Enumeration and give start, min and max as numbers."""
+    items = variable.get("items")
+    if not isinstance(items, dict) or not items:
+        raise DescriptionError(f"{where}: an Enumeration needs [items.NAME] tables")
+    for name, item in items.items():
+        if not isinstance(item, dict):
+            raise DescriptionError(f"{where}: item {name} is not a table")
+        check_keys(f"{where}: item {name}", item, KEYS["item"])
+        for key in KEYS["item"]:
+            if key not in item:
+                raise DescriptionError(f"{where}: item {name} lacks {key}")
+        if not IDENTIFIER.fullmatch(item["constant"]):
+            raise DescriptionError(f"{where}: item {name}: constant must be a C identifier")
+    if "min" in variable or "max" in variable:
+        raise DescriptionError(f"{where}: min and max follow from the items")
+    v = {**variable, "min": 1, "max": len(items)}
+    if "start" in variable:
+        if variable["start"] not in items:
+            raise DescriptionError(
+                f"{where}: start = {variable['start']!r} is not one of {', '.join(items)}"
+            )
+        v["start"] = list(items).index(variable["start"]) + 1
+    return v
+
+
+def type_name(variable: str) -> str:
+    """Name of the type of an Enumeration, for example SolverMethod for solver_method."""
+    return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
 
 
 def check_experiment(path: Path, experiment: Table) -> None:

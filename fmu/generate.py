@@ -12,7 +12,7 @@ import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
-from description import BASE_UNITS, DescriptionError, Table, is_unknown, load
+from description import BASE_UNITS, DescriptionError, Table, is_unknown, load, type_name
 
 LOG_CATEGORIES = (
     "logEvents",
@@ -26,12 +26,13 @@ LOG_CATEGORIES = (
 
 def guid(description: Table) -> str:
     """Hash of what defines the interface: all but texts, C names and default experiment."""
-    left_out = {"where", "description", "field", "owner"}
+    left_out = {"where", "description", "field", "owner", "items"}
     interface = {
         "model": description["model"]["name"],
         "units": description["units"],
         "variables": {
             name: {key: value for key, value in v.items() if key not in left_out}
+            | ({"items": list(v["items"])} if "items" in v else {})
             for name, v in description["variables"].items()
         },
     }
@@ -79,6 +80,7 @@ def model_description(description: Table, version: str) -> str:
         maxOutputDerivativeOrder="2",
     )
     add_units(ET.SubElement(root, "UnitDefinitions"), description["units"])
+    add_types(root, variables)
     categories = ET.SubElement(root, "LogCategories")
     for category in LOG_CATEGORIES:
         ET.SubElement(categories, "Category", name=category)
@@ -108,6 +110,21 @@ def add_units(parent: ET.Element, units: Table) -> None:
             ET.SubElement(element, "DisplayUnit", name=display, factor=number(factor))
 
 
+def add_types(root: ET.Element, variables: Table) -> None:
+    """Write TypeDefinitions: one type for each Enumeration."""
+    enumerations = {name: v for name, v in variables.items() if v["type"] == "Enumeration"}
+    if not enumerations:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for name, v in enumerations.items():
+        simple = ET.SubElement(definitions, "SimpleType", name=type_name(name))
+        enumeration = ET.SubElement(simple, "Enumeration")
+        for value, (item, keys) in enumerate(v["items"].items(), start=1):
+            ET.SubElement(
+                enumeration, "Item", name=item, value=str(value), description=keys["description"]
+            )
+
+
 def add_variable(
     parent: ET.Element, name: str, v: Table, index: dict[str, str], units: Table
 ) -> None:
@@ -119,6 +136,8 @@ def add_variable(
         parent, "ScalarVariable", name=name, valueReference=str(v["reference"]), **attributes
     )
     element = ET.SubElement(scalar, v["type"])
+    if v["type"] == "Enumeration":
+        element.set("declaredType", type_name(name))
     if "unit" in v:
         element.set("unit", v["unit"])
         for display in list(units[v["unit"]].get("display", {}))[:1]:
@@ -186,7 +205,7 @@ def variable_table(description: Table) -> str:
     """Text of variables.c: the rows, and the check that each field has the declared type."""
     model, variables = description["model"], description["variables"]
     structures = {"model": model["values"], "slave": "struct slave_values"}
-    c_types = {"Real": "double", "Integer": "int"}
+    c_types = {"Real": "double", "Integer": "int", "Enumeration": "int"}
     checks, rows = [], []
     for name, v in variables.items():
         structure = structures[v["owner"]]
@@ -194,8 +213,14 @@ def variable_table(description: Table) -> str:
             f"_Static_assert(_Generic((({structure} *)0)->{v['field']}, {c_types[v['type']]}: 1, "
             f'default: 0), "{name}: {v["field"]} must be of type {c_types[v["type"]]}");'
         )
+        checks += [
+            f'_Static_assert({item["constant"]} == {value}, "{name}: {item["constant"]} must be '
+            f'{value}");'
+            for value, item in enumerate(v.get("items", {}).values(), start=1)
+        ]
+        kind = "REAL" if v["type"] == "Real" else "INTEGER"
         rows.append(
-            f'    {{{v["reference"]}, "{name}", VARIABLE_{v["type"].upper()}, '
+            f'    {{{v["reference"]}, "{name}", VARIABLE_{kind}, '
             f"VARIABLE_OF_{v['owner'].upper()}, offsetof({structure}, {v['field']}),\n"
             f"     CAUSALITY_{v['causality'].upper()}, VARIABILITY_{v['variability'].upper()}, "
             f"INITIAL_{(v['initial'] or 'none').upper()},\n"
