@@ -201,6 +201,14 @@ class _Reader:
             self.fail(where, f"{name!r} is not {kind} of the model (known: {known})")
         return self.declared[name]
 
+    def item(self, value: Any, items: list[str], key: str) -> float:
+        """Number of an Enumeration's item, which is given by its name."""
+        if value not in items:
+            guess = _did_you_mean(value, items) if isinstance(value, str) else ""
+            known = ", ".join(f'"{item}"' for item in items)
+            self.fail(key, f"expected one of {known}, got {_show(value)}{guess}")
+        return float(items.index(value) + 1)
+
     def in_range(self, low: float, high: float, variable: dict[str, Any], key: str) -> None:
         unit = f" {variable['unit']}" if "unit" in variable else ""
         if low < variable.get("min", -math.inf):
@@ -209,11 +217,14 @@ class _Reader:
             self.fail(key, f"expected at most {variable['max']!r}{unit}, got {high!r}")
 
     def values(self, content: dict[str, Any], section: str) -> dict[str, float]:
-        """Section [parameters] or [initial]: name = value."""
+        """Section [parameters] or [initial]: name = value, or an Enumeration's item as a text."""
         result = {}
         for name, value in self.table(content.get(section, {}), f"[{section}]").items():
             variable = self.variable(name, section)
             key = f"[{section}] {name}"
+            if variable["type"] == "Enumeration":
+                result[name] = self.item(value, list(variable["items"]), key)
+                continue
             result[name] = self.number(value, key)
             if variable["type"] == "Integer" and not result[name].is_integer():
                 self.fail(key, f"expected a whole number, got {_show(value)}")

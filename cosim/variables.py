@@ -16,7 +16,8 @@ def load(model_folder: Path) -> dict[str, dict[str, Any]]:
     -------
     dict
         The tables ``[variables.*]`` by name, in order of value reference. ``type`` is filled in
-        where the file leaves it to its default, Real.
+        where the file leaves it to its default, Real. The start value of an Enumeration, which the
+        file gives by the item's name, is its number, as it is for the FMU; so are min and max.
 
     Raises
     ------
@@ -39,9 +40,24 @@ def load(model_folder: Path) -> dict[str, dict[str, Any]]:
                 raise UserError(f"{path}: [variables.{name}] is already in {origin[name]}")
             if not isinstance(variable, dict) or "reference" not in variable:
                 raise UserError(f"{path}: [variables.{name}] needs a value reference")
-            found[name] = {"type": "Real"} | variable
+            found[name] = _numbered({"type": "Real"} | variable, f"{path}: [variables.{name}]")
             origin[name] = path
     return dict(sorted(found.items(), key=lambda item: item[1]["reference"]))
+
+
+def _numbered(variable: dict[str, Any], where: str) -> dict[str, Any]:
+    """`variable` with the numbers of an Enumeration: its items count from 1."""
+    if variable["type"] != "Enumeration":
+        return variable
+    items = variable.get("items")
+    if not isinstance(items, dict) or not items:
+        raise UserError(f"{where}: an Enumeration needs items")
+    variable |= {"min": 1, "max": len(items)}
+    if "start" in variable:
+        if variable["start"] not in items:
+            raise UserError(f"{where}: start must be one of {', '.join(items)}")
+        variable["start"] = list(items).index(variable["start"]) + 1
+    return variable
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -172,9 +172,9 @@ def test_a_variable_added_to_the_toml_alone_is_built_in(model_copy: Path, tmp_pa
     compile_table(tmp_path / "out")
 
 
-def compile_table(folder: Path) -> None:
+def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
     """Compile the generated variables.c; raise with the compiler's words where that fails."""
-    includes = [f"-I{ROOT / name}" for name in ("src", "fmu", "models/rp_manipulator")]
+    includes = [f"-I{ROOT / name}" for name in ("src", "fmu", "models", f"models/{model}")]
     command = ["cc", "-std=c17", "-fsyntax-only", *includes, folder / "variables.c"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
@@ -265,6 +265,139 @@ def test_a_wrong_file_is_refused_with_a_reason(model_copy: Path, tmp_path: Path,
     for word in [".toml", *words]:
         assert word in result.stderr
     assert not (tmp_path / "out").exists()
+
+
+# Enumerations: the reference motions have two
+
+
+@pytest.fixture
+def trajectory(tmp_path: Path) -> Path:
+    """A copy of what the generator reads for RPTrajectory, as model_copy."""
+    (tmp_path / "src").mkdir()
+    for shared in (ROOT / "src").glob("*.toml"):
+        shutil.copy(shared, tmp_path / "src")
+    folder = tmp_path / "models" / "rp_trajectory"
+    folder.mkdir(parents=True)
+    return Path(shutil.copy(ROOT / "models" / "rp_trajectory" / "variables.toml", folder))
+
+
+def change(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+def test_an_enumeration_in_the_model_description(trajectory: Path, tmp_path: Path) -> None:
+    root = generated(trajectory, tmp_path / "out")
+    types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/SimpleType")}
+    assert list(types) == ["MotionType", "BranchType"]
+    items = types["MotionType"].findall("Enumeration/Item")
+    names = [(item.get("name"), item.get("value")) for item in items]
+    assert names == [("point_to_point", "1"), ("line", "2"), ("circle", "3")]
+    assert all(item.get("description") for item in items)
+    # the order that the schema asks for
+    tags = [child.tag for child in root]
+    assert tags.index("TypeDefinitions") == tags.index("UnitDefinitions") + 1
+    assert tags.index("TypeDefinitions") < tags.index("LogCategories")
+
+    motion, branch = (scalars(root)[name] for name in ("motion", "branch"))
+    assert [(v[0].tag, v[0].attrib) for v in (motion, branch)] == [
+        ("Enumeration", {"declaredType": "MotionType", "start": "3", "min": "1", "max": "3"}),
+        ("Enumeration", {"declaredType": "BranchType", "start": "1", "min": "1", "max": "2"}),
+    ]
+
+
+def test_an_enumeration_is_an_integer_in_the_table(trajectory: Path, tmp_path: Path) -> None:
+    generated(trajectory, tmp_path / "out")
+    table = (tmp_path / "out" / "variables.c").read_text()
+    row = table.partition('{1, "motion", ')[2].partition("}")[0]
+    assert row.startswith("VARIABLE_INTEGER, VARIABLE_OF_MODEL, ")
+    assert "3.0, 1.0, 3.0, 1.0" in row  # start, min, max, nominal
+    compile_table(tmp_path / "out", "rp_trajectory")
+
+
+def test_no_types_without_an_enumeration(description: ET.Element) -> None:
+    assert description.find("TypeDefinitions") is None
+
+
+def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_path: Path) -> None:
+    guids = [generated(trajectory, tmp_path / "same").get("guid")]
+    change(trajectory, "The end effector moves along a circle", "Round and round")
+    guids.append(generated(trajectory, tmp_path / "text").get("guid"))
+    change(trajectory, "line = {", "straight = {")
+    guids.append(generated(trajectory, tmp_path / "item").get("guid"))
+    assert guids[0] == guids[1] != guids[2]
+
+
+# what is replaced, by what, and what the message must say beside the file
+WRONG_ENUMERATIONS = {
+    "no_items": (
+        "[variables.branch.items]",
+        "[variables.other.items]",
+        ["branch", "an Enumeration needs [items.NAME]"],
+    ),
+    "empty_items": (
+        'field = "parameters.l1"',
+        'field = "parameters.l1"\ntype = "Enumeration"\nitems = {}',
+        ["l1", "an Enumeration needs [items.NAME]"],
+    ),
+    "items_of_a_real": (
+        'field = "parameters.l1"',
+        'field = "parameters.l1"\nitems.one = { constant = "ONE", description = "One" }',
+        ["l1", "items belong to an Enumeration"],
+    ),
+    "start_no_item": ('start = "circle"', 'start = "ellipse"', ["motion", "'ellipse'", "circle"]),
+    "start_number": ('start = "circle"', "start = 3", ["motion", "start = 3", "circle"]),
+    "start_missing": ('start = "circle"\n', "", ["motion", "start is missing"]),
+    "start_of_a_real": ("start = 0.1\n", 'start = "circle"\n', ["variable a", "finite number"]),
+    "constant_missing": (
+        '{ constant = "RP_TRAJECTORY_LINE", ',
+        "{ ",
+        ["motion", "item line", "lacks constant"],
+    ),
+    "constant_no_identifier": (
+        "RP_TRAJECTORY_LINE",
+        "RP TRAJECTORY LINE",
+        ["item line", "C identifier"],
+    ),
+    "description_missing": (
+        ', description = "The end effector moves along a circle"',
+        "",
+        ["item circle", "lacks description"],
+    ),
+    "item_no_table": ("line = {", "arc = 1\nline = {", ["motion", "item arc", "not a table"]),
+    "item_key_unknown": ("line = {", "line = { value = 2,", ["item line", "unknown key 'value'"]),
+    "own_minimum": ('start = "circle"', 'start = "circle"\nmin = 1', ["motion", "min and max"]),
+    "with_unit": ('start = "circle"', 'start = "circle"\nunit = "m"', ["motion", "no unit"]),
+}
+
+
+@pytest.mark.parametrize("case", WRONG_ENUMERATIONS)
+def test_a_wrong_enumeration_is_refused(trajectory: Path, tmp_path: Path, case: str) -> None:
+    old, new, words = WRONG_ENUMERATIONS[case]
+    change(trajectory, old, new)
+    result = generate(trajectory, tmp_path / "out")
+    assert result.returncode == 2
+    assert len(result.stderr.splitlines()) == 1
+    for word in [".toml", *words]:
+        assert word in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "word"),
+    [
+        ("RP_TRAJECTORY_LINE", "RP_TRAJECTORY_CIRCLE", "RP_TRAJECTORY_CIRCLE must be 2"),
+        ("RP_TRAJECTORY_LINE", "RP_TRAJECTORY_SPIRAL", "RP_TRAJECTORY_SPIRAL"),
+        ("parameters.motion", "parameters.radius", "motion: parameters.radius must be of type int"),
+    ],
+)
+def test_a_constant_of_another_value_does_not_compile(
+    trajectory: Path, tmp_path: Path, old: str, new: str, word: str
+) -> None:
+    change(trajectory, old, new)
+    generated(trajectory, tmp_path / "out")
+    with pytest.raises(ValueError, match=word):
+        compile_table(tmp_path / "out", "rp_trajectory")
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:

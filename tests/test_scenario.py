@@ -34,6 +34,15 @@ min = -10.0
 reference = 4
 causality = "output"
 initial = "calculated"
+[variables.gear]
+reference = 6
+type = "Enumeration"
+causality = "parameter"
+start = "second"
+[variables.gear.items]
+first = { description = "Slow", constant = "GEAR_FIRST" }
+second = { description = "Faster", constant = "GEAR_SECOND" }
+third = { description = "Fast", constant = "GEAR_THIRD" }
 """
 INCLUDED = """
 [variables.max_steps]
@@ -101,8 +110,51 @@ def test_only_what_is_needed(write) -> None:
 
 def test_variables_are_read_with_their_includes(write) -> None:
     declared = variables.load(write("").parents[1])
-    assert list(declared) == ["time", "mass", "speed", "power", "force", "max_steps"]
+    assert list(declared) == ["time", "mass", "speed", "power", "force", "gear", "max_steps"]
     assert declared["mass"]["type"] == "Real" and declared["max_steps"]["type"] == "Integer"
+
+
+def test_an_enumeration_starts_at_the_number_of_its_item(write) -> None:
+    gear = variables.load(write("").parents[1])["gear"]
+    assert (gear["start"], gear["min"], gear["max"]) == (2, 1, 3)
+
+
+@pytest.mark.parametrize(("item", "number"), [("first", 1), ("second", 2), ("third", 3)])
+def test_an_enumeration_is_given_by_the_name_of_an_item(write, item: str, number: int) -> None:
+    run = scenario.load(write(f'{HEAD}{TIME}[parameters]\ngear = "{item}"\n'))
+    assert run.parameters == {"gear": number}
+
+
+@pytest.mark.parametrize(
+    ("given", "shown"),
+    [
+        ('"fourth"', "'fourth'"),
+        ('"Third"', "'Third', did you mean 'third'?"),
+        ("2", "2"),
+        ("true", "true"),
+        ('["first"]', "['first']"),
+    ],
+)
+def test_what_is_no_item_is_refused_with_the_items(write, given: str, shown: str) -> None:
+    with pytest.raises(UserError) as caught:
+        scenario.load(write(f"{HEAD}{TIME}[parameters]\ngear = {given}\n"))
+    message = f'[parameters] gear: expected one of "first", "second", "third", got {shown}'
+    assert str(caught.value).endswith(f"run.toml: {message}")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('start = "second"', 'start = "fourth"', "start must be one of first, second, third"),
+        ("[variables.gear.items]", "[variables.gear.things]", "an Enumeration needs items"),
+    ],
+)
+def test_a_wrong_enumeration_is_refused(write, old: str, new: str, message: str) -> None:
+    path = write(HEAD + TIME)
+    declared = path.parents[1] / "variables.toml"
+    declared.write_text(declared.read_text().replace(old, new))
+    with pytest.raises(UserError, match=re.escape(f"[variables.gear]: {message}")):
+        scenario.load(path)
 
 
 def test_variable_declared_twice(write, tmp_path: Path) -> None:
@@ -256,7 +308,7 @@ MISTAKES = {
     ),
     "input as parameter": (
         f"{HEAD}{TIME}[parameters]\nforce = 1",
-        "[parameters]: 'force' is not a parameter of the model (known: mass, max_steps)",
+        "[parameters]: 'force' is not a parameter of the model (known: mass, gear, max_steps)",
     ),
     "parameter as initial": (
         f"{HEAD}{TIME}[initial]\nmass = 1",
