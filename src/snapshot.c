@@ -298,7 +298,8 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
         !(state->own.relative_tolerance >= 0.0 && isfinite(state->own.relative_tolerance)) ||
         (state->experiment_defined &&
          slave_check_experiment(slave, &state->experiment) != STATUS_OK) ||
-        !isfinite(state->own.solver_last_step) || state->own.max_internal_steps < 1 ||
+        !isfinite(state->own.solver_last_step) ||
+        (slave->integrator != NULL && state->own.max_internal_steps < 1) ||
         !are_counts(&state->statistics) || state->steps_before_restart < 0 ||
         state->steps_before_restart > state->statistics.steps ||
         !are_settable(slave, block + (memory->values - memory->block))) {
