@@ -45,6 +45,14 @@ static inline struct taylor taylor_quotient(struct taylor x, struct taylor y) {
     return (struct taylor){value, first, second};
 }
 
+/* From x = root^2, differentiated. */
+static inline struct taylor taylor_square_root(struct taylor x) {
+    const double root = sqrt(x.value);
+    const double first = x.first / (2.0 * root);
+    const double second = (x.second - 2.0 * first * first) / (2.0 * root);
+    return (struct taylor){root, first, second};
+}
+
 static inline struct taylor taylor_sine(struct taylor x) {
     const double s = sin(x.value);
     const double c = cos(x.value);
@@ -55,6 +63,16 @@ static inline struct taylor taylor_cosine(struct taylor x) {
     const double s = sin(x.value);
     const double c = cos(x.value);
     return (struct taylor){c, -s * x.first, -s * x.second - c * x.first * x.first};
+}
+
+/* From (x^2 + y^2) angle' = x y' - y x', differentiated. */
+static inline struct taylor taylor_atan2(struct taylor y, struct taylor x) {
+    const double r2 = x.value * x.value + y.value * y.value;
+    const double half_r2_rate = x.value * x.first + y.value * y.first;
+    const double first = (x.value * y.first - y.value * x.first) / r2;
+    const double second =
+        (x.value * y.second - y.value * x.second - 2.0 * first * half_r2_rate) / r2;
+    return (struct taylor){atan2(y.value, x.value), first, second};
 }
 
 #endif

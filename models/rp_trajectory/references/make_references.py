@@ -1,0 +1,210 @@
+"""Makes the reference trajectories of the reference motions, apart from the code that they check.
+
+The path and its rates come from sympy, the scaling law from the conditions at its ends; the joints
+follow from the forward kinematics, x + i y = exp(i q1) (L + i a), and its first two derivatives by
+time, solved in 40 digits and rounded once.
+"""
+
+import argparse
+import functools
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import mpmath as mp
+import numpy as np
+import sympy as sp
+
+MODEL_FOLDER = Path(__file__).resolve().parents[1]
+ROOT = MODEL_FOLDER.parents[1]
+sys.path.insert(0, str(ROOT))
+
+from cosim import scenario as scenarios
+from cosim import variables
+from cosim.errors import UserError
+from cosim.scenario import Scenario
+from cosim.simulation import write_csv
+
+UNIT = "RPTrajectory"
+DIGITS = 40
+JOINTS = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
+OUTPUTS = (*JOINTS, "ee_x_ref", "ee_y_ref", "ee_vx_ref", "ee_vy_ref")
+KINDS = tuple(variables.load(MODEL_FOLDER)["motion"]["items"])
+BRANCHES = tuple(variables.load(MODEL_FOLDER)["branch"]["items"])
+
+
+@functools.cache
+def scaling_law(x: sp.Expr) -> sp.Expr:
+    """Quintic from 0 to 1 whose first and second derivatives are 0 at both ends."""
+    c, z = sp.symbols("c:6"), sp.Symbol("z")
+    quintic = sum(ck * z**k for k, ck in enumerate(c))
+    conditions = [quintic.subs(z, 0), quintic.subs(z, 1) - 1]
+    conditions += [quintic.diff(z, k).subs(z, end) for k in (1, 2) for end in (0, 1)]
+    return quintic.subs(sp.solve(conditions, c)).subs(z, x)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A piece of a motion, up to the elapsed time `end` (s)."""
+
+    end: mp.mpf
+    # elapsed time (s) -> both coordinates (rad and m, or m), their rates, their second rates
+    evaluate: Callable[[mp.mpf], list[mp.mpf]]
+
+
+def fraction(number: float | mp.mpf) -> sp.Rational:
+    """The number as the fraction that it is."""
+    magnitude, exponent = mp.mpf(abs(number)).man_exp
+    return (-1 if number < 0 else 1) * sp.Integer(int(magnitude)) * sp.Integer(2) ** int(exponent)
+
+
+def segments(value: dict[str, float | mp.mpf]) -> list[Segment]:
+    """Both coordinates of the motion, joints of point_to_point or those of the end effector."""
+    u = sp.Symbol("u")
+
+    def exact(name: str) -> sp.Expr:
+        return fraction(value[name])
+
+    if value["motion"] == KINDS.index("circle") + 1:
+        rate, ramp = exact("frequency"), exact("ramp_time")
+        full = exact("turns") / abs(rate)  # s: time that the turns take at full speed
+        x = sp.Symbol("x")
+        ramped = sp.integrate(scaling_law(x), (x, 0, u / ramp)) * ramp
+        cruising = ramped.subs(u, ramp) + (u - ramp)
+        braking = cruising.subs(u, full) + ramped.subs(u, ramp) - ramped.subs(u, full + ramp - u)
+        times = [(0, 0), (ramp, ramped), (full, cruising), (full + ramp, braking), (sp.oo, full)]
+
+        def position(time: sp.Expr) -> list[sp.Expr]:
+            phase = exact("start_angle") + 2 * sp.pi * rate * time
+            around = (sp.cos(phase), sp.sin(phase))
+            centers = (exact("x_center"), exact("y_center"))
+            return [c + exact("radius") * e for c, e in zip(centers, around, strict=True)]
+    else:
+        duration = exact("duration")
+        times = [(0, 0), (duration, scaling_law(u / duration)), (sp.oo, 1)]
+        joints = value["motion"] == KINDS.index("point_to_point") + 1
+        names = ("q1", "q2") if joints else ("ee_x", "ee_y")
+
+        def position(time: sp.Expr) -> list[sp.Expr]:
+            ends = [(exact(f"{name}_from"), exact(f"{name}_to")) for name in names]
+            return [begin + (end - begin) * time for begin, end in ends]
+
+    result = []
+    for end, time in times:
+        path = position(sp.sympify(time))
+        rates = [[c.diff(u, order) for c in path] for order in range(3)]
+        flat = [expression for order in rates for expression in order]
+        limit = mp.inf if end is sp.oo else mp.mpf(sp.Rational(end).p) / sp.Rational(end).q
+        result.append(Segment(limit, sp.lambdify(u, flat, "mpmath")))
+    return result
+
+
+def joint_rates(
+    q1: mp.mpf, L: mp.mpf, a: mp.mpf, velocity: mp.mpc, acceleration: mp.mpc
+) -> tuple[mp.mpc, mp.mpc]:
+    """Rates of the joints, q1 as the real part and q2 as the imaginary one, first and second.
+
+    p = exp(i q1) (L + i a) has p' = exp(i q1) (L' + i q1' (L + i a)) and
+    p'' = exp(i q1) (L'' + i q1'' (L + i a) + 2 i q1' L' - q1'^2 (L + i a)).
+    """
+    turn = mp.expj(-q1)
+    v = turn * velocity
+    dq1 = v.imag / L
+    dL = v.real + a * dq1
+    w = turn * acceleration - 2j * dq1 * dL + dq1**2 * mp.mpc(L, a)
+    ddq1 = w.imag / L
+    return mp.mpc(dq1, dL), mp.mpc(ddq1, w.real + a * ddq1)
+
+
+class Motion:
+    """One motion; evaluates it at times that go forward, so that q1 stays continuous."""
+
+    def __init__(self, parameters: dict[str, float | mp.mpf]) -> None:
+        declared = variables.load(MODEL_FOLDER)
+        start = {n: v["start"] for n, v in declared.items() if v["causality"] == "parameter"}
+        self.value = start | parameters
+        self.segments = segments(self.value)
+        self.q1: mp.mpf | None = None  # the last one
+
+    def coordinates(self, t: float | mp.mpf) -> list[mp.mpc]:
+        """Position, velocity, acceleration; where two segments meet, those of the later one."""
+        u = mp.mpf(t) - mp.mpf(self.value["start_time"])
+        segment = next(segment for segment in self.segments if u < segment.end)
+        x = segment.evaluate(u)
+        return [mp.mpc(x[0], x[1]), mp.mpc(x[2], x[3]), mp.mpc(x[4], x[5])]
+
+    def outputs(self, t: float | mp.mpf) -> list[mp.mpf]:
+        """Values of OUTPUTS at `t` (s), which is less than half a turn after the one before."""
+        l1, a = mp.mpf(self.value["l1"]), mp.mpf(self.value["a"])
+        position, velocity, acceleration = self.coordinates(t)
+        if self.value["motion"] == KINDS.index("point_to_point") + 1:
+            L = l1 + position.imag
+            q, dq, ddq = position, velocity, acceleration
+            turn = mp.expj(q.real)
+            position = turn * mp.mpc(L, a)
+            velocity = turn * (dq.imag + 1j * dq.real * mp.mpc(L, a))
+        else:
+            sign = -1 if self.value["branch"] == BRANCHES.index("backward") + 1 else 1
+            L = sign * mp.sqrt(abs(position) ** 2 - a**2)
+            q1 = mp.arg(position / mp.mpc(L, a))
+            if self.q1 is not None:
+                q1 += 2 * mp.pi * mp.nint((self.q1 - q1) / (2 * mp.pi))
+            self.q1 = q1
+            q = mp.mpc(q1, L - l1)
+            dq, ddq = joint_rates(q1, L, a, velocity, acceleration)
+        pairs = (q, dq, ddq, position, velocity)
+        return [part for pair in pairs for part in (pair.real, pair.imag)]
+
+
+def simulate(scenario: Scenario) -> np.ndarray:
+    """Values of OUTPUTS at every communication point of the reference, (rows, outputs)."""
+    with mp.workdps(DIGITS):
+        motion = Motion(scenario.parameters)
+        rows = [motion.outputs(t) for t in scenario.times[scenario.reference_rows]]
+        return np.array([[float(x) for x in row] for row in rows])
+
+
+def write(scenario: Scenario, folder: Path) -> None:
+    """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
+    folder.mkdir(parents=True, exist_ok=True)
+    times = scenario.times
+    values = simulate(scenario) + 0.0  # no negative zero
+    write_csv(folder / f"{UNIT}_ref.csv", times[scenario.reference_rows], OUTPUTS, values)
+    write_csv(folder / f"{UNIT}_in.csv", times, (), np.empty((len(times), 0)))
+    options = {
+        "StartTime": scenario.start,
+        "StopTime": scenario.stop,
+        "StepSize": scenario.steps[0] if len(scenario.steps) == 1 else 0.0,  # 0: variable
+        "RelTol": scenario.tolerance,
+    }
+    text = "".join(f"{key},{value!r}\n" for key, value in options.items())
+    (folder / f"{UNIT}_ref.opt").write_text(text, encoding="utf-8", newline="\n")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
+    arguments = parser.parse_args()
+    try:
+        known = {
+            name: path
+            for name, path in scenarios.find_all(ROOT).items()
+            if path.parent.parent == MODEL_FOLDER
+        }
+        for name in arguments.names:
+            if name not in known:
+                raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
+        for name in arguments.names or known:
+            scenario = scenarios.load(known[name])
+            write(
+                scenario, arguments.output / name if arguments.output else scenario.reference_folder
+            )
+            print(f"{name}: {len(scenario.reference_rows)} rows")
+    except UserError as error:
+        sys.exit(f"error: {error}")
+
+
+if __name__ == "__main__":
+    main()

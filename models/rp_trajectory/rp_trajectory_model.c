@@ -1,0 +1,93 @@
+#include "rp_trajectory_model.h"
+
+#include <stdio.h>
+
+static const struct rp_trajectory_parameters at_rest;
+
+static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
+                                   double dx[]) {
+    // there is no state
+    (void)values;
+    (void)t;
+    (void)x;
+    (void)u;
+    (void)dx;
+    return STATUS_OK;
+}
+
+static enum status outputs(void *values_pointer, double t) {
+    struct rp_trajectory_values *v = values_pointer;
+    const struct rp_trajectory_curve curve = {&v->parameters, &at_rest, &at_rest, {.value = t}};
+    struct rp_trajectory_point point;
+    rp_trajectory_evaluate(&curve, &point);
+    for (int i = 0; i < 2; i++) {
+        v->q[i] = point.q[i].position.value;
+        v->dq[i] = point.q[i].velocity.value;
+        v->ddq[i] = point.q[i].acceleration.value;
+        v->ee_position[i] = point.ee[i].position.value;
+        v->ee_velocity[i] = point.ee[i].velocity.value;
+    }
+    return STATUS_OK;
+}
+
+static void put(struct taylor x, double *first, double *second) {
+    *first = x.first;
+    *second = x.second;
+}
+
+static enum status propagate(const void *values_pointer, double t, double dt, void *first_pointer,
+                             void *second_pointer) {
+    const struct rp_trajectory_values *values = values_pointer;
+    struct rp_trajectory_values straight = {0};
+    struct rp_trajectory_values *first = first_pointer;
+    struct rp_trajectory_values *second = second_pointer != NULL ? second_pointer : &straight;
+    const struct rp_trajectory_curve curve = {
+        &values->parameters, &first->parameters, &second->parameters, {t, dt, 0.0}};
+    struct rp_trajectory_point point;
+    rp_trajectory_evaluate(&curve, &point);
+    for (int i = 0; i < 2; i++) {
+        put(point.q[i].position, &first->q[i], &second->q[i]);
+        put(point.q[i].velocity, &first->dq[i], &second->dq[i]);
+        put(point.q[i].acceleration, &first->ddq[i], &second->ddq[i]);
+        put(point.ee[i].position, &first->ee_position[i], &second->ee_position[i]);
+        put(point.ee[i].velocity, &first->ee_velocity[i], &second->ee_velocity[i]);
+    }
+    return STATUS_OK;
+}
+
+static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
+    const struct rp_trajectory_parameters *p =
+        &((const struct rp_trajectory_values *)values_pointer)->parameters;
+    double nearest[2];
+    switch (rp_trajectory_check(p)) {
+    case RP_TRAJECTORY_VALID:
+        return STATUS_OK;
+    case RP_TRAJECTORY_NO_FREQUENCY:
+        snprintf(text, size, "frequency = 0 is refused: a circle needs one above or below 0");
+        break;
+    case RP_TRAJECTORY_SHORT_TURNS:
+        snprintf(text, size,
+                 "turns / |frequency| = %g s is refused: it must be at least ramp_time = %g s "
+                 "(turns = %g, frequency = %g Hz)",
+                 p->turns / fabs(p->frequency), p->ramp_time, p->turns, p->frequency);
+        break;
+    case RP_TRAJECTORY_OUT_OF_REACH:
+        snprintf(text, size,
+                 "the path to (%g, %g) m is refused: there it is %g m from the axis of joint 1, "
+                 "and it must stay beyond the smallest reachable distance |a| = %g m",
+                 nearest[0] + 0.0, nearest[1] + 0.0, rp_trajectory_distance(p, nearest),
+                 fabs(p->a));
+        break;
+    }
+    return STATUS_INVALID_PARAMETERS;
+}
+
+const struct model rp_trajectory_model = {
+    .values_size = sizeof(struct rp_trajectory_values),
+    .parameters = {offsetof(struct rp_trajectory_values, parameters),
+                   sizeof(struct rp_trajectory_parameters)},
+    .right_hand_side = right_hand_side,
+    .outputs = outputs,
+    .propagate = propagate,
+    .check_parameters = check_parameters,
+};
