@@ -9,6 +9,7 @@ import sys
 import time
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,7 +19,7 @@ from conftest import ROOT
 from fmpy import fmi2
 
 from cosim import __main__ as cli
-from cosim import accuracy, reference, report, simulation
+from cosim import accuracy, reference, report, simulation, variables
 from cosim import scenario as scenarios
 from cosim.accuracy import Runs, Sweep
 from cosim.errors import UserError
@@ -42,8 +43,15 @@ def opened(fmu: Path) -> Iterator[Fmu]:
 
 
 @pytest.fixture(scope="module")
-def runs(opened: Fmu) -> Runs:
-    return Runs({"rp_manipulator": opened})
+def runs(opened: Fmu) -> Iterator[Runs]:
+    """Of all models, whose FMUs lie in one folder."""
+    others = {"rp_controller": "RPController.fmu", "rp_trajectory": "RPTrajectory.fmu"}
+    with ExitStack() as stack:
+        fmus = {
+            model: stack.enter_context(Fmu(opened.path.parent / name))
+            for model, name in others.items()
+        }
+        yield Runs({"rp_manipulator": opened, **fmus})
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +192,9 @@ def test_reads_references() -> None:
     for name in NAMES:
         loaded = load(name)
         read = reference.load(loaded)
-        assert read.names[:4] == ("q1", "q2", "dq1", "dq2")
+        declared = variables.load(loaded.model_folder)
+        outputs = [name for name, v in declared.items() if v["causality"] == "output"]
+        assert list(read.names) == outputs
         assert read.values.shape == (len(loaded.reference_rows), len(read.names))
         assert np.array_equal(read.times, loaded.times[loaded.reference_rows])
 

@@ -1,0 +1,73 @@
+#include "rp_controller_model.h"
+
+#include "rp_controller_propagation.h"
+
+#include <stdio.h>
+#include <string.h>
+
+_Static_assert(sizeof(struct rp_controller_inputs) == sizeof(double[10]),
+               "the inputs are one array of doubles");
+
+static enum status right_hand_side(const void *values_pointer, double t, const double x[],
+                                   const double u[], double dx[]) {
+    const struct rp_controller_parameters *p =
+        &((const struct rp_controller_values *)values_pointer)->parameters;
+    (void)t;
+    struct rp_controller_inputs inputs;
+    memcpy(&inputs, u, sizeof inputs);
+
+    double unlimited[2];
+    rp_controller_unlimited(p, &inputs, x, unlimited);
+    rp_controller_integral_rates(p, &inputs, unlimited, dx);
+    return STATUS_OK;
+}
+
+static enum status outputs(void *values_pointer, double t) {
+    struct rp_controller_values *v = values_pointer;
+    const struct rp_controller_parameters *p = &v->parameters;
+    const struct rp_controller_inputs *inputs = &v->inputs;
+    (void)t;
+
+    rp_controller_unlimited(p, inputs, v->integral, v->unlimited);
+    rp_controller_limited(p, v->unlimited, v->effort);
+    rp_controller_integral_rates(p, inputs, v->unlimited, v->dintegral);
+    for (int i = 0; i < 2; i++) {
+        v->error[i] = inputs->q_ref[i] - inputs->q[i];
+        v->derror[i] = inputs->dq_ref[i] - inputs->dq[i];
+    }
+    return STATUS_OK;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    // no field depends on the time itself
+    (void)t;
+    (void)dt;
+    rp_controller_propagate(values, first, second);
+    return STATUS_OK;
+}
+
+static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
+    const struct rp_parameters *arm =
+        &((const struct rp_controller_values *)values_pointer)->parameters.arm;
+    if (rp_parameters_check(arm)) {
+        return STATUS_OK;
+    }
+    snprintf(text, size,
+             "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
+             "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
+             rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
+    return STATUS_INVALID_PARAMETERS;
+}
+
+const struct model rp_controller_model = {
+    .values_size = sizeof(struct rp_controller_values),
+    .parameters = {offsetof(struct rp_controller_values, parameters),
+                   sizeof(struct rp_controller_parameters)},
+    .inputs = {offsetof(struct rp_controller_values, inputs), sizeof(struct rp_controller_inputs)},
+    .states = {offsetof(struct rp_controller_values, integral), sizeof(double[2])},
+    .derivatives = {offsetof(struct rp_controller_values, dintegral), sizeof(double[2])},
+    .right_hand_side = right_hand_side,
+    .outputs = outputs,
+    .propagate = propagate,
+    .check_parameters = check_parameters,
+};
