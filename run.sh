@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Sets up, builds RPManipulator.fmu, simulates scenarios with fmpy and checks them against their
 # references. ./run.sh: all scenarios; ./run.sh NAME ...: these; ./run.sh --list: their names;
-# ./run.sh --help: more.
+# ./run.sh --help: more. ./run.sh system [VARIANT ...]: the closed loop, build/ClosedLoop.ssp, in
+# Ecos; ./run.sh system --list: its variants. ./run.sh coupling: what the coupling of them costs.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
@@ -19,4 +20,7 @@ if [ "${1-}" = --list ]; then
   exec "$python" -m cosim list "${@:2}"
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
-exec "$python" -m cosim run "$@"
+case "${1-}" in
+  system | coupling) exec "$python" -m cosim "$@" ;;
+  *) exec "$python" -m cosim run "$@" ;;
+esac

@@ -24,6 +24,7 @@ mkdir -p build 2>/dev/null && [ -w build ] || fail "the folder $PWD cannot be wr
 
 # ---- system packages
 
+has_libtbb() { compgen -G '/usr/lib/*/libtbb.so.12'; }
 has_venv() { python3 -c 'import ensurepip, venv' 2>/dev/null; }
 missing=()
 need() { "${@:2}" >/dev/null 2>&1 || missing+=("$1"); }
@@ -37,6 +38,9 @@ need gcc command -v gcc
 need libc6-dev test -e /usr/include/math.h
 need libsundials-dev test -e /usr/include/cvode/cvode.h
 need python3-venv has_venv
+# Ecos links to the first and unpacks FMUs by the command of the second
+need libtbb12 has_libtbb
+need unzip command -v unzip
 [ "$dev" = no ] || need clang command -v clang
 
 if [ "${#missing[@]}" -gt 0 ]; then
@@ -63,6 +67,10 @@ install_requirements() {
   cp "$1" "$stamp"
 }
 install_requirements requirements.txt
+# the wheel of Ecos has its programs without their run bits
+for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu}; do
+  [ -x "$program" ] || chmod +x "$program"
+done
 [ "$dev" = no ] || install_requirements requirements-dev.txt
 
 # ---- Unity: Debian 13 has it in a package; before, that package is unpacked here, not installed

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cosim.accuracy import Run, Runs, Sweep
     from cosim.convergence import Convergence
     from cosim.scenario import Scenario
+    from cosim.ssp import Ssp
     from cosim.unit import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -84,6 +85,41 @@ def _parser() -> argparse.ArgumentParser:
         description="Prints the name and the title of every scenario.",
     )
     listing.set_defaults(command=_list)
+    system = commands.add_parser(
+        "system",
+        help="run the closed loop in Ecos, check against the references, write a report",
+        description="Runs the variants of the closed loop (build/ClosedLoop.ssp) in Ecos and "
+        "compares every variable with the reference. Exit code: 0 all within the bound, 1 not, "
+        "2 wrong use, a wrong system or a component that fails.",
+    )
+    system.add_argument("names", nargs="*", metavar="VARIANT", help="variants (default: all)")
+    system.add_argument("--list", action="store_true", help="name the variants")
+    system.add_argument(
+        "--ssp", type=Path, metavar="PATH", help="the system (default: build/ClosedLoop.ssp)"
+    )
+    system.add_argument(
+        "--report",
+        type=Path,
+        metavar="DIR",
+        default=ROOT / "build" / "report" / "system",
+        help="folder for pictures and results (default: build/report/system)",
+    )
+    system.set_defaults(command=_system)
+    coupling = commands.add_parser(
+        "coupling",
+        help="study how far co-simulation of the closed loop is from its exact solution",
+        description="Steps the closed loop (build/ClosedLoop.ssp) in several orders, with inputs "
+        "held and extrapolated and with step-size control, and compares it with the solution in "
+        "continuous time. Exit code: 0 as expected, 1 not, 2 wrong use.",
+    )
+    coupling.add_argument(
+        "--report",
+        type=Path,
+        metavar="DIR",
+        default=ROOT / "build" / "report" / "system",
+        help="folder for the picture (default: build/report/system)",
+    )
+    coupling.set_defaults(command=_coupling)
     return parser
 
 
@@ -142,6 +178,61 @@ def _run(options: argparse.Namespace) -> int:
     failed = dict.fromkeys(x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
     print(f"FAILED: {', '.join(failed)}" if failed else f"passed: {_count(chosen, 'scenario')}")
     return 1 if failed else 0
+
+
+def _system(options: argparse.Namespace) -> int:
+    os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
+    from cosim import ssp, system
+
+    path = options.ssp or system.SYSTEM
+    if options.ssp is None and not path.exists():
+        raise UserError(f"{path}: no such file, ./run.sh builds it")
+    with ssp.unpacked(path) as unpacked:
+        chosen = system.choose(unpacked, options.names)
+        if options.list:
+            print(*chosen, sep="\n")
+            return 0
+        return _run_system(unpacked, chosen, options.report)
+
+
+def _run_system(ssp: Ssp, chosen: Sequence[str], folder: Path) -> int:
+    """Run variants; a row appears as one ends, and its files are written then."""
+    from cosim import system, system_report
+
+    try:
+        system_report.remove(folder, chosen)
+        references = {name: system.load_reference(ssp, name) for name in chosen}
+        width = max(len("variant"), *map(len, chosen))
+        head = f"{'variant':<{width}}  steps      error    bound  tracking error  wall time  result"
+        print(head, "-" * len(head), sep="\n", flush=True)
+        outcomes = []
+        for name in chosen:
+            outcome = system.simulate(ssp, name, references[name])
+            result = "passed" if outcome.passed else f"FAILED ({outcome.worst})"
+            print(
+                f"{name:<{width}} {ssp.system.steps:>6} {outcome.error:>10.2e} "
+                f"{system.BOUND:>8.0e} {1e3 * outcome.distance.max():>12.4f} mm "
+                f"{outcome.run.wall_time:>8.3f} s  {result}",
+                flush=True,
+            )
+            for message in outcome.run.messages:
+                print(f"{name}: {message}", file=sys.stderr)
+            system_report.write_run(folder, ssp, outcome)
+            outcomes.append(outcome)
+        index = system_report.write_page(folder, ssp, outcomes)
+    except OSError as error:
+        raise UserError(f"{folder}: the report cannot be written: {error}") from error
+    print(f"\nreport: {_from_here(index)}")
+    failed = [outcome.variant for outcome in outcomes if not outcome.passed]
+    print(f"FAILED: {', '.join(failed)}" if failed else f"passed: {_count(chosen, 'variant')}")
+    return 1 if failed else 0
+
+
+def _coupling(options: argparse.Namespace) -> int:
+    os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
+    from cosim import coupling
+
+    return 0 if coupling.run(options.report) else 1
 
 
 def _choose(names: Sequence[str]) -> list[Scenario]:

@@ -1,0 +1,182 @@
+"""Runs a system in Ecos, in a process of its own.
+
+Ecos goes on when a component fails, tells so in its log at level debug alone, and leaves its
+temporary files behind. So the run is a child process whose log is read and whose temporary folder
+is removed: `python -m cosim.ecos FOLDER` is that child.
+"""
+
+import ctypes
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cosim.errors import UserError
+
+if TYPE_CHECKING:
+    from cosim.ssp import Ssp
+
+PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
+# of an FMU: [path of the FMU] status text
+MESSAGE = re.compile(r"\[(?P<fmu>[^\]]*\.fmu)\] (?P<status>fmi2\w+) (?P<text>.*)")
+BAD = ("fmi2Discard", "fmi2Error", "fmi2Fatal")
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What Ecos gave: row i is what can be read of it after step i."""
+
+    names: tuple[str, ...]  # component.variable
+    times: np.ndarray  # (rows,) s
+    values: np.ndarray  # (rows, len(names)) in the variables' units
+    wall_time: float  # s, of the steps with the reading
+    messages: tuple[str, ...]  # warnings of the components
+
+
+def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
+    """Run a system from its start to its stop time with one of its parameter sets.
+
+    Parameters
+    ----------
+    ssp : Ssp
+    variant : str
+        Name of a parameter set; has to exist, Ecos applies nothing for an unknown one.
+    names : sequence of str
+        Real variables to read, ``component.variable``.
+
+    Raises
+    ------
+    UserError
+        If a component fails or gives a value that is not finite (the text names component,
+        variable and time), or if Ecos itself fails.
+    """
+    system = ssp.system
+    if variant not in system.parameters:
+        raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
+    with TemporaryDirectory(prefix="cosim-") as name:
+        folder = Path(name)
+        plan = {
+            "ssp": str(ssp.path.resolve()),
+            "variant": variant,
+            "names": [f"{c}::{v}" for c, _, v in (name.partition(".") for name in names)],
+            "start": system.start,
+            "step": system.step,
+            "steps": system.steps,
+        }
+        (folder / PLAN).write_text(json.dumps(plan), encoding="utf-8")
+        code = _start(folder)
+        log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
+        if code != 0:
+            last = next((line for line in reversed(log.splitlines()) if line.strip()), "no output")
+            raise UserError(f"{ssp.path}: {variant}: Ecos failed (exit code {code}): {last}")
+        values = np.load(folder / ROWS)
+        done = json.loads((folder / DONE).read_text(encoding="utf-8"))
+    times = system.start + system.step * np.arange(len(values))
+    _check_values(ssp, variant, names, times, values)
+    messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
+    for match in messages:
+        if match["status"] in BAD:
+            where = f"{variant}: component {_components(ssp, match['fmu'])}"
+            when = "in initialization" if len(values) == 1 else f"by t = {times[-1]:.6g} s"
+            raise UserError(f"{where} failed {when} ({match['status']}): {match['text']}")
+    if len(values) != system.steps + 1:
+        raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
+    texts = [f"{_components(ssp, m['fmu'])}: {m['text']}" for m in messages]
+    return Run(tuple(names), times, values, done["wall_time"], tuple(dict.fromkeys(texts)))
+
+
+def _start(folder: Path) -> int:
+    """Run the child; its exit code."""
+    environment = os.environ | {"TMPDIR": str(folder), "PYTHONUNBUFFERED": "1"}
+    with (folder / LOG).open("wb") as log:
+        child = subprocess.run(
+            [sys.executable, "-m", "cosim.ecos", str(folder)],
+            check=False,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            cwd=ROOT,
+            env=environment,
+        )
+    return child.returncode
+
+
+def _components(ssp: "Ssp", fmu: str) -> str:
+    """Name of the component whose FMU it is; Ecos's log tells the FMU alone."""
+    names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
+    return " or ".join(map(repr, names)) or repr(Path(fmu).name)
+
+
+def _check_values(
+    ssp: "Ssp", variant: str, names: Sequence[str], times: np.ndarray, values: np.ndarray
+) -> None:
+    """Refuse values that are not finite: names the component that the first of them is from."""
+    bad_rows = np.flatnonzero(~np.isfinite(values).all(axis=1))
+    if not len(bad_rows):
+        return
+    row = bad_rows[0]
+    bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
+    # a component that was given one passes it on at once
+    victims = {
+        connection.end_component
+        for connection in ssp.system.connections
+        if f"{connection.start_component}.{connection.start_connector}" in bad
+    }
+    sources = [name for name in bad if name.partition(".")[0] not in victims]
+    component, _, variable = (sources or bad)[0].partition(".")
+    value = values[row, list(names).index(f"{component}.{variable}")]
+    raise UserError(
+        f"{variant}: component {component!r}: {variable!r} is {value} at t = {times[row]:.6g} s"
+    )
+
+
+# ---- the child
+
+
+def _child(folder: Path) -> None:
+    """Run the plan of the folder, until a value is not finite or a component has complained."""
+    from ecospy import EcosLib, EcosSimulation
+
+    plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+    names, steps = plan["names"], plan["steps"]
+    EcosLib.set_log_level("debug")
+    rows = np.empty((steps + 1, len(names)))
+    flush = ctypes.CDLL(None).fflush
+    seen = 0
+
+    def go_on(row: int) -> bool:
+        nonlocal seen
+        rows[row] = [simulation.get_real(name) for name in names]
+        flush(None)
+        if os.fstat(1).st_size != seen:  # the log has grown, which is rare
+            log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
+            seen = os.fstat(1).st_size
+            if any(match["status"] in BAD for match in MESSAGE.finditer(log)):
+                return False
+        return bool(np.isfinite(rows[row]).all())
+
+    with EcosSimulation(step_size=plan["step"], ssp_path=plan["ssp"]) as simulation:
+        if not simulation.init(start_time=plan["start"], parameter_set=plan["variant"]):
+            raise RuntimeError(EcosLib.get_last_error())
+        row, begin = 0, time.perf_counter()
+        while go_on(row) and row < steps:
+            simulation.step()
+            row += 1
+        wall_time = time.perf_counter() - begin
+        simulation.terminate()
+    np.save(folder / ROWS, rows[: row + 1])
+    (folder / DONE).write_text(json.dumps({"wall_time": wall_time}), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    _child(Path(sys.argv[1]))

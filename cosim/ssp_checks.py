@@ -1,0 +1,161 @@
+"""Checks the system of an SSP against its FMUs, before anything runs."""
+
+import difflib
+import math
+from collections.abc import Iterable
+from typing import NoReturn
+
+from fmpy import read_model_description
+from fmpy.model_description import ModelVariable
+
+from cosim.errors import UserError
+from cosim.ssp import Component, Connector, Parameter, Ssp
+
+# type of a variable -> types of a parameter's value that engines can give it
+SETTABLE = {
+    "Real": ("Real",),
+    "Integer": ("Integer",),
+    "Enumeration": ("Integer",),
+    "Boolean": ("Boolean",),
+    "String": ("String",),
+}
+PARAMETERS = ("parameter", "input", "output")  # causalities of what has a start value
+
+
+def check(ssp: Ssp) -> None:
+    """Check that the system can be run and that nothing in it is left to chance.
+
+    Every component has its FMU, every connector is a variable of it with that causality, type and
+    unit, connections go from an output to an input of the same type and unit, every input of every
+    FMU is connected exactly once, and parameters are variables that can be set.
+
+    Raises
+    ------
+    UserError
+        If not; the text names component and variable.
+    """
+    _Checker(ssp).check()
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of an error message that proposes the closest of `known`, or nothing."""
+    close = difflib.get_close_matches(name, list(known), n=1)
+    return f", did you mean {close[0]!r}?" if close else ""
+
+
+class _Checker:
+    def __init__(self, ssp: Ssp) -> None:
+        self.ssp = ssp
+        self.system = ssp.system
+        self.variables: dict[str, dict[str, ModelVariable]] = {}
+
+    def fail(self, message: str) -> NoReturn:
+        raise UserError(f"{self.ssp.path}: {message}")
+
+    def check(self) -> None:
+        for component in self.system.components:
+            self.variables[component.name] = self.read(component)
+            for connector in component.connectors.values():
+                self.connector(component, connector)
+        self.connections()
+        self.inputs()
+        for variant, components in self.system.parameters.items():
+            for component, values in components.items():
+                for name, parameter in values.items():
+                    self.parameter(variant, component, name, parameter)
+
+    def read(self, component: Component) -> dict[str, ModelVariable]:
+        """Variables of the component's FMU, by name."""
+        path = self.ssp.fmu(component.name)
+        where = f"component {component.name!r}: {component.source}"
+        if not path.is_file():
+            self.fail(f"{where} is missing in the SSP")
+        try:
+            description = read_model_description(path, validate=False)
+        except Exception as error:  # fmpy raises bare exceptions, zipfile its own
+            self.fail(f"{where} is no FMU: {' '.join(str(error).split())}")
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            self.fail(f"{where} is no FMI 2.0 co-simulation unit")
+        return {variable.name: variable for variable in description.modelVariables}
+
+    def connector(self, component: Component, connector: Connector) -> None:
+        where = f"component {component.name!r}: connector {connector.name!r}"
+        variables = self.variables[component.name]
+        variable = variables.get(connector.name)
+        if variable is None:
+            hint = did_you_mean(connector.name, variables)
+            self.fail(f"{where}: its FMU has no such variable{hint}")
+        if variable.causality != connector.kind:
+            self.fail(f"{where} is an {connector.kind}, in its FMU {_causality(variable)}")
+        if variable.type != connector.type:
+            self.fail(f"{where} is of type {connector.type}, in its FMU {variable.type}")
+        if variable.unit != connector.unit:
+            self.fail(f"{where} is in {_unit(connector.unit)}, in its FMU {_unit(variable.unit)}")
+
+    def connections(self) -> None:
+        fed: dict[tuple[str, str], str] = {}
+        for connection in self.system.connections:
+            where = f"connection {connection}"
+            start = self.end(where, connection.start_component, connection.start_connector)
+            end = self.end(where, connection.end_component, connection.end_connector)
+            if start.kind != "output":
+                self.fail(f"{where}: {connection.start_connector!r} is no output")
+            if end.kind != "input":
+                self.fail(f"{where}: {connection.end_connector!r} is no input")
+            if start.type != end.type:
+                self.fail(f"{where}: types differ, {start.type} and {end.type}")
+            if start.unit != end.unit:
+                self.fail(f"{where}: units differ, {_unit(start.unit)} and {_unit(end.unit)}")
+            target = (connection.end_component, connection.end_connector)
+            if target in fed:
+                self.fail(f"{where}: the input has a connection already, {fed[target]}")
+            fed[target] = str(connection)
+
+    def end(self, where: str, component: str, connector: str) -> Connector:
+        """Connector at one end of a connection."""
+        names = [known.name for known in self.system.components]
+        if component not in names:
+            hint = did_you_mean(component, names)
+            self.fail(f"{where}: there is no component {component!r}{hint}")
+        connectors = self.system.component(component).connectors
+        if connector not in connectors:
+            hint = did_you_mean(connector, connectors)
+            self.fail(f"{where}: component {component!r} has no connector {connector!r}{hint}")
+        return connectors[connector]
+
+    def inputs(self) -> None:
+        fed = {(c.end_component, c.end_connector) for c in self.system.connections}
+        for component, variables in self.variables.items():
+            for variable in variables.values():
+                if variable.causality == "input" and (component, variable.name) not in fed:
+                    self.fail(f"component {component!r}: input {variable.name!r} is not connected")
+
+    def parameter(self, variant: str, component: str, name: str, parameter: Parameter) -> None:
+        where = f"parameter set {variant!r}: component {component!r}"
+        variables = self.variables[component]
+        variable = variables.get(name)
+        if variable is None:
+            hint = did_you_mean(name, variables)
+            self.fail(f"{where}: its FMU has no variable {name!r}{hint}")
+        where = f"{where}: {name!r}"
+        if variable.causality not in PARAMETERS or variable.start is None:
+            self.fail(f"{where} is {_causality(variable)} and cannot be set")
+        if parameter.type not in SETTABLE[variable.type]:
+            self.fail(f"{where} is of type {parameter.type}, in its FMU {variable.type}")
+        if parameter.unit is not None and parameter.unit != variable.unit:
+            self.fail(f"{where} is in {_unit(parameter.unit)}, in its FMU {_unit(variable.unit)}")
+        if parameter.type in ("Real", "Integer"):
+            least = -math.inf if variable.min is None else float(variable.min)
+            greatest = math.inf if variable.max is None else float(variable.max)
+            if not least <= parameter.value <= greatest:
+                range_text = f"{least:g} to {greatest:g}"
+                self.fail(f"{where} is {parameter.value!r}, expected {range_text}")
+
+
+def _unit(unit: str | None) -> str:
+    return "no unit" if unit is None else repr(unit)
+
+
+def _causality(variable: ModelVariable) -> str:
+    article = "an" if variable.causality[0] in "aeiou" else "a"
+    return f"{article} {variable.causality}"
