@@ -1,0 +1,44 @@
+"""Makes the reference of the study of the coupling: a motion with a fast and a slow part.
+
+The closed loop in continuous time, by the functions that make the other references; the motion is
+that of cosim/coupling_doubling.py. Writes models/closed_loop/coupling/fast_and_slow.csv.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+FOLDER = Path(__file__).resolve().parent
+ROOT = FOLDER.parents[2]
+sys.path.insert(0, str(ROOT))
+
+from cosim.coupling_doubling import FAST, FAST_AND_SLOW, FAST_STOP, STATES  # noqa: E402
+from models.closed_loop.references.closed_loop import monolithic  # noqa: E402
+from models.rp_manipulator.references.make_references import write_whole  # noqa: E402
+
+ROWS_PER_SECOND = 50
+PARAMETERS = {f"{c}.{name}": value for c, values in FAST.items() for name, value in values.items()}
+
+
+def text() -> str:
+    """The file's text, with 17 significant digits."""
+    times = np.arange(round(FAST_STOP * ROWS_PER_SECOND) + 1) / ROWS_PER_SECOND
+    columns = monolithic(PARAMETERS, times)
+    table = np.column_stack((times, *(columns[name] for name in STATES))).astype(np.float64)
+    lines = [",".join(f'"{name}"' for name in ("time", *STATES))]
+    lines += [",".join(f"{value + 0.0:.17g}" for value in row) for row in table]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description="Makes the reference of the study of coupling.")
+    parser.add_argument("--output", type=Path, default=FAST_AND_SLOW, metavar="FILE")
+    output = parser.parse_args().output
+    output.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(output, text())
+
+
+if __name__ == "__main__":
+    main()
