@@ -1,0 +1,172 @@
+"""Step-size control by step doubling, for any master of cosim.master.
+
+A step H is made at once and, rolled back by the FMU states, again as two steps H/2. Where the
+coupling is of order p, so that an error of C H^(p+1) is made in a step, the two results are
+C H^(p+1) (1 - 2^-p) apart, and the second one, which is kept, is off by 1/(2^p - 1) of that. The
+step is accepted where this estimate is within the tolerance; the next one aims at a little less.
+
+The estimate takes the step to be a function of the state at its beginning, a one-step method. That
+holds in Gauss-Seidel order with a controller in front of its plant: its efforts are those of the
+measurements at the beginning of the step. In Jacobi order the plant moves by efforts that are one
+step old: the outputs kept from the step before are part of the state, and a change of the step
+changes their age.
+
+Hidden from the estimate are corners of what drives the system: where a reference's slope jumps
+within the first half of the step, both results may meet it with the same line, and after a rest
+neither knows of it. Corners that are known are given as such: steps end at them, and begin anew
+with the first length.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.errors import UserError
+from cosim.master import Master, Snapshot
+
+SAFETY = 0.9  # of the step that would just reach the tolerance
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
+
+
+@dataclass(frozen=True)
+class Control:
+    """What is asked of the steps.
+
+    The norm of a difference is the largest over the signals of `scales`, each divided by its
+    scale.
+    """
+
+    tolerance: float  # of the error that one accepted step makes, in the norm
+    scales: Mapping[str, float]  # "component.variable": what counts as 1, in its unit
+    first: float  # s
+    shortest: float  # s
+    longest: float  # s
+    corners: Sequence[float] = ()  # s, where inputs of the system are not smooth: steps end there
+
+
+@dataclass(frozen=True, eq=False)
+class Controlled:
+    """A run with controlled steps; row i of `values` is what is read at times[i]."""
+
+    times: np.ndarray  # (accepted + 1,) s
+    values: np.ndarray  # (accepted + 1, names)
+    estimates: np.ndarray  # (accepted,) error of each step, in the norm
+    limited: np.ndarray  # (accepted,) whether something else than the tolerance chose the step
+    rejected: int  # attempts that were rolled back for good
+    do_steps: int  # calls of fmi2DoStep, those rolled back included
+
+    @property
+    def accepted(self) -> int:
+        """Steps that count."""
+        return len(self.estimates)
+
+
+def run(
+    master: Master,
+    stop: float,
+    control: Control,
+    before: Callable[[float], object] = lambda _: None,
+) -> Controlled:
+    """Step `master`, which is initialized, to the time `stop`.
+
+    Parameters
+    ----------
+    master : Master
+        One with held inputs is taken for of order 1, one that extrapolates for of order 2.
+    stop : float
+        s; the last step ends exactly there.
+    control : Control
+    before : callable, optional
+        Called with the length of each accepted step, the system being brought back to the
+        beginning of the step; it may step the system.
+
+    Raises
+    ------
+    UserError
+        If a signal is unknown, a step would have to be shorter than the shortest, or an FMU fails
+        or has no state to go back to.
+    """
+    order = 2 if master.extrapolates else 1
+    places, scales = _norm(master, control)
+    times, rows, estimates, limited = [master.time], [master.values.copy()], [], []
+    rejected, do_steps, wanted, was_rejected = 0, 0, control.first, True
+    ends = deque(sorted(t for t in {*control.corners, stop} if master.time < t <= stop))
+    with Snapshot(master) as begin, Snapshot(master) as end:
+        begin.take()
+        while ends:
+            start = times[-1]
+            target, cut = _fit(start, ends[0], wanted)
+            length = target - start
+            calls = master.do_steps
+            master.advance(target)
+            coarse = master.values[places]
+            begin.restore()
+            master.advance(start + length / 2)
+            master.advance(target)
+            do_steps += master.do_steps - calls
+            difference = np.abs(master.values[places] - coarse) / scales
+            estimate = float(difference.max()) / (2**order - 1)
+            factor = _factor(estimate, control.tolerance, order)
+            if estimate > control.tolerance:
+                rejected, was_rejected = rejected + 1, True
+                wanted = length * min(factor, SAFETY)
+                if wanted < control.shortest:
+                    raise UserError(
+                        f"the step from t = {start!r} s would have to be below "
+                        f"{control.shortest:g} s for an error of {control.tolerance:g}"
+                    )
+                begin.restore()
+                continue
+            limits = control.longest, LARGEST_FACTOR * length
+            times.append(target)
+            rows.append(master.values.copy())
+            estimates.append(estimate)
+            limited.append(cut or length >= control.longest or was_rejected)
+            end.take()
+            begin.restore()
+            before(length)
+            end.restore()
+            begin.take()
+            grown = length * factor if not was_rejected else length * min(factor, 1.0)
+            wanted = max(min(grown if not cut else max(grown, wanted), *limits), control.shortest)
+            was_rejected = False
+            if target == ends[0]:
+                ends.popleft()
+                wanted = control.first
+    return Controlled(
+        np.array(times),
+        np.array(rows),
+        np.array(estimates),
+        np.array(limited),
+        rejected,
+        do_steps,
+    )
+
+
+def _norm(master: Master, control: Control) -> tuple[np.ndarray, np.ndarray]:
+    """Places of the signals among the values, and their scales."""
+    for name in control.scales:
+        if name not in master.names:
+            raise UserError(f"{name}: the system has no such value to control the step by")
+    places = [master.names.index(name) for name in control.scales]
+    return np.array(places, dtype=int), np.array([*control.scales.values()])
+
+
+def _fit(start: float, stop: float, wanted: float) -> tuple[float, bool]:
+    """End of the next step, and whether `stop` shortens it."""
+    left = stop - start
+    if left <= wanted * (1 + 1e-9):
+        return stop, left < wanted
+    if left < 2 * wanted:
+        return start + left / 2, True
+    return start + wanted, False
+
+
+def _factor(estimate: float, tolerance: float, order: int) -> float:
+    """Of the present step: the one whose error is expected to be a little below the tolerance."""
+    if estimate == 0.0:
+        return LARGEST_FACTOR
+    factor = SAFETY * (tolerance / estimate) ** (1 / (order + 1))
+    return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
