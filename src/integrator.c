@@ -1,9 +1,9 @@
 #include "integrator.h"
 
+#include "small_vector.h"
 #include "sundials_compat.h"
 
 #include <math.h>
-#include <nvector/nvector_serial.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,8 +34,8 @@ struct integrator {
 static int evaluate_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *integrator_pointer) {
     struct integrator *integrator = integrator_pointer;
     const struct ode *ode = &integrator->ode;
-    const double *x_data = N_VGetArrayPointer(x);
-    double *dx_data = N_VGetArrayPointer(dx);
+    const double *x_data = small_vector_data(x);
+    double *dx_data = small_vector_data(dx);
 
     bool valid = ode->rhs(t, x_data, dx_data, ode->context) == STATUS_OK;
     for (size_t i = 0; i < ode->state_count; i++) {
@@ -86,15 +86,14 @@ static enum status setup(struct integrator *integrator) {
     if (sundials_context_create(&integrator->context) != 0) {
         return STATUS_OUT_OF_MEMORY;
     }
-    integrator->x = N_VNew_Serial(n, integrator->context);
-    integrator->last_x = N_VNew_Serial(n, integrator->context);
-    integrator->absolute_tolerances = N_VNew_Serial(n, integrator->context);
+    integrator->x = small_vector_create(n, integrator->context);
+    integrator->last_x = small_vector_create(n, integrator->context);
+    integrator->absolute_tolerances = small_vector_create(n, integrator->context);
     integrator->cvode = CVodeCreate(CV_ADAMS, integrator->context);
     if (integrator->x == NULL || integrator->last_x == NULL ||
         integrator->absolute_tolerances == NULL || integrator->cvode == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
-    N_VConst(0.0, integrator->x);
 
     integrator->solver = SUNNonlinSol_FixedPoint(integrator->x, 0, integrator->context);
     if (integrator->solver == NULL) {
@@ -158,7 +157,7 @@ void integrator_destroy(struct integrator *integrator) {
 
 enum status integrator_configure(struct integrator *integrator,
                                  const struct integrator_settings *settings) {
-    memcpy(N_VGetArrayPointer(integrator->absolute_tolerances), settings->absolute_tolerances,
+    memcpy(small_vector_data(integrator->absolute_tolerances), settings->absolute_tolerances,
            integrator->ode.state_count * sizeof(double));
     int flag = CVodeSVtolerances(integrator->cvode, settings->relative_tolerance,
                                  integrator->absolute_tolerances);
@@ -173,7 +172,7 @@ enum status integrator_configure(struct integrator *integrator,
 enum status integrator_restart(struct integrator *integrator, const double x[], double span) {
     integrator->statistics.restarts++;
     integrator->counted = (struct integrator_statistics){0};
-    memcpy(N_VGetArrayPointer(integrator->x), x, integrator->ode.state_count * sizeof(double));
+    memcpy(small_vector_data(integrator->x), x, integrator->ode.state_count * sizeof(double));
     N_VScale(1.0, integrator->x, integrator->last_x);
     integrator->span = span;
     integrator->reached = 0.0;
@@ -205,7 +204,7 @@ static void update_statistics(struct integrator *integrator) {
 /* What CVODE left in x can be used: with extreme values it ends with success where its step has
  * underflowed to nothing, or with a state that is not finite. */
 static bool has_reached(const struct integrator *integrator, double t) {
-    const double *x = N_VGetArrayPointer(integrator->x);
+    const double *x = small_vector_data(integrator->x);
     double internal_time = 0.0;
     (void)CVodeGetCurrentTime(integrator->cvode, &internal_time);
     for (size_t i = 0; i < integrator->ode.state_count; i++) {
@@ -240,7 +239,7 @@ enum status integrator_advance(struct integrator *integrator, double t, long max
         status = STATUS_NO_CONVERGENCE;
     }
     *reached = integrator->reached;
-    memcpy(x, N_VGetArrayPointer(integrator->last_x), integrator->ode.state_count * sizeof(double));
+    memcpy(x, small_vector_data(integrator->last_x), integrator->ode.state_count * sizeof(double));
     return status;
 }
 

@@ -1,0 +1,300 @@
+#include "small_vector.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdlib.h>
+
+_Static_assert(sizeof(sunrealtype) == sizeof(double), "SUNDIALS must be built for doubles");
+
+struct small_vector {
+    struct _generic_N_Vector base; /* first: the N_Vector */
+    sunindextype length;
+    double data[];
+};
+
+static sunindextype length_of(N_Vector x) {
+    return ((const struct small_vector *)(const void *)x)->length;
+}
+
+/* Arguments may be the same vector, but never overlap otherwise. */
+#if defined(__clang__)
+#define INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define INDEPENDENT _Pragma("GCC ivdep")
+#endif
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+static N_Vector create_like(const struct _generic_N_Vector *base, sunindextype length) {
+    struct small_vector *created = calloc(1, sizeof *created + (size_t)length * sizeof(double));
+    if (created == NULL) {
+        return NULL;
+    }
+    created->base = *base;
+    created->base.content = created->data;
+    created->length = length;
+    return &created->base;
+}
+
+static N_Vector clone(N_Vector x) {
+    return create_like(x, length_of(x));
+}
+
+static void destroy(N_Vector x) {
+    free(x);
+}
+
+static void space(N_Vector x, sunindextype *reals, sunindextype *integers) {
+    *reals = length_of(x);
+    *integers = 1;
+}
+
+static N_Vector_ID id(N_Vector x) {
+    (void)x;
+    return SUNDIALS_NVEC_CUSTOM;
+}
+
+/* ---- Operations, n elements each ------------------------------------------------------------ */
+
+#define OPERATION static inline __attribute__((always_inline))
+
+OPERATION void linear_sum(sunindextype n, double a, const double *x, double b, const double *y,
+                          double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = a * x[i] + b * y[i];
+    }
+}
+
+OPERATION void constant(sunindextype n, double c, double *z) {
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = c;
+    }
+}
+
+OPERATION void product(sunindextype n, const double *x, const double *y, double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = x[i] * y[i];
+    }
+}
+
+OPERATION void quotient(sunindextype n, const double *x, const double *y, double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = x[i] / y[i];
+    }
+}
+
+OPERATION void scale(sunindextype n, double c, const double *x, double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = c * x[i];
+    }
+}
+
+OPERATION void absolute(sunindextype n, const double *x, double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = fabs(x[i]);
+    }
+}
+
+OPERATION void inverse(sunindextype n, const double *x, double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = 1.0 / x[i];
+    }
+}
+
+OPERATION void add_constant(sunindextype n, const double *x, double b, double *z) {
+    INDEPENDENT
+    for (sunindextype i = 0; i < n; i++) {
+        z[i] = x[i] + b;
+    }
+}
+
+OPERATION double dot_product(sunindextype n, const double *x, const double *y) {
+    double sum = 0.0;
+    for (sunindextype i = 0; i < n; i++) {
+        sum += x[i] * y[i];
+    }
+    return sum;
+}
+
+OPERATION double max_norm(sunindextype n, const double *x) {
+    double largest = 0.0;
+    for (sunindextype i = 0; i < n; i++) {
+        largest = fabs(x[i]) > largest ? fabs(x[i]) : largest;
+    }
+    return largest;
+}
+
+OPERATION double minimum(sunindextype n, const double *x) {
+    double smallest = x[0];
+    for (sunindextype i = 1; i < n; i++) {
+        smallest = x[i] < smallest ? x[i] : smallest;
+    }
+    return smallest;
+}
+
+/* sqrt(sum (x w)^2 / n) */
+OPERATION double weighted_norm(sunindextype n, const double *x, const double *w) {
+    double sum = 0.0;
+    for (sunindextype i = 0; i < n; i++) {
+        sum += x[i] * w[i] * (x[i] * w[i]);
+    }
+    return sqrt(sum / (double)n);
+}
+
+/* z = sum c[k] X[k]; z may be one of X. Element by element, so that sums stay in registers. */
+OPERATION void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
+                                  double *z) {
+    if (n <= 6) {
+        double sum[6];
+        scale(n, c[0], small_vector_data(X[0]), sum);
+        for (int k = 1; k < count; k++) {
+            linear_sum(n, 1.0, sum, c[k], small_vector_data(X[k]), sum);
+        }
+        scale(n, 1.0, sum, z);
+        return;
+    }
+    for (sunindextype i = 0; i < n; i++) {
+        double sum = c[0] * small_vector_data(X[0])[i];
+        for (int k = 1; k < count; k++) {
+            sum += c[k] * small_vector_data(X[k])[i];
+        }
+        z[i] = sum;
+    }
+}
+
+/* Z[k] = a[k] x + Y[k] */
+OPERATION void scale_add_multi(sunindextype n, int count, const double *a, const double *x,
+                               N_Vector *Y, N_Vector *Z) {
+    for (int k = 0; k < count; k++) {
+        linear_sum(n, a[k], x, 1.0, small_vector_data(Y[k]), small_vector_data(Z[k]));
+    }
+}
+
+/* Z[k] = c[k] X[k] */
+OPERATION void scale_vectors(sunindextype n, int count, const double *c, N_Vector *X, N_Vector *Z) {
+    for (int k = 0; k < count; k++) {
+        scale(n, c[k], small_vector_data(X[k]), small_vector_data(Z[k]));
+    }
+}
+
+/* Z[k] = a X[k] + b Y[k] */
+OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, double b, N_Vector *Y,
+                           N_Vector *Z) {
+    for (int k = 0; k < count; k++) {
+        linear_sum(n, a, small_vector_data(X[k]), b, small_vector_data(Y[k]),
+                   small_vector_data(Z[k]));
+    }
+}
+
+/* ---- Tables of operations ------------------------------------------------------------------- */
+
+/* The operations above as SUNDIALS calls them, for vectors of the length n, an expression of the
+ * vector x: a number, or length_of(x). */
+// clang-format off
+#define DEFINE_TABLE(name, n)                                                                      \
+    static void name##_linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y,            \
+                                  N_Vector z) {                                                    \
+        linear_sum(n, a, small_vector_data(x), b, small_vector_data(y), small_vector_data(z));     \
+    }                                                                                              \
+    static void name##_constant(sunrealtype c, N_Vector x) {                                       \
+        constant(n, c, small_vector_data(x));                                                      \
+    }                                                                                              \
+    static void name##_product(N_Vector x, N_Vector y, N_Vector z) {                               \
+        product(n, small_vector_data(x), small_vector_data(y), small_vector_data(z));              \
+    }                                                                                              \
+    static void name##_quotient(N_Vector x, N_Vector y, N_Vector z) {                              \
+        quotient(n, small_vector_data(x), small_vector_data(y), small_vector_data(z));             \
+    }                                                                                              \
+    static void name##_scale(sunrealtype c, N_Vector x, N_Vector z) {                              \
+        scale(n, c, small_vector_data(x), small_vector_data(z));                                   \
+    }                                                                                              \
+    static void name##_absolute(N_Vector x, N_Vector z) {                                          \
+        absolute(n, small_vector_data(x), small_vector_data(z));                                   \
+    }                                                                                              \
+    static void name##_inverse(N_Vector x, N_Vector z) {                                           \
+        inverse(n, small_vector_data(x), small_vector_data(z));                                    \
+    }                                                                                              \
+    static void name##_add_constant(N_Vector x, sunrealtype b, N_Vector z) {                       \
+        add_constant(n, small_vector_data(x), b, small_vector_data(z));                            \
+    }                                                                                              \
+    static sunrealtype name##_dot_product(N_Vector x, N_Vector y) {                                \
+        return dot_product(n, small_vector_data(x), small_vector_data(y));                         \
+    }                                                                                              \
+    static sunrealtype name##_max_norm(N_Vector x) {                                               \
+        return max_norm(n, small_vector_data(x));                                                  \
+    }                                                                                              \
+    static sunrealtype name##_minimum(N_Vector x) {                                                \
+        return minimum(n, small_vector_data(x));                                                   \
+    }                                                                                              \
+    static sunrealtype name##_weighted_norm(N_Vector x, N_Vector w) {                              \
+        return weighted_norm(n, small_vector_data(x), small_vector_data(w));                       \
+    }                                                                                              \
+    static int name##_linear_combination(int count, sunrealtype *c, N_Vector *X, N_Vector x) {     \
+        linear_combination(n, count, c, X, small_vector_data(x));                                  \
+        return 0;                                                                                  \
+    }                                                                                              \
+    static int name##_scale_add_multi(int count, sunrealtype *a, N_Vector x, N_Vector *Y,          \
+                                      N_Vector *Z) {                                               \
+        scale_add_multi(n, count, a, small_vector_data(x), Y, Z);                                  \
+        return 0;                                                                                  \
+    }                                                                                              \
+    static int name##_scale_vectors(int count, sunrealtype *c, N_Vector *X, N_Vector *Z) {         \
+        const N_Vector x = X[0];                                                                   \
+        (void)x;                                                                                   \
+        scale_vectors(n, count, c, X, Z);                                                          \
+        return 0;                                                                                  \
+    }                                                                                              \
+    static int name##_sum_vectors(int count, sunrealtype a, N_Vector *X, sunrealtype b,            \
+                                  N_Vector *Y, N_Vector *Z) {                                      \
+        const N_Vector x = X[0];                                                                   \
+        (void)x;                                                                                   \
+        sum_vectors(n, count, a, X, b, Y, Z);                                                      \
+        return 0;                                                                                  \
+    }                                                                                              \
+    static const struct _generic_N_Vector_Ops name = {                                             \
+        .nvgetvectorid = id,                                                                       \
+        .nvclone = clone,                                                                          \
+        .nvdestroy = destroy,                                                                      \
+        .nvspace = space,                                                                          \
+        .nvgetarraypointer = small_vector_data,                                                    \
+        .nvgetlength = length_of,                                                                  \
+        .nvlinearsum = name##_linear_sum,                                                          \
+        .nvconst = name##_constant,                                                                \
+        .nvprod = name##_product,                                                                  \
+        .nvdiv = name##_quotient,                                                                  \
+        .nvscale = name##_scale,                                                                   \
+        .nvabs = name##_absolute,                                                                  \
+        .nvinv = name##_inverse,                                                                   \
+        .nvaddconst = name##_add_constant,                                                         \
+        .nvdotprod = name##_dot_product,                                                           \
+        .nvmaxnorm = name##_max_norm,                                                              \
+        .nvmin = name##_minimum,                                                                   \
+        .nvwrmsnorm = name##_weighted_norm,                                                        \
+        .nvlinearcombination = name##_linear_combination,                                          \
+        .nvscaleaddmulti = name##_scale_add_multi,                                                 \
+        .nvscalevectorarray = name##_scale_vectors,                                                \
+        .nvlinearsumvectorarray = name##_sum_vectors,                                              \
+    };
+// clang-format on
+
+DEFINE_TABLE(of_2, 2)
+DEFINE_TABLE(of_4, 4)
+DEFINE_TABLE(of_6, 6)
+DEFINE_TABLE(of_any, length_of(x))
+
+N_Vector small_vector_create(sunindextype length, SUNContext context) {
+    const struct _generic_N_Vector_Ops *const tables[] = {[2] = &of_2, [4] = &of_4, [6] = &of_6};
+    const struct _generic_N_Vector_Ops *table = &of_any;
+    if (length < (sunindextype)(sizeof tables / sizeof tables[0]) && tables[length] != NULL) {
+        table = tables[length];
+    }
+    // SUNDIALS never writes to a table of operations, though the type of its pointer would let it
+    return create_like(
+        &(const struct _generic_N_Vector){.ops = (N_Vector_Ops)table, .sunctx = context}, length);
+}

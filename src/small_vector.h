@@ -1,0 +1,22 @@
+/* An N_Vector of SUNDIALS for few doubles: one block of memory per vector, a table of operations
+ * shared by all, loops whose length the compiler knows where it is 2, 4 or 6. N_VNew_Serial does
+ * the same at any length and several times the cost per operation.
+ *
+ * Beyond what every integrator of SUNDIALS asks for it has the fused operations that CVODE and
+ * ARKODE use; sums are formed in the order in which N_Vector_Serial forms them. Private to the
+ * integrator. */
+#ifndef SMALL_VECTOR_H
+#define SMALL_VECTOR_H
+
+#include <sundials/sundials_nvector.h>
+
+/* A vector of length (> 0) zeros, or NULL where memory is short. Vectors cloned from it are zeros
+ * too. N_VDestroy frees each. */
+N_Vector small_vector_create(sunindextype length, SUNContext context);
+
+/* The elements of a vector that small_vector_create or a clone made. */
+static inline double *small_vector_data(N_Vector vector) {
+    return (double *)vector->content;
+}
+
+#endif
