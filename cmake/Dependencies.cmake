@@ -1,8 +1,8 @@
 # Finds SUNDIALS, Python, the FMI headers and, for tests, Unity. setup.sh installs all of them.
 
-find_package(SUNDIALS REQUIRED COMPONENTS cvode)
-if(NOT TARGET SUNDIALS::cvode_static)
-  message(FATAL_ERROR "SUNDIALS has no static CVODE: the FMU must not need a SUNDIALS library where "
+find_package(SUNDIALS REQUIRED COMPONENTS arkode cvode)
+if(NOT TARGET SUNDIALS::cvode_static OR NOT TARGET SUNDIALS::arkode_static)
+  message(FATAL_ERROR "SUNDIALS has no static CVODE or ARKODE: the FMU must not need a SUNDIALS library where "
                       "it runs. Install libsundials-dev, or build SUNDIALS with "
                       "-DBUILD_STATIC_LIBS=ON and position independent code.")
 endif()

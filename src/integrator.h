@@ -1,20 +1,32 @@
-/* Integration of an ode by SUNDIALS CVODE (Adams-Moulton, fixed-point iteration), which stays
- * behind this handle: no type or message of SUNDIALS leaves it.
+/* Integration of an ode by SUNDIALS, which stays behind this handle: no type or message of it
+ * leaves.
  *
  * Time here is counted from the last restart, so that its rounding does not grow with the time of
  * the simulation. CVODE steps past the points asked for and interpolates; a restart drops what lies
- * beyond. One handle serves one thread at a time; handles share nothing. */
+ * beyond. The Runge-Kutta method ends its steps at the points asked for and has no history. One
+ * handle serves one thread at a time; handles share nothing. */
 #ifndef INTEGRATOR_H
 #define INTEGRATOR_H
 
 #include "message.h"
 #include "ode.h"
 
+#include <stdbool.h>
+
 struct integrator;
 
+enum integrator_method {
+    INTEGRATOR_CVODE_ADAMS = 1, /* multistep of orders 1 to 12, fixed-point iteration */
+    INTEGRATOR_CVODE_BDF = 2,   /* for stiff equations: orders 1 to 5, Newton with the Jacobian */
+    INTEGRATOR_ERK = 3,         /* explicit Runge-Kutta of order 5 (ARKODE's ERKStep) */
+    INTEGRATOR_METHODS,
+};
+
 struct integrator_settings {
+    enum integrator_method method;
     double relative_tolerance;         /* > 0, of every internal step */
     const double *absolute_tolerances; /* > 0, one per state in its unit; copied */
+    double max_step;                   /* s: of internal steps; 0: no limit */
 };
 
 /* Totals since integrator_configure, and the last internal step. */
@@ -27,8 +39,8 @@ struct integrator_statistics {
     int last_order;   /* its order */
 };
 
-/* Allocates all that integration needs; nothing is allocated later. ode and sink are copied, what
- * they point to must outlive the handle. On failure *integrator is NULL. */
+/* ode and sink are copied, what they point to must outlive the handle. On failure *integrator is
+ * NULL. */
 __attribute__((nonnull, warn_unused_result)) enum status
 integrator_create(const struct ode *ode, const struct message_sink *sink,
                   struct integrator **integrator);
@@ -36,22 +48,33 @@ integrator_create(const struct ode *ode, const struct message_sink *sink,
 /* NULL is allowed. */
 void integrator_destroy(struct integrator *integrator);
 
-/* Sets tolerances and clears the statistics. A restart must follow. */
+/* Sets method, tolerances and limits and clears the statistics. Allocates all that the method
+ * needs, where it is not the one before; nothing is allocated later. A restart must follow. */
 __attribute__((nonnull, warn_unused_result)) enum status
 integrator_configure(struct integrator *integrator, const struct integrator_settings *settings);
 
+/* After a stop, further advances go on from a history of internal steps. Otherwise each advance
+ * starts anew, and a restart there changes nothing. */
+__attribute__((nonnull)) bool integrator_has_history(const struct integrator *integrator);
+
 /* Starts anew from x at time 0 with no history. span (> 0): the right-hand side is not evaluated at
- * times beyond it, nor may integrator_advance go there; INFINITY where there is no such limit. */
+ * times beyond it, nor may integrator_advance go there; INFINITY where there is no such limit.
+ * first_step: what integrator_next_step gave for a solution like this one, s; 0: none is known. */
 __attribute__((nonnull, warn_unused_result)) enum status
-integrator_restart(struct integrator *integrator, const double x[], double span);
+integrator_restart(struct integrator *integrator, const double x[], double span, double first_step);
+
+/* After an advance: how long a first internal step can be after a restart here, s; 0 where that
+ * cannot be told. */
+__attribute__((nonnull)) double integrator_next_step(const struct integrator *integrator);
 
 /* Integrates to the time t, not before the one of the last call, in max_steps (>= 1) internal steps
  * at most, and writes the state there to x.
  * Where that fails (STATUS_TOO_MANY_STEPS, STATUS_NO_CONVERGENCE, STATUS_NOT_FINITE), *reached <= t
  * is the last time with a valid state and x that state; on success *reached is t.
  *
- * What follows a restart is a function of its state and span and of the first t after it, which
- * bounds the first internal step; at which further times there was a stop does not matter. */
+ * What follows a restart is a function of its state, span and first step and of the first t after
+ * it, which bounds the first internal step; at which further times there was a stop does not matter
+ * where the integrator has a history. */
 __attribute__((nonnull, warn_unused_result)) enum status
 integrator_advance(struct integrator *integrator, double t, long max_steps, double *reached,
                    double x[]);

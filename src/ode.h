@@ -11,9 +11,13 @@
  * step. context: that of struct ode. */
 typedef enum status ode_rhs(double t, const double x[], double dx[], void *context);
 
+/* Writes the derivatives of f by x: J[i + state_count j] is that of f_i by x_j. As ode_rhs else. */
+typedef enum status ode_jacobian(double t, const double x[], double J[], void *context);
+
 struct ode {
     size_t state_count; /* > 0 */
     ode_rhs *rhs;
+    ode_jacobian *jacobian; /* for INTEGRATOR_CVODE_BDF alone */
     void *context;
 };
 

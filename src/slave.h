@@ -7,6 +7,7 @@
 #ifndef SLAVE_H
 #define SLAVE_H
 
+#include "integrator.h"
 #include "variables.h"
 
 struct slave;
@@ -23,6 +24,8 @@ struct slave_values {
     double solver_last_step;             /* s: length of the last internal step */
     int solver_last_order;
     int solver_failed_steps; /* refused attempts since initialization */
+    int solver_method;       /* an enum integrator_method */
+    double max_step;         /* s: of internal steps; 0: no limit */
 };
 
 struct slave_experiment {

@@ -4,7 +4,6 @@
 #define SLAVE_STATE_H
 
 #include "clock.h"
-#include "integrator.h"
 #include "polynomial.h"
 #include "slave.h"
 
@@ -30,6 +29,8 @@ struct slave_state {
     double latest_time; /* s since the restart */
     struct integrator_statistics statistics;
     long steps_before_restart; /* internal steps */
+    double restart_step;       /* s: first internal step asked for at the last restart; 0: none */
+    double next_step;          /* s: the same, for a restart now */
 };
 
 /* Parts of one block of memory, of which a snapshot is a copy. */
@@ -55,9 +56,11 @@ struct slave {
     bool outputs_are_valid;        /* the calculated values belong to the others */
     bool history_is_lost;          /* the integrator is not where state says: replay first */
     struct integrator *integrator; /* NULL where the model has no states */
-    double configured_tolerance;   /* relative tolerance that the integrator was configured with */
-    double *work;                  /* one value per input: those that the right-hand side sees */
-    char *first;                   /* value structures for derivatives */
+    struct integrator_settings configured; /* what the integrator was configured with, without the
+                                              tolerances of the states */
+    bool inputs_move; /* since the last restart; otherwise work holds their values */
+    double *work;     /* one value per input: those that the right-hand side sees */
+    char *first;      /* value structures for derivatives */
     char *second;
     struct slave_snapshot *newest; /* snapshots that belong to the instance, a list */
     struct slave_snapshot *oldest;
@@ -102,10 +105,14 @@ enum status slave_check_experiment(const struct slave *slave,
 /* The parameters go together; says why where they do not. */
 enum status slave_check_parameters(const struct slave *slave);
 
-/* Gives the integrator the tolerance it has to run at. */
+/* Gives the integrator the method, tolerance and limits it has to run with. */
 enum status slave_configure_integrator(struct slave *slave);
 
-/* Right-hand side of the integrator; context: the slave. */
+/* What the integrator was configured with is not what the values ask for. */
+bool slave_is_configured_otherwise(const struct slave *slave);
+
+/* Right-hand side of the integrator and its derivatives by the states; context: the slave. */
 ode_rhs slave_rhs;
+ode_jacobian slave_jacobian;
 
 #endif

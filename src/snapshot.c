@@ -83,7 +83,7 @@ static enum status resume(struct slave *slave) {
         return STATUS_OK;
     }
     enum status status = STATUS_OK;
-    if (slave->configured_tolerance != slave->state.own.effective_relative_tolerance) {
+    if (slave_is_configured_otherwise(slave)) {
         status = slave_configure_integrator(slave);
     }
     integrator_set_statistics(slave->integrator, &slave->state.statistics);
@@ -144,6 +144,8 @@ static void transfer_own(struct codec *codec, struct slave_values *own) {
     codec_real(codec, &own->solver_last_step);
     codec_int(codec, &own->solver_last_order);
     codec_int(codec, &own->solver_failed_steps);
+    codec_int(codec, &own->solver_method);
+    codec_real(codec, &own->max_step);
 }
 
 static void transfer_statistics(struct codec *codec, struct integrator_statistics *statistics) {
@@ -202,6 +204,8 @@ static void transfer_state(struct codec *codec, const struct slave *slave, unsig
     codec_real(codec, &state->latest_time);
     transfer_statistics(codec, &state->statistics);
     codec_long(codec, &state->steps_before_restart);
+    codec_real(codec, &state->restart_step);
+    codec_real(codec, &state->next_step);
     transfer_values(codec, slave->unit, block + (memory->values - memory->block));
     transfer_values(codec, slave->unit, block + (memory->held - memory->block));
     // pending, current and running lie side by side
@@ -279,6 +283,19 @@ static bool are_counts(const struct integrator_statistics *statistics) {
     return isfinite(statistics->last_step);
 }
 
+/* Steps and method that the integrator can be given. */
+static bool can_integrate(const struct slave_state *state) {
+    const double steps[] = {state->own.max_step, state->restart_step, state->next_step};
+    for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
+        if (!(steps[i] >= 0.0 && isfinite(steps[i]))) {
+            return false;
+        }
+    }
+    return state->own.max_internal_steps >= 1 &&
+           state->own.solver_method >= INTEGRATOR_CVODE_ADAMS &&
+           state->own.solver_method < INTEGRATOR_METHODS;
+}
+
 /* A state that an instance can be in: a hash that fits does not prove it. */
 static bool is_plausible(const struct slave *slave, const struct slave_state *state,
                          const char *block) {
@@ -298,8 +315,8 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
         !(state->own.relative_tolerance >= 0.0 && isfinite(state->own.relative_tolerance)) ||
         (state->experiment_defined &&
          slave_check_experiment(slave, &state->experiment) != STATUS_OK) ||
+        (slave->integrator != NULL && !can_integrate(state)) ||
         !isfinite(state->own.solver_last_step) ||
-        (slave->integrator != NULL && state->own.max_internal_steps < 1) ||
         !are_counts(&state->statistics) || state->steps_before_restart < 0 ||
         state->steps_before_restart > state->statistics.steps ||
         !are_settable(slave, block + (memory->values - memory->block))) {

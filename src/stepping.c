@@ -5,14 +5,58 @@
 #include <math.h>
 #include <string.h>
 
-enum status slave_rhs(double t, const double x[], double dx[], void *slave_pointer) {
-    const struct slave *slave = slave_pointer;
+static bool is_moving(const struct polynomial inputs[], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
+            if (inputs[i].d[k] != 0.0) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* ---- What the integrator calls -------------------------------------------------------------- */
+
+static void evaluate_inputs(const struct slave *slave, double t) {
     const size_t input_count = count_of(slave->model->inputs);
     for (size_t i = 0; i < input_count; i++) {
         slave->work[i] = polynomial_value(&slave->memory.running[i], t);
     }
+}
+
+enum status slave_rhs(double t, const double x[], double dx[], void *slave_pointer) {
+    const struct slave *slave = slave_pointer;
+    if (slave->inputs_move) {
+        evaluate_inputs(slave, t);
+    }
     return slave->model->right_hand_side(slave->memory.held, slave->state.restart_time.s + t, x,
                                          slave->work, dx);
+}
+
+/* Column by column: derivatives along each state. */
+enum status slave_jacobian(double t, const double x[], double J[], void *slave_pointer) {
+    struct slave *slave = slave_pointer;
+    const struct model *model = slave->model;
+    const double time = slave->state.restart_time.s + t;
+    const size_t n = count_of(model->states);
+    char *point = slave->second;
+    if (slave->inputs_move) {
+        evaluate_inputs(slave, t);
+    }
+    memcpy(point, slave->memory.held, model->values_size);
+    memcpy(doubles_of(point, model->states), x, model->states.size);
+    if (model->inputs.size > 0) {
+        memcpy(doubles_of(point, model->inputs), slave->work, model->inputs.size);
+    }
+    enum status status = model->outputs(point, time);
+    for (size_t j = 0; j < n && status == STATUS_OK; j++) {
+        memset(slave->first, 0, model->values_size);
+        doubles_of(slave->first, model->states)[j] = 1.0;
+        status = model->propagate(point, time, 0.0, slave->first, NULL);
+        memcpy(&J[n * j], doubles_of(slave->first, model->derivatives), n * sizeof(double));
+    }
+    return status;
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
@@ -48,17 +92,6 @@ static enum status refuse_times(const struct slave *slave, double t, double h) {
     return STATUS_OK;
 }
 
-static bool is_moving(const struct polynomial inputs[], size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
-            if (inputs[i].d[k] != 0.0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 static bool are_equal(const struct polynomial first[], const struct polynomial second[],
                       size_t count) {
     for (size_t i = 0; i < count; i++) {
@@ -86,16 +119,23 @@ static bool can_go_on(const struct slave *slave, double target) {
            !is_moving(memory->pending, input_count);
 }
 
+/* For inputs that are held, once instead of at every evaluation. */
+static void prepare_inputs(struct slave *slave) {
+    slave->inputs_move = is_moving(slave->memory.running, count_of(slave->model->inputs));
+    evaluate_inputs(slave, 0.0);
+}
+
 static enum status restart(struct slave *slave, struct clock_time end) {
     struct slave_memory *memory = &slave->memory;
     struct slave_state *state = &slave->state;
     const size_t input_count = count_of(slave->model->inputs);
     memcpy(memory->held, memory->values, slave->model->values_size);
     memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
+    prepare_inputs(slave);
 
     const double target = clock_difference(end, state->time);
     state->span = INFINITY;
-    if (is_moving(memory->pending, input_count)) {
+    if (slave->inputs_move) {
         state->span = target;
     } else if (state->experiment.stop_time_defined) {
         const struct clock_time stop = {.s = state->experiment.stop_time};
@@ -105,9 +145,10 @@ static enum status restart(struct slave *slave, struct clock_time end) {
     state->restart_time = state->time;
     state->first_time = target;
     state->steps_before_restart = state->statistics.steps;
+    state->restart_step = state->next_step;
     slave->history_is_lost = false;
     return integrator_restart(slave->integrator, doubles_of(memory->held, slave->model->states),
-                              state->span);
+                              state->span, state->restart_step);
 }
 
 /* Brings the integrator to where the restored state says it is, in the internal steps that it says
@@ -118,8 +159,10 @@ static enum status replay(struct slave *slave) {
     const long steps = state->statistics.steps - state->steps_before_restart;
     double *x = doubles_of(slave->first, states);
     double reached;
+    prepare_inputs(slave);
     enum status status =
-        integrator_restart(slave->integrator, doubles_of(slave->memory.held, states), state->span);
+        integrator_restart(slave->integrator, doubles_of(slave->memory.held, states), state->span,
+                           state->restart_step);
     if (status == STATUS_OK) {
         status = integrator_advance(slave->integrator, state->first_time, steps, &reached, x);
     }
@@ -181,7 +224,8 @@ static enum status integrate_to(struct slave *slave, struct clock_time end) {
     status = integrator_advance(slave->integrator, target, state->own.max_internal_steps,
                                 &state->latest_time,
                                 doubles_of(slave->memory.values, slave->model->states));
-    state->has_history = status == STATUS_OK;
+    state->has_history = status == STATUS_OK && integrator_has_history(slave->integrator);
+    state->next_step = status == STATUS_OK ? integrator_next_step(slave->integrator) : 0.0;
     slave_set_clock(slave,
                     status == STATUS_OK ? end : clock_add(state->restart_time, state->latest_time));
     end_inputs(slave, clock_difference(state->time, begin));

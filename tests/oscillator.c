@@ -89,13 +89,15 @@ static const struct variable variables[] = {
      INFINITY, 1.0},
     {84, "effective_relative_tolerance", OF_SLAVE(VARIABLE_REAL, effective_relative_tolerance),
      CAUSALITY_LOCAL, VARIABILITY_FIXED, INITIAL_CALCULATED, 0.0, ANY},
+    {90, "solver_method", OF_SLAVE(VARIABLE_INTEGER, solver_method), FIXED, 1.0, 1.0, 3.0, 1.0},
+    {91, "max_step", OF_SLAVE(VARIABLE_REAL, max_step), FIXED, 0.0, 0.0, INFINITY, 1.0},
 };
 
 static const short row_of_reference[] = {
-    0,  1,  2,  -1, -1, -1, -1, -1, -1, -1, 3,  4,  -1, -1, -1, -1, -1, -1, -1, -1, 5,  -1,
-    -1, -1, -1, -1, -1, -1, -1, -1, 6,  7,  -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
-    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
-    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 8,  9,  10, 11, 12,
+    0,  1,  2,  -1, -1, -1, -1, -1, -1, -1, 3,  4,  -1, -1, -1, -1, -1, -1, -1, -1, 5,  -1, -1,
+    -1, -1, -1, -1, -1, -1, -1, 6,  7,  -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
+    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1,
+    -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 8,  9,  10, 11, 12, -1, -1, -1, -1, -1, 13, 14,
 };
 
 const struct unit oscillator_unit = {

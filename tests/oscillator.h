@@ -31,6 +31,8 @@ enum oscillator_reference {
     OSCILLATOR_RELATIVE_TOLERANCE = 82,
     OSCILLATOR_MAX_STEPS = 83,
     OSCILLATOR_EFFECTIVE_TOLERANCE = 84,
+    OSCILLATOR_SOLVER_METHOD = 90,
+    OSCILLATOR_MAX_STEP = 91,
 };
 
 extern const struct model oscillator_model;
