@@ -154,7 +154,9 @@ struct component *component_enter(fmi2Component c, enum call call) {
     const struct call_rule *rule = &call_rules[call];
     const enum call_kind kind =
         component->kind == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE;
-    component_log(component, fmi2OK, LOG_ALL, "%s", rule->name);
+    if (component->is_logged[LOG_ALL]) {
+        component_log(component, fmi2OK, LOG_ALL, "%s", rule->name);
+    }
     if (rule->kind != ANY_KIND && rule->kind != kind) {
         component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
                        kind_names[rule->kind], kind_names[kind]);

@@ -152,6 +152,7 @@ enum status integrator_restart(struct integrator *integrator, const double x[], 
     integrator->span = span;
     integrator->reached = 0.0;
     integrator->failed_at = -INFINITY;
+    integrator->internal = -INFINITY;
     integrator->first_step = first_step;
     return integrator->method->status_of_flag(integrator, integrator->method->restart(integrator));
 }
@@ -179,14 +180,34 @@ static void update_statistics(struct integrator *integrator) {
 static bool has_reached(const struct integrator *integrator, double t) {
     // at a stop time the solver may be short of it by its own rounding
     return integrator_are_finite(small_vector_data(integrator->x), integrator->ode.state_count) &&
-           integrator->method->internal_time(integrator) >= t * (1.0 - 1e-12);
+           integrator->internal >= t * (1.0 - 1e-12);
+}
+
+/* A point that an internal step has passed already takes no more than a polynomial. */
+static bool interpolate(struct integrator *integrator, double t, double x[]) {
+    const size_t count = integrator->ode.state_count;
+    if (!(integrator->internal >= t) || !integrator->method->has_history ||
+        integrator->method->interpolate(integrator, t) != 0 ||
+        !integrator_are_finite(small_vector_data(integrator->x), count)) {
+        return false;
+    }
+    integrator->reached = t;
+    memcpy(small_vector_data(integrator->last_x), small_vector_data(integrator->x),
+           count * sizeof(double));
+    memcpy(x, small_vector_data(integrator->x), count * sizeof(double));
+    return true;
 }
 
 enum status integrator_advance(struct integrator *integrator, double t, long max_steps,
                                double *reached, double x[]) {
     const size_t size = integrator->ode.state_count * sizeof(double);
+    if (interpolate(integrator, t, x)) {
+        *reached = t;
+        return STATUS_OK;
+    }
     double stopped_at = integrator->reached;
     const int flag = integrator->method->advance(integrator, t, max_steps, &stopped_at);
+    integrator->internal = integrator->method->internal_time(integrator);
     update_statistics(integrator);
     enum status status = integrator->method->status_of_flag(integrator, flag);
     if (status == STATUS_OK) {

@@ -32,6 +32,7 @@ struct integrator {
     double span;       /* internal steps must not pass it */
     double reached;    /* where the last advance ended */
     double failed_at;  /* the last time that the right-hand side failed at */
+    double internal;   /* where the last internal step ended; -INFINITY before the first */
     double first_step; /* s: of the next restart or, with no history, advance; 0: unknown */
 
     struct integrator_statistics statistics;
@@ -63,6 +64,9 @@ struct method {
     /* Steps, failed steps, last step and its order since the last restart; time of the solver. */
     void (*count)(const struct integrator *integrator, struct integrator_statistics *now);
     double (*internal_time)(const struct integrator *integrator);
+
+    /* Writes the state at t, between the last two internal steps, to x; NULL with no history. */
+    int (*interpolate)(const struct integrator *integrator, double t);
 
     enum status (*status_of_flag)(const struct integrator *integrator, int flag);
 };

@@ -205,7 +205,7 @@ enum status slave_enter_initialization(struct slave *slave) {
 }
 
 enum status slave_check_parameters(const struct slave *slave) {
-    char text[256] = "";
+    char text[256]; // written where the parameters are refused
     const enum status status =
         slave->model->check_parameters(slave->memory.values, text, sizeof text);
     if (status != STATUS_OK) {

@@ -108,6 +108,9 @@ enum status slave_check_parameters(const struct slave *slave);
 /* Gives the integrator the method, tolerance and limits it has to run with. */
 enum status slave_configure_integrator(struct slave *slave);
 
+/* Brings state.next_step up to date, which costs too much to be done after each step. */
+void slave_update_next_step(struct slave *slave);
+
 /* What the integrator was configured with is not what the values ask for. */
 bool slave_is_configured_otherwise(const struct slave *slave);
 

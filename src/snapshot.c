@@ -69,6 +69,7 @@ enum status slave_save(struct slave *slave, unsigned tag, struct slave_snapshot 
     } else if (check_own(slave, *snapshot) != STATUS_OK) {
         return STATUS_INVALID_ARGUMENT;
     }
+    slave_update_next_step(slave);
     (*snapshot)->tag = tag;
     (*snapshot)->state = slave->state;
     memcpy((*snapshot)->memory, slave->memory.block, slave->memory.size);

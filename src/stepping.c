@@ -125,10 +125,17 @@ static void prepare_inputs(struct slave *slave) {
     evaluate_inputs(slave, 0.0);
 }
 
+void slave_update_next_step(struct slave *slave) {
+    if (slave->state.has_history && !slave->history_is_lost) {
+        slave->state.next_step = integrator_next_step(slave->integrator);
+    }
+}
+
 static enum status restart(struct slave *slave, struct clock_time end) {
     struct slave_memory *memory = &slave->memory;
     struct slave_state *state = &slave->state;
     const size_t input_count = count_of(slave->model->inputs);
+    slave_update_next_step(slave);
     memcpy(memory->held, memory->values, slave->model->values_size);
     memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
     prepare_inputs(slave);
@@ -200,6 +207,13 @@ static void end_inputs(struct slave *slave, double elapsed) {
     struct slave_memory *memory = &slave->memory;
     const size_t input_count = count_of(slave->model->inputs);
     double *u = doubles_of(memory->values, slave->model->inputs);
+    if (!is_moving(memory->pending, input_count)) {
+        for (size_t i = 0; i < input_count; i++) {
+            memory->current[i] = memory->pending[i];
+            u[i] = memory->pending[i].d[0];
+        }
+        return;
+    }
     for (size_t i = 0; i < input_count; i++) {
         memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
         memory->pending[i] = (struct polynomial){{memory->pending[i].d[0]}};
@@ -225,7 +239,9 @@ static enum status integrate_to(struct slave *slave, struct clock_time end) {
                                 &state->latest_time,
                                 doubles_of(slave->memory.values, slave->model->states));
     state->has_history = status == STATUS_OK && integrator_has_history(slave->integrator);
-    state->next_step = status == STATUS_OK ? integrator_next_step(slave->integrator) : 0.0;
+    if (!state->has_history) {
+        state->next_step = status == STATUS_OK ? integrator_next_step(slave->integrator) : 0.0;
+    }
     slave_set_clock(slave,
                     status == STATUS_OK ? end : clock_add(state->restart_time, state->latest_time));
     end_inputs(slave, clock_difference(state->time, begin));

@@ -2,13 +2,6 @@
 
 #include <math.h>
 
-const struct variable *variable_find(const struct unit *unit, unsigned reference) {
-    if (reference >= unit->reference_count || unit->row_of_reference[reference] < 0) {
-        return NULL;
-    }
-    return &unit->variables[unit->row_of_reference[reference]];
-}
-
 bool variable_is_settable(const struct variable *variable, enum phase phase) {
     const bool is_input = variable->causality == CAUSALITY_INPUT;
     switch (phase) {

@@ -68,7 +68,12 @@ enum phase {
 };
 
 /* NULL where the unit has no such reference. */
-const struct variable *variable_find(const struct unit *unit, unsigned reference);
+static inline const struct variable *variable_find(const struct unit *unit, unsigned reference) {
+    if (reference >= unit->reference_count || unit->row_of_reference[reference] < 0) {
+        return NULL;
+    }
+    return &unit->variables[unit->row_of_reference[reference]];
+}
 
 /* Before and during initialization: start values and inputs; later: inputs and tunable parameters.
  */

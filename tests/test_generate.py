@@ -28,7 +28,8 @@ gravity2 56 local N; f1_x 60 local N; f1_z 61 local N; tau1_y 62 local N.m; f2_x
 f2_z 64 local N; tau2_y 65 local N.m; solver_steps 80 local -; solver_rhs_evaluations 81 local -;
 relative_tolerance 82 parameter 1; max_internal_steps 83 parameter -;
 effective_relative_tolerance 84 local 1; solver_restarts 85 local -; solver_last_step 86 local s;
-solver_last_order 87 local -; solver_failed_steps 88 local -
+solver_last_order 87 local -; solver_failed_steps 88 local -; solver_method 90 parameter -;
+max_step 91 parameter s
 """
 
 

@@ -9,11 +9,14 @@
 #include <unity.h>
 
 static struct slave *slave;
+static int method;
 
 static struct slave *started(void) {
     struct slave *created = NULL;
     const struct slave_experiment experiment = {.stop_time_defined = true, .stop_time = 1000.0};
+    const unsigned reference = OSCILLATOR_SOLVER_METHOD;
     ASSERT_OK(slave_create(&oscillator_unit, &last_text_sink, &created));
+    ASSERT_OK(slave_set_integer(created, &reference, 1, &method));
     ASSERT_OK(slave_setup_experiment(created, &experiment));
     ASSERT_OK(slave_enter_initialization(created));
     ASSERT_OK(slave_exit_initialization(created));
@@ -57,6 +60,65 @@ static void set(struct slave *to, unsigned reference, double value) {
 
 static void step(struct slave *stepped, double h) {
     ASSERT_OK(slave_do_step(stepped, slave_time(stepped), h));
+}
+
+/* Inputs that change at every step, so that each restart relies on the step before. */
+static void test_a_run_of_restarts_goes_on_bit_for_bit(void) {
+    struct slave *other = started();
+    struct slave_snapshot *snapshot = NULL;
+    struct slave_snapshot *copy = NULL;
+    unsigned char bytes[4096];
+    const size_t size = slave_serialized_size(slave);
+    TEST_ASSERT_TRUE(size <= sizeof bytes);
+    for (int i = 0; i < 60; i++) {
+        const double u = sin(0.3 * i);
+        const double h = i % 7 == 0 ? 0.3 : 0.001;
+        ASSERT_OK(slave_save(slave, 0, &snapshot));
+        ASSERT_OK(slave_serialize(slave, snapshot, bytes, size));
+        set(slave, OSCILLATOR_U, 3.0);
+        step(slave, 0.1);
+        if (i % 2 == 0) {
+            ASSERT_OK(slave_restore(slave, snapshot));
+            ASSERT_OK(slave_save(slave, 0, &snapshot)); // of a state that was only restored
+            ASSERT_OK(slave_restore(slave, snapshot));
+        } else {
+            ASSERT_OK(slave_deserialize(slave, bytes, size, &copy));
+            ASSERT_OK(slave_restore(slave, copy));
+            ASSERT_OK(slave_forget(slave, &copy));
+        }
+        set(slave, OSCILLATOR_U, u);
+        set(other, OSCILLATOR_U, u);
+        step(slave, h);
+        step(other, h);
+        assert_equal(other, slave);
+    }
+    slave_destroy(other);
+}
+
+/* A snapshot from before initialization carries another method. */
+static void test_a_state_of_another_method_can_be_restored(void) {
+    struct slave *other = started();
+    struct slave_snapshot *snapshot = NULL;
+    struct slave_snapshot *copy = NULL;
+    unsigned char bytes[4096];
+    const size_t size = slave_serialized_size(slave);
+    const int own_method = method;
+    step(slave, 0.1);
+    ASSERT_OK(slave_save(slave, 0, &snapshot));
+    ASSERT_OK(slave_serialize(slave, snapshot, bytes, size));
+    slave_destroy(other);
+    method = method == INTEGRATOR_ERK ? INTEGRATOR_CVODE_ADAMS : INTEGRATOR_ERK;
+    other = started();
+    method = own_method;
+    step(other, 0.2);
+    ASSERT_OK(slave_deserialize(other, bytes, size, &copy));
+    ASSERT_OK(slave_restore(other, copy));
+    for (int i = 0; i < 10; i++) {
+        step(slave, 0.1);
+        step(other, 0.1);
+        assert_equal(slave, other);
+    }
+    slave_destroy(other);
 }
 
 static void test_a_run_goes_on_from_its_history_bit_for_bit(void) {
@@ -221,13 +283,17 @@ static void test_bytes_that_are_not_sound_are_refused(void) {
 
 int main(void) {
     UNITY_BEGIN();
-    RUN_TEST(test_a_run_goes_on_from_its_history_bit_for_bit);
-    RUN_TEST(test_saving_at_every_step_changes_nothing);
-    RUN_TEST(test_restarts_without_a_change_are_part_of_the_state);
-    RUN_TEST(test_bytes_carry_a_state_to_another_instance);
-    RUN_TEST(test_input_derivatives_are_part_of_the_state);
-    RUN_TEST(test_snapshots_of_others_are_refused);
-    RUN_TEST(test_a_snapshot_can_be_forgotten_in_any_order);
-    RUN_TEST(test_bytes_that_are_not_sound_are_refused);
+    for (method = INTEGRATOR_CVODE_ADAMS; method < INTEGRATOR_METHODS; method++) {
+        RUN_TEST(test_a_run_goes_on_from_its_history_bit_for_bit);
+        RUN_TEST(test_a_run_of_restarts_goes_on_bit_for_bit);
+        RUN_TEST(test_a_state_of_another_method_can_be_restored);
+        RUN_TEST(test_saving_at_every_step_changes_nothing);
+        RUN_TEST(test_restarts_without_a_change_are_part_of_the_state);
+        RUN_TEST(test_bytes_carry_a_state_to_another_instance);
+        RUN_TEST(test_input_derivatives_are_part_of_the_state);
+        RUN_TEST(test_snapshots_of_others_are_refused);
+        RUN_TEST(test_a_snapshot_can_be_forgotten_in_any_order);
+        RUN_TEST(test_bytes_that_are_not_sound_are_refused);
+    }
     return UNITY_END();
 }
