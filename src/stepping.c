@@ -104,18 +104,23 @@ static bool are_equal(const struct polynomial first[], const struct polynomial s
     return true;
 }
 
+/* The parameters are those that the integrator runs with. */
+static bool parameters_are_held(const struct slave *slave) {
+    const struct slave_memory *memory = &slave->memory;
+    const struct span parameters = slave->model->parameters;
+    return memcmp(memory->held + parameters.offset, memory->values + parameters.offset,
+                  parameters.size) == 0;
+}
+
 /* The integrator may go on from where it is to target. A pure function of what is set now and what
  * the integrator runs with: how often and in what order values were set does not matter. */
 static bool can_go_on(const struct slave *slave, double target) {
     const struct slave_memory *memory = &slave->memory;
     const struct slave_state *state = &slave->state;
-    const struct span parameters = slave->model->parameters;
     const size_t input_count = count_of(slave->model->inputs);
     return state->has_history && target <= state->span &&
            state->statistics.steps - state->steps_before_restart < SLAVE_LONGEST_HISTORY &&
-           memcmp(memory->held + parameters.offset, memory->values + parameters.offset,
-                  parameters.size) == 0 &&
-           are_equal(memory->running, memory->pending, input_count) &&
+           parameters_are_held(slave) && are_equal(memory->running, memory->pending, input_count) &&
            !is_moving(memory->pending, input_count);
 }
 
@@ -135,7 +140,11 @@ static enum status restart(struct slave *slave, struct clock_time end) {
     struct slave_memory *memory = &slave->memory;
     struct slave_state *state = &slave->state;
     const size_t input_count = count_of(slave->model->inputs);
-    slave_update_next_step(slave);
+    if (parameters_are_held(slave)) {
+        slave_update_next_step(slave);
+    } else {
+        state->next_step = 0.0; // with others the instance is as good as new
+    }
     memcpy(memory->held, memory->values, slave->model->values_size);
     memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
     prepare_inputs(slave);

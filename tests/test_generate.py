@@ -86,11 +86,14 @@ def test_start_values_and_bounds(description: ET.Element) -> None:
     defaults = {"m1": 2, "m2": 1, "I1z": 0.1, "I2z": 0.05, "l1": 0.5, "lc1": 0.25, "a": 0.1}
     defaults |= {"g": 9.81, "q1": 0, "q2": 0, "dq1": 0, "dq2": 0, "tau1": 0, "f2": 0}
     defaults |= {"relative_tolerance": 0, "max_internal_steps": 100000}
+    defaults |= {"solver_method": 1, "max_step": 0}
     assert {name: float(s) for name, s in starts.items() if s is not None} == defaults
     minima = {n: float(v[0].get("min")) for n, v in variables.items() if v[0].get("min")}
     assert minima == {"m1": 0, "m2": 1e-9, "I1z": 0, "I2z": 0, "l1": 0, "lc1": 0} | {
         "relative_tolerance": 0,
         "max_internal_steps": 1,
+        "solver_method": 1,
+        "max_step": 0,
     }
 
 

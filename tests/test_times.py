@@ -389,7 +389,7 @@ def counters(instance: Instance) -> dict[str, int]:
 
 def test_solver_variables_are_declared(unit: Unit) -> None:
     declared = {v.name: v for v in unit.description.modelVariables if v.name.startswith("solver_")}
-    assert [v.valueReference for v in declared.values()] == [80, 81, 85, 86, 87, 88]
+    assert [v.valueReference for v in declared.values()] == [80, 81, 85, 86, 87, 88, 90]
     for name in (*COUNTERS, "solver_last_step", "solver_last_order"):
         assert declared[name].causality == "local" and declared[name].variability == "discrete"
 
