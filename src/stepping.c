@@ -113,7 +113,12 @@ static bool parameters_are_held(const struct slave *slave) {
 }
 
 /* The integrator may go on from where it is to target. A pure function of what is set now and what
- * the integrator runs with: how often and in what order values were set does not matter. */
+ * the integrator runs with: how often and in what order values were set does not matter.
+ *
+ * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms, going on
+ * with CVODE's history over a jump has 450 times the error of a restart and is slower where jumps
+ * are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only below
+ * 1e-9, and rollback would have to replay every jump. */
 static bool can_go_on(const struct slave *slave, double target) {
     const struct slave_memory *memory = &slave->memory;
     const struct slave_state *state = &slave->state;

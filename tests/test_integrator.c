@@ -290,6 +290,23 @@ static void test_nothing_is_allocated_after_creation(void) {
     TEST_ASSERT_TRUE(before > 0);
 }
 
+static void test_no_step_is_longer_than_the_limit(void) {
+    double x[2];
+    const double absolute[2] = {1e-6, 1e-6};
+    struct integrator_settings settings = {
+        .method = method, .relative_tolerance = 1e-4, .absolute_tolerances = absolute};
+    struct integrator_statistics statistics;
+    for (double limit = 0.0; limit < 0.015; limit += 0.01) {
+        settings.max_step = limit;
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+        restart(INFINITY);
+        advance(1.0, x);
+        integrator_get_statistics(integrator, &statistics);
+        TEST_ASSERT_EQUAL_INT(limit > 0.0, statistics.last_step <= 0.01 * (1.0 + 1e-9));
+        TEST_ASSERT_EQUAL_INT(limit > 0.0, statistics.steps >= 100);
+    }
+}
+
 static void test_destroying_nothing_is_allowed(void) {
     integrator_destroy(NULL);
 }
@@ -307,6 +324,7 @@ static void run_with(enum integrator_method with) {
     RUN_TEST(test_a_right_hand_side_that_fails_at_once_leaves_the_state);
     RUN_TEST(test_a_restart_after_a_failure_works);
     RUN_TEST(test_nothing_is_allocated_after_creation);
+    RUN_TEST(test_no_step_is_longer_than_the_limit);
     RUN_TEST(test_destroying_nothing_is_allowed);
     if (method != INTEGRATOR_ERK) {
         RUN_TEST(test_asking_for_more_points_costs_no_steps);
