@@ -18,7 +18,7 @@ static const double adams_iteration_error = 0.2;
 /* The first step after a restart is of order 1, over the step at which its error estimate would be
  * the tolerance. CVODE's own choice is 0.5 and takes two evaluations to find. The errors of first
  * steps all have the same sign and add up from restart to restart: measured over 2000 steps of 1
- * ms, the error of the trajectory at 0.1 is a fifth of that at 0.5, for 1 % more internal steps. */
+ * ms, the error of the trajectory at 0.1 is a third of that at 0.5, for as many internal steps. */
 static const double first_step_fraction = 0.1;
 
 static enum status status_of_flag(const struct integrator *integrator, int flag) {
