@@ -285,14 +285,14 @@ static bool are_counts(const struct integrator_statistics *statistics) {
 }
 
 /* Steps and method that the integrator can be given. */
-static bool can_integrate(const struct slave_state *state) {
+static bool can_integrate(const struct slave *slave, const struct slave_state *state) {
     const double steps[] = {state->own.max_step, state->restart_step, state->next_step};
     for (size_t i = 0; i < sizeof steps / sizeof steps[0]; i++) {
         if (!(steps[i] >= 0.0 && isfinite(steps[i]))) {
             return false;
         }
     }
-    return state->own.max_internal_steps >= 1 &&
+    return (slave->integrator == NULL || state->own.max_internal_steps >= 1) &&
            state->own.solver_method >= INTEGRATOR_CVODE_ADAMS &&
            state->own.solver_method < INTEGRATOR_METHODS;
 }
@@ -316,8 +316,7 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
         !(state->own.relative_tolerance >= 0.0 && isfinite(state->own.relative_tolerance)) ||
         (state->experiment_defined &&
          slave_check_experiment(slave, &state->experiment) != STATUS_OK) ||
-        (slave->integrator != NULL && !can_integrate(state)) ||
-        !isfinite(state->own.solver_last_step) ||
+        !can_integrate(slave, state) || !isfinite(state->own.solver_last_step) ||
         !are_counts(&state->statistics) || state->steps_before_restart < 0 ||
         state->steps_before_restart > state->statistics.steps ||
         !are_settable(slave, block + (memory->values - memory->block))) {

@@ -320,8 +320,9 @@ def test_an_enumeration_is_an_integer_in_the_table(trajectory: Path, tmp_path: P
     compile_table(tmp_path / "out", "rp_trajectory")
 
 
-def test_no_types_without_an_enumeration(description: ET.Element) -> None:
-    assert description.find("TypeDefinitions") is None
+def test_types_are_those_of_the_enumerations(description: ET.Element) -> None:
+    types = [t.get("name") for t in description.iterfind("TypeDefinitions/SimpleType")]
+    assert types == ["SolverMethodType"]
 
 
 def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_path: Path) -> None:
