@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Sets up, builds RPManipulator.fmu, simulates scenarios with fmpy and checks them against their
+# Sets up, builds the FMUs, simulates scenarios with fmpy and checks them against their
 # references. ./run.sh: all scenarios; ./run.sh NAME ...: these; ./run.sh --list: their names;
 # ./run.sh --help: more. ./run.sh system [VARIANT ...]: the closed loop, build/ClosedLoop.ssp, in
 # Ecos; ./run.sh system --list: its variants. ./run.sh coupling: what the coupling of them costs.

@@ -113,6 +113,9 @@ def _parser() -> argparse.ArgumentParser:
         "continuous time. Exit code: 0 as expected, 1 not, 2 wrong use.",
     )
     coupling.add_argument(
+        "--ssp", type=Path, metavar="PATH", help="the system (default: build/ClosedLoop.ssp)"
+    )
+    coupling.add_argument(
         "--report",
         type=Path,
         metavar="DIR",
@@ -187,12 +190,28 @@ def _system(options: argparse.Namespace) -> int:
     path = options.ssp or system.SYSTEM
     if options.ssp is None and not path.exists():
         raise UserError(f"{path}: no such file, ./run.sh builds it")
-    with ssp.unpacked(path) as unpacked:
+    with ExitStack() as stack:
+        try:
+            unpacked = stack.enter_context(ssp.unpacked(path))
+        except UserError:
+            if not options.list:
+                _remove_results(options.report)
+            raise
         chosen = system.choose(unpacked, options.names)
         if options.list:
             print(*chosen, sep="\n")
             return 0
         return _run_system(unpacked, chosen, options.report)
+
+
+def _remove_results(folder: Path) -> None:
+    """Of a system that cannot be run nothing older is left that might be taken for its results."""
+    from cosim import system, system_report
+
+    try:
+        system_report.remove(folder, [x.name for x in system.REFERENCES.iterdir() if x.is_dir()])
+    except OSError as error:
+        raise UserError(f"{folder}: older results cannot be removed: {error}") from error
 
 
 def _run_system(ssp: Ssp, chosen: Sequence[str], folder: Path) -> int:
@@ -232,7 +251,7 @@ def _coupling(options: argparse.Namespace) -> int:
     os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
     from cosim import coupling
 
-    return 0 if coupling.run(options.report) else 1
+    return 0 if coupling.run(options.report, options.ssp) else 1
 
 
 def _choose(names: Sequence[str]) -> list[Scenario]:

@@ -24,7 +24,7 @@ PICTURE = "coupling.png"
 COLORS = ("#d1793a", "#1d4e79", "#b0435f", "#2f8f83")
 
 
-def run(report_folder: Path) -> bool:
+def run(report_folder: Path, system: Path | None = None) -> bool:
     """Make the study, print its tables, write its picture; whether all verdicts are good.
 
     Raises
@@ -32,7 +32,7 @@ def run(report_folder: Path) -> bool:
     UserError
         If the system or a reference is missing, an FMU fails, or the picture cannot be written.
     """
-    with study.opened() as loop:
+    with study.opened(system or study.SYSTEM) as loop:
         convergence = study.study_convergence(loop)
         show(convergence_lines(convergence))
         tracking = study.study_tracking(loop)

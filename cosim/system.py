@@ -18,6 +18,8 @@ ROOT = Path(__file__).resolve().parents[1]
 SYSTEM = ROOT / "build" / "ClosedLoop.ssp"
 REFERENCES = ROOT / "models" / "closed_loop" / "references"
 REFERENCE = "ecos.csv"  # of Jacobi stepping, read after inputs are set
+START, STOP = 0.0, 6.0  # s, of the references
+STEPS_PER_SECOND = 1000  # that the references are made for
 BOUND = 1e-7  # on the relative error of every variable
 END_EFFECTOR = (("trajectory.ee_x_ref", "arm.ee_x"), ("trajectory.ee_y_ref", "arm.ee_y"))
 
@@ -115,6 +117,7 @@ def load_reference(ssp: Ssp, variant: str, folder: Path = REFERENCES) -> Referen
         If the file is missing, damaged, or not of this system; names the line and the command
         that makes references.
     """
+    _check_experiment(ssp)
     path = folder / variant / REFERENCE
     names, table = _read(path, variant)
     known = recorded(ssp)
@@ -130,10 +133,24 @@ def load_reference(ssp: Ssp, variant: str, folder: Path = REFERENCES) -> Referen
     off |= (steps < 0) | (steps > system.steps) | (np.diff(steps, prepend=-1) <= 0)
     if off.any():
         row = int(np.flatnonzero(off)[0])
-        raise _wrong(path, variant, f"no communication point: {table[row, 0]!r} s", row + 2)
+        time = float(table[row, 0])
+        raise _wrong(path, variant, f"no communication point: {time!r} s", row + 2)
     if steps[-1] != system.steps:
         raise _wrong(path, variant, f"ends before {system.stop!r} s", len(steps) + 1)
     return Reference(path, steps, dict(zip(names, table[:, 1:].T, strict=True)))
+
+
+def _check_experiment(ssp: Ssp) -> None:
+    """Check that the references are those of the system's times."""
+    system = ssp.system
+    given = (system.start, system.stop, system.step)
+    expected = (START, STOP, 1 / STEPS_PER_SECOND)
+    if not np.allclose(given, expected, rtol=1e-9, atol=0.0):
+        raise UserError(
+            f"{ssp.path}: runs from {system.start!r} to {system.stop!r} s in steps of "
+            f"{system.step!r} s; the references are for {START!r} to {STOP!r} s in steps of "
+            f"{1 / STEPS_PER_SECOND!r} s"
+        )
 
 
 def _wrong(path: Path, variant: str, message: str, line: int | None = None) -> UserError:

@@ -220,7 +220,7 @@ def test_tables_and_picture(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     doubling = coupling_doubling.study_doubling(loop, [1e-4])
-    monkeypatch.setattr(coupling.study, "opened", lambda: nullcontext(loop))
+    monkeypatch.setattr(coupling.study, "opened", lambda _: nullcontext(loop))
     monkeypatch.setattr(coupling.study, "study_convergence", lambda _: convergence)
     monkeypatch.setattr(coupling, "study_doubling", lambda _: doubling)
     assert coupling.run(tmp_path / "new")

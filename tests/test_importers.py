@@ -40,8 +40,10 @@ IMPORTERS = {
     "ecospy": Importer(),
     # The FMI Library in libcosimpy 0.0.6 wants a start value for the independent variable, which
     # FMI 2.0.5, section 2.2.7, forbids; corrected upstream (fmi-library, pull request 129).
+    # libcosim leaves enumerations out, and says so.
     "libcosimpy": Importer(
         false_alarm=r"Start attribute is required for this causality, variability and initial"
+        r"|FMI 2.0 Enumeration variable type not supported, variable with name solver_method"
     ),
     "fmi-sim": Importer(),
     "cofmupy": Importer(),

@@ -270,6 +270,27 @@ def fails(path: Path, variant: str, folder: Path, capsys: pytest.CaptureFixture[
     return err
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('baseStepSize="0.001"', 'baseStepSize="0.002"', ["0.002 s", "references are for"]),
+        ('stopTime="6"', 'stopTime="3"', ["3.0 s", "references are for"]),
+        (
+            'source="resources/RPManipulator.fmu"',
+            'source="resources/None.fmu"',
+            ["arm", "None.fmu"],
+        ),
+    ],
+)
+def test_a_system_that_cannot_be_compared_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, words: list[str]
+) -> None:
+    path = edited(SSP, tmp_path / "other.ssp", {"SystemStructure.ssd": replace(old, new)})
+    text = fails(path, "nominal", tmp_path, capsys)
+    for word in words:
+        assert word in text
+
+
 def broken(component: str, fmu: str, reference: int, folder: Path) -> Path:
     """SSP in which a variable of a component is NaN from the tenth step on."""
     library = not_a_number(reference, 10, folder)

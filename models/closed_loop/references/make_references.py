@@ -17,6 +17,7 @@ ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
 from cosim.errors import UserError
+from cosim.system import STEPS_PER_SECOND, STOP
 from models.closed_loop.references.closed_loop import (
     COLUMNS,
     COMPONENTS,
@@ -28,8 +29,6 @@ from models.rp_manipulator.references.make_references import write_whole
 
 RESOURCES = FOLDER.parent / "resources"  # the parameter sets, <component>_<variant>.ssv
 NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
-STOP = 6.0  # s, as in SystemStructure.ssd
-STEPS_PER_SECOND = 1000  # as in SystemStructure.ssd
 KEPT = 20  # every so many communication points go into the files
 
 
