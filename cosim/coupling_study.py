@@ -15,8 +15,10 @@ import numpy as np
 from cosim import ssp
 from cosim.convergence import slope
 from cosim.errors import UserError
-from cosim.master import Connection, Master
+from cosim.files import read_csv
+from cosim.master import Master
 from cosim.part import Part
+from cosim.ssp import Connection
 from cosim.unit import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -114,11 +116,7 @@ def opened(path: Path = SYSTEM) -> Iterator[Loop]:
         unpacked = stack.enter_context(ssp.unpacked(path))
         system = unpacked.system
         fmus = {c.name: stack.enter_context(Fmu(unpacked.fmu(c.name))) for c in system.components}
-        connections = [
-            Connection(c.start_component, c.start_connector, c.end_component, c.end_connector)
-            for c in system.connections
-        ]
-        yield Loop(fmus, connections, system.parameter_sets, system.stop)
+        yield Loop(fmus, system.connections, system.parameter_sets, system.stop)
 
 
 def grid(stop: float, step: float) -> np.ndarray:
@@ -132,14 +130,14 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 def read_reference(path: Path) -> Columns:
     """Columns of a reference by name, with "time"."""
-    try:
-        with path.open(encoding="utf-8") as file:
-            names = [name.strip().strip('"') for name in file.readline().split(",")]
-            table = np.loadtxt(file, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise UserError(f"{path}: cannot be used: {error}") from error
-    if table.shape[1] != len(names) or not {"time", *STATES} <= set(names):
-        raise UserError(f"{path}: not a reference of the closed loop")
+
+    def failure(message: str, line: int | None) -> UserError:
+        place = f"{path}, line {line}" if line else f"{path}"
+        return UserError(f"{place}: {message}")
+
+    names, table = read_csv(path, failure)
+    if not set(STATES) <= set(names):
+        raise failure("not a reference of the closed loop", 1)
     return dict(zip(names, table.T, strict=True))
 
 
@@ -206,10 +204,12 @@ def created_energy(loop: Loop, columns: Columns) -> float:
 
 def law(loop: Loop, columns: Columns) -> np.ndarray:
     """Efforts of the nominal controller for given references and measurements, (2, rows)."""
-    sources = {c.input: f"{c.source}.{c.output}" for c in loop.connections}
+    sources = {
+        c.end_connector: f"{c.start_component}.{c.start_connector}" for c in loop.connections
+    }
     with Part(loop.fmus["controller"], "controller") as part:
         part.outputs = ["tau1", "f2"]
-        part.inputs = [c.input for c in loop.connections if c.target == "controller"]
+        part.inputs = [c.end_connector for c in loop.connections if c.end_component == "controller"]
         part.attach(bytearray(16), 0, np.empty(0))
         part.begin(0.0, None, loop.parameters("nominal")["controller"])
         part.end()

@@ -15,7 +15,6 @@ Gauss-Seidel order those from components before it meet value and slope at the e
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from ctypes import byref, c_double
-from typing import NamedTuple
 
 import numpy as np
 from fmpy import fmi2
@@ -23,19 +22,11 @@ from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError
 from cosim.part import Part
+from cosim.ssp import Connection
 from cosim.unit import Fmu
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUTS = ("held", "extrapolated")
-
-
-class Connection(NamedTuple):
-    """From an output of one component to an input of one."""
-
-    source: str
-    output: str
-    target: str
-    input: str
 
 
 class Snapshot:
@@ -136,7 +127,7 @@ class Master:
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
-        connections = [Connection(*connection) for connection in connections]
+        connections = list(connections)
         _check(fmus, connections, self.extrapolates)
         for component, name in also:
             _find(fmus, component, name, None)
@@ -170,12 +161,16 @@ class Master:
         self.slopes = np.zeros(len(keys))
         first = 0
         for position, part in enumerate(self.parts.values()):
-            incoming = [c for c in connections if c.target == part.name]
-            part.inputs = [c.input for c in incoming]
-            part.sources = np.array([place[c.source, c.output] for c in incoming], dtype=int)
+            incoming = [c for c in connections if c.end_component == part.name]
+            part.inputs = [c.end_connector for c in incoming]
+            part.sources = np.array(
+                [place[c.start_component, c.start_connector] for c in incoming], dtype=int
+            )
             before = list(self.parts)[:position]
-            part.ahead = np.array([c.source in before and not self.jacobi for c in incoming])
-            used = {c.output for c in connections if c.source == part.name}
+            part.ahead = np.array(
+                [c.start_component in before and not self.jacobi for c in incoming]
+            )
+            used = {c.start_connector for c in connections if c.start_component == part.name}
             part.sloped = [i for i, name in enumerate(part.outputs) if name in used]
             part.attach(memory, first, self.slopes)
             first += len(part.outputs)
@@ -332,17 +327,21 @@ def _check(fmus: Mapping[str, Fmu], connections: Sequence[Connection], sloped: b
     """Every connection leads from an output to an input, and one to every input."""
     seen = set()
     for connection in connections:
-        _find(fmus, connection.source, connection.output, "output")
-        _find(fmus, connection.target, connection.input, "input")
-        end = connection.target, connection.input
+        _find(fmus, connection.start_component, connection.start_connector, "output")
+        _find(fmus, connection.end_component, connection.end_connector, "input")
+        end = connection.end_component, connection.end_connector
         if end in seen:
             raise UserError(f"{'.'.join(end)}: is connected more than once")
         seen.add(end)
-        source, target = fmus[connection.source], fmus[connection.target]
+        source, target = fmus[connection.start_component], fmus[connection.end_component]
         if sloped and not (source.description.coSimulation.maxOutputDerivativeOrder or 0) >= 1:
-            raise UserError(f"{connection.source}: {source.path} has no output derivatives")
+            raise UserError(
+                f"{connection.start_component}: {source.path} has no output derivatives"
+            )
         if sloped and not target.description.coSimulation.canInterpolateInputs:
-            raise UserError(f"{connection.target}: {target.path} does not interpolate inputs")
+            raise UserError(
+                f"{connection.end_component}: {target.path} does not interpolate inputs"
+            )
     for component, fmu in fmus.items():
         for variable in fmu.variables.values():
             if variable.causality == "input" and (component, variable.name) not in seen:

@@ -1,7 +1,5 @@
 """Reference trajectories, the error of a run against them, and the bounds on it."""
 
-import csv
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +7,7 @@ import numpy as np
 
 from cosim import variables
 from cosim.errors import UserError
+from cosim.files import read_csv
 from cosim.scenario import Scenario
 from cosim.simulation import Result
 
@@ -59,9 +58,8 @@ def load(scenario: Scenario) -> Reference:
     """
     path = scenario.reference_folder / f"{model_name(scenario)}_ref.csv"
     reader = _Reader(path, scenario)
-    names, rows = reader.parse()
+    names, table = read_csv(path, reader.fail)
     reader.check_names(names)
-    table = np.array(rows)
     reader.check_times(table[:, 0])
     return Reference(path, table[:, 0], names[1:], table[:, 1:])
 
@@ -112,42 +110,8 @@ class _Reader:
         script = f"models/{self.scenario.model}/references/make_references.py {self.scenario.name}"
         return UserError(f"{place}: {message}; to make it again: build/venv/bin/python {script}")
 
-    def parse(self) -> tuple[tuple[str, ...], list[list[float]]]:
-        """Header and rows of numbers, all of the same length."""
-        try:
-            text = self.path.read_text(encoding="utf-8")
-        except FileNotFoundError:
-            raise self.fail("no such file") from None
-        except OSError as error:
-            raise self.fail(f"cannot be read: {error.strerror or error}") from error
-        except UnicodeDecodeError:
-            raise self.fail("not a text file") from None
-        if not text:
-            raise self.fail("is empty")
-        if not text.endswith("\n"):
-            raise self.fail("is cut off in the middle", text.count("\n") + 1)
-        lines = csv.reader(text.splitlines())
-        names = tuple(next(lines))
-        rows = [self.numbers(row, len(names), number) for number, row in enumerate(lines, start=2)]
-        if not rows:
-            raise self.fail("has no values", 1)
-        return names, rows
-
-    def numbers(self, row: list[str], columns: int, line: int) -> list[float]:
-        if len(row) != columns:
-            raise self.fail(f"expected {columns} values, found {len(row)}", line)
-        try:
-            values = [float(literal) for literal in row]
-        except ValueError as error:
-            raise self.fail(f"expected numbers, {error}", line) from None
-        if not all(map(math.isfinite, values)):
-            raise self.fail("expected finite numbers", line)
-        return values
-
     def check_names(self, names: tuple[str, ...]) -> None:
-        """Check that every Real output is there, behind the time, and nothing unknown or twice."""
-        if names[0] != "time":
-            raise self.fail(f"expected the first column to be 'time', found {names[0]!r}", 1)
+        """Check that every Real output is there, and nothing unknown or twice."""
         declared = variables.load(self.scenario.model_folder)
         for name in names[1:]:
             if declared.get(name, {}).get("type") != "Real":

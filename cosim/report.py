@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from cosim import reference, simulation
+from cosim import reference
 from cosim.accuracy import Run, Sweep
+from cosim.files import write_csv
 from cosim.scenario import Scenario
 
 INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
@@ -130,7 +131,7 @@ def write(
     for name, group in grouped.items():
         _save(scenario_figure(group), folder / f"{name}.png")
         result = group[0].result
-        simulation.write_csv(folder / f"{name}.csv", result.times, result.names, result.values)
+        write_csv(folder / f"{name}.csv", result.times, result.names, result.values)
         progress(len(group))
     if sweeps:
         _save(accuracy_figure(sweeps), folder / "accuracy.png")
@@ -357,7 +358,7 @@ def _page(
         parts += ["<h2>Error against tolerance</h2>", _sweeps_table(sweeps)]
         parts.append('<figure><img src="accuracy.png" alt="Error over tolerance"></figure>')
     for section in sections:
-        parts += [f"<h2>{html.escape(section.title)}</h2>", _table(section.head, section.rows)]
+        parts += [f"<h2>{html.escape(section.title)}</h2>", table(section.head, section.rows)]
         parts += _notes(section.notes)
         file, text = (html.escape(x, quote=True) for x in (section.name, section.alternative))
         parts.append(f'<figure><img src="{file}.png" alt="{text}"></figure>')
@@ -391,7 +392,7 @@ def _runs_table(runs: Sequence[Run]) -> str:
                 verdict(run.passed),
             ]
         )
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _sweeps_table(sweeps: Sequence[Sweep]) -> str:
@@ -403,9 +404,9 @@ def _sweeps_table(sweeps: Sequence[Sweep]) -> str:
         ]
         for sweep in sweeps
     ]
-    table = _table(["scenario", *map(short, sweeps[0].tolerances), "result"], rows)
+    sweeps_table = table(["scenario", *map(short, sweeps[0].tolerances), "result"], rows)
     broken = [f"{s.scenario.name}: {text}" for s in sweeps for text in s.violations]
-    return "\n".join([table, *_notes(broken)])
+    return "\n".join([sweeps_table, *_notes(broken)])
 
 
 def _notes(texts: Sequence[str]) -> list[str]:
@@ -416,7 +417,7 @@ def verdict(passed: bool) -> str:
     return "passed" if passed else '<span class="failed">FAILED</span>'
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """HTML table; the cells are HTML already."""
     lines = ["<tr>" + "".join(f"<th>{cell}</th>" for cell in head) + "</tr>"]
     lines += ["<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows]

@@ -3,7 +3,6 @@
 The README.md next to the scenarios documents the format.
 """
 
-import difflib
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from cosim import variables
-from cosim.errors import UserError
+from cosim.errors import UserError, did_you_mean
 
 MAX_STEPS = 10_000_000
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
@@ -74,7 +73,7 @@ def find(root: Path, name: str) -> Path:
     found = find_all(root)
     if name not in found:
         known = ", ".join(found) or "none"
-        raise UserError(f"no scenario {name!r}{_did_you_mean(name, found)} (known: {known})")
+        raise UserError(f"no scenario {name!r}{did_you_mean(name, found)} (known: {known})")
     return found[name]
 
 
@@ -172,7 +171,7 @@ class _Reader:
         place = f"{where}: " if where else ""
         for key in table:
             if key not in known:
-                guess = _did_you_mean(key, known)
+                guess = did_you_mean(key, known)
                 raise UserError(
                     f"{self.path}: {place}unknown key {key!r}{guess} (known: {', '.join(known)})"
                 )
@@ -192,7 +191,7 @@ class _Reader:
         meant = [key for key, variable in self.declared.items() if suits(variable)]
         where, known = f"[{section}]", ", ".join(meant) or "none"
         if name not in self.declared:
-            guess = _did_you_mean(name, meant)
+            guess = did_you_mean(name, meant)
             self.fail(where, f"the model has no variable {name!r}{guess} (known: {known})")
         if name not in meant:
             kind = {"parameters": "a parameter", "initial": "a state", "inputs": "an input"}[
@@ -204,7 +203,7 @@ class _Reader:
     def item(self, value: Any, items: list[str], key: str) -> float:
         """Number of an Enumeration's item, which is given by its name."""
         if value not in items:
-            guess = _did_you_mean(value, items) if isinstance(value, str) else ""
+            guess = did_you_mean(value, items) if isinstance(value, str) else ""
             known = ", ".join(f'"{item}"' for item in items)
             self.fail(key, f"expected one of {known}, got {_show(value)}{guess}")
         return float(items.index(value) + 1)
@@ -322,11 +321,6 @@ class _Reader:
                 self.fail(f"{key}[{i}]", f"expected a time after {last!r} s, got {_show(row)}")
         t, values = np.array(points).T
         return np.interp(elapsed, t, values)
-
-
-def _did_you_mean(name: str, known: Iterable[str]) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f", did you mean {close[0]!r}?" if close else ""
 
 
 def _show(value: Any) -> str:

@@ -1,11 +1,9 @@
 """Runs scenarios on co-simulation units."""
 
-import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from fmpy import fmi2
@@ -118,34 +116,6 @@ def simulate(
             messages=tuple(instance.messages),
         )
     return result
-
-
-def write_csv(path: Path, times: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
-    """Write trajectories in the layout of the FMI cross-check, 17 significant digits.
-
-    The file appears complete or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        Its folder exists.
-    times : ndarray, shape (rows,)
-        s.
-    names : sequence of str
-        One name per column of `values`.
-    values : ndarray, shape (rows, len(names))
-        In the variables' units.
-    """
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    header = ",".join(f'"{name}"' for name in ("time", *names))
-    try:
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
-            table = np.column_stack((times, values))
-            np.savetxt(file, table, fmt="%.17g", delimiter=",", header=header, comments="")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _step_through(

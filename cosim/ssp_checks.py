@@ -1,14 +1,12 @@
 """Checks the system of an SSP against its FMUs, before anything runs."""
 
-import difflib
 import math
-from collections.abc import Iterable
 from typing import NoReturn
 
 from fmpy import read_model_description
 from fmpy.model_description import ModelVariable
 
-from cosim.errors import UserError
+from cosim.errors import UserError, did_you_mean
 from cosim.ssp import Component, Connector, Parameter, Ssp
 
 # type of a variable -> types of a parameter's value that engines can give it
@@ -35,12 +33,6 @@ def check(ssp: Ssp) -> None:
         If not; the text names component and variable.
     """
     _Checker(ssp).check()
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of an error message that proposes the closest of `known`, or nothing."""
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f", did you mean {close[0]!r}?" if close else ""
 
 
 class _Checker:

@@ -1,7 +1,5 @@
 """Runs the closed loop in Ecos, variant by variant, and compares with the references."""
 
-import csv
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,9 +8,9 @@ import numpy as np
 from fmpy import read_model_description
 
 from cosim import ecos, reference
-from cosim.errors import UserError
+from cosim.errors import UserError, did_you_mean
+from cosim.files import read_csv
 from cosim.ssp import Ssp
-from cosim.ssp_checks import did_you_mean
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEM = ROOT / "build" / "ClosedLoop.ssp"
@@ -119,7 +117,8 @@ def load_reference(ssp: Ssp, variant: str, folder: Path = REFERENCES) -> Referen
     """
     _check_experiment(ssp)
     path = folder / variant / REFERENCE
-    names, table = _read(path, variant)
+    columns, table = read_csv(path, lambda message, line: _wrong(path, variant, message, line))
+    names = columns[1:]
     known = recorded(ssp)
     for name in names:
         if name not in known or names.count(name) > 1:
@@ -157,29 +156,3 @@ def _wrong(path: Path, variant: str, message: str, line: int | None = None) -> U
     place = f"{path}, line {line}" if line else f"{path}"
     script = f"models/closed_loop/references/make_references.py {variant}"
     return UserError(f"{place}: {message}; to make it again: build/venv/bin/python {script}")
-
-
-def _read(path: Path, variant: str) -> tuple[list[str], np.ndarray]:
-    """Names of the columns behind the time, and all rows."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise _wrong(path, variant, "no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise _wrong(path, variant, f"cannot be read: {error}") from error
-    lines = list(csv.reader(text.splitlines()))
-    if len(lines) < 2 or lines[0][:1] != ["time"]:
-        raise _wrong(path, variant, "expected a header that begins with time, and values", 1)
-    if not text.endswith("\n"):
-        raise _wrong(path, variant, "is cut off in the middle", len(lines))
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            row = [float(value) for value in line]
-        except ValueError as error:
-            raise _wrong(path, variant, f"expected numbers, {error}", number) from None
-        if len(row) != len(lines[0]) or not all(map(math.isfinite, row)):
-            message = f"expected {len(lines[0])} finite numbers"
-            raise _wrong(path, variant, message, number)
-        rows.append(row)
-    return lines[0][1:], np.array(rows)

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cosim import simulation
-from cosim.report import DASHED, ERRORS, MUTED, PAGE, REFERENCE, RUN, STYLE, short, verdict
+from cosim.files import whole, write_csv
+from cosim.report import DASHED, ERRORS, MUTED, PAGE, REFERENCE, RUN, STYLE, short, table, verdict
 from cosim.ssp import Ssp
 from cosim.system import BOUND, Outcome
 
@@ -32,24 +32,16 @@ def write_run(folder: Path, ssp: Ssp, outcome: Outcome) -> None:
     """Write the picture and all recorded values of a run; a file is complete or not there."""
     folder.mkdir(parents=True, exist_ok=True)
     run = outcome.run
-    picture = folder / f"{outcome.variant}.png"
-    temporary = picture.with_name(f".{picture.name}")
-    try:
-        with mpl.rc_context(STYLE):
-            picture_of = figure(ssp, outcome)
-            picture_of.savefig(temporary, format="png", metadata={"Software": None})
-        temporary.replace(picture)
-    finally:
-        temporary.unlink(missing_ok=True)
-    simulation.write_csv(folder / f"{outcome.variant}.csv", run.times, run.names, run.values)
+    with whole(folder / f"{outcome.variant}.png") as path, mpl.rc_context(STYLE):
+        figure(ssp, outcome).savefig(path, metadata={"Software": None})
+    write_csv(folder / f"{outcome.variant}.csv", run.times, run.names, run.values)
 
 
 def write_page(folder: Path, ssp: Ssp, outcomes: Sequence[Outcome]) -> Path:
     """Write index.html over the runs of `write_run`; return its path."""
     index = folder / "index.html"
-    temporary = index.with_name(f".{index.name}")
-    temporary.write_text(_page(ssp, outcomes), encoding="utf-8")
-    temporary.replace(index)
+    with whole(index) as path:
+        path.write_text(_page(ssp, outcomes), encoding="utf-8")
     return index
 
 
@@ -140,27 +132,26 @@ def _page(ssp: Ssp, outcomes: Sequence[Outcome]) -> str:
     system = ssp.system
     head = ["variant", "steps", "error", "bound", "worst variable", "tracking error"]
     head += ["wall time", "result"]
-    lines = ["<tr>" + "".join(f"<th>{cell}</th>" for cell in head) + "</tr>"]
-    figures = []
+    rows, figures = [], []
     for outcome in outcomes:
         name = html.escape(outcome.variant, quote=True)
-        cells = [
-            f'<a href="#{name}">{name}</a>',
-            str(system.steps),
-            f"{outcome.error:.2e}",
-            short(BOUND),
-            html.escape(outcome.worst),
-            f"{1e3 * outcome.distance.max():.3g} mm",
-            f"{outcome.run.wall_time:.3f} s",
-            verdict(outcome.passed),
-        ]
-        lines.append("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+        rows.append(
+            [
+                f'<a href="#{name}">{name}</a>',
+                str(system.steps),
+                f"{outcome.error:.2e}",
+                short(BOUND),
+                html.escape(outcome.worst),
+                f"{1e3 * outcome.distance.max():.3g} mm",
+                f"{outcome.run.wall_time:.3f} s",
+                verdict(outcome.passed),
+            ]
+        )
         figures.append(
             f'<figure id="{name}"><img src="{name}.png" alt="{name}: joints, tracking errors, '
             f'efforts, path of the end effector">\n<figcaption>All values: '
             f'<a href="{name}.csv">{name}.csv</a></figcaption></figure>'
         )
-    table = '<div class="wide"><table>\n' + "\n".join(lines) + "\n</table></div>"
     intro = (
         f"<p>Run by Ecos with steps of {1e3 * system.step:g} ms. Error: largest difference of any "
         "variable from the reference of Ecos's order, relative to the variable's largest value. "
@@ -168,5 +159,5 @@ def _page(ssp: Ssp, outcomes: Sequence[Outcome]) -> str:
     )
     return PAGE.format(
         title=html.escape(f"{ssp.path.stem}: runs against their references"),
-        body="\n".join([intro, table, *figures]),
+        body="\n".join([intro, table(head, rows), *figures]),
     )

@@ -23,6 +23,7 @@ from cosim import accuracy, reference, report, simulation, variables
 from cosim import scenario as scenarios
 from cosim.accuracy import Runs, Sweep
 from cosim.errors import UserError
+from cosim.files import write_csv
 from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.unit import Fmu
@@ -352,7 +353,7 @@ def test_a_failing_initialization_is_explained(project: Path, opened: Fmu) -> No
 def test_csv_is_in_the_cross_check_layout(tmp_path: Path) -> None:
     file = tmp_path / "out.csv"
     values = np.array([[1 / 3, -0.1], [1e300, 5e-324]])
-    simulation.write_csv(file, np.array([0.0, 0.1]), ["q1", "a,b"], values)
+    write_csv(file, np.array([0.0, 0.1]), ["q1", "a,b"], values)
     lines = file.read_text().splitlines()
     assert lines[0] == '"time","q1","a,b"'
     assert lines[1] == "0,0.33333333333333331,-0.10000000000000001"
@@ -369,7 +370,7 @@ def test_csv_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(np, "savetxt", half)
     with pytest.raises(OSError, match="disk full"):
-        simulation.write_csv(file, np.zeros(2), ["q1"], np.zeros((2, 1)))
+        write_csv(file, np.zeros(2), ["q1"], np.zeros((2, 1)))
     assert file.read_text() == "before"
     assert list(tmp_path.iterdir()) == [file]
 
@@ -667,7 +668,7 @@ def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) 
     rows = np.loadtxt(file, delimiter=",", skiprows=1)
     rows[:, 0] = load(LONG, project).times[load(LONG, project).reference_rows]
     names = [name.strip('"') for name in file.read_text().splitlines()[0].split(",")]
-    simulation.write_csv(file, rows[:, 0], names[1:], rows[:, 1:])
+    write_csv(file, rows[:, 0], names[1:], rows[:, 1:])
 
     shutil.copytree(ROOT / "cosim", project / "cosim")
     command = [sys.executable, "-u", "-m", "cosim", "run", LONG, "--fmu", str(fmu)]

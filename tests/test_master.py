@@ -10,7 +10,8 @@ from conftest import ROOT
 
 from cosim import step_control
 from cosim.errors import UserError
-from cosim.master import Connection, Master, Snapshot
+from cosim.master import Master, Snapshot
+from cosim.ssp import Connection
 from cosim.unit import Fmu
 
 H, STEPS = 0.05, 40

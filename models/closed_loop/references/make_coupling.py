@@ -15,21 +15,18 @@ ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
 from cosim.coupling_doubling import FAST, FAST_AND_SLOW, FAST_STOP, STATES  # noqa: E402
+from cosim.files import write_csv  # noqa: E402
 from models.closed_loop.references.closed_loop import monolithic  # noqa: E402
-from models.rp_manipulator.references.make_references import write_whole  # noqa: E402
 
 ROWS_PER_SECOND = 50
 PARAMETERS = {f"{c}.{name}": value for c, values in FAST.items() for name, value in values.items()}
 
 
-def text() -> str:
-    """The file's text, with 17 significant digits."""
+def write(output: Path) -> None:
     times = np.arange(round(FAST_STOP * ROWS_PER_SECOND) + 1) / ROWS_PER_SECOND
     columns = monolithic(PARAMETERS, times)
-    table = np.column_stack((times, *(columns[name] for name in STATES))).astype(np.float64)
-    lines = [",".join(f'"{name}"' for name in ("time", *STATES))]
-    lines += [",".join(f"{value + 0.0:.17g}" for value in row) for row in table]
-    return "\n".join(lines) + "\n"
+    values = np.column_stack([columns[name] for name in STATES]).astype(np.float64) + 0.0
+    write_csv(output, times, STATES, values)
 
 
 def main() -> None:
@@ -37,7 +34,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=FAST_AND_SLOW, metavar="FILE")
     output = parser.parse_args().output
     output.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(output, text())
+    write(output)
 
 
 if __name__ == "__main__":

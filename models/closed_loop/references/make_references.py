@@ -17,6 +17,7 @@ ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
 from cosim.errors import UserError
+from cosim.files import write_csv
 from cosim.system import STEPS_PER_SECOND, STOP
 from models.closed_loop.references.closed_loop import (
     COLUMNS,
@@ -25,7 +26,6 @@ from models.closed_loop.references.closed_loop import (
     monolithic,
     sampled,
 )
-from models.rp_manipulator.references.make_references import write_whole
 
 RESOURCES = FOLDER.parent / "resources"  # the parameter sets, <component>_<variant>.ssv
 NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
@@ -70,14 +70,6 @@ def make(
     }
 
 
-def text(times: np.ndarray, columns: Columns) -> str:
-    """Text of a CSV file, with 17 significant digits."""
-    header = ",".join(f'"{name}"' for name in ("time", *COLUMNS))
-    table = np.column_stack((times, *(columns[name] for name in COLUMNS))).astype(np.float64)
-    lines = (",".join(f"{value + 0.0:.17g}" for value in row) for row in table)
-    return "\n".join([header, *lines]) + "\n"
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description="Makes the references of the closed loop.")
     parser.add_argument("names", nargs="*", metavar="VARIANT", help="variants (default: all)")
@@ -92,7 +84,9 @@ def main() -> None:
             folder = arguments.output / name
             folder.mkdir(parents=True, exist_ok=True)
             for file, (times, columns) in make(known[name]).items():
-                write_whole(folder / file, text(times, columns))
+                values = np.column_stack([columns[name] for name in COLUMNS])
+                rounded = values.astype(np.float64) + 0.0  # no negative zeros
+                write_csv(folder / file, times, COLUMNS, rounded)
                 print(f"{name}/{file}: {len(times)} rows")
     except UserError as error:
         sys.exit(f"error: {error}")

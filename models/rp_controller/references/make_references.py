@@ -6,7 +6,6 @@ linear equations that change where an effort meets a limit: their Taylor series,
 evaluated at the end of each piece, and the limit is located by bisection.
 """
 
-import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -19,11 +18,9 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim import scenario as scenarios
 from cosim import variables
-from cosim.errors import UserError
 from cosim.scenario import Scenario
-from cosim.simulation import write_csv
+from models import reference_files
 
 UNIT = "RPController"
 ARM = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
@@ -191,51 +188,17 @@ def simulate(scenario: Scenario, declared: dict, arm: Callable[..., tuple]) -> n
     return np.array(rows)
 
 
-def write(scenario: Scenario, folder: Path, arm: Callable[..., tuple]) -> None:
-    """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
-    declared = variables.load(MODEL_FOLDER)
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = scenario.reference_rows
-    outputs = simulate(scenario, declared, arm) + 0.0  # no negative zeros
-    write_csv(folder / f"{UNIT}_ref.csv", scenario.times[rows], OUTPUTS, outputs[rows])
-    inputs = input_table(scenario, declared)
-    write_csv(folder / f"{UNIT}_in.csv", scenario.times, INPUTS, inputs)
-    options = {
-        "StartTime": scenario.start,
-        "StopTime": scenario.stop,
-        "StepSize": scenario.steps[0] if len(scenario.steps) == 1 else 0.0,  # 0: variable
-        "RelTol": scenario.tolerance,
-    }
-    text = "".join(f"{key},{value!r}\n" for key, value in options.items())
-    path = folder / f"{UNIT}_ref.opt"
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8", newline="\n")
-    temporary.replace(path)
+def prepare() -> Callable[[Scenario, Path], None]:
+    """Derive the arm's equations; return what writes the reference of a scenario to a folder."""
+    declared, arm = variables.load(MODEL_FOLDER), equations_of_the_arm()
 
+    def write(scenario: Scenario, folder: Path) -> None:
+        outputs = simulate(scenario, declared, arm)[scenario.reference_rows]
+        inputs = input_table(scenario, declared)
+        reference_files.write(scenario, folder, UNIT, (OUTPUTS, outputs), (INPUTS, inputs))
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
-    arguments = parser.parse_args()
-    try:
-        known = {
-            name: path
-            for name, path in scenarios.find_all(ROOT).items()
-            if path.parent.parent == MODEL_FOLDER
-        }
-        for name in arguments.names:
-            if name not in known:
-                raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
-        arm = equations_of_the_arm()
-        for name in arguments.names or known:
-            scenario = scenarios.load(known[name])
-            folder = arguments.output / name if arguments.output else scenario.reference_folder
-            write(scenario, folder, arm)
-            print(f"{name}: {len(scenario.reference_rows)} rows")
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    return write
 
 
 if __name__ == "__main__":
-    main()
+    reference_files.main(MODEL_FOLDER, prepare)

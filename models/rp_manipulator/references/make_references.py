@@ -6,7 +6,6 @@ form of "Example of dynamics computation (Euler-Lagrange and Newton-Euler formul
 Revolute-Prismatic (RP) manipulator (Problem 7.8)" goes in.
 """
 
-import argparse
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +18,10 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim import scenario as scenarios
 from cosim import variables
 from cosim.errors import UserError
 from cosim.scenario import Scenario
+from models import reference_files
 
 UNIT = "RPManipulator"
 PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
@@ -169,60 +168,11 @@ class Reference:
 
     def write(self, scenario: Scenario, folder: Path) -> None:
         """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
-        folder.mkdir(parents=True, exist_ok=True)
-        rows = scenario.reference_rows
-        outputs = self.simulate(scenario).astype(np.float64)
-        constant_step = scenario.steps[0] if len(scenario.steps) == 1 else 0.0  # 0: variable
-        options = {
-            "StartTime": scenario.start,
-            "StopTime": scenario.stop,
-            "StepSize": constant_step,
-            "RelTol": scenario.tolerance,
-        }
-        write_whole(
-            folder / f"{UNIT}_ref.csv", _csv(self.outputs, scenario.times[rows], outputs[rows])
+        outputs = self.simulate(scenario)[scenario.reference_rows]
+        reference_files.write(
+            scenario, folder, UNIT, (self.outputs, outputs), (INPUTS, self.inputs(scenario))
         )
-        write_whole(folder / f"{UNIT}_in.csv", _csv(INPUTS, scenario.times, self.inputs(scenario)))
-        write_whole(folder / f"{UNIT}_ref.opt", "".join(f"{k},{v!r}\n" for k, v in options.items()))
-
-
-def _csv(names: list[str] | tuple[str, ...], times: np.ndarray, values: np.ndarray) -> str:
-    """Text of a CSV file with `times` (rows,) and `values` (rows, names)."""
-    header = ",".join(f'"{name}"' for name in ("time", *names))
-    table = np.column_stack((times, values))
-    return "\n".join([header, *(",".join(f"{x + 0.0:.17g}" for x in row) for row in table)]) + "\n"
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write `text` whole or not at all."""
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(text, encoding="utf-8", newline="\n")
-    temporary.replace(path)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
-    arguments = parser.parse_args()
-    try:
-        known = {
-            name: path
-            for name, path in scenarios.find_all(ROOT).items()
-            if path.parent.parent == MODEL_FOLDER
-        }
-        for name in arguments.names:
-            if name not in known:
-                raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
-        reference = Reference()
-        for name in arguments.names or known:
-            scenario = scenarios.load(known[name])
-            folder = arguments.output / name if arguments.output else scenario.reference_folder
-            reference.write(scenario, folder)
-            print(f"{name}: {len(scenario.reference_rows)} rows")
-    except UserError as error:
-        sys.exit(f"error: {error}")
 
 
 if __name__ == "__main__":
-    main()
+    reference_files.main(MODEL_FOLDER, lambda: Reference().write)

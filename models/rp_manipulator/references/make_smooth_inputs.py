@@ -13,12 +13,13 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 import sympy as sp
-from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, ROOT, STATES, derive, write_whole
+from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, ROOT, STATES, derive
 
 from cosim import convergence, variables
 from cosim import scenario as scenarios
 from cosim.convergence import Sines
 from cosim.errors import UserError
+from cosim.files import whole
 from cosim.scenario import Scenario
 
 equations = functools.cache(derive)
@@ -90,7 +91,8 @@ def write(scenario: Scenario, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     final, largest = final_state(scenario)
     content = {"time": scenario.stop, "final": final, "largest": largest}
-    write_whole(folder / "exact.json", json.dumps(content, indent=2) + "\n")
+    with whole(folder / "exact.json") as path:
+        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8", newline="\n")
 
 
 def main() -> None:

@@ -5,7 +5,6 @@ follow from the forward kinematics, x + i y = exp(i q1) (L + i a), and its first
 time, solved in 40 digits and rounded once.
 """
 
-import argparse
 import functools
 import sys
 from collections.abc import Callable
@@ -20,11 +19,9 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim import scenario as scenarios
 from cosim import variables
-from cosim.errors import UserError
 from cosim.scenario import Scenario
-from cosim.simulation import write_csv
+from models import reference_files
 
 UNIT = "RPTrajectory"
 DIGITS = 40
@@ -167,44 +164,9 @@ def simulate(scenario: Scenario) -> np.ndarray:
 
 def write(scenario: Scenario, folder: Path) -> None:
     """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
-    folder.mkdir(parents=True, exist_ok=True)
-    times = scenario.times
-    values = simulate(scenario) + 0.0  # no negative zero
-    write_csv(folder / f"{UNIT}_ref.csv", times[scenario.reference_rows], OUTPUTS, values)
-    write_csv(folder / f"{UNIT}_in.csv", times, (), np.empty((len(times), 0)))
-    options = {
-        "StartTime": scenario.start,
-        "StopTime": scenario.stop,
-        "StepSize": scenario.steps[0] if len(scenario.steps) == 1 else 0.0,  # 0: variable
-        "RelTol": scenario.tolerance,
-    }
-    text = "".join(f"{key},{value!r}\n" for key, value in options.items())
-    (folder / f"{UNIT}_ref.opt").write_text(text, encoding="utf-8", newline="\n")
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
-    parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
-    arguments = parser.parse_args()
-    try:
-        known = {
-            name: path
-            for name, path in scenarios.find_all(ROOT).items()
-            if path.parent.parent == MODEL_FOLDER
-        }
-        for name in arguments.names:
-            if name not in known:
-                raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
-        for name in arguments.names or known:
-            scenario = scenarios.load(known[name])
-            write(
-                scenario, arguments.output / name if arguments.output else scenario.reference_folder
-            )
-            print(f"{name}: {len(scenario.reference_rows)} rows")
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    no_inputs = (), np.empty((len(scenario.times), 0))
+    reference_files.write(scenario, folder, UNIT, (OUTPUTS, simulate(scenario)), no_inputs)
 
 
 if __name__ == "__main__":
-    main()
+    reference_files.main(MODEL_FOLDER, lambda: write)
