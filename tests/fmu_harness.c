@@ -1,6 +1,5 @@
 #include "fmu_harness.h"
 
-#include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,37 +7,11 @@
 
 struct fmu_functions fmu;
 
-#define FMU_NAME(name) "fmi2" #name,
-const char *const fmu_function_names[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_NAME)};
-#undef FMU_NAME
-
 char *fmu_description;
 struct fmu_variable fmu_variables[FMU_VARIABLE_CAPACITY];
 size_t fmu_variable_count;
 
 /* ---- Loading -------------------------------------------------------------------------------- */
-
-static bool load_functions(const char *path) {
-#define FMU_OFFSET(name) offsetof(struct fmu_functions, name),
-    static const size_t offsets[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_OFFSET)};
-#undef FMU_OFFSET
-
-    // never closed: leak reports need the names of its functions
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (library == NULL) {
-        fprintf(stderr, "%s\n", dlerror());
-        return false;
-    }
-    for (size_t i = 0; i < FMU_FUNCTION_COUNT; i++) {
-        void *symbol = dlsym(library, fmu_function_names[i]);
-        if (symbol == NULL) {
-            fprintf(stderr, "%s\n", dlerror());
-            return false;
-        }
-        memcpy((char *)&fmu + offsets[i], &symbol, sizeof symbol);
-    }
-    return true;
-}
 
 static bool load_description(const char *path) {
     enum { SIZE = 1 << 18 };
@@ -75,7 +48,8 @@ bool fmu_load(int argc, char **argv) {
         fprintf(stderr, "usage: %s FMU.so modelDescription.xml\n", argv[0]);
         return false;
     }
-    return load_functions(argv[1]) && load_description(argv[2]);
+    // never closed: leak reports need the names of its functions
+    return fmu_library_open(argv[1], &fmu) != NULL && load_description(argv[2]);
 }
 
 /* ---- Messages ------------------------------------------------------------------------------- */

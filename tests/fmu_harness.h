@@ -3,82 +3,14 @@
 #ifndef FMU_HARNESS_H
 #define FMU_HARNESS_H
 
+#include "fmu_library.h"
 #include "value_references.h"
-
-#include <stdbool.h>
-#include <stddef.h>
-
-#include <fmi2TypesPlatform.h>
-
-#include <fmi2FunctionTypes.h>
-
-/* Every function of fmi2Functions.h (section 2.1), without its prefix. */
-#define FMU_FUNCTION_LIST(X)                                                                       \
-    X(GetTypesPlatform)                                                                            \
-    X(GetVersion)                                                                                  \
-    X(SetDebugLogging)                                                                             \
-    X(Instantiate)                                                                                 \
-    X(FreeInstance)                                                                                \
-    X(SetupExperiment)                                                                             \
-    X(EnterInitializationMode)                                                                     \
-    X(ExitInitializationMode)                                                                      \
-    X(Terminate)                                                                                   \
-    X(Reset)                                                                                       \
-    X(GetReal)                                                                                     \
-    X(GetInteger)                                                                                  \
-    X(GetBoolean)                                                                                  \
-    X(GetString)                                                                                   \
-    X(SetReal)                                                                                     \
-    X(SetInteger)                                                                                  \
-    X(SetBoolean)                                                                                  \
-    X(SetString)                                                                                   \
-    X(GetFMUstate)                                                                                 \
-    X(SetFMUstate)                                                                                 \
-    X(FreeFMUstate)                                                                                \
-    X(SerializedFMUstateSize)                                                                      \
-    X(SerializeFMUstate)                                                                           \
-    X(DeSerializeFMUstate)                                                                         \
-    X(GetDirectionalDerivative)                                                                    \
-    /* Model Exchange */                                                                           \
-    X(EnterEventMode)                                                                              \
-    X(NewDiscreteStates)                                                                           \
-    X(EnterContinuousTimeMode)                                                                     \
-    X(CompletedIntegratorStep)                                                                     \
-    X(SetTime)                                                                                     \
-    X(SetContinuousStates)                                                                         \
-    X(GetDerivatives)                                                                              \
-    X(GetEventIndicators)                                                                          \
-    X(GetContinuousStates)                                                                         \
-    X(GetNominalsOfContinuousStates)                                                               \
-    /* Co-Simulation */                                                                            \
-    X(SetRealInputDerivatives)                                                                     \
-    X(GetRealOutputDerivatives)                                                                    \
-    X(DoStep)                                                                                      \
-    X(CancelStep)                                                                                  \
-    X(GetStatus)                                                                                   \
-    X(GetRealStatus)                                                                               \
-    X(GetIntegerStatus)                                                                            \
-    X(GetBooleanStatus)                                                                            \
-    X(GetStringStatus)
-
-#define FMU_CODE(name) FMU_##name,
-enum fmu_function { FMU_FUNCTION_LIST(FMU_CODE) FMU_FUNCTION_COUNT };
-#undef FMU_CODE
-
-#define FMU_POINTER(name) fmi2##name##TYPE *name;
-struct fmu_functions {
-    FMU_FUNCTION_LIST(FMU_POINTER)
-};
-#undef FMU_POINTER
 
 #define FMU_COUNT(array) (sizeof(array) / sizeof(array)[0])
 
 /* ---- The loaded FMU ------------------------------------------------------------------------- */
 
 extern struct fmu_functions fmu;
-
-/* As the standard spells it: "fmi2GetReal". */
-extern const char *const fmu_function_names[FMU_FUNCTION_COUNT];
 
 /* Text of modelDescription.xml. */
 extern char *fmu_description;

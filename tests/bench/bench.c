@@ -10,6 +10,7 @@
 
 #include "fmu_library.h"
 #include "rp_manipulator.h"
+#include "value_references.h"
 
 #include <cvode/cvode.h>
 #include <malloc.h>
@@ -191,17 +192,18 @@ static void log_text(fmi2ComponentEnvironment environment, fmi2String name, fmi2
 
 static const fmi2CallbackFunctions callbacks = {.logger = log_text};
 
-static fmi2Component start(const struct fmu_library *fmu, const struct work *work, int method) {
+static fmi2Component start(const struct fmu_functions *fmu, const struct work *work, int method) {
     static const fmi2ValueReference states[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                 RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
     static const fmi2ValueReference solver_method = RP_MANIPULATOR_solver_method;
     fmi2Component c =
-        fmu->instantiate("bench", fmi2CoSimulation, RP_MANIPULATOR_GUID, "", &callbacks, 0, 0);
+        fmu->Instantiate("bench", fmi2CoSimulation, RP_MANIPULATOR_GUID, "", &callbacks, 0, 0);
     require(c != NULL, "not instantiated");
-    require(fmu->set_real(c, states, 4, x_start) == fmi2OK &&
-                fmu->set_integer(c, &solver_method, 1, &method) == fmi2OK &&
-                fmu->setup_experiment(c, 1, work->tolerance, 0.0, 0, 0.0) == fmi2OK &&
-                fmu->enter_initialization(c) == fmi2OK && fmu->exit_initialization(c) == fmi2OK,
+    require(fmu->SetReal(c, states, 4, x_start) == fmi2OK &&
+                fmu->SetInteger(c, &solver_method, 1, &method) == fmi2OK &&
+                fmu->SetupExperiment(c, 1, work->tolerance, 0.0, 0, 0.0) == fmi2OK &&
+                fmu->EnterInitializationMode(c) == fmi2OK &&
+                fmu->ExitInitializationMode(c) == fmi2OK,
             "not initialized");
     return c;
 }
@@ -212,7 +214,7 @@ struct counts {
     double evaluations;
 };
 
-static double run_fmu(const struct fmu_library *fmu, const struct work *work, int method,
+static double run_fmu(const struct fmu_functions *fmu, const struct work *work, int method,
                       double states[][4], struct counts *counts) {
     static const fmi2ValueReference references[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
     static const fmi2ValueReference outputs[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
@@ -223,19 +225,19 @@ static double run_fmu(const struct fmu_library *fmu, const struct work *work, in
     fmi2Component c = start(fmu, work, method);
     const double begin = now();
     for (int i = 0; i < work->steps; i++) {
-        const bool done = fmu->set_real(c, references, 2, inputs[i]) == fmi2OK &&
-                          fmu->do_step(c, work->step * i, work->step, 1) == fmi2OK &&
-                          fmu->get_real(c, outputs, 4, states[i]) == fmi2OK;
+        const bool done = fmu->SetReal(c, references, 2, inputs[i]) == fmi2OK &&
+                          fmu->DoStep(c, work->step * i, work->step, 1) == fmi2OK &&
+                          fmu->GetReal(c, outputs, 4, states[i]) == fmi2OK;
         require(done, "a step failed");
     }
     const double elapsed = now() - begin;
     int total[2];
-    require(fmu->get_integer(c, totals, 2, total) == fmi2OK &&
-                fmu->get_real(c, &tolerance, 1, &counts->effective_tolerance) == fmi2OK,
+    require(fmu->GetInteger(c, totals, 2, total) == fmi2OK &&
+                fmu->GetReal(c, &tolerance, 1, &counts->effective_tolerance) == fmi2OK,
             "no counts");
     counts->internal_steps = (double)total[0] / work->steps;
     counts->evaluations = (double)total[1] / work->steps;
-    fmu->free_instance(c);
+    fmu->FreeInstance(c);
     return elapsed;
 }
 
@@ -256,8 +258,8 @@ enum { PLAIN, ADAMS, BDF, ERK, RUNS };
 static const char *const run_names[RUNS] = {"plain loop", "cvode_adams", "cvode_bdf", "erk"};
 
 /* must: ratio to reach, of Adams and of erk; 0: none */
-static void compare(const struct fmu_library *fmu, const struct work *work, const double must[RUNS],
-                    int repeats) {
+static void compare(const struct fmu_functions *fmu, const struct work *work,
+                    const double must[RUNS], int repeats) {
     static double states[LONGEST_RUN][4];
     static double reference[LONGEST_RUN][4];
     double seconds[RUNS][MOST_REPEATS];
@@ -296,21 +298,21 @@ static void compare(const struct fmu_library *fmu, const struct work *work, cons
 }
 
 /* Instantiate to free, and what an instance that runs has allocated. */
-static void measure_life(const struct fmu_library *fmu, const struct work *work, int repeats) {
+static void measure_life(const struct fmu_functions *fmu, const struct work *work, int repeats) {
     for (int method = ADAMS; method < RUNS; method++) {
         double seconds[MOST_REPEATS];
         for (int repeat = 0; repeat < repeats; repeat++) {
             const double begin = now();
             for (int i = 0; i < 100; i++) {
-                fmu->free_instance(start(fmu, work, method));
+                fmu->FreeInstance(start(fmu, work, method));
             }
             seconds[repeat] = (now() - begin) / 100.0;
         }
         const size_t before = mallinfo2().uordblks;
         fmi2Component c = start(fmu, work, method);
-        require(fmu->do_step(c, 0.0, work->step, 1) == fmi2OK, "a step failed");
+        require(fmu->DoStep(c, 0.0, work->step, 1) == fmi2OK, "a step failed");
         const size_t after = mallinfo2().uordblks;
-        fmu->free_instance(c);
+        fmu->FreeInstance(c);
         const double elapsed = 1e6 * median(seconds, repeats);
         const double kib = (double)(after - before) / 1024.0;
         printf("  %-12s instantiate to free %6.1f us (must 30 %s), memory %5.1f KiB (must 32 "
@@ -324,8 +326,8 @@ int main(int count, char **arguments) {
     require(count >= 2, "usage: bench PATH/RPManipulator.so [repeats]");
     const int wanted = count > 2 ? atoi(arguments[2]) : 21;
     const int repeats = wanted < 1 ? 1 : wanted > MOST_REPEATS ? MOST_REPEATS : wanted;
-    struct fmu_library fmu;
-    require(fmu_library_open(arguments[1], &fmu), "the FMU cannot be loaded");
+    struct fmu_functions fmu;
+    require(fmu_library_open(arguments[1], &fmu) != NULL, "the FMU cannot be loaded");
 
     static const struct {
         struct work work;
@@ -344,6 +346,5 @@ int main(int count, char **arguments) {
     }
     printf("\n");
     measure_life(&fmu, &table[0].work, repeats);
-    fmu_library_close(&fmu);
     return 0;
 }

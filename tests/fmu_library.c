@@ -1,0 +1,32 @@
+#include "fmu_library.h"
+
+#include <dlfcn.h>
+#include <stdio.h>
+#include <string.h>
+
+#define FMU_NAME(name) "fmi2" #name,
+const char *const fmu_function_names[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_NAME)};
+#undef FMU_NAME
+
+void *fmu_library_open(const char *path, struct fmu_functions *functions) {
+#define FMU_OFFSET(name) offsetof(struct fmu_functions, name),
+    static const size_t offsets[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_OFFSET)};
+#undef FMU_OFFSET
+
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (library == NULL) {
+        fprintf(stderr, "%s\n", dlerror());
+        return NULL;
+    }
+    for (size_t i = 0; i < FMU_FUNCTION_COUNT; i++) {
+        void *symbol = dlsym(library, fmu_function_names[i]);
+        if (symbol == NULL) {
+            fprintf(stderr, "%s\n", dlerror());
+            dlclose(library);
+            return NULL;
+        }
+        // as POSIX has it: a function pointer is the bytes of the object pointer
+        memcpy((char *)functions + offsets[i], &symbol, sizeof symbol);
+    }
+    return library;
+}

@@ -1,0 +1,79 @@
+/* A built FMU's shared object and the functions of the standard header in it, as importers load
+ * them. */
+#ifndef FMU_LIBRARY_H
+#define FMU_LIBRARY_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+#include <fmi2TypesPlatform.h>
+
+#include <fmi2FunctionTypes.h>
+
+/* Every function of fmi2Functions.h (section 2.1), without its prefix. */
+#define FMU_FUNCTION_LIST(X)                                                                       \
+    X(GetTypesPlatform)                                                                            \
+    X(GetVersion)                                                                                  \
+    X(SetDebugLogging)                                                                             \
+    X(Instantiate)                                                                                 \
+    X(FreeInstance)                                                                                \
+    X(SetupExperiment)                                                                             \
+    X(EnterInitializationMode)                                                                     \
+    X(ExitInitializationMode)                                                                      \
+    X(Terminate)                                                                                   \
+    X(Reset)                                                                                       \
+    X(GetReal)                                                                                     \
+    X(GetInteger)                                                                                  \
+    X(GetBoolean)                                                                                  \
+    X(GetString)                                                                                   \
+    X(SetReal)                                                                                     \
+    X(SetInteger)                                                                                  \
+    X(SetBoolean)                                                                                  \
+    X(SetString)                                                                                   \
+    X(GetFMUstate)                                                                                 \
+    X(SetFMUstate)                                                                                 \
+    X(FreeFMUstate)                                                                                \
+    X(SerializedFMUstateSize)                                                                      \
+    X(SerializeFMUstate)                                                                           \
+    X(DeSerializeFMUstate)                                                                         \
+    X(GetDirectionalDerivative)                                                                    \
+    /* Model Exchange */                                                                           \
+    X(EnterEventMode)                                                                              \
+    X(NewDiscreteStates)                                                                           \
+    X(EnterContinuousTimeMode)                                                                     \
+    X(CompletedIntegratorStep)                                                                     \
+    X(SetTime)                                                                                     \
+    X(SetContinuousStates)                                                                         \
+    X(GetDerivatives)                                                                              \
+    X(GetEventIndicators)                                                                          \
+    X(GetContinuousStates)                                                                         \
+    X(GetNominalsOfContinuousStates)                                                               \
+    /* Co-Simulation */                                                                            \
+    X(SetRealInputDerivatives)                                                                     \
+    X(GetRealOutputDerivatives)                                                                    \
+    X(DoStep)                                                                                      \
+    X(CancelStep)                                                                                  \
+    X(GetStatus)                                                                                   \
+    X(GetRealStatus)                                                                               \
+    X(GetIntegerStatus)                                                                            \
+    X(GetBooleanStatus)                                                                            \
+    X(GetStringStatus)
+
+#define FMU_CODE(name) FMU_##name,
+enum fmu_function { FMU_FUNCTION_LIST(FMU_CODE) FMU_FUNCTION_COUNT };
+#undef FMU_CODE
+
+#define FMU_POINTER(name) fmi2##name##TYPE *name;
+struct fmu_functions {
+    FMU_FUNCTION_LIST(FMU_POINTER)
+};
+#undef FMU_POINTER
+
+/* As the standard spells it: "fmi2GetReal". */
+extern const char *const fmu_function_names[FMU_FUNCTION_COUNT];
+
+/* Handle of the shared object at path, for dlclose. NULL, with a line on stderr, where it or one of
+ * the functions is not found. */
+void *fmu_library_open(const char *path, struct fmu_functions *functions);
+
+#endif
