@@ -117,12 +117,16 @@ static enum status set(struct slave *slave, enum variable_type type, const unsig
             return status;
         }
     }
+    bool is_setting = false;
     for (size_t i = 0; i < count; i++) {
-        slave_write_field(slave, variable_find(slave->unit, references[i]),
-                          element(type, values, i));
+        const struct variable *variable = variable_find(slave->unit, references[i]);
+        slave_write_field(slave, variable, element(type, values, i));
+        is_setting |= variable->owner == VARIABLE_OF_SLAVE;
     }
     slave->outputs_are_valid = false;
-    slave_update_tolerance(slave);
+    if (is_setting) {
+        slave_update_tolerance(slave);
+    }
     return STATUS_OK;
 }
 

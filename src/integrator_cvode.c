@@ -156,6 +156,7 @@ static int restart(struct integrator *integrator) {
 }
 
 static int advance(struct integrator *integrator, double t, long max_steps, double *stopped_at) {
+    integrator->columns.count = 0;
     int flag = CVodeSetMaxNumSteps(integrator->solver, max_steps);
     if (flag == CV_SUCCESS && integrator->reached == 0.0) {
         flag = CVodeSetInitStep(integrator->solver, fmin(integrator->first_step, t));
@@ -205,8 +206,23 @@ static double internal_time(const struct integrator *integrator) {
     return t;
 }
 
-static int interpolate(const struct integrator *integrator, double t) {
-    return CVodeGetDky(integrator->solver, t, 0, integrator->x);
+/* CVodeGetDky combines the columns of the Nordsieck array, up to 13, which stay as they are until
+ * the next internal step. It computes the powers of the time with a product for each factor: most
+ * of the cost of a short communication step. So it is asked once per internal step, for the
+ * columns, and Horner's scheme does the rest. */
+static int interpolate(struct integrator *integrator, double t) {
+    struct small_vector_terms *columns = &integrator->columns;
+    if (columns->count == 0) {
+        small_vector_note_terms(integrator->work, columns);
+        const int flag = CVodeGetDky(integrator->solver, t, 0, integrator->work);
+        small_vector_note_terms(integrator->work, NULL);
+        if (flag != CV_SUCCESS || columns->count == 0) {
+            return flag != CV_SUCCESS ? flag : CV_MEM_FAIL;
+        }
+    }
+    const double steps = (t - integrator->internal) / integrator->counted.last_step;
+    small_vector_polynomial(columns, steps, integrator->x);
+    return CV_SUCCESS;
 }
 
 #define COMMON                                                                                     \

@@ -27,6 +27,7 @@ struct integrator {
     N_Vector last_x; /* state at reached */
     N_Vector absolute_tolerances;
     N_Vector work;
+    struct small_vector_terms columns; /* of the last internal step; count 0: not known yet */
 
     // times in s since the restart
     double span;       /* internal steps must not pass it */
@@ -66,7 +67,7 @@ struct method {
     double (*internal_time)(const struct integrator *integrator);
 
     /* Writes the state at t, between the last two internal steps, to x; NULL with no history. */
-    int (*interpolate)(const struct integrator *integrator, double t);
+    int (*interpolate)(struct integrator *integrator, double t);
 
     enum status (*status_of_flag)(const struct integrator *integrator, int flag);
 };

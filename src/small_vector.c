@@ -9,6 +9,7 @@ _Static_assert(sizeof(sunrealtype) == sizeof(double), "SUNDIALS must be built fo
 struct small_vector {
     struct _generic_N_Vector base; /* first: the N_Vector */
     sunindextype length;
+    struct small_vector_terms *terms; /* NULL: not noted */
     double data[];
 };
 
@@ -168,6 +169,37 @@ OPERATION void linear_combination(sunindextype n, int count, const double *c, N_
     }
 }
 
+static void note(struct small_vector_terms *terms, int count, N_Vector *X) {
+    terms->count = count <= SMALL_VECTOR_MOST_TERMS ? count : 0;
+    for (int k = 0; k < terms->count; k++) {
+        terms->data[k] = small_vector_data(X[k]);
+    }
+}
+
+void small_vector_note_terms(N_Vector x, struct small_vector_terms *terms) {
+    ((struct small_vector *)(void *)x)->terms = terms;
+}
+
+static struct small_vector_terms *terms_of(N_Vector x) {
+    return ((const struct small_vector *)(const void *)x)->terms;
+}
+
+OPERATION void polynomial(sunindextype n, const struct small_vector_terms *terms, double s,
+                          double *x) {
+    scale(n, 1.0, terms->data[0], x);
+    for (int k = 1; k < terms->count; k++) {
+        linear_sum(n, s, x, 1.0, terms->data[k], x);
+    }
+}
+
+void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x) {
+    if (length_of(x) == 4) {
+        polynomial(4, terms, s, small_vector_data(x));
+    } else {
+        polynomial(length_of(x), terms, s, small_vector_data(x));
+    }
+}
+
 /* Z[k] = a[k] x + Y[k] */
 OPERATION void scale_add_multi(sunindextype n, int count, const double *a, const double *x,
                                N_Vector *Y, N_Vector *Z) {
@@ -237,6 +269,9 @@ OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, dou
     }                                                                                              \
     static int name##_linear_combination(int count, sunrealtype *c, N_Vector *X, N_Vector x) {     \
         linear_combination(n, count, c, X, small_vector_data(x));                                  \
+        if (terms_of(x) != NULL) {                                                                 \
+            note(terms_of(x), count, X);                                                           \
+        }                                                                                          \
         return 0;                                                                                  \
     }                                                                                              \
     static int name##_scale_add_multi(int count, sunrealtype *a, N_Vector x, N_Vector *Y,          \

@@ -10,6 +10,13 @@
 
 #include <sundials/sundials_nvector.h>
 
+/* What a linear combination was made of: see small_vector_note_terms. */
+enum { SMALL_VECTOR_MOST_TERMS = 16 };
+struct small_vector_terms {
+    int count; /* 0: none, or more than there is room for */
+    const double *data[SMALL_VECTOR_MOST_TERMS];
+};
+
 /* A vector of length (> 0) zeros, or NULL where memory is short. Vectors cloned from it are zeros
  * too. N_VDestroy frees each. */
 N_Vector small_vector_create(sunindextype length, SUNContext context);
@@ -18,5 +25,13 @@ N_Vector small_vector_create(sunindextype length, SUNContext context);
 static inline double *small_vector_data(N_Vector vector) {
     return (double *)vector->content;
 }
+
+/* From now on N_VLinearCombination with the result x notes the data of its terms, in their order.
+ * terms NULL: no longer. */
+void small_vector_note_terms(N_Vector x, struct small_vector_terms *terms);
+
+/* x = sum of data[k] s^(count - 1 - k): the terms as the coefficients of a polynomial, that of the
+ * highest power first. count > 0. */
+void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x);
 
 #endif

@@ -92,11 +92,16 @@ static enum status refuse_times(const struct slave *slave, double t, double h) {
     return STATUS_OK;
 }
 
-static bool are_equal(const struct polynomial first[], const struct polynomial second[],
-                      size_t count) {
+/* The next step's inputs are held at the values that the integrator runs with. */
+static bool inputs_are_held(const struct slave_memory *memory, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
-            if (first[i].d[k] != second[i].d[k]) {
+        const double *next = memory->pending[i].d;
+        const double *now = memory->running[i].d;
+        if (next[0] != now[0]) {
+            return false;
+        }
+        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
+            if (next[k] != 0.0 || now[k] != 0.0) {
                 return false;
             }
         }
@@ -125,8 +130,7 @@ static bool can_go_on(const struct slave *slave, double target) {
     const size_t input_count = count_of(slave->model->inputs);
     return state->has_history && target <= state->span &&
            state->statistics.steps - state->steps_before_restart < SLAVE_LONGEST_HISTORY &&
-           parameters_are_held(slave) && are_equal(memory->running, memory->pending, input_count) &&
-           !is_moving(memory->pending, input_count);
+           parameters_are_held(slave) && inputs_are_held(memory, input_count);
 }
 
 /* For inputs that are held, once instead of at every evaluation. */

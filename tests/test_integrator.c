@@ -138,6 +138,25 @@ static void test_asking_for_more_points_costs_no_steps(void) {
     TEST_ASSERT_TRUE(labs(many.steps - few.steps) <= 1);
 }
 
+/* A point asked for alone comes from CVODE; one of many within an internal step does not. */
+static void test_many_points_lie_where_each_lies_alone(void) {
+    enum { POINTS = 300 };
+    const double first_step = 1e-6; // otherwise it depends on the first point
+    double many[POINTS][2];
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, INFINITY, first_step));
+    for (int i = 0; i < POINTS; i++) {
+        advance(0.01 * (i + 1), many[i]);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        double alone[2];
+        TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                              integrator_restart(integrator, start, INFINITY, first_step));
+        advance(0.01 * (i + 1), alone);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, alone[0], many[i][0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, alone[1], many[i][1]);
+    }
+}
+
 static void test_a_restart_begins_at_time_zero_from_its_state(void) {
     double first[2];
     double again[2];
@@ -328,6 +347,7 @@ static void run_with(enum integrator_method with) {
     RUN_TEST(test_destroying_nothing_is_allowed);
     if (method != INTEGRATOR_ERK) {
         RUN_TEST(test_asking_for_more_points_costs_no_steps);
+        RUN_TEST(test_many_points_lie_where_each_lies_alone);
         RUN_TEST(test_a_run_can_be_repeated_with_two_stops);
     }
 }

@@ -184,6 +184,26 @@ static void check_arrays(void) {
     }
 }
 
+/* The terms of a linear combination, as coefficients of a polynomial, that of s^4 first. */
+static void check_polynomial(void) {
+    sunrealtype powers[COUNT];
+    struct small_vector_terms terms = {0};
+    for (int k = 0; k < COUNT; k++) {
+        powers[k] = pow(-0.75, COUNT - 1 - k);
+    }
+    small_vector_note_terms(small[2][0], &terms);
+    N_VLinearCombination(COUNT, powers, small[0], small[2][0]);
+    small_vector_note_terms(small[2][0], NULL);
+    N_VLinearCombination(COUNT, powers, serial[0], serial[2][0]);
+    TEST_ASSERT_EQUAL_INT(COUNT, terms.count);
+    for (int k = 0; k < COUNT; k++) {
+        TEST_ASSERT_EQUAL_PTR(small_vector_data(small[0][k]), terms.data[k]);
+    }
+    N_VConst(0.0, small[2][0]);
+    small_vector_polynomial(&terms, -0.75, small[2][0]);
+    assert_same(COUNT * 256.0 * DBL_EPSILON);
+}
+
 static void test_linear_sum(void) {
     at_every_length(check_linear_sum);
 }
@@ -202,6 +222,26 @@ static void test_linear_combination(void) {
 
 static void test_operations_on_arrays_of_vectors(void) {
     at_every_length(check_arrays);
+}
+
+static void test_polynomial_of_noted_terms(void) {
+    at_every_length(check_polynomial);
+}
+
+static void test_more_terms_than_there_is_room_for_are_not_noted(void) {
+    sunrealtype factors[SMALL_VECTOR_MOST_TERMS + 1] = {1.0};
+    N_Vector same[SMALL_VECTOR_MOST_TERMS + 1];
+    struct small_vector_terms terms = {.count = 1};
+    create(4);
+    for (int k = 0; k <= SMALL_VECTOR_MOST_TERMS; k++) {
+        same[k] = small[0][0];
+    }
+    small_vector_note_terms(small[1][0], &terms);
+    N_VLinearCombination(SMALL_VECTOR_MOST_TERMS + 1, factors, same, small[1][0]);
+    TEST_ASSERT_EQUAL_INT(0, terms.count);
+    N_VLinearCombination(SMALL_VECTOR_MOST_TERMS, factors, same, small[1][0]);
+    TEST_ASSERT_EQUAL_INT(SMALL_VECTOR_MOST_TERMS, terms.count);
+    destroy();
 }
 
 static void check_length(void) {
@@ -247,6 +287,8 @@ int main(void) {
     RUN_TEST(test_reductions);
     RUN_TEST(test_linear_combination);
     RUN_TEST(test_operations_on_arrays_of_vectors);
+    RUN_TEST(test_polynomial_of_noted_terms);
+    RUN_TEST(test_more_terms_than_there_is_room_for_are_not_noted);
     RUN_TEST(test_length);
     RUN_TEST(test_nan_stays_in_the_norm);
     RUN_TEST(test_a_vector_is_one_block_and_operations_take_none);
