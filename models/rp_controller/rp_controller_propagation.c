@@ -1,6 +1,6 @@
 #include "rp_controller_propagation.h"
 
-#include "taylor.h"
+#include "rp_curve.h"
 
 #include <stddef.h>
 
@@ -17,10 +17,6 @@ static const struct taylor none = {0.0, 0.0, 0.0};
 #define ON_CURVE(curve, field)                                                                     \
     ((struct taylor){(curve)->values->field, (curve)->first->field, (curve)->second->field})
 
-static struct taylor product(struct taylor x, struct taylor y, struct taylor z) {
-    return taylor_product(taylor_product(x, y), z);
-}
-
 static struct taylor error(const struct curve *c, int i) {
     return taylor_difference(ON_CURVE(c, inputs.q_ref[i]), ON_CURVE(c, inputs.q[i]));
 }
@@ -36,65 +32,41 @@ static struct taylor correction(const struct curve *c, int i) {
     return taylor_sum(taylor_sum(proportional, damping), ON_CURVE(c, integral[i]));
 }
 
-static struct taylor slide_length(const struct curve *c) {
-    return taylor_sum(ON_CURVE(c, parameters.arm.l1), ON_CURVE(c, inputs.q[1]));
+static struct rp_curve arm_on_curve(const struct curve *c) {
+    const struct rp_parameters *const parameters[3] = {
+        &c->values->parameters.arm, &c->first->parameters.arm, &c->second->parameters.arm};
+    const double *const q[3] = {c->values->inputs.q, c->first->inputs.q, c->second->inputs.q};
+    const double *const dq[3] = {c->values->inputs.dq, c->first->inputs.dq, c->second->inputs.dq};
+    return rp_curve_of(parameters, q, dq);
 }
 
-/* g (m1 lc1 c1 + m2 (L c1 - a s1)) and m2 g s1, (11). */
-static void gravity_forces(const struct curve *c, struct taylor forces[2]) {
-    const struct taylor m2 = ON_CURVE(c, parameters.arm.m2);
-    const struct taylor s1 = taylor_sine(ON_CURVE(c, inputs.q[0]));
-    const struct taylor c1 = taylor_cosine(ON_CURVE(c, inputs.q[0]));
-    const struct taylor g = ON_CURVE(c, parameters.arm.g);
-
-    const struct taylor moment1 =
-        product(ON_CURVE(c, parameters.arm.m1), ON_CURVE(c, parameters.arm.lc1), c1);
-    const struct taylor x2 = taylor_difference(taylor_product(slide_length(c), c1),
-                                               taylor_product(ON_CURVE(c, parameters.arm.a), s1));
-    forces[0] = taylor_product(g, taylor_sum(moment1, taylor_product(m2, x2)));
-    forces[1] = product(m2, g, s1);
-}
-
-/* The left sides of (14) and (15) without gravity:
- *
- *   (J + m2 a^2) ddq1 - a m2 ddq2 + 2 m2 L dq1 dq2,   J = m1 lc1^2 + I1z + I2z + m2 L^2
- *   m2 (ddq2 - a ddq1 - L dq1^2) */
-static void motion_forces(const struct curve *c, const struct taylor ddq[2],
+/* D ddq + C dq: the left sides of (14) and (15) without gravity. */
+static void motion_forces(const struct rp_curve *arm, const struct taylor ddq[2],
                           struct taylor forces[2]) {
-    const struct taylor m2 = ON_CURVE(c, parameters.arm.m2);
-    const struct taylor a = ON_CURVE(c, parameters.arm.a);
-    const struct taylor L = slide_length(c);
-    const struct taylor dq1 = ON_CURVE(c, inputs.dq[0]);
-    const struct taylor dq2 = ON_CURVE(c, inputs.dq[1]);
-
-    const struct taylor link1 = taylor_product(ON_CURVE(c, parameters.arm.m1),
-                                               taylor_square(ON_CURVE(c, parameters.arm.lc1)));
-    const struct taylor fixed = taylor_sum(taylor_sum(link1, ON_CURVE(c, parameters.arm.I1z)),
-                                           ON_CURVE(c, parameters.arm.I2z));
-    const struct taylor reach = taylor_sum(taylor_square(L), taylor_square(a));
-    const struct taylor d11 = taylor_sum(fixed, taylor_product(m2, reach));
-    const struct taylor coriolis = taylor_scaled(2.0, product(L, dq1, dq2));
-    forces[0] =
-        taylor_sum(taylor_product(d11, ddq[0]),
-                   taylor_product(m2, taylor_difference(coriolis, taylor_product(a, ddq[1]))));
-
-    const struct taylor turning =
-        taylor_sum(taylor_product(a, ddq[0]), taylor_product(L, taylor_square(dq1)));
-    forces[1] = taylor_product(m2, taylor_difference(ddq[1], turning));
+    struct taylor D[2][2];
+    struct taylor coriolis[2];
+    rp_curve_mass_matrix(arm, D);
+    rp_curve_coriolis_forces(arm, coriolis);
+    for (int i = 0; i < 2; i++) {
+        const struct taylor inertial =
+            taylor_sum(taylor_product(D[i][0], ddq[0]), taylor_product(D[i][1], ddq[1]));
+        forces[i] = taylor_sum(inertial, coriolis[i]);
+    }
 }
 
 static void unlimited_efforts(const struct curve *c, struct taylor efforts[2]) {
     const int mode = c->values->parameters.mode;
+    const struct rp_curve arm = arm_on_curve(c);
     const struct taylor v[2] = {correction(c, 0), correction(c, 1)};
     struct taylor gravity[2] = {none, none};
     if (mode != RP_CONTROLLER_PD) {
-        gravity_forces(c, gravity);
+        rp_curve_gravity_forces(&arm, gravity);
     }
 
     if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
         const struct taylor ddq[2] = {taylor_sum(ON_CURVE(c, inputs.ddq_ref[0]), v[0]),
                                       taylor_sum(ON_CURVE(c, inputs.ddq_ref[1]), v[1])};
-        motion_forces(c, ddq, efforts);
+        motion_forces(&arm, ddq, efforts);
     } else {
         efforts[0] = taylor_product(ON_CURVE(c, parameters.inertia[0]), v[0]);
         efforts[1] = taylor_product(ON_CURVE(c, parameters.inertia[1]), v[1]);
