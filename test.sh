@@ -1,8 +1,16 @@
 #!/usr/bin/env bash
 # Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest.
-# Arguments go to the last ctest, the one that runs everything: ./test.sh -R slave
+#   ./test.sh [--long] [ARGUMENTS]
+# --long: then also the long campaigns (some hours), with a table of their figures at the end.
+# ARGUMENTS go to the ctest that runs everything: ./test.sh -R slave
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
+
+long=no
+if [ "${1-}" = --long ]; then
+  long=yes
+  shift
+fi
 
 ./setup.sh --dev
 
@@ -25,3 +33,9 @@ tests/importers/install.sh || [ -z "${CI-}" ]
 step "gcc, optimized; all tests"
 build default
 ctest --preset default -j 2 "$@"
+
+if [ "$long" = yes ]; then
+  step "long campaigns"
+  ctest --preset default -C Long -L long
+  python3 tests/figures.py build/Testing/Temporary/LastTest.log
+fi

@@ -1,0 +1,55 @@
+"""Prints the figures of the campaigns that ran last as a table: ./test.sh --long ends with it.
+
+A campaign prints one line, `figures: WHAT; executions N; seconds N; findings N; ...`, of which
+ctest keeps a copy in its log.
+"""
+
+import sys
+from pathlib import Path
+
+COLUMNS = ("executions", "calls", "instances", "cycles", "seconds", "findings")
+PREFIX = "figures: "
+
+
+def parse(line: str) -> tuple[str, dict[str, str], list[str]]:
+    """Name, figures of COLUMNS by their name, and what else the line tells."""
+    what, *fields = (field.strip() for field in line.removeprefix(PREFIX).split(";"))
+    known: dict[str, str] = {}
+    others = []
+    for field in fields:
+        name, _, value = field.partition(" ")
+        if name in COLUMNS:
+            known[name] = value
+        else:
+            others.append(field)
+    return what, known, others
+
+
+def table(lines: list[str]) -> str:
+    rows = [("", *COLUMNS, "")]
+    for line in lines:
+        what, known, others = parse(line)
+        rows.append((what, *(known.get(name, "") for name in COLUMNS), ", ".join(others)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(
+            [row[0].ljust(widths[0])]
+            + [cell.rjust(width) for cell, width in zip(row[1:-1], widths[1:-1], strict=True)]
+            + [row[-1]]
+        ).rstrip()
+        for row in rows
+    )
+
+
+def main() -> None:
+    if len(sys.argv) != 2:
+        sys.exit(f"usage: {sys.argv[0]} build/Testing/Temporary/LastTest.log")
+    text = Path(sys.argv[1]).read_text(encoding="utf-8", errors="replace")
+    lines = [line.strip() for line in text.splitlines() if line.startswith(PREFIX)]
+    if not lines:
+        sys.exit(f"{sys.argv[1]} tells of no campaign")
+    print(table(lines))
+
+
+if __name__ == "__main__":
+    main()
