@@ -127,12 +127,16 @@ enum status integrator_configure(struct integrator *integrator,
     }
     integrator->settings = *settings;
     integrator->settings.absolute_tolerances = NULL;
+    integrator->settings.max_step = 0.0;
     memcpy(small_vector_data(integrator->absolute_tolerances), settings->absolute_tolerances,
            integrator->ode.state_count * sizeof(double));
-    int flag = method->configure(integrator);
-    if (flag >= 0 && is_new) {
-        flag = warm_up(integrator);
+    int flag = 0;
+    if (is_new) { // before any limit: short steps would make it long
+        flag = method->configure(integrator);
+        flag = flag < 0 ? flag : warm_up(integrator);
     }
+    integrator->settings.max_step = settings->max_step;
+    flag = flag < 0 ? flag : method->configure(integrator);
     integrator->statistics = (struct integrator_statistics){0};
     integrator->counted = (struct integrator_statistics){0};
     return method->status_of_flag(integrator, flag);
