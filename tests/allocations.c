@@ -1,6 +1,6 @@
 #include "allocations.h"
 
-#include <stddef.h>
+#include <stdlib.h>
 
 static long count;
 
@@ -8,25 +8,47 @@ long allocation_count(void) {
     return count;
 }
 
-// the names are the linker's for --wrap
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t items, size_t size);
-void *__real_realloc(void *memory, size_t size);
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t items, size_t size);
-void *__wrap_realloc(void *memory, size_t size);
+#ifdef __SANITIZE_ADDRESS__
 
-void *__wrap_malloc(size_t size) {
+#include <sanitizer/allocator_interface.h>
+
+static void count_one(const volatile void *memory, size_t size) {
+    (void)memory;
+    (void)size;
     count++;
-    return __real_malloc(size);
 }
 
-void *__wrap_calloc(size_t items, size_t size) {
-    count++;
-    return __real_calloc(items, size);
+static void ignore(const volatile void *memory) {
+    (void)memory;
 }
 
-void *__wrap_realloc(void *memory, size_t size) {
-    count++;
-    return __real_realloc(memory, size);
+__attribute__((constructor)) static void install(void) {
+    (void)__sanitizer_install_malloc_and_free_hooks(count_one, ignore);
 }
+
+#else
+
+// glibc calls a program's own functions of these names in place of its own, and so does all that
+// the program loads; these are those behind them
+void *__libc_malloc(size_t size);
+void *__libc_calloc(size_t items, size_t size);
+void *__libc_realloc(void *memory, size_t size);
+
+#define EXPORTED __attribute__((visibility("default")))
+
+EXPORTED void *malloc(size_t size) {
+    count++;
+    return __libc_malloc(size);
+}
+
+EXPORTED void *calloc(size_t items, size_t size) {
+    count++;
+    return __libc_calloc(items, size);
+}
+
+EXPORTED void *realloc(void *memory, size_t size) {
+    count++;
+    return __libc_realloc(memory, size);
+}
+
+#endif

@@ -1,4 +1,4 @@
-/* Counts allocations: link with allocations.c and the option --wrap for each function. */
+/* Counts allocations of the program and of all that it loads: link with allocations.c. */
 #ifndef ALLOCATIONS_H
 #define ALLOCATIONS_H
 

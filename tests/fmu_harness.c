@@ -179,6 +179,13 @@ void fmu_initialize(fmi2Component component, double start, double tolerance) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(component));
 }
 
+fmi2Component fmu_initialized_with(fmi2Integer method, struct fmu_log *log, double start) {
+    const fmi2Component component = fmu_instantiate(log, false);
+    fmu_set_integer(component, RP_MANIPULATOR_solver_method, method);
+    fmu_initialize(component, start, 0.0);
+    return component;
+}
+
 fmi2Component fmu_initialized(struct fmu_log *log, double start) {
     const fmi2Component component = fmu_instantiate(log, false);
     fmu_initialize(component, start, 0.0);
@@ -196,6 +203,16 @@ void fmu_set(fmi2Component component, fmi2ValueReference reference, double value
 double fmu_get(fmi2Component component, fmi2ValueReference reference) {
     double value = 0.0;
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(component, &reference, 1, &value));
+    return value;
+}
+
+void fmu_set_integer(fmi2Component component, fmi2ValueReference reference, fmi2Integer value) {
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(component, &reference, 1, &value));
+}
+
+fmi2Integer fmu_get_integer(fmi2Component component, fmi2ValueReference reference) {
+    fmi2Integer value = 0;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetInteger(component, &reference, 1, &value));
     return value;
 }
 

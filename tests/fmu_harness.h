@@ -66,14 +66,22 @@ void fmu_tear_down(const struct fmu_log *log);
 /* SetupExperiment to ExitInitializationMode; tolerance 0: not defined. No stop time. */
 void fmu_initialize(fmi2Component component, double start, double tolerance);
 
-/* An instance between steps, at time start. */
+/* An instance between steps, at time start; with the default method or this one. */
 fmi2Component fmu_initialized(struct fmu_log *log, double start);
+fmi2Component fmu_initialized_with(fmi2Integer method, struct fmu_log *log, double start);
 
 /* One Real; the test fails unless the status is fmi2OK. */
 void fmu_set(fmi2Component component, fmi2ValueReference reference, double value);
 double fmu_get(fmi2Component component, fmi2ValueReference reference);
 
 fmi2Status fmu_try_set(fmi2Component component, fmi2ValueReference reference, double value);
+
+/* One Integer or Enumeration, likewise. */
+void fmu_set_integer(fmi2Component component, fmi2ValueReference reference, fmi2Integer value);
+fmi2Integer fmu_get_integer(fmi2Component component, fmi2ValueReference reference);
+
+/* Values of solver_method. */
+enum { FMU_CVODE_ADAMS = 1, FMU_CVODE_BDF = 2, FMU_ERK = 3, FMU_METHODS };
 
 /* All variables, each in the place of its row in fmu_variables. */
 struct fmu_values {

@@ -141,6 +141,21 @@ static const struct fmu_operation lasting[] = {
     {.kind = FMU_SET, .reference = RP_MANIPULATOR_f2, .value = -20.0},
 };
 
+fmi2Component fmu_lasting(fmi2Integer method, struct fmu_log *log) {
+    const fmi2Component component = fmu_instantiate(log, false);
+    fmu_set_integer(component, RP_MANIPULATOR_solver_method, method);
+    for (size_t i = 0; i < FMU_COUNT(lasting); i++) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_apply(component, &lasting[i]));
+    }
+    fmu_initialize(component, 0.0, 0.0);
+    return component;
+}
+
+static struct fmu_operation set_integer(fmi2ValueReference reference, unsigned value) {
+    return (struct fmu_operation){
+        .kind = FMU_SET_INTEGER, .reference = reference, .order = (fmi2Integer)value};
+}
+
 static void add_initialization(struct fmu_sequence *sequence, struct fmu_random *random,
                                unsigned seed) {
     static const double starts[] = {0.0, 0.0, -0.5, 1000.0};
@@ -157,10 +172,12 @@ static void add_initialization(struct fmu_sequence *sequence, struct fmu_random 
     for (size_t i = 0; holds_long(seed) && i < FMU_COUNT(lasting); i++) {
         add(sequence, lasting[i]);
     }
+    add(sequence, set_integer(RP_MANIPULATOR_solver_method, 1 + seed % (FMU_METHODS - 1)));
+    if (seed % 4 == 3) {
+        add(sequence, set_within(random, &(struct range){RP_MANIPULATOR_max_step, 0.002, 0.05}));
+    }
     if (seed % 10 == 0) {
-        add(sequence, (struct fmu_operation){.kind = FMU_SET_INTEGER,
-                                             .reference = RP_MANIPULATOR_max_internal_steps,
-                                             .order = 40});
+        add(sequence, set_integer(RP_MANIPULATOR_max_internal_steps, 40));
     }
     sequence->end = starts[fmu_random_below(random, FMU_COUNT(starts))];
     add(sequence,

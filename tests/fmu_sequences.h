@@ -45,9 +45,14 @@ struct fmu_sequence {
     double end;           /* s: time after the last operation */
 };
 
-/* In every tenth, steps may fail for want of internal steps; every 25th begins with thousands of
- * internal steps in which nothing is set. */
+/* The method of integration, one of all, goes with the seed: seed % 3 is enough to run them all. In
+ * every fourth the internal steps are limited; in every tenth, steps may fail for want of them;
+ * every 25th begins with thousands of them in which nothing is set. */
 void fmu_sequence_make(struct fmu_sequence *sequence, unsigned seed);
+
+/* An instance initialized at 0 s in a motion in which nothing has to be set for thousands of
+ * internal steps, because it does not slow down. */
+fmi2Component fmu_lasting(fmi2Integer method, struct fmu_log *log);
 
 fmi2Status fmu_apply(fmi2Component component, const struct fmu_operation *operation);
 
