@@ -99,6 +99,9 @@ static int warm_up(struct integrator *integrator) {
     integrator->ode.rhs = rest;
     integrator->ode.jacobian = rest_jacobian;
     integrator->ode.context = &state_count;
+    // what the last method has left may not be finite
+    N_VConst(0.0, integrator->x);
+    N_VConst(0.0, integrator->last_x);
     int flag = integrator->method->restart(integrator);
     if (flag >= 0) {
         flag = integrator->method->advance(integrator, 1.0, 100, &stopped_at);

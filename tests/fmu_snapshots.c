@@ -74,11 +74,13 @@ void fmu_restore_bytes(fmi2Component component, const struct fmu_bytes *bytes) {
 
 const double fmu_used_until = 0.625;
 
-fmi2Component fmu_used(struct fmu_log *log) {
+fmi2Component fmu_used(fmi2Integer method, struct fmu_log *log) {
     const fmi2Integer order = 2;
     const fmi2ValueReference f2 = RP_MANIPULATOR_f2;
     const double slope = 3.0;
     const fmi2Component c = fmu_instantiate(log, false);
+    fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
+    fmu_set(c, RP_MANIPULATOR_max_step, 0.03125);
     fmu_set(c, RP_MANIPULATOR_q1, 0.25);
     fmu_set(c, RP_MANIPULATOR_m1, 1.5);
     fmu_initialize(c, 0.5, 1e-7);

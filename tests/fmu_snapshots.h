@@ -32,7 +32,7 @@ void fmu_restore_bytes(fmi2Component component, const struct fmu_bytes *bytes);
 /* ---- An instance to save -------------------------------------------------------------------- */
 
 /* Between steps, at time fmu_used_until (s), everything set that can be. */
-fmi2Component fmu_used(struct fmu_log *log);
+fmi2Component fmu_used(fmi2Integer method, struct fmu_log *log);
 extern const double fmu_used_until;
 
 /* One step from there; values are those after it. */

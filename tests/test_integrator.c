@@ -335,6 +335,27 @@ static void test_no_step_is_longer_than_the_limit(void) {
     }
 }
 
+/* Whatever state the one before ended with. */
+static void test_another_method_may_take_over(void) {
+    static const double not_finite[2] = {NAN, INFINITY};
+    const double absolute[2] = {1e-12, 1e-12};
+    double x[2];
+    double expected[2];
+    restart(INFINITY);
+    advance(1.0, expected);
+    for (enum integrator_method other = INTEGRATOR_CVODE_ADAMS; other < INTEGRATOR_METHODS;
+         other++) {
+        const struct integrator_settings settings = {
+            .method = other, .relative_tolerance = 1e-10, .absolute_tolerances = absolute};
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, not_finite, INFINITY, 0.0));
+    }
+    configure(1e-10);
+    restart(INFINITY);
+    advance(1.0, x);
+    TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
+}
+
 static void test_destroying_nothing_is_allowed(void) {
     integrator_destroy(NULL);
 }
@@ -353,6 +374,7 @@ static void run_with(enum integrator_method with) {
     RUN_TEST(test_a_restart_after_a_failure_works);
     RUN_TEST(test_nothing_is_allocated_after_creation);
     RUN_TEST(test_no_step_is_longer_than_the_limit);
+    RUN_TEST(test_another_method_may_take_over);
     RUN_TEST(test_destroying_nothing_is_allowed);
     if (method != INTEGRATOR_ERK) {
         RUN_TEST(test_asking_for_more_points_costs_no_steps);
