@@ -1,5 +1,7 @@
 #include "fmu_harness.h"
 
+#include "fmu_model_exchange.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -259,43 +261,59 @@ void fmu_assert_in_error(fmi2Component component) {
 static const double run_start = 0.5;
 static const double run_step = 0.01;
 
-fmi2Status fmu_run_start(fmi2Component component, unsigned variant) {
+fmi2Status fmu_run_start(fmi2Type type, fmi2Component component, unsigned variant) {
     const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                              RP_MANIPULATOR_dq1, RP_MANIPULATOR_m2};
     const double values[] = {0.3 + 0.01 * variant, 0.1, -0.5, 1.5};
     fmi2Status status = fmu.SetReal(component, references, 4, values);
+    if (type == fmi2ModelExchange) {
+        return worse(status, fmu_me_enter_continuous_time(component, run_start));
+    }
     status = worse(status, fmu.SetupExperiment(component, fmi2False, 0, run_start, fmi2False, 0));
     status = worse(status, fmu.EnterInitializationMode(component));
     return worse(status, fmu.ExitInitializationMode(component));
 }
 
 /* The inputs change at every third step: the integrator both goes on and restarts. */
-fmi2Status fmu_run_step(fmi2Component component, unsigned step, struct fmu_run *run) {
+fmi2Status fmu_run_step(fmi2Type type, fmi2Component component, unsigned step,
+                        struct fmu_run *run) {
     const fmi2ValueReference references[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
     const double values[] = {step / 3 % 5 - 2.0, 0.5 * (step / 3)};
+    const double time = run_start + step * run_step;
     fmi2Status status = fmu.SetReal(component, references, 2, values);
-    status = worse(status, fmu.DoStep(component, run_start + step * run_step, run_step, fmi2True));
+    status =
+        worse(status, type == fmi2ModelExchange ? fmu_me_step(component, time, run_step)
+                                                : fmu.DoStep(component, time, run_step, fmi2True));
     return worse(status, fmu_get_all(component, &run->after[step]));
 }
 
-fmi2Status fmu_run(fmi2Component component, unsigned variant, struct fmu_run *run) {
+fmi2Status fmu_run_as(fmi2Type type, fmi2Component component, unsigned variant,
+                      struct fmu_run *run) {
     memset(run, 0, sizeof *run);
-    fmi2Status status = fmu_run_start(component, variant);
+    fmi2Status status = fmu_run_start(type, component, variant);
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
-        status = worse(status, fmu_run_step(component, i, run));
+        status = worse(status, fmu_run_step(type, component, i, run));
     }
     return status;
 }
 
-void fmu_assert_reset_is_fresh(fmi2Component component, const char *message) {
+fmi2Status fmu_run(fmi2Component component, unsigned variant, struct fmu_run *run) {
+    return fmu_run_as(fmi2CoSimulation, component, variant, run);
+}
+
+void fmu_assert_reset_is_fresh_as(fmi2Type type, fmi2Component component, const char *message) {
     static struct fmu_run fresh;
     static struct fmu_run again;
     static struct fmu_log log;
-    const fmi2Component other = fmu_instantiate(&log, false);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu_run(other, 0, &fresh), message);
+    const fmi2Component other = fmu_instantiate_as(type, &log, false);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu_run_as(type, other, 0, &fresh), message);
     fmu_free(other);
 
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.Reset(component), message);
-    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu_run(component, 0, &again), message);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu_run_as(type, component, 0, &again), message);
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&fresh, &again, sizeof fresh, message);
+}
+
+void fmu_assert_reset_is_fresh(fmi2Component component, const char *message) {
+    fmu_assert_reset_is_fresh_as(fmi2CoSimulation, component, message);
 }

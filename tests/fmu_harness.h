@@ -107,13 +107,17 @@ struct fmu_run {
     struct fmu_values after[FMU_RUN_STEPS];
 };
 
-/* From an instance that was just made or reset. The variant decides the start values. Nothing is
- * asserted, so that threads may call these: they return the worst status of all calls. */
-fmi2Status fmu_run_start(fmi2Component component, unsigned variant);
-fmi2Status fmu_run_step(fmi2Component component, unsigned step, struct fmu_run *run);
+/* From an instance that was just made or reset, as a master for its kind does. The variant decides
+ * the start values. Nothing is asserted, so that threads may call these: they return the worst
+ * status of all calls. */
+fmi2Status fmu_run_start(fmi2Type type, fmi2Component component, unsigned variant);
+fmi2Status fmu_run_step(fmi2Type type, fmi2Component component, unsigned step, struct fmu_run *run);
+fmi2Status fmu_run_as(fmi2Type type, fmi2Component component, unsigned variant,
+                      struct fmu_run *run);
 fmi2Status fmu_run(fmi2Component component, unsigned variant, struct fmu_run *run);
 
 /* Resets the instance; its run then has the bits of a fresh instance's. */
+void fmu_assert_reset_is_fresh_as(fmi2Type type, fmi2Component component, const char *message);
 void fmu_assert_reset_is_fresh(fmi2Component component, const char *message);
 
 #endif

@@ -212,11 +212,11 @@ static void test_interleaved_instances_do_not_disturb_each_other(void) {
     memset(together, 0, sizeof together);
     for (unsigned i = 0; i < INSTANCES; i++) {
         c[i] = fmu_instantiate(&messages, false);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(c[i], i));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2CoSimulation, c[i], i));
     }
     for (unsigned step = 0; step < FMU_RUN_STEPS; step++) {
         for (unsigned i = 0; i < INSTANCES; i++) {
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(c[i], step, &together[i]));
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2CoSimulation, c[i], step, &together[i]));
         }
     }
     TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);

@@ -202,7 +202,7 @@ static void test_wrong_sizes_and_missing_arrays_are_errors(void) {
                 TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, status, name);
                 TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2Error]);
                 fmu_assert_in_error(c);
-                fmu_me_assert_reset_is_fresh(c, name);
+                fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, name);
             }
             TEST_ASSERT_EQUAL_DOUBLE(1.0, x[FMU_STATES]);
             fmu_free(c);
@@ -231,7 +231,7 @@ static void test_a_time_that_is_not_finite_is_refused(void) {
         TEST_ASSERT_TRUE(status == fmi2Discard || status == fmi2Error);
         TEST_ASSERT_EQUAL_UINT(1, messages.count[status]);
         TEST_ASSERT_EQUAL_DOUBLE(1.0, fmu_get(c, RP_MANIPULATOR_time));
-        fmu_me_assert_reset_is_fresh(c, "after a time that is not finite");
+        fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after a time that is not finite");
         fmu_log_clear(&messages);
     }
 }

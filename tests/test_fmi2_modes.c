@@ -98,7 +98,7 @@ static void test_parameters_without_inertia_are_refused(void) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.ExitInitializationMode(c));
     fmu_assert_logged(&messages, "lc1 = 0");
-    fmu_me_assert_reset_is_fresh(c, "after an initialization without inertia");
+    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an initialization without inertia");
 
     fmu_log_clear(&messages);
     c = fmu_me_initialized(&messages, 0.0);
@@ -106,7 +106,7 @@ static void test_parameters_without_inertia_are_refused(void) {
     set_no_inertia(c);
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterContinuousTimeMode(c));
     fmu_assert_logged(&messages, "lc1 = 0");
-    fmu_me_assert_reset_is_fresh(c, "after an event without inertia");
+    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an event without inertia");
 }
 
 /* ---- Rollback ------------------------------------------------------------------------------- */
@@ -116,20 +116,20 @@ static void test_rollback_is_exact(void) {
     static struct fmu_run expected;
     static struct fmu_run run;
     const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run(plain, 0, &expected));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
 
     const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_start(c, 0));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, c, 0));
     memset(&run, 0, sizeof run);
     fmi2FMUstate saved[FMU_RUN_STEPS];
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
         saved[i] = fmu_save(c);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_step(c, i, &run));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, i, &run));
         if (i % 4 == 3) { // go back, and repeat without saving
             fmu_restore(c, saved[i - 2]);
             for (unsigned again = i - 2; again <= i; again++) {
                 memset(&run.after[again], 0, sizeof run.after[again]);
-                TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_step(c, again, &run));
+                TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, again, &run));
             }
         }
     }
@@ -140,18 +140,18 @@ static void test_another_instance_goes_on_from_the_bytes(void) {
     static struct fmu_run expected;
     static struct fmu_run run;
     const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run(plain, 0, &expected));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
 
     memset(&run, 0, sizeof run);
     fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_start(c, 0));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, c, 0));
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
         struct fmu_bytes bytes = fmu_save_bytes(c);
         fmu_free(c);
         c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
         fmu_restore_bytes(c, &bytes);
         fmu_bytes_free(&bytes);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_step(c, i, &run));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, i, &run));
     }
     TEST_ASSERT_EQUAL_MEMORY(&expected, &run, sizeof run);
 }
@@ -164,18 +164,18 @@ static void test_both_kinds_side_by_side(void) {
     const fmi2Component own = fmu_instantiate(&messages, false);
     const fmi2Component other = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(own, 2, &alone[0]));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run(other, 2, &alone[1]));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, other, 2, &alone[1]));
     fmu_free(own);
     fmu_free(other);
 
     memset(together, 0, sizeof together);
     const fmi2Component c = fmu_instantiate(&messages, false);
     const fmi2Component m = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(c, 2));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_start(m, 2));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2CoSimulation, c, 2));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, m, 2));
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(c, i, &together[0]));
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_run_step(m, i, &together[1]));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2CoSimulation, c, i, &together[0]));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, m, i, &together[1]));
     }
     TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);
 }
@@ -185,7 +185,7 @@ static void test_reset_keeps_the_kind(void) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_enter_continuous_time(c, 0.0));
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, 0.0, 0.1, fmi2True));
-    fmu_me_assert_reset_is_fresh(c, "after a reset");
+    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after a reset");
 }
 
 int main(int argc, char **argv) {

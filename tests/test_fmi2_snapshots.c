@@ -45,8 +45,7 @@ static void go_elsewhere(fmi2Type type, fmi2Component c, int where) {
         break;
     default:
         TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
-        TEST_ASSERT_EQUAL_INT(fmi2OK, type == fmi2CoSimulation ? fmu_run(c, 5, &run)
-                                                               : fmu_me_run(c, 5, &run));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(type, c, 5, &run));
         break;
     }
 }

@@ -146,14 +146,6 @@ static void assert_saved_state_leads_back(const struct pair *pair, fmi2Component
     assert_refused(pair, c);
 }
 
-static void assert_reset_is_fresh(const struct pair *pair, fmi2Component c) {
-    if (pair->type == fmi2CoSimulation) {
-        fmu_assert_reset_is_fresh(c, pair->text);
-    } else {
-        fmu_me_assert_reset_is_fresh(c, pair->text);
-    }
-}
-
 static void check(const struct pair *pair) {
     const char *states = allowed_states(pair->type, pair->function);
     TEST_ASSERT_NOT_NULL_MESSAGE(states, pair->text);
@@ -171,7 +163,7 @@ static void check(const struct pair *pair) {
         assert_refused(pair, c);
         assert_saved_state_leads_back(pair, c, saved);
     }
-    assert_reset_is_fresh(pair, c);
+    fmu_assert_reset_is_fresh_as(pair->type, c, pair->text);
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.FreeFMUstate(c, &saved), pair->text);
     fmu_free(c);
 }

@@ -1,4 +1,5 @@
 /* What the motion of the arm conserves, through the slave and the integrator. */
+#include "last_text.h"
 #include "rp_model.h"
 #include "slave.h"
 #include "unit.h"
@@ -9,15 +10,8 @@
 
 static struct slave *slave;
 
-static void print(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
-    TEST_MESSAGE(text);
-}
-
 void setUp(void) {
-    const struct message_sink sink = {.write = print};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&unit, &sink, &slave));
+    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
 }
 
 void tearDown(void) {
@@ -26,19 +20,19 @@ void tearDown(void) {
 
 static double get(unsigned reference) {
     double value = NAN;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_get_real(slave, &reference, 1, &value));
+    ASSERT_OK(slave_get_real(slave, &reference, 1, &value));
     return value;
 }
 
 static void set(unsigned reference, double value) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_set_real(slave, &reference, 1, &value));
+    ASSERT_OK(slave_set_real(slave, &reference, 1, &value));
 }
 
 static void initialize(double tolerance) {
     const struct slave_experiment experiment = {.tolerance_defined = true, .tolerance = tolerance};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+    ASSERT_OK(slave_setup_experiment(slave, &experiment));
+    ASSERT_OK(slave_enter_initialization(slave));
+    ASSERT_OK(slave_exit_initialization(slave));
 }
 
 static double momentum(void) {
@@ -59,7 +53,7 @@ static void test_free_motion_conserves_energy(void) {
         double scale = 0.0;
         double drift = 0.0;
         for (int i = 0; i < 500; i++) {
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_do_step(slave, 0.01 * i, 0.01));
+            ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
             scale = fmax(scale, fabs(get(RP_MANIPULATOR_kinetic_energy)) +
                                     fabs(get(RP_MANIPULATOR_potential_energy)));
             drift = fmax(drift, fabs(get(RP_MANIPULATOR_total_energy) - start));
@@ -84,7 +78,7 @@ static void test_horizontal_motion_conserves_the_generalized_momentum(void) {
         double dq1 = 0.0;
         for (int i = 0; i < 500; i++) {
             set(RP_MANIPULATOR_f2, -9.0 * get(RP_MANIPULATOR_q2));
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_do_step(slave, 0.01 * i, 0.01));
+            ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
             scale = fmax(scale, fabs(get(RP_MANIPULATOR_kinetic_energy)));
             drift = fmax(drift, fabs(momentum() - start));
             dq1 = fmax(dq1, fabs(get(RP_MANIPULATOR_dq1) - 3.0));
@@ -103,7 +97,7 @@ static void test_the_energy_gained_is_the_work_of_the_efforts(void) {
     set(RP_MANIPULATOR_f2, force);
     const double start = get(RP_MANIPULATOR_total_energy);
     for (int i = 0; i < 200; i++) {
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
         const double work = torque * get(RP_MANIPULATOR_q1) + force * get(RP_MANIPULATOR_q2);
         const double scale = fabs(get(RP_MANIPULATOR_kinetic_energy)) +
                              fabs(get(RP_MANIPULATOR_potential_energy)) + fabs(work);
@@ -118,7 +112,7 @@ static void test_joint_loads_that_drive_are_the_efforts(void) {
         const double force = 9.0 * cos(0.07 * i);
         set(RP_MANIPULATOR_tau1, torque);
         set(RP_MANIPULATOR_f2, force);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
         const double scale = 1.0 + fabs(get(RP_MANIPULATOR_f1_x)) + fabs(get(RP_MANIPULATOR_f2_x));
         TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, torque, get(RP_MANIPULATOR_tau1_y));
         TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, force, get(RP_MANIPULATOR_f2_z));

@@ -1,5 +1,6 @@
 /* The controller: its law with the arm that it drives, and its integral part through the slave and
  * the integrator. tests/test_controller.py compares values and derivatives with sympy. */
+#include "last_text.h"
 #include "rp_controller_model.h"
 #include "rp_controller_propagation.h"
 #include "rp_test_support.h"
@@ -15,15 +16,8 @@
 static struct slave *slave;
 static struct rp_test_random random_source;
 
-static void print(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
-    TEST_MESSAGE(text);
-}
-
 void setUp(void) {
-    const struct message_sink sink = {.write = print};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&unit, &sink, &slave));
+    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
     random_source.state = 4;
 }
 
@@ -180,12 +174,12 @@ static void test_calculated_fields_are_written_and_not_read(void) {
 
 static double get(unsigned reference) {
     double value = NAN;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_get_real(slave, &reference, 1, &value));
+    ASSERT_OK(slave_get_real(slave, &reference, 1, &value));
     return value;
 }
 
 static void set(unsigned reference, double value) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_set_real(slave, &reference, 1, &value));
+    ASSERT_OK(slave_set_real(slave, &reference, 1, &value));
 }
 
 /* PD of joint 1, by itself: u = M (Kp e + Kd de + w). */
@@ -195,7 +189,7 @@ static const double e = 0.25, de = -0.5;
 static void start(double gain, double tracking_time, double w) {
     const unsigned mode = RP_CONTROLLER_mode;
     const int pd = RP_CONTROLLER_PD;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_set_integer(slave, &mode, 1, &pd));
+    ASSERT_OK(slave_set_integer(slave, &mode, 1, &pd));
     set(RP_CONTROLLER_inertia1, M);
     set(RP_CONTROLLER_Kp1, Kp);
     set(RP_CONTROLLER_Kd1, Kd);
@@ -206,14 +200,13 @@ static void start(double gain, double tracking_time, double w) {
     set(RP_CONTROLLER_q1_ref, e);
     set(RP_CONTROLLER_dq1, -de);
     const struct slave_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+    ASSERT_OK(slave_setup_experiment(slave, &experiment));
+    ASSERT_OK(slave_enter_initialization(slave));
+    ASSERT_OK(slave_exit_initialization(slave));
 }
 
 static void step_to(double t) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                          slave_do_step(slave, slave_time(slave), t - slave_time(slave)));
+    ASSERT_OK(slave_do_step(slave, slave_time(slave), t - slave_time(slave)));
 }
 
 /* Below the limit w' = Ki e: a ramp. At w = edge the effort meets the limit; from there on
@@ -314,8 +307,7 @@ static void test_integral_follows_extrapolated_inputs(void) {
     const unsigned references[] = {RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1};
     const int orders[] = {1, 2, 1};
     const double derivatives[] = {r - 1.0, b, -1.0};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                          slave_set_input_derivatives(slave, references, 3, orders, derivatives));
+    ASSERT_OK(slave_set_input_derivatives(slave, references, 3, orders, derivatives));
     step_to(h);
     ASSERT_CLOSE(1.0 + Ki * (e * h + r * h * h / 2.0 + b * h * h * h / 6.0),
                  get(RP_CONTROLLER_integral1), 1e-10);
