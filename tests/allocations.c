@@ -10,7 +10,10 @@ long allocation_count(void) {
 
 #ifdef __SANITIZE_ADDRESS__
 
-#include <sanitizer/allocator_interface.h>
+// the sanitizer's own functions stay; declared as in its allocator_interface.h, which not every gcc
+// comes with
+int __sanitizer_install_malloc_and_free_hooks(void (*allocated)(const volatile void *, size_t),
+                                              void (*freed)(const volatile void *));
 
 static void count_one(const volatile void *memory, size_t size) {
     (void)memory;
