@@ -89,6 +89,36 @@ static void test_a_reset_brings_the_default_method_back(void) {
     TEST_ASSERT_EQUAL_INT(FMU_CVODE_ADAMS, fmu_get_integer(c, RP_MANIPULATOR_solver_method));
 }
 
+/* Also of the solver nothing is left over: the same method again, after steps of all kinds that
+ * failed. */
+static void test_a_reset_leaves_nothing_of_what_failed(void) {
+    static const struct {
+        fmi2ValueReference reference;
+        double value, length;
+    } failures[] = {{RP_MANIPULATOR_dq1, 1e160, 0.1},     {RP_MANIPULATOR_dq2, 1e200, 0.1},
+                    {RP_MANIPULATOR_f2, 1e300, 0.1},      {RP_MANIPULATOR_dq1, 1.0, 1e-160},
+                    {RP_MANIPULATOR_dq1, 1.0, 1e300},     {RP_MANIPULATOR_tau1, 1.7e308, 1.0},
+                    {RP_MANIPULATOR_max_step, 1e-20, 1.0}};
+    static struct fmu_run expected;
+    static struct fmu_run again;
+    const fmi2Component fresh = fmu_instantiate(&messages, false);
+    fmu_set_integer(fresh, RP_MANIPULATOR_solver_method, method);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(fresh, 0, &expected));
+
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    for (size_t i = 0; i < FMU_COUNT(failures); i++) {
+        fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
+        fmu_set(c, failures[i].reference, failures[i].value);
+        fmu_initialize(c, 0.0, 0.0);
+        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, 0.0, failures[i].length, fmi2True));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+        fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(c, 0, &again));
+        TEST_ASSERT_EQUAL_MEMORY(&expected, &again, sizeof expected);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    }
+}
+
 /* CVODE goes past communication points with held inputs; the Runge-Kutta method ends there. */
 static void test_internal_steps_over_communication_points(void) {
     enum { STEPS = 1000 };
@@ -204,6 +234,7 @@ int main(int argc, char **argv) {
     for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
         RUN_TEST(test_the_order_is_one_of_the_method);
         RUN_TEST(test_a_reset_brings_the_default_method_back);
+        RUN_TEST(test_a_reset_leaves_nothing_of_what_failed);
         RUN_TEST(test_internal_steps_over_communication_points);
         RUN_TEST(test_no_internal_step_is_longer_than_the_limit);
         RUN_TEST(test_no_limit_and_one_that_is_not_reached_change_nothing);

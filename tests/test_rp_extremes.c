@@ -9,6 +9,7 @@
 #include <unity.h>
 
 static struct slave *slave;
+static int method;
 
 void setUp(void) {
     const struct message_sink quiet = {0};
@@ -29,17 +30,23 @@ static double get(unsigned reference) {
     return value;
 }
 
+static void initialize(void) {
+    const struct slave_experiment experiment = {.start_time = 0.0};
+    const unsigned reference = RP_MANIPULATOR_solver_method;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_set_integer(slave, &reference, 1, &method));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+}
+
 /* The horizontal plane without offset: link 2 alone slides uniformly or uniformly accelerated. */
 static void start_sliding(double dq2, double f2) {
-    const struct slave_experiment experiment = {.start_time = 0.0};
     slave_reset(slave);
     set(RP_MANIPULATOR_g, 0.0);
     set(RP_MANIPULATOR_a, 0.0);
     set(RP_MANIPULATOR_dq2, dq2);
     set(RP_MANIPULATOR_f2, f2);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+    initialize();
 }
 
 static void test_a_huge_speed_is_integrated_or_refused(void) {
@@ -50,7 +57,8 @@ static void test_a_huge_speed_is_integrated_or_refused(void) {
         const enum status status = slave_do_step(slave, 0.0, h);
         TEST_ASSERT_TRUE(status_severity(status) <= SEVERITY_DISCARD);
         TEST_ASSERT_DOUBLE_WITHIN(1e-7 * dq2 * h, dq2 * slave_time(slave), get(RP_MANIPULATOR_q2));
-        TEST_ASSERT_TRUE(status == STATUS_OK || exponent > 100);
+        // ARKODE gives up where its first guess of a step is too long by more than it may shrink it
+        TEST_ASSERT_TRUE(status == STATUS_OK || exponent > (method == INTEGRATOR_ERK ? 40 : 100));
     }
 }
 
@@ -78,28 +86,32 @@ static void test_tiny_steps_are_done_or_refused(void) {
         TEST_ASSERT_TRUE(status_severity(status) <= SEVERITY_DISCARD);
         TEST_ASSERT_DOUBLE_WITHIN(1e-7 * h + DBL_TRUE_MIN, slave_time(slave),
                                   get(RP_MANIPULATOR_q2));
-        // CVODE squares its step: below 1e-150 s that underflows
-        TEST_ASSERT_TRUE(status == STATUS_OK || exponent < -150);
+        // solvers square their step: below 1e-150 s that underflows, in ARKODE up to 1e-148 s where
+        // the step before has failed so
+        TEST_ASSERT_TRUE(status == STATUS_OK ||
+                         exponent < (method == INTEGRATOR_ERK ? -148 : -150));
     }
 }
 
-static void test_after_a_refused_step_the_state_is_that_of_the_time_reached(void) {
-    const struct slave_experiment experiment = {.start_time = 0.0};
+static void test_the_state_is_that_of_the_time_reached(void) {
     set(RP_MANIPULATOR_l1, 1e212);
     set(RP_MANIPULATOR_g, -9e-20);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_setup_experiment(slave, &experiment));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_enter_initialization(slave));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_exit_initialization(slave));
+    initialize();
     const enum status status = slave_do_step(slave, 0.0, 4e209);
-    TEST_ASSERT_EQUAL_INT(SEVERITY_DISCARD, status_severity(status));
+    // the arm is so long that it stays where it is, which the Runge-Kutta method can tell
+    TEST_ASSERT_EQUAL_INT(method == INTEGRATOR_ERK ? SEVERITY_NONE : SEVERITY_DISCARD,
+                          status_severity(status));
+    TEST_ASSERT_EQUAL_DOUBLE(status == STATUS_OK ? 4e209 : 0.0, slave_time(slave));
     TEST_ASSERT_TRUE(isfinite(get(RP_MANIPULATOR_q1)) && isfinite(get(RP_MANIPULATOR_q2)));
 }
 
 int main(void) {
     UNITY_BEGIN();
-    RUN_TEST(test_a_huge_speed_is_integrated_or_refused);
-    RUN_TEST(test_a_huge_force_is_integrated_or_refused);
-    RUN_TEST(test_tiny_steps_are_done_or_refused);
-    RUN_TEST(test_after_a_refused_step_the_state_is_that_of_the_time_reached);
+    for (method = INTEGRATOR_CVODE_ADAMS; method < INTEGRATOR_METHODS; method++) {
+        RUN_TEST(test_a_huge_speed_is_integrated_or_refused);
+        RUN_TEST(test_a_huge_force_is_integrated_or_refused);
+        RUN_TEST(test_tiny_steps_are_done_or_refused);
+        RUN_TEST(test_the_state_is_that_of_the_time_reached);
+    }
     return UNITY_END();
 }
