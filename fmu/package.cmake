@@ -41,7 +41,7 @@ function(add_fmu name)
     ${FMU_SOURCE_DIR}/fmi2_model_exchange.c)
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${name} PRIVATE ${name}_unit)
+  target_link_libraries(${name} PRIVATE ${name}_unit reserved_allocation)
   target_link_options(${name} PRIVATE
     -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now)
 

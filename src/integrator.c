@@ -23,6 +23,25 @@ static void forward_text(int error_code, const char *text, void *integrator_poin
                   "%s: %s", integrator->method->name, text);
 }
 
+/* Bytes: about twice what SUNDIALS 6.4 allocates for a context and the method that needs most, the
+ * one with matrices: 5.7 kB for 4 states, 15 kB for 20 and 185 kB for 100. */
+static size_t reserve_size(size_t n) {
+    return 12288 + sizeof(double) * (60 * n + 4 * n * n);
+}
+
+/* Context and vectors, which stay while methods change. */
+static enum status create_common(struct integrator *created) {
+    const sunindextype n = (sunindextype)created->ode.state_count;
+    const bool is_complete =
+        sundials_context_create(&created->context) == 0 &&
+        (created->x = small_vector_create(n, created->context)) != NULL &&
+        (created->last_x = small_vector_create(n, created->context)) != NULL &&
+        (created->absolute_tolerances = small_vector_create(n, created->context)) != NULL &&
+        (created->work = small_vector_create(n, created->context)) != NULL;
+    created->without_method = created->reserve.used;
+    return is_complete ? STATUS_OK : STATUS_OUT_OF_MEMORY;
+}
+
 enum status integrator_create(const struct ode *ode, const struct message_sink *sink,
                               struct integrator **integrator) {
     *integrator = NULL;
@@ -34,14 +53,15 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->sink = *sink;
     created->texts = (struct sundials_texts){.handle = forward_text, .context = created};
 
-    const sunindextype n = (sunindextype)ode->state_count;
-    if (sundials_context_create(&created->context) != 0 ||
-        (created->x = small_vector_create(n, created->context)) == NULL ||
-        (created->last_x = small_vector_create(n, created->context)) == NULL ||
-        (created->absolute_tolerances = small_vector_create(n, created->context)) == NULL ||
-        (created->work = small_vector_create(n, created->context)) == NULL) {
+    enum status status = STATUS_OUT_OF_MEMORY;
+    if (reserve_create(&created->reserve, reserve_size(ode->state_count))) {
+        reserve_enter(&created->reserve);
+        status = create_common(created);
+        reserve_leave(&created->reserve);
+    }
+    if (status != STATUS_OK) {
         integrator_destroy(created);
-        return STATUS_OUT_OF_MEMORY;
+        return status;
     }
     *integrator = created;
     return STATUS_OK;
@@ -50,6 +70,7 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
 static void destroy_method(struct integrator *integrator) {
     if (integrator->method != NULL) {
         integrator->method->destroy(integrator);
+        reserve_cut(&integrator->reserve, integrator->without_method);
     }
     integrator->method = NULL;
 }
@@ -58,6 +79,7 @@ void integrator_destroy(struct integrator *integrator) {
     if (integrator == NULL) {
         return;
     }
+    reserve_enter(&integrator->reserve);
     destroy_method(integrator);
     N_Vector const vectors[] = {integrator->x, integrator->last_x, integrator->absolute_tolerances,
                                 integrator->work};
@@ -69,6 +91,8 @@ void integrator_destroy(struct integrator *integrator) {
     if (integrator->context != NULL) {
         SUNContext_Free(&integrator->context);
     }
+    reserve_leave(&integrator->reserve);
+    reserve_destroy(&integrator->reserve);
     free(integrator);
 }
 
@@ -87,11 +111,15 @@ static enum status rest_jacobian(double t, const double x[], double J[], void *s
     return STATUS_OK;
 }
 
-/* Integrates x' = 0: solvers allocate what they need at their first step. */
+/* Integrates x' = 0: solvers allocate what they need at their first step. With settings of its own:
+ * the user's may ask for more steps than are spent here. */
 static int warm_up(struct integrator *integrator) {
     const struct ode ode = integrator->ode;
     size_t state_count = ode.state_count;
     double stopped_at = 0.0;
+    integrator->settings.relative_tolerance = 1e-3;
+    integrator->settings.max_step = 0.0;
+    N_VConst(1.0, integrator->absolute_tolerances);
     integrator->span = INFINITY;
     integrator->reached = 0.0;
     integrator->failed_at = -INFINITY;
@@ -102,7 +130,10 @@ static int warm_up(struct integrator *integrator) {
     // what the last method has left may not be finite
     N_VConst(0.0, integrator->x);
     N_VConst(0.0, integrator->last_x);
-    int flag = integrator->method->restart(integrator);
+    int flag = integrator->method->configure(integrator);
+    if (flag >= 0) {
+        flag = integrator->method->restart(integrator);
+    }
     if (flag >= 0) {
         flag = integrator->method->advance(integrator, 1.0, 100, &stopped_at);
     }
@@ -110,39 +141,45 @@ static int warm_up(struct integrator *integrator) {
     return flag;
 }
 
-enum status integrator_configure(struct integrator *integrator,
-                                 const struct integrator_settings *settings) {
+static enum status create_method(struct integrator *integrator, const struct method *method) {
+    destroy_method(integrator);
+    integrator->method = method;
+    const enum status status = method->create(integrator);
+    return status == STATUS_OK ? method->status_of_flag(integrator, warm_up(integrator)) : status;
+}
+
+/* Where this fails there is no method: the next call starts anew. */
+static enum status configure(struct integrator *integrator,
+                             const struct integrator_settings *settings) {
     static const struct method *const methods[INTEGRATOR_METHODS] = {
         [INTEGRATOR_CVODE_ADAMS] = &integrator_cvode_adams,
         [INTEGRATOR_CVODE_BDF] = &integrator_cvode_bdf,
         [INTEGRATOR_ERK] = &integrator_erk,
     };
     const struct method *method = methods[settings->method];
-    const bool is_new = integrator->method != method;
-    if (is_new) {
+    enum status status =
+        integrator->method == method ? STATUS_OK : create_method(integrator, method);
+    if (status == STATUS_OK) {
+        integrator->settings = *settings;
+        integrator->settings.absolute_tolerances = NULL;
+        memcpy(small_vector_data(integrator->absolute_tolerances), settings->absolute_tolerances,
+               integrator->ode.state_count * sizeof(double));
+        status = method->status_of_flag(integrator, method->configure(integrator));
+    }
+    if (status != STATUS_OK) {
         destroy_method(integrator);
-        integrator->method = method;
-        const enum status status = method->create(integrator);
-        if (status != STATUS_OK) {
-            destroy_method(integrator);
-            return status;
-        }
     }
-    integrator->settings = *settings;
-    integrator->settings.absolute_tolerances = NULL;
-    integrator->settings.max_step = 0.0;
-    memcpy(small_vector_data(integrator->absolute_tolerances), settings->absolute_tolerances,
-           integrator->ode.state_count * sizeof(double));
-    int flag = 0;
-    if (is_new) { // before any limit: short steps would make it long
-        flag = method->configure(integrator);
-        flag = flag < 0 ? flag : warm_up(integrator);
-    }
-    integrator->settings.max_step = settings->max_step;
-    flag = flag < 0 ? flag : method->configure(integrator);
+    return status;
+}
+
+enum status integrator_configure(struct integrator *integrator,
+                                 const struct integrator_settings *settings) {
+    reserve_enter(&integrator->reserve);
+    const enum status status = configure(integrator, settings);
+    reserve_leave(&integrator->reserve);
     integrator->statistics = (struct integrator_statistics){0};
     integrator->counted = (struct integrator_statistics){0};
-    return method->status_of_flag(integrator, flag);
+    return status;
 }
 
 bool integrator_has_history(const struct integrator *integrator) {

@@ -49,7 +49,8 @@ integrator_create(const struct ode *ode, const struct message_sink *sink,
 void integrator_destroy(struct integrator *integrator);
 
 /* Sets method, tolerances and limits and clears the statistics. Allocates all that the method
- * needs, where it is not the one before; nothing is allocated later. A restart must follow. */
+ * needs, where it is not the one before (in an FMU from the reserve of the handle, which cannot
+ * fail); nothing is allocated later. A restart must follow. On failure it must be called again. */
 __attribute__((nonnull, warn_unused_result)) enum status
 integrator_configure(struct integrator *integrator, const struct integrator_settings *settings);
 

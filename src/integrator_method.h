@@ -4,6 +4,7 @@
 #define INTEGRATOR_METHOD_H
 
 #include "integrator.h"
+#include "reserve.h"
 #include "small_vector.h"
 #include "sundials_compat.h"
 
@@ -15,6 +16,8 @@ struct integrator {
     struct ode ode;
     struct message_sink sink;
     struct sundials_texts texts;
+    struct reserve reserve;              /* for context, vectors and solver */
+    size_t without_method;               /* bytes of it */
     struct integrator_settings settings; /* without the tolerances of the states */
 
     const struct method *method; /* NULL before integrator_configure */

@@ -242,9 +242,12 @@ enum status slave_configure_integrator(struct slave *slave) {
                 absolute_fraction * variable->nominal * tolerance;
         }
     }
-    struct integrator_settings settings = slave->configured = settings_of(slave);
+    struct integrator_settings settings = settings_of(slave);
     settings.absolute_tolerances = absolute;
-    return integrator_configure(slave->integrator, &settings);
+    const enum status status = integrator_configure(slave->integrator, &settings);
+    slave->configured = status == STATUS_OK ? settings : (struct integrator_settings){0};
+    slave->configured.absolute_tolerances = NULL;
+    return status;
 }
 
 enum status slave_exit_initialization(struct slave *slave) {

@@ -1,0 +1,118 @@
+#include "reserve.h"
+
+#include <errno.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Threads that have entered a reserve: SUNDIALS passes nothing to malloc that could tell the
+ * instance. Thread-local storage would be the usual place, but in a shared object that is loaded
+ * later it either allocates at a thread's first access, and ends the process where that fails, or
+ * takes from room that the loader does not always get back: after a hundred cycles of loading and
+ * unloading three FMUs they could not be loaded any more. No lock: a thread of high priority would
+ * wait for one of low priority. */
+struct slot {
+    const void *_Atomic thread; /* NULL: free */
+    struct reserve *reserve;    /* that the thread entered last; of no concern to others */
+};
+
+/* More threads at once than this, each in the few microseconds of making or freeing a solver, have
+ * to wait. */
+enum { SLOTS = 256 };
+
+static struct slot slots[SLOTS];
+static atomic_size_t used_slots; /* all from this one on were always free */
+
+/* Every thread has an errno of its own. */
+static const void *this_thread(void) {
+    return &errno;
+}
+
+/* NULL: this thread has entered none. */
+static struct slot *own_slot(void) {
+    const size_t count = atomic_load_explicit(&used_slots, memory_order_relaxed);
+    for (size_t i = 0; i < count; i++) {
+        if (atomic_load_explicit(&slots[i].thread, memory_order_relaxed) == this_thread()) {
+            return &slots[i];
+        }
+    }
+    return NULL;
+}
+
+static struct slot *claim_slot(void) {
+    size_t i = 0;
+    const void *nobody = NULL;
+    while (!atomic_compare_exchange_strong(&slots[i].thread, &nobody, this_thread())) {
+        nobody = NULL;
+        i = (i + 1) % SLOTS;
+        if (i == 0) {
+            sched_yield();
+        }
+    }
+    size_t count = atomic_load(&used_slots);
+    while (count <= i && !atomic_compare_exchange_weak(&used_slots, &count, i + 1)) {
+    }
+    return &slots[i];
+}
+
+bool reserve_create(struct reserve *reserve, size_t size) {
+    *reserve = (struct reserve){.block = malloc(size)};
+    reserve->size = reserve->block != NULL ? size : 0;
+    return reserve->block != NULL;
+}
+
+void reserve_destroy(struct reserve *reserve) {
+    free(reserve->block);
+    *reserve = (struct reserve){0};
+}
+
+void reserve_enter(struct reserve *reserve) {
+    struct slot *slot = own_slot();
+    if (slot == NULL) {
+        slot = claim_slot();
+    }
+    reserve->outer = slot->reserve;
+    slot->reserve = reserve;
+}
+
+void reserve_leave(struct reserve *reserve) {
+    struct slot *slot = own_slot();
+    slot->reserve = reserve->outer;
+    if (slot->reserve == NULL) {
+        atomic_store_explicit(&slot->thread, NULL, memory_order_release);
+    }
+}
+
+/* The reserve that this thread entered last, or NULL. */
+static struct reserve *entered(void) {
+    const struct slot *slot = own_slot();
+    return slot != NULL ? slot->reserve : NULL;
+}
+
+void *reserve_take(size_t size) {
+    const size_t alignment = _Alignof(max_align_t);
+    struct reserve *reserve = entered();
+    const size_t left = reserve != NULL ? reserve->size - reserve->used : 0;
+    if (size >= left) { // even a block of no bytes must lie inside
+        return NULL;
+    }
+    void *taken = reserve->block + reserve->used;
+    const size_t with_padding = (size + alignment - 1) / alignment * alignment;
+    reserve->used += with_padding < left ? with_padding : left;
+    return memset(taken, 0, size);
+}
+
+size_t reserve_rest(const void *memory) {
+    const struct reserve *reserve = entered();
+    if (reserve == NULL) {
+        return 0;
+    }
+    const uintptr_t from_start = (uintptr_t)memory - (uintptr_t)reserve->block;
+    return from_start < reserve->size ? reserve->size - from_start : 0;
+}
+
+void reserve_cut(struct reserve *reserve, size_t used) {
+    reserve->used = used;
+}

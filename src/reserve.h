@@ -1,0 +1,43 @@
+/* Memory that is taken once for an instance and given out to SUNDIALS, whose allocations then
+ * cannot fail. Where they do, SUNDIALS 6 dereferences many of the null pointers, loses other blocks
+ * and prints to stderr.
+ *
+ * It works in what is linked with the library reserved_allocation, as every FMU is; elsewhere a
+ * reserve is never asked, and SUNDIALS allocates as usual. */
+#ifndef RESERVE_H
+#define RESERVE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct reserve {
+    char *block; /* NULL: there is none */
+    size_t size; /* bytes */
+    size_t used;
+    struct reserve *outer; /* that the thread had entered before */
+};
+
+/* False where memory is short; the reserve is then empty. */
+__attribute__((nonnull, warn_unused_result)) bool reserve_create(struct reserve *reserve,
+                                                                 size_t size);
+
+/* Frees all that was given out. Empty is allowed. */
+__attribute__((nonnull)) void reserve_destroy(struct reserve *reserve);
+
+/* Between the two, which the same thread calls, its allocations are served from the reserve. Pairs
+ * may be nested, as where a logger that SUNDIALS calls makes another instance. */
+__attribute__((nonnull)) void reserve_enter(struct reserve *reserve);
+__attribute__((nonnull)) void reserve_leave(struct reserve *reserve);
+
+/* Zeroed memory for any type from the reserve that this thread entered last. NULL where none is
+ * entered, or there is not enough left. */
+void *reserve_take(size_t size);
+
+/* Bytes from memory to the end of the reserve that this thread entered last; 0 where it lies
+ * elsewhere. A block that the reserve gave out is never freed by itself. */
+size_t reserve_rest(const void *memory);
+
+/* Takes back all that was given out since used was as much. */
+__attribute__((nonnull)) void reserve_cut(struct reserve *reserve, size_t used);
+
+#endif
