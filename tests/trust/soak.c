@@ -1,0 +1,232 @@
+/* Long runs in which the resident memory must stay where it is after a warm-up: instances that come
+ * and go, steps with snapshots, and loading and unloading of the shared object. */
+#define _GNU_SOURCE // mallinfo2, RTLD_NOLOAD
+
+#include "fmu_library.h"
+#include "value_references.h"
+
+#include <dlfcn.h>
+#include <malloc.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static const long growth_limit = 64; /* KiB after the warm-up */
+
+static struct fmu_functions fmu;
+static unsigned long findings;
+
+static void expect(bool is_right, const char *what) {
+    if (!is_right && findings++ < 10) {
+        printf("finding: %s\n", what);
+    }
+}
+
+/* The FMU has nothing to say in these runs. */
+static void receive(fmi2ComponentEnvironment environment, fmi2String instance_name,
+                    fmi2Status status, fmi2String category, fmi2String message, ...) {
+    (void)environment;
+    (void)instance_name;
+    (void)status;
+    (void)category;
+    expect(false, message);
+}
+
+/* ---- Memory --------------------------------------------------------------------------------- */
+
+/* KiB, but for used. Pages of files come and go as the kernel likes, 64 KiB at a time: what a leak
+ * makes grow are the others. */
+struct memory {
+    long resident; /* with pages of files */
+    long own;      /* resident without them */
+    long used;     /* bytes allocated */
+};
+
+static struct memory memory_now(void) {
+    const long page = sysconf(_SC_PAGESIZE) / 1024;
+    long size = 0;
+    long resident = 0;
+    long shared = 0;
+    FILE *file = fopen("/proc/self/statm", "r");
+    if (file == NULL || fscanf(file, "%ld %ld %ld", &size, &resident, &shared) != 3) {
+        expect(false, "/proc/self/statm cannot be read");
+    }
+    if (file != NULL) {
+        fclose(file);
+    }
+    return (struct memory){resident * page, (resident - shared) * page, (long)mallinfo2().uordblks};
+}
+
+/* ---- Instances ------------------------------------------------------------------------------ */
+
+static fmi2Component initialized(fmi2Type kind, fmi2Integer method) {
+    const fmi2CallbackFunctions callbacks = {.logger = receive};
+    const fmi2ValueReference integer = RP_MANIPULATOR_solver_method;
+    const fmi2ValueReference references[] = {RP_MANIPULATOR_g, RP_MANIPULATOR_dq1,
+                                             RP_MANIPULATOR_f2};
+    // the slide oscillates between a constant force inward and the centrifugal one, without end
+    const double values[] = {0.0, 10.0, -20.0};
+    const fmi2Component c =
+        fmu.Instantiate("soak", kind, RP_MANIPULATOR_GUID, NULL, &callbacks, fmi2False, fmi2False);
+    expect(c != NULL, "no instance");
+    expect(fmu.SetReal(c, references, 3, values) == fmi2OK, "start values");
+    expect(fmu.SetInteger(c, &integer, 1, &method) == fmi2OK, "method");
+    expect(fmu.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "experiment");
+    expect(fmu.EnterInitializationMode(c) == fmi2OK, "initialization");
+    expect(fmu.ExitInitializationMode(c) == fmi2OK, "end of initialization");
+    return c;
+}
+
+/* One step of 1 ms; the torque changes its sign at every third. */
+static double step(fmi2Component c, unsigned long i) {
+    const fmi2ValueReference input = RP_MANIPULATOR_tau1;
+    const fmi2ValueReference output = RP_MANIPULATOR_q2;
+    const double torque = i / 3 % 2 == 0 ? 0.5 : -0.5;
+    double q2 = NAN;
+    expect(fmu.SetReal(c, &input, 1, &torque) == fmi2OK, "input");
+    expect(fmu.DoStep(c, (double)i * 1e-3, 1e-3, fmi2True) == fmi2OK, "step");
+    expect(fmu.GetReal(c, &output, 1, &q2) == fmi2OK && isfinite(q2), "output");
+    return q2;
+}
+
+/* A step, undone and done again from the same bytes. */
+static double step_again(fmi2Component c, unsigned long i, bool as_bytes) {
+    fmi2FMUstate state = NULL;
+    fmi2FMUstate read = NULL;
+    fmi2Byte bytes[2048];
+    size_t size = 0;
+    expect(fmu.GetFMUstate(c, &state) == fmi2OK, "saving");
+    if (as_bytes) {
+        expect(fmu.SerializedFMUstateSize(c, state, &size) == fmi2OK && size <= sizeof bytes,
+               "size of a state");
+        expect(fmu.SerializeFMUstate(c, state, bytes, size) == fmi2OK, "serialization");
+        expect(fmu.DeSerializeFMUstate(c, bytes, size, &read) == fmi2OK, "deserialization");
+    }
+    const double first = step(c, i);
+    expect(fmu.SetFMUstate(c, as_bytes ? read : state) == fmi2OK, "restoring");
+    const double second = step(c, i);
+    expect(memcmp(&first, &second, sizeof first) == 0, "another value after a rollback");
+    expect(fmu.FreeFMUstate(c, &state) == fmi2OK && fmu.FreeFMUstate(c, &read) == fmi2OK,
+           "freeing a state");
+    return second;
+}
+
+/* ---- Cycles --------------------------------------------------------------------------------- */
+
+/* Instantiate, run, free; snapshots are freed by every other instance only. */
+static void live(unsigned long cycle) {
+    static double q2[3];
+    const fmi2Integer method = (fmi2Integer)(cycle % 3) + 1;
+    const bool is_model_exchange = cycle % 7 == 0;
+    const fmi2Component c =
+        initialized(is_model_exchange ? fmi2ModelExchange : fmi2CoSimulation, method);
+    fmi2FMUstate kept = NULL;
+    expect(fmu.GetFMUstate(c, &kept) == fmi2OK, "saving");
+    if (!is_model_exchange) {
+        double last = 0.0;
+        for (unsigned long i = 0; i < 5; i++) {
+            last = i == 3 ? step_again(c, i, cycle % 2 == 0) : step(c, i);
+        }
+        expect(cycle < 6 || memcmp(&q2[method - 1], &last, sizeof last) == 0,
+               "another result than in the first cycle");
+        q2[method - 1] = last;
+    }
+    if (cycle % 2 == 0) {
+        expect(fmu.FreeFMUstate(c, &kept) == fmi2OK, "freeing a state");
+    }
+    fmu.FreeInstance(c);
+}
+
+/* One of three instances, each with its own method, steps on. Every tenth step is undone once, and
+ * every hundredth from bytes. */
+static void step_on(unsigned long cycle) {
+    static fmi2Component instances[3];
+    const unsigned long i = cycle / 3;
+    fmi2Component *c = &instances[cycle % 3];
+    if (*c == NULL) {
+        *c = initialized(fmi2CoSimulation, (fmi2Integer)(cycle % 3) + 1);
+    }
+    (void)(i % 10 == 0 ? step_again(*c, i, i % 100 == 0) : step(*c, i));
+}
+
+static const char *paths[3];
+
+/* As importers do: load, instantiate, a few steps, free, unload. Two other FMUs are loaded
+ * meanwhile and unloaded in the same order. */
+static void reload(unsigned long cycle) {
+    void *others[2];
+    void *library = fmu_library_open(paths[0], &fmu);
+    if (library == NULL) {
+        expect(false, "the FMU cannot be loaded");
+        return;
+    }
+    for (int i = 0; i < 2; i++) {
+        others[i] = dlopen(paths[i + 1], RTLD_NOW | RTLD_LOCAL);
+        expect(others[i] != NULL, "another FMU cannot be loaded");
+    }
+    live(cycle);
+    expect(dlclose(library) == 0, "the FMU cannot be unloaded");
+    expect(dlopen(paths[0], RTLD_NOW | RTLD_NOLOAD) == NULL, "the FMU is still loaded");
+    for (int i = 0; i < 2; i++) {
+        if (others[i] != NULL) {
+            dlclose(others[i]);
+        }
+    }
+}
+
+/* ---- Campaigns ------------------------------------------------------------------------------ */
+
+static const struct campaign {
+    const char *name;
+    void (*cycle)(unsigned long number);
+    bool loads; /* by itself */
+} campaigns[] = {
+    {"life", live, false},
+    {"steps", step_on, false},
+    {"reload", reload, true},
+};
+
+/* The first tenth warms up. */
+static void run(const struct campaign *campaign, unsigned long count) {
+    struct timespec begin;
+    struct timespec end;
+    struct memory before = {0};
+    clock_gettime(CLOCK_MONOTONIC, &begin);
+    for (unsigned long i = 0; i < count; i++) {
+        if (i == count / 10) {
+            before = memory_now();
+        }
+        campaign->cycle(i);
+    }
+    const struct memory after = memory_now();
+    clock_gettime(CLOCK_MONOTONIC, &end);
+    const long growth = after.own - before.own;
+    expect(growth <= growth_limit, "the resident memory grows");
+    expect(after.used - before.used <= growth_limit * 1024, "the allocated memory grows");
+    printf("figures: soak %s; cycles %lu; seconds %.1f; findings %lu; resident memory %ld KiB; "
+           "memory growth %ld KiB; growth with pages of files %ld KiB; growth of allocated memory "
+           "%ld bytes\n",
+           campaign->name, count,
+           (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec),
+           findings, after.resident, growth, after.resident - before.resident,
+           after.used - before.used);
+}
+
+int main(int argc, char **argv) {
+    const unsigned long count = argc == 6 ? strtoul(argv[2], NULL, 10) : 0;
+    for (size_t i = 0; count > 0 && i < sizeof campaigns / sizeof campaigns[0]; i++) {
+        if (strcmp(argv[1], campaigns[i].name) == 0) {
+            memcpy(paths, &argv[3], sizeof paths);
+            if (!campaigns[i].loads && fmu_library_open(paths[0], &fmu) == NULL) {
+                return 2;
+            }
+            run(&campaigns[i], count);
+            return findings == 0 ? 0 : 1;
+        }
+    }
+    fprintf(stderr, "usage: %s life|steps|reload CYCLES FMU.so ANOTHER.so ANOTHER.so\n", argv[0]);
+    return 2;
+}
