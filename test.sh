@@ -26,6 +26,10 @@ step "AddressSanitizer and UndefinedBehaviorSanitizer; C tests"
 build asan
 ctest --preset asan --progress -j 2
 
+step "ThreadSanitizer; the test with many threads"
+build tsan
+ctest --preset tsan --progress
+
 step "other importers, each in an environment of its own"
 # without network the tests of those that are missing are skipped; CI must have them
 tests/importers/install.sh || [ -z "${CI-}" ]
