@@ -43,16 +43,16 @@ static fmi2Status start(fmi2Component c, unsigned variant) {
     const fmi2ValueReference reference = RP_MANIPULATOR_solver_method;
     const fmi2Integer method = (fmi2Integer)(variant % METHODS) + 1;
     const fmi2Status status = fmu.SetInteger(c, &reference, 1, &method);
-    return worse(status, fmu_run_start(c, variant));
+    return worse(status, fmu_run_start(fmi2CoSimulation, c, variant));
 }
 
 /* A step, undone and done again. */
 static fmi2Status step_twice(fmi2Component c, unsigned step, struct fmu_run *run) {
     fmi2FMUstate state = NULL;
     fmi2Status status = fmu.GetFMUstate(c, &state);
-    status = worse(status, fmu_run_step(c, step, run));
+    status = worse(status, fmu_run_step(fmi2CoSimulation, c, step, run));
     status = worse(status, fmu.SetFMUstate(c, state));
-    status = worse(status, fmu_run_step(c, step, run));
+    status = worse(status, fmu_run_step(fmi2CoSimulation, c, step, run));
     return step % 2 == 0 ? worse(status, fmu.FreeFMUstate(c, &state)) : status;
 }
 
@@ -87,7 +87,8 @@ static void step_instance(struct work *work, fmi2Component *c, unsigned instance
                           struct fmu_run *run) {
     const unsigned what = (instance + step) % 4;
     fmi2Status status = what == 1 ? move(c, &work->log) : fmi2OK;
-    status = worse(status, what == 2 ? step_twice(*c, step, run) : fmu_run_step(*c, step, run));
+    status = worse(status, what == 2 ? step_twice(*c, step, run)
+                                     : fmu_run_step(fmi2CoSimulation, *c, step, run));
     const struct fmu_run *alone = &expected[variant_of(work, instance)];
     note(work, status == fmi2OK &&
                    memcmp(&run->after[step], &alone->after[step], sizeof run->after[step]) == 0);
@@ -132,7 +133,7 @@ static bool run_alone(void) {
         const fmi2Component c = instantiate(&log);
         status = worse(status, start(c, variant));
         for (unsigned step = 0; step < FMU_RUN_STEPS; step++) {
-            status = worse(status, fmu_run_step(c, step, &expected[variant]));
+            status = worse(status, fmu_run_step(fmi2CoSimulation, c, step, &expected[variant]));
         }
         fmu.FreeInstance(c);
     }
