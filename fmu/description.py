@@ -103,11 +103,22 @@ def check_keys(where: str, table: Table, kinds: dict[str, type]) -> None:
             raise DescriptionError(f"{where}: unknown key '{key}', expected {', '.join(kinds)}")
         if kinds[key] is float:
             if not is_finite_number(value):
-                raise DescriptionError(f"{where}: {key} = {value!r:.40} is not a finite number")
+                raise DescriptionError(f"{where}: {key} = {shown(value)} is not a finite number")
         elif not isinstance(value, kinds[key]) or isinstance(value, bool):
-            raise DescriptionError(f"{where}: {key} = {value!r} is not a {kinds[key].__name__}")
+            kind = kinds[key].__name__
+            raise DescriptionError(f"{where}: {key} = {shown(value)} is not a {kind}")
+        elif isinstance(value, int) and not INTEGERS[0] <= value <= INTEGERS[1]:
+            raise DescriptionError(f"{where}: {key} = {shown(value)} is not an int of 32 bits")
         elif isinstance(value, list) and not all(isinstance(item, str) for item in value):
-            raise DescriptionError(f"{where}: {key} = {value!r} is not a list of strings")
+            raise DescriptionError(f"{where}: {key} = {shown(value)} is not a list of strings")
+
+
+def shown(value: object) -> str:
+    """Short form of a value; an integer may have more digits than Python writes."""
+    try:
+        return f"{value!r:.40}"
+    except ValueError:
+        return "a very large number"
 
 
 def read_toml(path: Path) -> Table:
@@ -116,7 +127,7 @@ def read_toml(path: Path) -> Table:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DescriptionError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
         raise DescriptionError(f"{path}: is not valid TOML: {error}") from None
     check_keys(str(path), content, KEYS[""])
     return content
@@ -227,9 +238,9 @@ def numbered(where: str, variable: Table) -> Table:
         raise DescriptionError(f"{where}: min and max follow from the items")
     v = {**variable, "min": 1, "max": len(items)}
     if "start" in variable:
-        if variable["start"] not in items:
+        if not isinstance(variable["start"], str) or variable["start"] not in items:
             raise DescriptionError(
-                f"{where}: start = {variable['start']!r} is not one of {', '.join(items)}"
+                f"{where}: start = {shown(variable['start'])} is not one of {', '.join(items)}"
             )
         v["start"] = list(items).index(variable["start"]) + 1
     return v

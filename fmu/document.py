@@ -22,6 +22,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from mdit_py_plugins.anchors import anchors_plugin
 from mdit_py_plugins.dollarmath import dollarmath_plugin
+from whole import whole
 
 STYLE_SHEET = Path(__file__).with_suffix(".css")
 
@@ -191,9 +192,11 @@ def document(readme: Path, model_description: Path, output: Path) -> None:
 </html>
 """
     output.mkdir(parents=True, exist_ok=True)
-    (output / "index.html").write_text(page, encoding="utf-8", newline="\n")
     for image in images:
-        shutil.copyfile(image, output / image.name)
+        with whole(output / image.name) as temporary:
+            shutil.copyfile(image, temporary)
+    with whole(output / "index.html") as temporary:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
 
 
 def main() -> int:

@@ -13,6 +13,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from description import BASE_UNITS, DescriptionError, Table, is_unknown, load, type_name
+from whole import whole
 
 LOG_CATEGORIES = (
     "logEvents",
@@ -265,8 +266,9 @@ def variable_table(description: Table) -> str:
 
 def write_if_changed(path: Path, text: str) -> None:
     """Write a file, but leave an equal one alone so that nothing is rebuilt for it."""
-    if not path.exists() or path.read_text(encoding="utf-8") != text:
-        path.write_text(text, encoding="utf-8")
+    if not path.is_file() or path.read_bytes() != text.encode():
+        with whole(path) as temporary:
+            temporary.write_bytes(text.encode())
 
 
 def main() -> int:
@@ -286,7 +288,7 @@ def main() -> int:
         ):
             write_if_changed(arguments.output / name, text)
     except (DescriptionError, OSError) as error:
-        print(f"generate.py: {error}", file=sys.stderr)
+        print(f"generate.py: {error!s:.2000}", file=sys.stderr)
         return 2
     return 0
 

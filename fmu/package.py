@@ -7,6 +7,8 @@ import sys
 import zipfile
 from pathlib import Path
 
+from whole import whole
+
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
 
@@ -29,8 +31,10 @@ def collect(entries: list[str]) -> dict[str, Path]:
 
 def pack(archive: Path, files: dict[str, Path]) -> None:
     """Write the archive to a temporary name and rename it, so that a broken one never stays."""
-    temporary = archive.with_name(archive.name + ".part")
-    with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target:
+    with (
+        whole(archive) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
+    ):
         for name in sorted(files):
             info = zipfile.ZipInfo(name, FIXED_DATE)
             info.create_system = UNIX
@@ -38,7 +42,6 @@ def pack(archive: Path, files: dict[str, Path]) -> None:
             executable = name.startswith("binaries/")
             info.external_attr = (0o100755 if executable else 0o100644) << 16
             target.writestr(info, files[name].read_bytes())
-    temporary.replace(archive)
 
 
 def main() -> int:
