@@ -4,6 +4,7 @@
 # ./run.sh --help: more. ./run.sh system [VARIANT ...]: the closed loop, build/ClosedLoop.ssp, in
 # Ecos; ./run.sh system --list: its variants. ./run.sh coupling: what the coupling of them costs.
 set -euo pipefail
+unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
 "$root/setup.sh"
@@ -15,12 +16,12 @@ build() {
     cmake --build "$root/build" --parallel 2
 }
 
-export PYTHONPATH="$root${PYTHONPATH:+:$PYTHONPATH}"
+export PYTHONPATH="$root"
 if [ "${1-}" = --list ]; then
-  exec "$python" -m cosim list "${@:2}"
+  exec "$python" -P -m cosim list "${@:2}"
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 case "${1-}" in
-  system | coupling) exec "$python" -m cosim "$@" ;;
-  *) exec "$python" -m cosim run "$@" ;;
+  system | coupling) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
+  *) exec "$python" -P -m cosim run "$@" ;;
 esac

@@ -4,6 +4,7 @@
 # --long: then also the long campaigns (some hours), with a table of their figures at the end.
 # ARGUMENTS go to the ctest that runs everything: ./test.sh -R slave
 set -euo pipefail
+unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
 long=no
