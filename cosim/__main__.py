@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from cosim.errors import UserError
+from cosim.outputs import from_here, reason, written
 
 # What takes long to import is imported where it is used: Ctrl-C meanwhile leaves no traceback, and
 # `list` is quick.
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from cosim.unit import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
+LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 QUICK = 20.0  # s, longest sweep that comes with a scenario asked for by name
 
 
@@ -32,19 +36,51 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 passed, 1 a bound exceeded, 2 a user's mistake."""
+    """Run the command line; the exit code: 0 passed, 1 a bound exceeded, 2 a user's mistake.
+
+    2 also where the system gives out: no memory, no room on the disk or for the output.
+    """
+    if isinstance(sys.stdout, TextIOWrapper):  # names that it cannot encode are no reason to stop
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         options = _parser().parse_args(arguments)
-        return options.command(options)
+        code = options.command(options)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
     except UserError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
+        return _refuse(str(error))
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:  # whoever read the output has left
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return 1
+    except OSError as error:
+        _drop_output()
+        return _refuse(f"{error.filename or 'output or temporary files'}: {reason(error)}")
+    except MemoryError:
+        return _refuse("out of memory")
+
+
+def _refuse(text: str) -> int:
+    """Tell in one line what is wrong, with what would move the cursor escaped."""
+    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    text = text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ..."
+    with suppress(OSError):  # where standard error is full too
+        print(f"error: {text}", file=sys.stderr)
+    return 2
+
+
+def _drop_output() -> None:
+    """Let what is still buffered go nowhere, or the interpreter would fail on it at its end."""
+    with suppress(OSError, ValueError, AttributeError):  # closed, or not of the system
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _stop(number: int, _: object) -> NoReturn:
+    """A request to end: like Ctrl-C, temporary files are removed on the way out."""
+    raise SystemExit(128 + number)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -65,13 +101,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--fmu", type=Path, metavar="PATH", help="the FMU (default: that of the model, in build/)"
     )
-    run.add_argument(
-        "--report",
-        type=Path,
-        metavar="DIR",
-        default=ROOT / "build" / "report",
-        help="folder for pictures and results (default: build/report)",
-    )
+    _add_report(run, ROOT / "build" / "report")
     run.add_argument(
         "--tolerance",
         type=_tolerance,
@@ -85,8 +115,14 @@ def _parser() -> argparse.ArgumentParser:
         description="Prints the name and the title of every scenario.",
     )
     listing.set_defaults(command=_list)
+    closed_loop = _Parser(add_help=False)
+    closed_loop.add_argument(
+        "--ssp", type=Path, metavar="PATH", help="the system (default: build/ClosedLoop.ssp)"
+    )
+    _add_report(closed_loop, ROOT / "build" / "report" / "system")
     system = commands.add_parser(
         "system",
+        parents=[closed_loop],
         help="run the closed loop in Ecos, check against the references, write a report",
         description="Runs the variants of the closed loop (build/ClosedLoop.ssp) in Ecos and "
         "compares every variable with the reference. Exit code: 0 all within the bound, 1 not, "
@@ -94,36 +130,27 @@ def _parser() -> argparse.ArgumentParser:
     )
     system.add_argument("names", nargs="*", metavar="VARIANT", help="variants (default: all)")
     system.add_argument("--list", action="store_true", help="name the variants")
-    system.add_argument(
-        "--ssp", type=Path, metavar="PATH", help="the system (default: build/ClosedLoop.ssp)"
-    )
-    system.add_argument(
-        "--report",
-        type=Path,
-        metavar="DIR",
-        default=ROOT / "build" / "report" / "system",
-        help="folder for pictures and results (default: build/report/system)",
-    )
     system.set_defaults(command=_system)
     coupling = commands.add_parser(
         "coupling",
+        parents=[closed_loop],
         help="study how far co-simulation of the closed loop is from its exact solution",
         description="Steps the closed loop (build/ClosedLoop.ssp) in several orders, with inputs "
         "held and extrapolated and with step-size control, and compares it with the solution in "
         "continuous time. Exit code: 0 as expected, 1 not, 2 wrong use.",
     )
-    coupling.add_argument(
-        "--ssp", type=Path, metavar="PATH", help="the system (default: build/ClosedLoop.ssp)"
-    )
-    coupling.add_argument(
+    coupling.set_defaults(command=_coupling)
+    return parser
+
+
+def _add_report(parser: argparse.ArgumentParser, folder: Path) -> None:
+    parser.add_argument(
         "--report",
         type=Path,
         metavar="DIR",
-        default=ROOT / "build" / "report" / "system",
-        help="folder for the picture (default: build/report/system)",
+        default=folder,
+        help=f"folder for pictures and results (default: {folder.relative_to(ROOT)})",
     )
-    coupling.set_defaults(command=_coupling)
-    return parser
 
 
 def _tolerance(text: str) -> float:
@@ -172,12 +199,9 @@ def _run(options: argparse.Namespace) -> int:
             )
             for i, study in enumerate(studies)
         ]
-        try:
-            with Progress("report", len(done), "runs") as progress:
-                index = report.write(options.report, done, sweeps, progress, sections)
-        except OSError as error:
-            raise UserError(f"{options.report}: the report cannot be written: {error}") from error
-    print(f"\nreport: {_from_here(index)}")
+        with written(options.report), Progress("report", len(done), "runs") as progress:
+            index = report.write(options.report, done, sweeps, progress, sections)
+    print(f"\nreport: {from_here(index)}")
     failed = dict.fromkeys(x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
     print(f"FAILED: {', '.join(failed)}" if failed else f"passed: {_count(chosen, 'scenario')}")
     return 1 if failed else 0
@@ -208,40 +232,38 @@ def _remove_results(folder: Path) -> None:
     """Of a system that cannot be run nothing older is left that might be taken for its results."""
     from cosim import system, system_report
 
-    try:
+    with written(folder):
         system_report.remove(folder, [x.name for x in system.REFERENCES.iterdir() if x.is_dir()])
-    except OSError as error:
-        raise UserError(f"{folder}: older results cannot be removed: {error}") from error
 
 
 def _run_system(ssp: Ssp, chosen: Sequence[str], folder: Path) -> int:
     """Run variants; a row appears as one ends, and its files are written then."""
     from cosim import system, system_report
 
-    try:
+    with written(folder):
         system_report.remove(folder, chosen)
-        references = {name: system.load_reference(ssp, name) for name in chosen}
-        width = max(len("variant"), *map(len, chosen))
-        head = f"{'variant':<{width}}  steps      error    bound  tracking error  wall time  result"
-        print(head, "-" * len(head), sep="\n", flush=True)
-        outcomes = []
-        for name in chosen:
-            outcome = system.simulate(ssp, name, references[name])
-            result = "passed" if outcome.passed else f"FAILED ({outcome.worst})"
-            print(
-                f"{name:<{width}} {ssp.system.steps:>6} {outcome.error:>10.2e} "
-                f"{system.BOUND:>8.0e} {1e3 * outcome.distance.max():>12.4f} mm "
-                f"{outcome.run.wall_time:>8.3f} s  {result}",
-                flush=True,
-            )
-            for message in outcome.run.messages:
-                print(f"{name}: {message}", file=sys.stderr)
+    references = {name: system.load_reference(ssp, name) for name in chosen}
+    width = max(len("variant"), *map(len, chosen))
+    head = f"{'variant':<{width}}  steps      error    bound  tracking error  wall time  result"
+    print(head, "-" * len(head), sep="\n", flush=True)
+    outcomes = []
+    for name in chosen:
+        outcome = system.simulate(ssp, name, references[name])
+        result = "passed" if outcome.passed else f"FAILED ({outcome.worst})"
+        print(
+            f"{name:<{width}} {ssp.system.steps:>6} {outcome.error:>10.2e} "
+            f"{system.BOUND:>8.0e} {1e3 * outcome.distance.max():>12.4f} mm "
+            f"{outcome.run.wall_time:>8.3f} s  {result}",
+            flush=True,
+        )
+        for message in outcome.run.messages:
+            print(f"{name}: {message}", file=sys.stderr)
+        with written(folder):
             system_report.write_run(folder, ssp, outcome)
-            outcomes.append(outcome)
+        outcomes.append(outcome)
+    with written(folder):
         index = system_report.write_page(folder, ssp, outcomes)
-    except OSError as error:
-        raise UserError(f"{folder}: the report cannot be written: {error}") from error
-    print(f"\nreport: {_from_here(index)}")
+    print(f"\nreport: {from_here(index)}")
     failed = [outcome.variant for outcome in outcomes if not outcome.passed]
     print(f"FAILED: {', '.join(failed)}" if failed else f"passed: {_count(chosen, 'variant')}")
     return 1 if failed else 0
@@ -377,11 +399,8 @@ def _count(things: Sequence[object], name: str) -> str:
     return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")
 
 
-def _from_here(path: Path) -> Path:
-    """`path` as short as it can be given from the current folder."""
-    here = Path.cwd()
-    return path.relative_to(here) if path.is_relative_to(here) else path
-
-
 if __name__ == "__main__":
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(ending) is signal.SIG_DFL:  # nohup ignores SIGHUP
+            signal.signal(ending, _stop)
     sys.exit(main())

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim import reference, simulation
+from cosim.errors import UserError
 from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.simulation import Result
@@ -80,10 +81,18 @@ class Runs:
         if key not in self._runs:
             expected = self.reference(scenario)
             fmu = self._fmus[scenario.model]
+            _check_outputs(fmu, expected)
             result = simulation.simulate(fmu, scenario, tolerance, progress)
             errors = reference.errors(result, expected)
             self._runs[key] = Run(scenario, fmu, result, expected, errors)
         return self._runs[key]
+
+
+def _check_outputs(fmu: Fmu, expected: Reference) -> None:
+    """An FMU that lacks an output must not pass for want of a comparison."""
+    for name in expected.names:
+        if name not in fmu.variables:
+            raise UserError(f"{fmu.path}: has no variable {name!r}, which is in {expected.path}")
 
 
 @dataclass(frozen=True, eq=False)

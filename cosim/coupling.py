@@ -16,7 +16,7 @@ from cosim import coupling_study as study
 from cosim import report
 from cosim.coupling_doubling import LOCAL, Doubling, study_doubling
 from cosim.coupling_study import Convergence, Payload, Tracking
-from cosim.errors import UserError
+from cosim.outputs import from_here, written
 
 LARGEST_ERROR = 1e-3  # m, of the end effector on the circle at 1 ms in Jacobi order
 PREDICTED_WITHIN = 0.1  # of the measured error
@@ -42,13 +42,10 @@ def run(report_folder: Path, system: Path | None = None) -> bool:
         doubling = study_doubling(loop)
         show(doubling_lines(doubling))
     path = Path(report_folder) / PICTURE
-    try:
+    with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with mpl.rc_context(report.STYLE):
-            figure(convergence, tracking, doubling).savefig(path, metadata={"Software": None})
-    except OSError as error:
-        raise UserError(f"{path}: the picture cannot be written: {error}") from error
-    print(f"\npicture: {path}")
+        report.save(figure(convergence, tracking, doubling), path)
+    print(f"\npicture: {from_here(path)}")
     return (
         all(convergence.holds(i) for i in range(len(convergence.methods)))
         and tracking_passed(tracking)

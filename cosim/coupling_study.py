@@ -28,6 +28,15 @@ REFERENCES = ROOT / "models" / "closed_loop" / "references"
 STATES = ("arm.q1", "arm.q2", "arm.dq1", "arm.dq2")
 MASSES = tuple(("arm", name) for name in ("D11", "D12", "D22"))
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)  # s
+STOP = 6.0  # s, of the references
+# variables of the components
+NEEDED = {
+    "trajectory": ("q1_ref", "dq1_ref", "ddq1_ref", "q2_ref", "dq2_ref", "ddq2_ref")
+    + ("ee_x_ref", "ee_y_ref"),
+    "controller": ("Kp1", "Kp2", "Kd1", "Kd2", "tau1", "f2", "integral1", "integral2"),
+    "arm": ("q1", "q2", "dq1", "dq2", "D11", "D12", "D22", "ee_x", "ee_y", "total_energy")
+    + ("m2", "a", "g"),
+}
 COMMON = 0.04  # s, all steps and the reference's rows divide it
 LARGEST_DEVIATION = 0.2  # of a slope from the order expected
 
@@ -110,13 +119,35 @@ class Loop:
 @contextmanager
 def opened(path: Path = SYSTEM) -> Iterator[Loop]:
     """Unpack the closed loop; everything is removed at the end."""
-    if not path.exists():
+    if path == SYSTEM and not path.exists():
         raise UserError(f"{path}: no such file, ./run.sh builds it")
     with ExitStack() as stack:
         unpacked = stack.enter_context(ssp.unpacked(path))
         system = unpacked.system
         fmus = {c.name: stack.enter_context(Fmu(unpacked.fmu(c.name))) for c in system.components}
-        yield Loop(fmus, system.connections, system.parameter_sets, system.stop)
+        for component in system.components:
+            fmus[component.name].path = path / component.source  # told in messages
+        loop = Loop(fmus, system.connections, system.parameter_sets, system.stop)
+        _check(path, loop)
+        yield loop
+
+
+def _check(path: Path, loop: Loop) -> None:
+    """Check that a system is the closed loop that the study knows."""
+    for component, names in NEEDED.items():
+        if component not in loop.fmus:
+            raise UserError(f"{path}: has no component {component!r}, which the study needs")
+        for name in names:
+            if name not in loop.fmus[component].variables:
+                raise UserError(
+                    f"{path}: component {component!r} has no variable {name!r}, "
+                    "which the study needs"
+                )
+    for variant in ("nominal", "heavy_payload", "heavy_payload_integral"):
+        if variant not in loop.variants:
+            raise UserError(f"{path}: has no variant {variant!r}, which the study needs")
+    if loop.stop != STOP:
+        raise UserError(f"{path}: stops at {loop.stop!r} s; the references are for {STOP!r} s")
 
 
 def grid(stop: float, step: float) -> np.ndarray:

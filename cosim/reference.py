@@ -41,9 +41,10 @@ class Reference:
 def model_name(scenario: Scenario) -> str:
     """Name of the FMU that a scenario's model is built into, and of its reference files."""
     path = scenario.model_folder / variables.FILE_NAME
-    name = variables.read_toml(path).get("model", {}).get("name")
-    if not isinstance(name, str):
-        raise UserError(f"{path}: [model] needs a name")
+    model = variables.read_toml(path).get("model")
+    name = model.get("name") if isinstance(model, dict) else None
+    if not isinstance(name, str) or not name.isidentifier():
+        raise UserError(f"{path}: [model] needs a name, an identifier of C")
     return name
 
 

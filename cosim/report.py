@@ -16,6 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from cosim import reference
 from cosim.accuracy import Run, Sweep
 from cosim.files import write_csv
+from cosim.outputs import whole
 from cosim.scenario import Scenario
 
 INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
@@ -129,16 +130,17 @@ def write(
     for run in runs:
         grouped.setdefault(run.scenario.name, []).append(run)
     for name, group in grouped.items():
-        _save(scenario_figure(group), folder / f"{name}.png")
+        save(scenario_figure(group), folder / f"{name}.png")
         result = group[0].result
         write_csv(folder / f"{name}.csv", result.times, result.names, result.values)
         progress(len(group))
     if sweeps:
-        _save(accuracy_figure(sweeps), folder / "accuracy.png")
+        save(accuracy_figure(sweeps), folder / "accuracy.png")
     for section in sections:
-        _save(section.figure, folder / f"{section.name}.png")
+        save(section.figure, folder / f"{section.name}.png")
     index = folder / "index.html"
-    index.write_text(_page(grouped, sweeps, sections), encoding="utf-8")
+    with whole(index) as path:
+        path.write_text(_page(grouped, sweeps, sections), encoding="utf-8")
     return index
 
 
@@ -342,9 +344,10 @@ def short(number: float) -> str:
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
 
 
-def _save(figure: Figure, path: Path) -> None:
-    with mpl.rc_context(STYLE):
-        figure.savefig(path, metadata={"Software": None})
+def save(figure: Figure, path: Path) -> None:
+    """Write a picture in the style of all; complete or not at all."""
+    with whole(path) as temporary, mpl.rc_context(STYLE):
+        figure.savefig(temporary, metadata={"Software": None})
 
 
 def _page(

@@ -13,8 +13,10 @@ import numpy as np
 
 from cosim import variables
 from cosim.errors import UserError, did_you_mean
+from cosim.variables import show
 
 MAX_STEPS = 10_000_000
+MAX_PATTERN = 1000  # step lengths in a pattern
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
 
 
@@ -103,7 +105,7 @@ def load(path: Path) -> Scenario:
         reader.fail("tolerance", f"expected a number between 0 and 1, got {tolerance!r}")
     every = content.get("reference_every", 1)
     if type(every) is not int or every < 1:
-        reader.fail("reference_every", f"expected a whole number from 1 on, got {_show(every)}")
+        reader.fail("reference_every", f"expected a whole number from 1 on, got {show(every)}")
 
     start, stop, steps = reader.time(content["time"])
     times = reader.communication_points(start, stop, steps)
@@ -122,7 +124,7 @@ def load(path: Path) -> Scenario:
         tolerance=tolerance,
         times=times,
         inputs={name: reader.input(name, value, times - start) for name, value in inputs.items()},
-        reference_every=every,
+        reference_every=min(every, MAX_STEPS),
     )
 
 
@@ -140,28 +142,28 @@ class _Reader:
 
     def number(self, value: Any, key: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            self.fail(key, f"expected a number, got {_show(value)}")
+            self.fail(key, f"expected a number, got {show(value)}")
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            self.fail(key, f"expected a finite number, got {_show(value)}")
+            self.fail(key, f"expected a finite number, got {show(value)}")
         return number
 
     def text(self, value: Any, key: str) -> str:
         if not isinstance(value, str) or not value.strip():
-            self.fail(key, f"expected a text, got {_show(value)}")
+            self.fail(key, f"expected a text, got {show(value)}")
         return value.strip()
 
     def table(self, value: Any, key: str) -> dict[str, Any]:
         if not isinstance(value, dict):
-            self.fail(key, f"expected a table, got {_show(value)}")
+            self.fail(key, f"expected a table, got {show(value)}")
         return value
 
     def array(self, value: Any, key: str, of: str) -> list[Any]:
         if not isinstance(value, list) or not value:
-            self.fail(key, f"expected a list of {of}, got {_show(value)}")
+            self.fail(key, f"expected a list of {of}, got {show(value)}")
         return value
 
     def keys(
@@ -202,10 +204,10 @@ class _Reader:
 
     def item(self, value: Any, items: list[str], key: str) -> float:
         """Number of an Enumeration's item, which is given by its name."""
-        if value not in items:
+        if not isinstance(value, str) or value not in items:
             guess = did_you_mean(value, items) if isinstance(value, str) else ""
             known = ", ".join(f'"{item}"' for item in items)
-            self.fail(key, f"expected one of {known}, got {_show(value)}{guess}")
+            self.fail(key, f"expected one of {known}, got {show(value)}{guess}")
         return float(items.index(value) + 1)
 
     def in_range(self, low: float, high: float, variable: dict[str, Any], key: str) -> None:
@@ -226,7 +228,7 @@ class _Reader:
                 continue
             result[name] = self.number(value, key)
             if variable["type"] == "Integer" and not result[name].is_integer():
-                self.fail(key, f"expected a whole number, got {_show(value)}")
+                self.fail(key, f"expected a whole number, got {show(value)}")
             self.in_range(result[name], result[name], variable, key)
         return result
 
@@ -242,6 +244,10 @@ class _Reader:
         given = table["step"]
         if isinstance(given, list):
             self.array(given, "[time] step", "numbers")
+            if len(given) > MAX_PATTERN:
+                self.fail(
+                    "[time] step", f"has {len(given)} lengths, expected at most {MAX_PATTERN}"
+                )
         else:
             given = [given]
         steps = tuple(self.number(step, "[time] step") for step in given)
@@ -250,7 +256,10 @@ class _Reader:
                 self.fail("[time] step", f"expected more than 0 s, got {step!r}")
             if start + step == start or stop - step == stop:
                 self.fail("[time] step", f"{step!r} s is lost in rounding between start and stop")
-        count = (stop - start) / math.fsum(steps) * len(steps)
+        try:
+            count = (stop - start) / math.fsum(steps) * len(steps)
+        except OverflowError:
+            self.fail("[time] step", "the sum of the pattern overflows")
         if count > MAX_STEPS:
             self.fail("[time] step", f"makes {count:.3g} steps, expected at most {MAX_STEPS}")
         return start, stop, steps
@@ -262,7 +271,8 @@ class _Reader:
         period = math.fsum(steps)
         cycles = math.ceil((stop - start) / period) + 1
         within = np.array([math.fsum(steps[:i]) for i in range(len(steps))])
-        times = start + (np.arange(cycles)[:, None] * period + within).ravel()
+        with np.errstate(over="ignore"):  # beyond stop
+            times = start + (np.arange(cycles)[:, None] * period + within).ravel()
         remainder = np.maximum(SLIVER * np.array(steps), 4 * np.spacing(max(abs(start), abs(stop))))
         times = times[stop - times >= np.tile(remainder, cycles)]
         times = np.concatenate(([start], times[times > start], [stop]))
@@ -314,16 +324,10 @@ class _Reader:
         points = []
         for i, row in enumerate(self.array(table["table"], key, "[time, value] pairs")):
             if not isinstance(row, list) or len(row) != 2:
-                self.fail(f"{key}[{i}]", f"expected [time, value], got {_show(row)}")
+                self.fail(f"{key}[{i}]", f"expected [time, value], got {show(row)}")
             points.append([self.number(value, f"{key}[{i}]") for value in row])
             if i and points[i][0] <= points[i - 1][0]:
                 last = points[i - 1][0]
-                self.fail(f"{key}[{i}]", f"expected a time after {last!r} s, got {_show(row)}")
+                self.fail(f"{key}[{i}]", f"expected a time after {last!r} s, got {show(row)}")
         t, values = np.array(points).T
         return np.interp(elapsed, t, values)
-
-
-def _show(value: Any) -> str:
-    """Short, one-line form of a value from a TOML file."""
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
-    return text if len(text) <= 40 else f"{text[:37]}..."

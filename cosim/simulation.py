@@ -161,6 +161,8 @@ def _step_through(
 
 
 def _check_names(fmu: Fmu, scenario: Scenario) -> None:
+    if not fmu.real_outputs:
+        raise UserError(f"{fmu.path}: has no Real outputs, nothing can be recorded")
     for kind, causality, names in (
         ("parameter", "parameter", scenario.parameters),
         ("state with a start value", "output", scenario.initial),

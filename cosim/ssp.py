@@ -6,8 +6,8 @@ the system.
 """
 
 import math
+import re
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +20,8 @@ import fmpy
 from lxml import etree
 
 from cosim.errors import UserError
+from cosim.files import UnreadableError, check_archive, is_file
+from cosim.scenario import MAX_STEPS
 
 STRUCTURE = "SystemStructure.ssd"
 NAMESPACES = {
@@ -36,6 +38,9 @@ STEP_SIZE = (
     "ssd:Annotations/ssc:Annotation[@type='com.opensimulationplatform']"
     "/osp:Algorithm/osp:FixedStepAlgorithm/@baseStepSize"
 )
+
+# of a variant, whose results are files of that name
+PLAIN_NAME = re.compile(r"\w[\w .+-]{0,99}")
 
 Value = float | int | bool | str
 
@@ -153,14 +158,15 @@ def unpacked(path: Path) -> Iterator[Ssp]:
 
 def _extract(path: Path, folder: Path) -> None:
     try:
+        check_archive(path)
         with zipfile.ZipFile(path) as archive:
             archive.extractall(folder)
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file") from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise UserError(f"{path}: not an SSP, or a damaged one: {error}") from error
+    except UnreadableError as error:
+        raise UserError(f"{path}: {error}") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be unpacked: {error.strerror or error}") from error
+    except Exception as error:  # zipfile and its decoders have many of their own
+        raise UserError(f"{path}: not an SSP, or a damaged one: {error}") from error
 
 
 @cache
@@ -182,13 +188,15 @@ class _Reader:
     def parse(self, file: str, schema: str) -> etree._Element:
         """Root of an XML file that is valid against its schema."""
         path = self.folder / file
-        if not path.is_file():
+        if not is_file(path):
             self.fail(file, "is missing in the SSP")
         parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
         try:
             tree = etree.parse(path, parser)
         except etree.XMLSyntaxError as error:
             self.fail(file, f"not valid XML: {error.msg}")
+        if tree.docinfo.doctype:  # entities would stand in for what is checked here
+            self.fail(file, "has a DOCTYPE, leave it out")
         validator = _schema(schema)
         if not validator.validate(tree):
             first = validator.error_log[0]
@@ -282,6 +290,8 @@ class _Reader:
         start, stop, step = times
         if not (all(map(math.isfinite, times)) and start < stop and 0 < step <= stop - start):
             self.fail(STRUCTURE, f"start {start!r} s, stop {stop!r} s, step {step!r} s", node)
+        if (stop - start) / step > MAX_STEPS:
+            self.fail(STRUCTURE, f"step {step!r} s makes more than {MAX_STEPS} steps", node)
         return start, stop, step
 
     # parameter sets
@@ -304,6 +314,8 @@ class _Reader:
             sources.add(source)
             root = self.parse(source, VALUES_SCHEMA)
             name = root.get("name")
+            if not PLAIN_NAME.fullmatch(name):
+                self.fail(source, f"name {name!r} of the set is no plain name, as of a file", root)
             if name in sets:
                 self.fail(
                     STRUCTURE, f"component {component!r}: set {name!r} is bound twice", binding

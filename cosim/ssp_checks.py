@@ -7,6 +7,7 @@ from fmpy import read_model_description
 from fmpy.model_description import ModelVariable
 
 from cosim.errors import UserError, did_you_mean
+from cosim.files import check_archive, is_file
 from cosim.ssp import Component, Connector, Parameter, Ssp
 
 # type of a variable -> types of a parameter's value that engines can give it
@@ -60,9 +61,10 @@ class _Checker:
         """Variables of the component's FMU, by name."""
         path = self.ssp.fmu(component.name)
         where = f"component {component.name!r}: {component.source}"
-        if not path.is_file():
+        if not is_file(path):
             self.fail(f"{where} is missing in the SSP")
         try:
+            check_archive(path)
             description = read_model_description(path, validate=False)
         except Exception as error:  # fmpy raises bare exceptions, zipfile its own
             self.fail(f"{where} is no FMU: {' '.join(str(error).split())}")

@@ -10,8 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cosim.files import whole, write_csv
-from cosim.report import DASHED, ERRORS, MUTED, PAGE, REFERENCE, RUN, STYLE, short, table, verdict
+from cosim.files import write_csv
+from cosim.outputs import whole
+from cosim.report import (
+    DASHED,
+    ERRORS,
+    MUTED,
+    PAGE,
+    REFERENCE,
+    RUN,
+    STYLE,
+    save,
+    short,
+    table,
+    verdict,
+)
 from cosim.ssp import Ssp
 from cosim.system import BOUND, Outcome
 
@@ -32,8 +45,7 @@ def write_run(folder: Path, ssp: Ssp, outcome: Outcome) -> None:
     """Write the picture and all recorded values of a run; a file is complete or not there."""
     folder.mkdir(parents=True, exist_ok=True)
     run = outcome.run
-    with whole(folder / f"{outcome.variant}.png") as path, mpl.rc_context(STYLE):
-        figure(ssp, outcome).savefig(path, metadata={"Software": None})
+    save(figure(ssp, outcome), folder / f"{outcome.variant}.png")
     write_csv(folder / f"{outcome.variant}.csv", run.times, run.names, run.values)
 
 

@@ -15,6 +15,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.errors import UserError
+from cosim.files import UnreadableError, check_archive
 from cosim.scenario import Scenario
 
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")
@@ -192,10 +193,11 @@ def _read_description(path: Path) -> ModelDescription:
     if path.is_dir():
         raise UserError(f"{path}: is a folder, expected an FMU")
     try:
+        check_archive(path)
         description = fmpy.read_model_description(path)
         platforms = fmpy.supported_platforms(path)
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such file") from None
+    except UnreadableError as error:
+        raise UserError(f"{path}: {error}") from None
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror or error}") from error
     except BadZipFile:

@@ -13,7 +13,8 @@ import numpy as np
 
 from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.files import whole, write_csv
+from cosim.files import write_csv
+from cosim.outputs import whole
 from cosim.scenario import Scenario
 
 ROOT = Path(__file__).resolve().parents[1]

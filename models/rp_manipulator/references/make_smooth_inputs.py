@@ -19,7 +19,7 @@ from cosim import convergence, variables
 from cosim import scenario as scenarios
 from cosim.convergence import Sines
 from cosim.errors import UserError
-from cosim.files import whole
+from cosim.outputs import whole
 from cosim.scenario import Scenario
 
 equations = functools.cache(derive)

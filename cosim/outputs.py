@@ -1,0 +1,44 @@
+"""Files that appear complete or not at all, and what is told of them."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cosim.errors import UserError
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Temporary path to write to, which becomes `path` at the end and is removed on failure."""
+    path = Path(path)
+    # the suffix stays the last: pictures are written in the format that it tells
+    temporary = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Turn a failure of the system meanwhile into the user's error: `path` cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{path}: the report cannot be written: {reason(error)}") from error
+
+
+def from_here(path: Path) -> Path:
+    """`path` as short as it can be given from the current folder."""
+    try:
+        here = Path.cwd()
+    except OSError:  # it has been removed
+        return path
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+def reason(error: Exception) -> str:
+    """What the system says about a file, without number and name."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
