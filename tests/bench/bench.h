@@ -1,0 +1,30 @@
+/* The measurements of the benchmark; bench.c chooses among them. */
+#ifndef BENCH_H
+#define BENCH_H
+
+#include "fmu_library.h"
+#include "report.h"
+
+struct bench {
+    struct fmu_functions fmu;
+    struct report report;
+    int repeats;
+    bool quick; /* little of everything: shows that it works, the figures mean nothing */
+};
+
+/* steps.c: communication steps against the plain loop and MuJoCo */
+void measure_steps(struct bench *bench);
+
+/* sweeps.c: error and time over the tolerance, time over the communication step size */
+void measure_precision(struct bench *bench);
+void measure_step_sizes(struct bench *bench);
+
+/* instances.c: many instances stepped in turn, two threads with an instance each */
+void measure_instances(struct bench *bench);
+void measure_threads(struct bench *bench);
+
+/* calls.c: each call by itself, and from fmi2Instantiate to fmi2FreeInstance */
+void measure_calls(struct bench *bench);
+void measure_life(struct bench *bench);
+
+#endif

@@ -1,0 +1,219 @@
+#define _GNU_SOURCE // pthread_attr_setaffinity_np
+
+#include "bench.h"
+
+#include "fmu_run.h"
+#include "measure.h"
+#include "turns.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdlib.h>
+
+/* Instance i has start i % STARTS, so that whatever the number of instances, the same motions are
+ * computed, in another order. */
+enum { STARTS = 1000, STEPS = 10, COUNTS = 5 };
+
+/* s for a communication step, with count instances stepped in turn; in groups until every start has
+ * been used as often as any other. */
+static double step_in_turn(const struct fmu_functions *fmu, struct problem *problems[],
+                           enum method method, int count, fmi2Component instances[],
+                           double states[][STEPS][4]) {
+    const int total = count > STARTS ? count : STARTS;
+    const double clock = clock_cost(processor_time);
+    double seconds = 0.0;
+    for (int first = 0; first < total; first += count) {
+        for (int i = 0; i < count; i++) {
+            instances[i] = fmu_start(fmu, problems[(first + i) % STARTS], method, 1e-8);
+        }
+        const double begin = processor_time();
+        for (int step = 0; step < STEPS; step++) {
+            for (int i = 0; i < count; i++) {
+                const int start = (first + i) % STARTS;
+                fmu_step(fmu, instances[i], problems[start], step, states[start][step]);
+            }
+        }
+        seconds += processor_time() - begin - clock;
+        for (int i = 0; i < count; i++) {
+            fmu->FreeInstance(instances[i]);
+        }
+    }
+    return seconds / total / STEPS;
+}
+
+static double largest_error(struct problem *problems[], double states[][STEPS][4]) {
+    double error = 0.0;
+    for (int i = 0; i < STARTS; i++) {
+        error = fmax(error, problem_error(problems[i], states[i]));
+    }
+    return error;
+}
+
+static void measure_counts(struct bench *bench, struct problem *problems[], enum method method,
+                           const char *name) {
+    static const int counts[COUNTS] = {1, 10, 100, 1000, 10000};
+    const int measured = bench->quick ? COUNTS - 1 : COUNTS;
+    fmi2Component *instances = calloc(10000, sizeof instances[0]);
+    double(*states)[STEPS][4] = calloc(STARTS, sizeof states[0]);
+    double us[COUNTS][MOST_REPEATS];
+    double errors[COUNTS];
+    require(instances != NULL && states != NULL, "no memory");
+    for (int repeat = 0; repeat < bench->repeats; repeat++) {
+        for (int i = 0; i < measured; i++) {
+            us[i][repeat] =
+                1e6 * step_in_turn(&bench->fmu, problems, method, counts[i], instances, states);
+            errors[i] = largest_error(problems, states);
+        }
+    }
+    for (int i = 0; i < measured; i++) {
+        double more[MOST_REPEATS];
+        double ratio[MOST_REPEATS];
+        for (int repeat = 0; repeat < bench->repeats; repeat++) {
+            more[repeat] = us[i][repeat] - us[0][repeat];
+            ratio[repeat] = us[i][repeat] / us[0][repeat];
+        }
+        char work[64];
+        snprintf(work, sizeof work, "%d instances in turn", counts[i]);
+        report_row(&bench->report, "instances", work, name);
+        report_number(&bench->report, "instances", counts[i]);
+        const double more_us = median(more, bench->repeats);
+        const double times = median(ratio, bench->repeats);
+        const double one_us = median(us[i], bench->repeats);
+        report_number(&bench->report, "us", one_us);
+        report_number(&bench->report, "ratio", times);
+        report_number(&bench->report, "error", errors[i]);
+        printf("  %-12s %6d instances %7.2f us, %5.2f of one alone, %+6.2f us, error %7.1e", name,
+               counts[i], one_us, times, more_us, errors[i]);
+        report_judged(&bench->report, "more_us", more_us,
+                      (struct target){counts[i] == 10000 ? AT_MOST : NO_TARGET, 2.0});
+        printf("\n");
+        report_row_end(&bench->report);
+    }
+    free(states);
+    free(instances);
+}
+
+void measure_instances(struct bench *bench) {
+    struct problem *problems[STARTS];
+    for (int i = 0; i < STARTS; i++) {
+        problems[i] = problem_create(1e-3, STEPS, INPUTS_CHANGING, 1e-4 * i);
+    }
+    printf("\nmany instances, each stepped by 1 ms in turn, inputs changing\n");
+    measure_counts(bench, problems, CVODE_ADAMS, "cvode_adams");
+    measure_counts(bench, problems, ERK, "erk");
+    for (int i = 0; i < STARTS; i++) {
+        problem_destroy(problems[i]);
+    }
+}
+
+/* ---- Threads -------------------------------------------------------------------------------- */
+
+struct worker {
+    const struct fmu_functions *fmu;
+    const struct problem *problem;
+    enum method method;
+    int rounds;
+    pthread_barrier_t *start;
+    double begin;
+    double end;
+    double processor; /* time the thread was run, s */
+    double error;
+};
+
+static void *work(void *argument) {
+    struct worker *worker = argument;
+    struct fmu_counts counts;
+    double(*states)[4] = calloc((size_t)worker->problem->steps, sizeof states[0]);
+    require(states != NULL, "no memory");
+    pthread_barrier_wait(worker->start);
+    worker->begin = now();
+    for (int round = 0; round < worker->rounds; round++) {
+        fmu_run(worker->fmu, worker->problem, worker->method, 1e-8, states, &counts);
+    }
+    worker->end = now();
+    worker->processor = processor_time();
+    worker->error = problem_error(worker->problem, states);
+    free(states);
+    return NULL;
+}
+
+/* Thread 0 runs on the first processor that the program may use, thread 1 on the last one (those
+ * next to each other are often one core). */
+static void create_on_own_core(pthread_t *thread, int index, struct worker *worker) {
+    cpu_set_t allowed;
+    cpu_set_t own;
+    pthread_attr_t attributes;
+    require(sched_getaffinity(0, sizeof allowed, &allowed) == 0, "no processors");
+    size_t chosen = CPU_SETSIZE;
+    for (size_t i = 0; i < CPU_SETSIZE && (index > 0 || chosen == CPU_SETSIZE); i++) {
+        chosen = CPU_ISSET(i, &allowed) ? i : chosen;
+    }
+    CPU_ZERO(&own);
+    CPU_SET(chosen, &own);
+    require(pthread_attr_init(&attributes) == 0 &&
+                pthread_attr_setaffinity_np(&attributes, sizeof own, &own) == 0 &&
+                pthread_create(thread, &attributes, work, worker) == 0,
+            "no thread");
+    pthread_attr_destroy(&attributes);
+}
+
+/* s from the first thread's begin to the last one's end */
+static double run_threads(struct worker workers[2], const struct worker *like, int count,
+                          double *processor) {
+    pthread_t threads[2];
+    pthread_barrier_t start;
+    double begin = INFINITY;
+    double end = 0.0;
+    pthread_barrier_init(&start, NULL, (unsigned)count);
+    for (int i = 0; i < count; i++) {
+        workers[i] = *like;
+        workers[i].start = &start;
+        create_on_own_core(&threads[i], i, &workers[i]);
+    }
+    *processor = 0.0;
+    for (int i = 0; i < count; i++) {
+        pthread_join(threads[i], NULL);
+        begin = fmin(begin, workers[i].begin);
+        end = fmax(end, workers[i].end);
+        *processor += workers[i].processor;
+    }
+    pthread_barrier_destroy(&start);
+    *processor /= count * (end - begin);
+    return end - begin;
+}
+
+static void measure_two(struct bench *bench, const struct problem *problem, enum method method,
+                        const char *name, int rounds) {
+    const struct worker like = {.fmu = &bench->fmu,
+                                .problem = problem,
+                                .method = method,
+                                .rounds = bench->quick ? 1 : rounds};
+    double throughput[MOST_REPEATS];
+    double shares[MOST_REPEATS];
+    struct worker workers[2];
+    for (int repeat = 0; repeat < bench->repeats; repeat++) {
+        double share;
+        const double one = run_threads(workers, &like, 1, &share);
+        const double two = run_threads(workers, &like, 2, &shares[repeat]);
+        throughput[repeat] = 2.0 * one / two;
+    }
+    const double error = fmax(workers[0].error, workers[1].error);
+    const double share = median(shares, bench->repeats);
+    const double times = median(throughput, bench->repeats);
+    report_row(&bench->report, "threads", "two threads with an instance each", name);
+    report_number(&bench->report, "processor_share", share);
+    report_number(&bench->report, "error", error);
+    printf("  %-12s %5.2f times the steps of one thread, error %7.1e", name, times, error);
+    report_judged(&bench->report, "throughput", times, (struct target){AT_LEAST, 1.8});
+    printf("%s\n", share < 0.97 ? " (the threads had to wait: a busy machine, or one core)" : "");
+    report_row_end(&bench->report);
+}
+
+void measure_threads(struct bench *bench) {
+    struct problem *problem = problem_create(1e-3, 2000, INPUTS_CHANGING, 0.0);
+    printf("\ntwo threads, an instance each, 1 ms steps, inputs changing\n");
+    measure_two(bench, problem, CVODE_ADAMS, "cvode_adams", 5);
+    measure_two(bench, problem, ERK, "erk", 30);
+    problem_destroy(problem);
+}

@@ -1,0 +1,53 @@
+#define _POSIX_C_SOURCE 199309L // clock_gettime
+
+#include "measure.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+static double read_clock(clockid_t clock) {
+    struct timespec t;
+    clock_gettime(clock, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+double now(void) {
+    return read_clock(CLOCK_MONOTONIC);
+}
+
+double processor_time(void) {
+    return read_clock(CLOCK_THREAD_CPUTIME_ID);
+}
+
+double clock_cost(double (*clock)(void)) {
+    double cost[1001];
+    for (int i = 0; i < 1001; i++) {
+        const double begin = clock();
+        cost[i] = clock() - begin;
+    }
+    return median(cost, 1001);
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a;
+    const double y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double quantile(double values[], size_t count, double part) {
+    qsort(values, count, sizeof values[0], by_value);
+    return values[(size_t)floor(part * (double)(count - 1) + 0.5)];
+}
+
+double median(double values[], int count) {
+    return quantile(values, (size_t)count, 0.5);
+}
+
+void require(bool condition, const char *what) {
+    if (!condition) {
+        fprintf(stderr, "bench: %s\n", what);
+        exit(1);
+    }
+}

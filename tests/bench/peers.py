@@ -1,0 +1,214 @@
+"""The Python peers of the benchmark: others that integrate the arm, as their users call them.
+
+Each peer's run makes all steps of a work once and returns the time of the stepping, s, and the
+states at the end of each step, shape (steps, 4). What it makes before and after is not timed.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from statistics import median
+from time import thread_time
+
+import fmpy
+import mujoco
+import numpy as np
+from arm import INPUTS, START, STATES, Work, accelerations, taylor_adaptive
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.sundials import CVodeSolver
+from scipy.integrate import DOP853
+
+FOLDER = Path(__file__).resolve().parent
+Run = tuple[float, np.ndarray]
+
+
+def stepped(work: Work, step: Callable[[int, list[float]], object]) -> Run:
+    """Time the calls of step(index, inputs), which returns the states.
+
+    The time is the processor's for this thread, as in bench, without that of reading the clock.
+    """
+    inputs = work.inputs.tolist()
+    states = []
+    begin = thread_time()
+    for i, u in enumerate(inputs):
+        states.append(step(i, u))
+    elapsed = thread_time() - begin
+    return max(elapsed - clock_cost(), 1e-9), np.array(states)
+
+
+@cache
+def clock_cost() -> float:
+    """What two readings of the clock in a row differ by, s."""
+    return median(-thread_time() + thread_time() for _ in range(1001))
+
+
+# ---- heyoka, scipy, MuJoCo
+
+
+compiled = cache(taylor_adaptive)
+
+
+def run_heyoka(work: Work, tolerance: float) -> Run:
+    """heyoka's compiled Taylor method: sets its parameters, propagate_until, reads its state."""
+    taylor = compiled(tolerance)
+    taylor.time = 0.0
+    taylor.state[:] = START
+    pars, state, propagate, size = taylor.pars, taylor.state, taylor.propagate_until, work.step
+
+    def step(i: int, u: list[float]) -> np.ndarray:
+        pars[0], pars[1] = u
+        propagate(size * (i + 1))
+        return state.copy()
+
+    return stepped(work, step)
+
+
+def run_dop853(work: Work, tolerance: float) -> Run:
+    """scipy's DOP853, made anew at each communication point with the step size it proposed last."""
+    x, proposed = np.array(START), None
+
+    def step(i: int, u: list[float]) -> np.ndarray:
+        nonlocal x, proposed
+
+        def rhs(t: float, x: np.ndarray) -> tuple[float, float, float, float]:
+            q1, q2, dq1, dq2 = x.tolist()
+            ddq1, ddq2 = accelerations(q1, q2, dq1, dq2, *u)
+            return dq1, dq2, ddq1, ddq2
+
+        first = None if proposed is None else min(proposed, work.step)
+        solver = DOP853(
+            rhs, 0.0, x, work.step, rtol=tolerance, atol=1e-2 * tolerance, first_step=first
+        )
+        while solver.status == "running":
+            solver.step()
+        if solver.status != "finished":
+            raise RuntimeError("DOP853 failed")
+        proposed = solver.h_abs
+        x = solver.y
+        return x
+
+    return stepped(work, step)
+
+
+def run_mujoco(work: Work, tolerance: float) -> Run:
+    """MuJoCo's RK4 by its Python bindings, a mj_step each communication step."""
+    del tolerance
+    model = mujoco.MjModel.from_xml_path(str(FOLDER.parent / "rp_manipulator.xml"))
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.timestep = work.step
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = START[:2], START[2:]
+    efforts, q, dq, mj_step = data.qfrc_applied, data.qpos, data.qvel, mujoco.mj_step
+
+    def step(i: int, u: list[float]) -> tuple[float, ...]:
+        efforts[0], efforts[1] = u
+        mj_step(model, data)
+        return *q, *dq
+
+    return stepped(work, step)
+
+
+# ---- FMUs driven by fmpy
+
+
+class Unit:
+    """An FMU, extracted into a folder, of which fmpy makes instances."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        self.folder = fmpy.extract(path, unzipdir=folder)
+        self.description = fmpy.read_model_description(path, validate=False)
+        self.reference = {v.name: v.valueReference for v in self.description.modelVariables}
+        self.states = [self.reference[name] for name in STATES]
+        self.inputs = [self.reference[name] for name in INPUTS]
+
+    def start(self, kind: type, tolerance: float, method: int = 0) -> FMU2Slave | FMU2Model:
+        """Make an instance at START; method: of solver_method, 0: leave it."""
+        interface = (
+            self.description.coSimulation if kind is FMU2Slave else self.description.modelExchange
+        )
+        fmu = kind(
+            guid=self.description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=interface.modelIdentifier,
+            instanceName="benchmark",
+        )
+        fmu.instantiate()
+        fmu.setReal(self.states, START)
+        if method:
+            fmu.setInteger([self.reference["solver_method"]], [method])
+        fmu.setupExperiment(tolerance=tolerance)
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        return fmu
+
+
+def run_slave(unit: Unit, work: Work, tolerance: float, method: int = 0) -> Run:
+    """Co-simulation: setReal, doStep and getReal of fmpy."""
+    fmu = unit.start(FMU2Slave, tolerance, method)
+
+    def step(i: int, u: list[float]) -> list[float]:
+        fmu.setReal(unit.inputs, u)
+        fmu.doStep(work.step * i, work.step)
+        return fmu.getReal(unit.states)
+
+    run = stepped(work, step)
+    fmu.terminate()
+    fmu.freeInstance()
+    return run
+
+
+class NoInput:
+    """Inputs are set by the loop, at its events."""
+
+    def apply(self, time: float) -> None:
+        """Change nothing."""
+
+
+def run_model_exchange(unit: Unit, work: Work, tolerance: float) -> Run:
+    """Model exchange with the CVODE of fmpy (BDF): each change of inputs is an event, as in
+    fmpy.simulate_fmu, where the solver restarts."""
+    fmu = unit.start(FMU2Model, tolerance)
+    fmu.newDiscreteStates()
+    fmu.enterContinuousTimeMode()
+    solver = CVodeSolver(
+        nx=4,
+        nz=0,
+        get_x=fmu.getContinuousStates,
+        set_x=fmu.setContinuousStates,
+        get_dx=fmu.getDerivatives,
+        get_z=fmu.getEventIndicators,
+        get_nominals=fmu.getNominalsOfContinuousStates,
+        set_time=fmu.setTime,
+        input=NoInput(),
+        startTime=0.0,
+        relativeTolerance=tolerance,
+        maxNumSteps=100000,
+    )
+
+    def step(i: int, u: list[float]) -> list[float]:
+        if work.changing:
+            fmu.enterEventMode()
+            fmu.setReal(unit.inputs, u)
+            fmu.newDiscreteStates()
+            fmu.enterContinuousTimeMode()
+            solver.reset(work.step * i)
+        solver.step(work.step * i, work.step * (i + 1))
+        fmu.setTime(work.step * (i + 1))
+        fmu.completedIntegratorStep()
+        return fmu.getReal(unit.states)
+
+    run = stepped(work, step)
+    fmu.terminate()
+    fmu.freeInstance()
+    return run
+
+
+def build_python_plant(folder: Path) -> Path:
+    """Let pythonfmu make an FMU of python_plant.py."""
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", FOLDER / "python_plant.py"]
+    subprocess.run([*command, "-d", folder], check=True, capture_output=True)
+    return folder / "PythonPlant.fmu"

@@ -1,0 +1,76 @@
+#include "bench.h"
+
+#include "turns.h"
+
+#include <math.h>
+
+static void sweep_tolerances(struct bench *bench, const char *name, const struct problem *problem,
+                             double decades) {
+    for (double exponent = -4.0; exponent > -11.0 - 0.1; exponent -= decades) {
+        const double tolerance = pow(10.0, exponent);
+        struct turns turns = {0};
+        turns_add_usual(&turns, &bench->fmu, tolerance);
+        turns_take(&turns, &bench->fmu, problem, bench->repeats);
+        turns_report(&turns, &bench->report, "precision", name, problem, NULL);
+    }
+}
+
+static void sweep_mujoco(struct bench *bench, const char *name, const struct problem *problem,
+                         double longest) {
+    for (double substep = longest; substep > 2e-5; substep /= bench->quick ? 10.0 : 2.0) {
+        const int substeps = (int)lround(problem->step / substep);
+        if (!mujoco_available() || substeps < 1) {
+            continue;
+        }
+        struct turns turns = {0};
+        turns_add(&turns, (struct run){"MuJoCo RK4", MUJOCO, 0, 0.0, MUJOCO_RK4, substeps});
+        turns_add(&turns, (struct run){"MuJoCo implicitfast", MUJOCO, 0, 0.0, MUJOCO_IMPLICITFAST,
+                                       substeps});
+        turns_take(&turns, &bench->fmu, problem, bench->repeats);
+        turns_report(&turns, &bench->report, "precision", name, problem, NULL);
+    }
+}
+
+void measure_precision(struct bench *bench) {
+    static const struct {
+        const char *name;
+        double step;
+        int steps;
+        enum problem_inputs inputs;
+        double decades; /* from one tolerance to the next */
+    } table[] = {
+        {"1 ms steps, inputs changing", 1e-3, 2000, INPUTS_CHANGING, 1.0},
+        {"10 ms steps, inputs changing", 1e-2, 200, INPUTS_CHANGING, 1.0},
+        {"one step of 2 s, free motion", 2.0, 1, INPUTS_ZERO, 0.5},
+    };
+    for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
+        const int steps = bench->quick && table[i].steps > 100 ? 100 : table[i].steps;
+        struct problem *problem = problem_create(table[i].step, steps, table[i].inputs, 0.0);
+        sweep_tolerances(bench, table[i].name, problem, bench->quick ? 3.5 : table[i].decades);
+        sweep_mujoco(bench, table[i].name, problem, fmin(table[i].step, 1e-2));
+        problem_destroy(problem);
+    }
+}
+
+void measure_step_sizes(struct bench *bench) {
+    static const double sizes[] = {1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2,
+                                   2e-2, 5e-2, 0.1,  0.2,  0.5,  1.0};
+    static const struct {
+        enum problem_inputs inputs;
+        const char *name;
+    } kinds[] = {{INPUTS_CHANGING, "inputs changing"}, {INPUTS_CONSTANT, "inputs constant"}};
+    const double duration = 2.0;
+    for (size_t kind = 0; kind < 2; kind++) {
+        for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i += bench->quick ? 6 : 1) {
+            const int steps = (int)fmin(round(duration / sizes[i]), bench->quick ? 100 : 1000);
+            char work[64];
+            snprintf(work, sizeof work, "steps of %g ms, %s", 1e3 * sizes[i], kinds[kind].name);
+            struct problem *problem = problem_create(sizes[i], steps, kinds[kind].inputs, 0.0);
+            struct turns turns = {0};
+            turns_add_usual(&turns, &bench->fmu, 1e-8);
+            turns_take(&turns, &bench->fmu, problem, bench->repeats);
+            turns_report(&turns, &bench->report, "step size", work, problem, NULL);
+            problem_destroy(problem);
+        }
+    }
+}

@@ -1,0 +1,108 @@
+"""The figures of the benchmark as Markdown, as tests/bench/README.md shows them."""
+
+from __future__ import annotations
+
+
+def result(row: dict) -> str:
+    """Tell what a row must reach and whether it does."""
+    if "judged" not in row:
+        return ""
+    sign = {"<=": "≤", ">=": "≥"}[row["comparison"]]
+    return f"{sign} {row['limit']:g}: {'ok' if row['met'] else '**MISSED**'}"
+
+
+def number(value: float | None) -> str:
+    """Three digits, or nothing."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def error(row: dict) -> str:
+    """Error of a row, and of the peer that it is compared with."""
+    values = [row[name] for name in ("error", "error_of_peer") if name in row]
+    return ", ".join(f"{value:.0e}" for value in values)
+
+
+def lines(header: list[str], rows: list[list[str]]) -> list[str]:
+    """Make a table."""
+    rule = ["---"] + ["--:"] * (len(header) - 1)
+    return ["| " + " | ".join(cells) + " |" for cells in (header, rule, *rows)] + [""]
+
+
+def steps(rows: list[dict]) -> list[str]:
+    """A table for each work: who, time, ratio to the plain loop, error."""
+    text = []
+    header = ["", "us a step", "ratio", "error", "must be"]
+    works = dict.fromkeys(row["work"] for row in rows if row["group"] == "steps")
+    for work in works:
+        cells = [
+            [row["run"], number(row.get("us")), number(row["ratio"]), error(row), result(row)]
+            for group in ("steps", "against")
+            for row in rows
+            if (row["group"], row["work"]) == (group, work)
+        ]
+        text += [f"**{work[0].upper() + work[1:]}**", "", *lines(header, cells)]
+    return text
+
+
+def instances(rows: list[dict]) -> list[str]:
+    """Many instances in turn."""
+    cells = [
+        [f"{row['run']}, {row['instances']:.0f}", number(row["us"]), number(row["ratio"]),
+         f"{row['more_us']:+.2f}", error(row), result(row)]
+        for row in rows if row["group"] == "instances"
+    ]  # fmt: skip
+    header = ["instances", "us a step", "ratio", "us more than one alone", "error", "must be"]
+    return ["**Many instances, each stepped by 1 ms in turn**", "", *lines(header, cells)]
+
+
+def threads(rows: list[dict]) -> list[str]:
+    """Two threads."""
+    cells = [
+        [row["run"], number(row["throughput"]), number(row["processor_share"]), error(row),
+         result(row)]
+        for row in rows if row["group"] == "threads"
+    ]  # fmt: skip
+    header = ["", "times one thread", "share of a core each had", "error", "must be"]
+    return ["**Two threads with an instance each, 1 ms steps**", "", *lines(header, cells)]
+
+
+def calls(rows: list[dict]) -> list[str]:
+    """Each call by itself."""
+    cells = [
+        [row["run"], *(number(row[name]) for name in (
+            "set_us", "step_us", "get_us", "step_percentile_us", "ratio", "step_largest_us"))]
+        for row in rows if row["group"] == "calls"
+    ]  # fmt: skip
+    header = ["", "Set, us", "DoStep, us", "Get, us", "DoStep 99.9 %, us", "over the median",
+              "largest, us"]  # fmt: skip
+    return ["**Each call by itself, 1 ms steps, inputs changing, medians**", "",
+            *lines(header, cells)]  # fmt: skip
+
+
+def life(rows: list[dict]) -> list[str]:
+    """From fmi2Instantiate to fmi2FreeInstance."""
+    cells = [
+        [f"{row['run']}, {row['work']}",
+         f"{row[row['judged']]:.1f} {'us' if row['judged'] == 'us' else 'KiB'}", result(row)]
+        for row in rows if row["group"] == "life"
+    ]  # fmt: skip
+    return ["**An instance**", "", *lines(["", "", "must be"], cells)]
+
+
+def markdown(report: dict) -> str:
+    """All tables, from the contents of benchmark.json."""
+    rows, machine = report["rows"], report["machine"]
+    versions = ", ".join(
+        f"{name} {machine[name]}" for name in ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")
+    )
+    missed = sum(not row["met"] for row in rows if "judged" in row)
+    head = [
+        f"{machine['processor']}, {machine['cores']:.0f} cores, load {machine['load']:.1f} at the "
+        f"start; {machine['compiler']}, SUNDIALS {machine['sundials']}, Python "
+        f"{machine['python']}, {versions}. {missed} of the targets missed.",
+        "",
+    ]
+    parts = (steps, instances, threads, calls, life)
+    return "\n".join(head + [line for part in parts for line in part(rows)])
