@@ -166,6 +166,13 @@ def judge(row: dict, limit: float) -> None:
     row |= {"judged": "ratio", "comparison": "<=", "limit": limit, "met": row["ratio"] <= limit}
 
 
+def with_figures(page: str, tables: str) -> str:
+    """Replace what stands under the heading Figures of the page, up to the next heading."""
+    before, heading, after = page.partition("\n## Figures\n")
+    _, following, after = after.partition("\n## ")
+    return f"{before}{heading}\n{tables}{following}{after}"
+
+
 def main() -> None:
     """Measure, then write what was measured."""
     build = ROOT / "build"
@@ -177,6 +184,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=build / "report/benchmark")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
+    parser.add_argument("--readme", action="store_true", help="put the tables into README.md too")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
     for path in (options.bench, options.library, options.fmu):
@@ -210,6 +218,9 @@ def main() -> None:
     (options.output / "benchmark.json").write_text(json.dumps(result, indent=1) + "\n")
     text = markdown(result)
     (options.output / "benchmark.md").write_text(text)
+    if options.readme:
+        page = Path(__file__).with_name("README.md")
+        page.write_text(with_figures(page.read_text(), text))
     print(text)
     for path in draw(result["rows"], options.output):
         print(path)

@@ -117,7 +117,7 @@ struct worker {
     pthread_barrier_t *start;
     double begin;
     double end;
-    double processor; /* time the thread was run, s */
+    double processor; /* time that a core worked for it, s */
     double error;
 };
 
@@ -158,7 +158,8 @@ static void create_on_own_core(pthread_t *thread, int index, struct worker *work
     pthread_attr_destroy(&attributes);
 }
 
-/* s from the first thread's begin to the last one's end */
+/* s from the first thread's begin to the last one's end; processor: s that a core worked for one,
+ * on average */
 static double run_threads(struct worker workers[2], const struct worker *like, int count,
                           double *processor) {
     pthread_t threads[2];
@@ -179,7 +180,7 @@ static double run_threads(struct worker workers[2], const struct worker *like, i
         *processor += workers[i].processor;
     }
     pthread_barrier_destroy(&start);
-    *processor /= count * (end - begin);
+    *processor /= count;
     return end - begin;
 }
 
@@ -190,21 +191,28 @@ static void measure_two(struct bench *bench, const struct problem *problem, enum
                                 .method = method,
                                 .rounds = bench->quick ? 1 : rounds};
     double throughput[MOST_REPEATS];
+    double undisturbed[MOST_REPEATS]; // the same if no thread had to wait for its core
     double shares[MOST_REPEATS];
     struct worker workers[2];
     for (int repeat = 0; repeat < bench->repeats; repeat++) {
-        double share;
-        const double one = run_threads(workers, &like, 1, &share);
-        const double two = run_threads(workers, &like, 2, &shares[repeat]);
+        double worked_one;
+        double worked_two;
+        const double one = run_threads(workers, &like, 1, &worked_one);
+        const double two = run_threads(workers, &like, 2, &worked_two);
         throughput[repeat] = 2.0 * one / two;
+        undisturbed[repeat] = 2.0 * worked_one / worked_two;
+        shares[repeat] = worked_two / two;
     }
     const double error = fmax(workers[0].error, workers[1].error);
     const double share = median(shares, bench->repeats);
     const double times = median(throughput, bench->repeats);
+    const double possible = median(undisturbed, bench->repeats);
     report_row(&bench->report, "threads", "two threads with an instance each", name);
     report_number(&bench->report, "processor_share", share);
+    report_number(&bench->report, "undisturbed", possible);
     report_number(&bench->report, "error", error);
-    printf("  %-12s %5.2f times the steps of one thread, error %7.1e", name, times, error);
+    printf("  %-12s %5.2f times the steps of one thread (%4.2f by processor time), error %7.1e",
+           name, times, possible, error);
     report_judged(&bench->report, "throughput", times, (struct target){AT_LEAST, 1.8});
     printf("%s\n", share < 0.97 ? " (the threads had to wait: a busy machine, or one core)" : "");
     report_row_end(&bench->report);

@@ -45,26 +45,27 @@ void turns_add_usual(struct turns *turns, const struct fmu_functions *fmu, doubl
     }
 }
 
-/* Runs of few steps are made many times, so that the clock and its reading do not count. */
-static int passes_of(const struct problem *problem) {
-    return problem->steps >= 100 ? 1 : 100 / problem->steps < 30 ? 100 / problem->steps : 30;
+/* s for a communication step, mean of so many runs that the reading of the clock does not count. */
+static double run_long_enough(struct turns *turns, int run, const struct fmu_functions *fmu,
+                              const struct problem *problem, double states[][4]) {
+    const double clock = clock_cost(processor_time);
+    double seconds = 0.0;
+    int passes = 0;
+    while (passes == 0 || (seconds < 2e-3 && passes < 200)) {
+        seconds += run_once(&turns->runs[run], fmu, problem, states, &turns->counts[run]) - clock;
+        passes++;
+    }
+    return seconds / passes / problem->steps;
 }
 
 void turns_take(struct turns *turns, const struct fmu_functions *fmu, const struct problem *problem,
                 int repeats) {
     double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
-    const int passes = passes_of(problem);
-    const double clock = clock_cost(processor_time);
     require(states != NULL && repeats <= MOST_REPEATS, "no memory");
     turns->repeats = repeats;
     for (int repeat = 0; repeat < repeats; repeat++) {
         for (int run = 0; run < turns->count; run++) {
-            double seconds = 0.0;
-            for (int pass = 0; pass < passes; pass++) {
-                seconds +=
-                    run_once(&turns->runs[run], fmu, problem, states, &turns->counts[run]) - clock;
-            }
-            turns->seconds[run][repeat] = seconds / passes / problem->steps;
+            turns->seconds[run][repeat] = run_long_enough(turns, run, fmu, problem, states);
             turns->error[run] = problem_error(problem, states);
         }
     }
