@@ -2,8 +2,6 @@
 
 #include "turns.h"
 
-#include <string.h>
-
 static const struct work {
     const char *name;
     double step; /* s */
