@@ -9,6 +9,7 @@ import ctypes
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -99,16 +100,21 @@ def _start(folder: Path) -> int:
     """Run the child; its exit code."""
     environment = os.environ | {"TMPDIR": str(folder), "PYTHONUNBUFFERED": "1"}
     with (folder / LOG).open("wb") as log:
-        child = subprocess.run(
+        child = subprocess.Popen(
             [sys.executable, "-m", "cosim.ecos", str(folder)],
-            check=False,
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
             cwd=ROOT,
             env=environment,
+            process_group=0,  # Ecos starts programs of its own, which write to the folder too
         )
-    return child.returncode
+    try:
+        return child.wait()
+    except BaseException:
+        os.killpg(child.pid, signal.SIGKILL)
+        child.wait()
+        raise
 
 
 def _components(ssp: "Ssp", fmu: str) -> str:
