@@ -356,6 +356,19 @@ static void test_another_method_may_take_over(void) {
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
 }
 
+static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
+    static const double limits[] = {1e-3, 1e-9, 5e-324, 1e300};
+    const double absolute[2] = {1e-16, 1e-16};
+    struct integrator_settings settings = {
+        .method = method, .relative_tolerance = 1e-14, .absolute_tolerances = absolute};
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
+        settings.max_step = limits[i];
+        integrator_destroy(integrator);
+        create(circle_rhs);
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    }
+}
+
 static void test_destroying_nothing_is_allowed(void) {
     integrator_destroy(NULL);
 }
@@ -375,6 +388,7 @@ static void run_with(enum integrator_method with) {
     RUN_TEST(test_nothing_is_allocated_after_creation);
     RUN_TEST(test_no_step_is_longer_than_the_limit);
     RUN_TEST(test_another_method_may_take_over);
+    RUN_TEST(test_a_new_handle_takes_any_limit_and_tolerance);
     RUN_TEST(test_destroying_nothing_is_allowed);
     if (method != INTEGRATOR_ERK) {
         RUN_TEST(test_asking_for_more_points_costs_no_steps);
