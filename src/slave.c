@@ -16,11 +16,6 @@ static const double tolerance_fractions[INTEGRATOR_METHODS] = {
     [INTEGRATOR_ERK] = 1e-2,
 };
 
-/* Bounds of what the integrator can run at: below, rounding stops its error test from converging;
- * above, results have no digit left. */
-static const double finest_tolerance = 1e-14;
-static const double coarsest_tolerance = 1e-2;
-
 /* Absolute tolerance of a state, over relative tolerance times nominal value. */
 static const double absolute_fraction = 1e-2;
 
@@ -133,9 +128,9 @@ void slave_update_tolerance(struct slave *slave) {
     } else if (state->experiment.tolerance_defined) {
         tolerance = state->experiment.tolerance;
     }
-    state->own.effective_relative_tolerance =
-        fmin(fmax(tolerance_fractions[state->own.solver_method] * tolerance, finest_tolerance),
-             coarsest_tolerance);
+    state->own.effective_relative_tolerance = fmin(
+        fmax(tolerance_fractions[state->own.solver_method] * tolerance, SLAVE_FINEST_TOLERANCE),
+        SLAVE_COARSEST_TOLERANCE);
 }
 
 void slave_set_clock(struct slave *slave, struct clock_time time) {

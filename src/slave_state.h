@@ -11,6 +11,11 @@
  * snapshot has to replay at most. Larger: fewer restarts, slower rollback. */
 enum { SLAVE_LONGEST_HISTORY = 1000 };
 
+/* Bounds of what the integrator can run at: below, rounding stops its error test from converging;
+ * above, results have no digit left. */
+#define SLAVE_FINEST_TOLERANCE   1e-14
+#define SLAVE_COARSEST_TOLERANCE 1e-2
+
 /* All that later results depend on, but for the values in struct slave_memory. A plain value: a
  * snapshot is a copy of it. */
 struct slave_state {

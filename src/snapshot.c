@@ -312,7 +312,8 @@ static bool is_plausible(const struct slave *slave, const struct slave_state *st
 
     if ((int)state->phase < 0 || state->phase >= PHASE_COUNT ||
         !are_finite(times, sizeof times / sizeof times[0]) || !are_finite(pending, coefficients) ||
-        !are_finite(running, coefficients) || !(tolerance > 0.0 && tolerance < 1.0) ||
+        !are_finite(running, coefficients) ||
+        !(tolerance >= SLAVE_FINEST_TOLERANCE && tolerance <= SLAVE_COARSEST_TOLERANCE) ||
         !(state->own.relative_tolerance >= 0.0 && isfinite(state->own.relative_tolerance)) ||
         (state->experiment_defined &&
          slave_check_experiment(slave, &state->experiment) != STATUS_OK) ||

@@ -191,7 +191,8 @@ static void try_forged(const struct fmu_bytes *forged, const char *message) {
     const fmi2Component c = fmu_instantiate(&messages, false);
     const fmi2Status status = fmu.DeSerializeFMUstate(c, forged->data, forged->size, &made);
     TEST_ASSERT_TRUE_MESSAGE(status == fmi2OK || status == fmi2Error, message);
-    if (status == fmi2OK && fmu.SetFMUstate(c, made) == fmi2OK) {
+    if (status == fmi2OK) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, made), message);
         use_restored(c);
     }
     fmu_assert_reset_is_fresh(c, message);
