@@ -11,6 +11,10 @@
 static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
+/* s: ARKODE multiplies lengths of steps with each other, and with one that it keeps over a restart.
+ * Where that underflows, what it does would depend on the step before. */
+static const double shortest_advance = 1e-100;
+
 static enum status status_of_flag(const struct integrator *integrator, int flag) {
     const bool stuck = integrator_is_stuck(integrator);
     switch (flag) {
@@ -131,6 +135,13 @@ static int advance(struct integrator *integrator, double t, long max_steps, doub
         integrator->first_step > 0.0 ? length / ceil(length / integrator->first_step) : 0.0;
     integrator->counted = (struct integrator_statistics){0};
     N_VScale(1.0, integrator->last_x, integrator->x);
+    if (length < shortest_advance) {
+        *stopped_at = begin;
+        integrator->first_step = 0.0;
+        // brings its counts and its time to those of begin
+        (void)ERKStepReInit(integrator->solver, integrator_evaluate_rhs, begin, integrator->x);
+        return ARK_TOO_CLOSE;
+    }
     int flag = start(integrator, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
         flag = ERK(SetMaxNumSteps)(integrator->solver, max_steps);

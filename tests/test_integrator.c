@@ -369,6 +369,26 @@ static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
     }
 }
 
+static void test_a_vanishing_step_ends_in_the_same_way_each_time(void) {
+    static const double lengths[] = {5e-324, 1e-300, 1e-200};
+    for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
+        enum status statuses[2];
+        long evaluations[2];
+        for (int k = 0; k < 2; k++) {
+            struct integrator_statistics statistics;
+            double x[2];
+            double reached;
+            configure(1e-8);
+            restart(INFINITY);
+            statuses[k] = integrator_advance(integrator, lengths[i], step_limit, &reached, x);
+            integrator_get_statistics(integrator, &statistics);
+            evaluations[k] = statistics.rhs_evaluations;
+        }
+        TEST_ASSERT_EQUAL_INT(statuses[0], statuses[1]);
+        TEST_ASSERT_EQUAL_INT(evaluations[0], evaluations[1]);
+    }
+}
+
 static void test_destroying_nothing_is_allowed(void) {
     integrator_destroy(NULL);
 }
@@ -389,6 +409,7 @@ static void run_with(enum integrator_method with) {
     RUN_TEST(test_no_step_is_longer_than_the_limit);
     RUN_TEST(test_another_method_may_take_over);
     RUN_TEST(test_a_new_handle_takes_any_limit_and_tolerance);
+    RUN_TEST(test_a_vanishing_step_ends_in_the_same_way_each_time);
     RUN_TEST(test_destroying_nothing_is_allowed);
     if (method != INTEGRATOR_ERK) {
         RUN_TEST(test_asking_for_more_points_costs_no_steps);
