@@ -59,24 +59,27 @@ static enum status check_parameters(const void *values_pointer, char *text, size
     const struct rp_trajectory_parameters *p =
         &((const struct rp_trajectory_values *)values_pointer)->parameters;
     double nearest[2];
+    double distance;
     switch (rp_trajectory_check(p)) {
     case RP_TRAJECTORY_VALID:
         return STATUS_OK;
     case RP_TRAJECTORY_NO_FREQUENCY:
-        snprintf(text, size, "frequency = 0 is refused: a circle needs one above or below 0");
+        (void)snprintf(text, size, "frequency = 0 is refused: a circle needs one above or below 0");
         break;
     case RP_TRAJECTORY_SHORT_TURNS:
-        snprintf(text, size,
-                 "turns / |frequency| = %g s is refused: it must be at least ramp_time = %g s "
-                 "(turns = %g, frequency = %g Hz)",
-                 p->turns / fabs(p->frequency), p->ramp_time, p->turns, p->frequency);
+        (void)snprintf(
+            text, size,
+            "turns / |frequency| = %g s is refused: it must be at least ramp_time = %g s "
+            "(turns = %g, frequency = %g Hz)",
+            p->turns / fabs(p->frequency), p->ramp_time, p->turns, p->frequency);
         break;
     case RP_TRAJECTORY_OUT_OF_REACH:
-        snprintf(text, size,
-                 "the path to (%g, %g) m is refused: there it is %g m from the axis of joint 1, "
-                 "and it must stay beyond the smallest reachable distance |a| = %g m",
-                 nearest[0] + 0.0, nearest[1] + 0.0, rp_trajectory_distance(p, nearest),
-                 fabs(p->a));
+        distance = rp_trajectory_distance(p, nearest);
+        (void)snprintf(
+            text, size,
+            "the path to (%g, %g) m is refused: there it is %g m from the axis of joint 1, "
+            "and it must stay beyond the smallest reachable distance |a| = %g m",
+            nearest[0] + 0.0, nearest[1] + 0.0, distance, fabs(p->a));
         break;
     }
     return STATUS_INVALID_PARAMETERS;
