@@ -25,8 +25,11 @@ enum { TEXT_SIZE = 1024 };
 static void harmless(const char *text, char out[TEXT_SIZE]) {
     size_t length = 0;
     for (; *text != '\0' && length < TEXT_SIZE - 2; text++) {
-        const unsigned char c = (unsigned char)*text;
-        out[length++] = (c == '%' || c < ' ' || c == 0x7f) ? '?' : *text;
+        char c = *text;
+        if (c == '%' || (unsigned char)c < ' ' || c == 0x7f) {
+            c = '?';
+        }
+        out[length++] = c;
         if (c == '#') {
             out[length++] = '#';
         }
@@ -39,7 +42,7 @@ static void send(fmi2CallbackLogger logger, fmi2ComponentEnvironment environment
                  va_list arguments) {
     char raw[TEXT_SIZE];
     char text[TEXT_SIZE];
-    vsnprintf(raw, sizeof raw, format, arguments);
+    (void)vsnprintf(raw, sizeof raw, format, arguments);
     harmless(raw, text);
     logger(environment, name, status, category_names[category], text);
 }
@@ -116,7 +119,7 @@ fmi2Status component_fail(struct component *component, const char *format, ...) 
     char text[TEXT_SIZE];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     component_log(component, fmi2Error, LOG_STATUS_ERROR, "%s", text);
     component->state = STATE_ERROR;

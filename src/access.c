@@ -119,7 +119,7 @@ static enum status set(struct slave *slave, enum variable_type type, const unsig
     }
     bool is_setting = false;
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = variable_find(slave->unit, references[i]);
+        const struct variable *variable = variable_of(slave->unit, references[i]);
         slave_write_field(slave, variable, element(type, values, i));
         is_setting |= variable->owner == VARIABLE_OF_SLAVE;
     }
@@ -158,7 +158,7 @@ enum status slave_get_real(struct slave *slave, const unsigned references[], siz
         }
     }
     for (size_t i = 0; i < count; i++) {
-        values[i] = read_field(slave, variable_find(slave->unit, references[i]));
+        values[i] = read_field(slave, variable_of(slave->unit, references[i]));
     }
     return STATUS_OK;
 }
@@ -171,7 +171,7 @@ enum status slave_get_integer(struct slave *slave, const unsigned references[], 
         }
     }
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = variable_find(slave->unit, references[i]);
+        const struct variable *variable = variable_of(slave->unit, references[i]);
         values[i] = *(const int *)slave_field(slave, variable);
     }
     return STATUS_OK;

@@ -62,7 +62,7 @@ enum status slave_set_input_derivatives(struct slave *slave, const unsigned refe
         }
     }
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = variable_find(slave->unit, references[i]);
+        const struct variable *variable = variable_of(slave->unit, references[i]);
         const size_t input = slave_input_index(slave, variable);
         struct polynomial *pending = &slave->memory.pending[input];
         pending->d[orders[i]] = values[i];
@@ -128,7 +128,7 @@ enum status slave_get_output_derivatives(struct slave *slave, const unsigned ref
     }
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < count; i++) {
-            const struct variable *variable = variable_find(slave->unit, references[i]);
+            const struct variable *variable = variable_of(slave->unit, references[i]);
             const double value = value_in(orders[i] == 1 ? slave->first : slave->second, variable);
             if (!isfinite(value)) {
                 return slave_not_finite(slave, variable->name);
@@ -181,7 +181,7 @@ enum status slave_get_directional_derivative(struct slave *slave, const unsigned
 
     memset(slave->first, 0, slave->model->values_size);
     for (size_t i = 0; i < known_count; i++) {
-        const struct variable *variable = variable_find(slave->unit, knowns[i]);
+        const struct variable *variable = variable_of(slave->unit, knowns[i]);
         *(double *)(void *)(slave->first + variable->offset) += v[i];
     }
     status =
@@ -191,7 +191,7 @@ enum status slave_get_directional_derivative(struct slave *slave, const unsigned
     }
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < unknown_count; i++) {
-            const struct variable *variable = variable_find(slave->unit, unknowns[i]);
+            const struct variable *variable = variable_of(slave->unit, unknowns[i]);
             const double value = value_in(slave->first, variable);
             if (!isfinite(value)) {
                 return slave_not_finite(slave, variable->name);

@@ -11,7 +11,7 @@ void message_write(const struct message_sink *sink, enum status status, const ch
     char text[512];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
+    (void)vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     sink->write(sink->context, status, text);
 }

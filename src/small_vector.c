@@ -34,7 +34,7 @@ static N_Vector create_like(const struct _generic_N_Vector *base, sunindextype l
     created->base = *base;
     created->base.content = created->data;
     created->length = length;
-    return &created->base;
+    return (N_Vector)created;
 }
 
 static N_Vector clone(N_Vector x) {

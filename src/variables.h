@@ -67,12 +67,17 @@ enum phase {
     PHASE_COUNT,
 };
 
+/* Of a reference that the unit is known to have. */
+static inline const struct variable *variable_of(const struct unit *unit, unsigned reference) {
+    return &unit->variables[unit->row_of_reference[reference]];
+}
+
 /* NULL where the unit has no such reference. */
 static inline const struct variable *variable_find(const struct unit *unit, unsigned reference) {
     if (reference >= unit->reference_count || unit->row_of_reference[reference] < 0) {
         return NULL;
     }
-    return &unit->variables[unit->row_of_reference[reference]];
+    return variable_of(unit, reference);
 }
 
 /* Before and during initialization: start values and inputs; later: inputs and tunable parameters.

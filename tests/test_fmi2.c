@@ -119,9 +119,10 @@ static void test_the_other_callbacks_may_be_null(void) {
 }
 
 static char *copied(const char *text) {
-    char *copy = malloc(strlen(text) + 1);
+    const size_t size = strlen(text) + 1;
+    char *copy = malloc(size);
     TEST_ASSERT_NOT_NULL(copy);
-    return strcpy(copy, text);
+    return memcpy(copy, text, size);
 }
 
 static void test_nothing_passed_to_instantiate_is_kept(void) {

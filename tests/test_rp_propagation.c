@@ -254,8 +254,8 @@ static void test_first_derivatives_of_the_accelerations_are_the_jacobians(void) 
         double ddq1 = (fabs(x.v.tau[0]) + a * fabs(x.v.tau[1]) + L * inertial + weight) / J;
         double by_q2 = inertial + g * m2 + 2.0 * m2 * L * ddq1, by_dq2 = 2.0 * m2 * L * dq1;
         double by_dq1 = a * by_dq2 + 2.0 * m2 * L * dq2;
-        double torque[6] = {1.0, a, weight, by_q2, by_dq1, by_dq2};
-        double own[6] = {0.0, 1.0 / m2, g, dq1 * dq1, 2.0 * L * dq1, 0.0};
+        const double torque[6] = {1.0, a, weight, by_q2, by_dq1, by_dq2};
+        const double own[6] = {0.0, 1.0 / m2, g, dq1 * dq1, 2.0 * L * dq1, 0.0};
         for (int k = 0; k < 6; ++k) {
             union point first = {.all = {0}};
             first.all[8 + k] = 1.0;

@@ -136,7 +136,8 @@ static void check_elementwise(void) {
         N_VConst(-3.1, small[z][0]);
         N_VConst(-3.1, serial[z][0]);
         assert_same(0.0);
-        for (double factor = -1.0; factor < 2.5; factor += 0.5) {
+        for (int half = -2; half < 5; half++) {
+            const double factor = 0.5 * half;
             N_VScale(factor, small[0][0], small[z][0]);
             N_VScale(factor, serial[0][0], serial[z][0]);
             assert_same(0.0);

@@ -52,10 +52,10 @@ static enum status check_parameters(const void *values_pointer, char *text, size
     if (rp_parameters_check(arm)) {
         return STATUS_OK;
     }
-    snprintf(text, size,
-             "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-             "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
-             rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
+    (void)snprintf(text, size,
+                   "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
+                   "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
+                   rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
     return STATUS_INVALID_PARAMETERS;
 }
 
