@@ -41,7 +41,12 @@ need python3-venv has_venv
 # Ecos links to the first and unpacks FMUs by the command of the second
 need libtbb12 has_libtbb
 need unzip command -v unzip
-[ "$dev" = no ] || need clang command -v clang
+if [ "$dev" = yes ]; then
+  need clang command -v clang
+  need clang-tidy-14 command -v clang-tidy-14
+  need cppcheck command -v cppcheck
+  need valgrind command -v valgrind
+fi
 
 if [ "${#missing[@]}" -gt 0 ]; then
   install="apt-get install -y --no-install-recommends ${missing[*]}"
