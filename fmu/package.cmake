@@ -43,7 +43,8 @@ function(add_fmu name)
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${name} PRIVATE ${name}_unit reserved_allocation)
   target_link_options(${name} PRIVATE
-    -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now)
+    -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed
+    -Wl,-z,relro,-z,now,-z,noexecstack,-z,text)
 
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
