@@ -69,12 +69,6 @@ def test_packing_what_is_not_there_is_refused(tmp_path: Path, entry: str) -> Non
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_binary_needs_libc_and_libm_alone(binary: Path) -> None:
-    dynamic = output_of("readelf", "-d", binary)
-    needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", dynamic))
-    assert needed <= {"libc.so.6", "libm.so.6"}
-
-
 def test_the_binary_exports_the_functions_of_the_standard_and_nothing_else(binary: Path) -> None:
     symbols = output_of("nm", "-D", "--defined-only", binary).split("\n")
     exported = {line.split()[-1] for line in symbols if line}
@@ -82,12 +76,6 @@ def test_the_binary_exports_the_functions_of_the_standard_and_nothing_else(binar
     standard = set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
     assert len(standard) == 44
     assert exported == standard
-
-
-def test_the_binary_runs_on_older_systems(binary: Path) -> None:
-    versions = re.findall(r"GLIBC_(\d+)\.(\d+)", output_of("readelf", "-W", "--dyn-syms", binary))
-    newest = max((int(major), int(minor)) for major, minor in versions)
-    assert newest <= (2, 29)
 
 
 def test_fmpy_finds_no_problem(fmu: Path) -> None:
