@@ -52,23 +52,6 @@ def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
     assert "effective_relative_tolerance" in page and "<math" in page
 
 
-def test_packing_again_gives_the_same_bytes(fmu: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(fmu) as archive:
-        archive.extractall(tmp_path / "content")
-    entries = [f"{path.name}={path}" for path in (tmp_path / "content").iterdir()]
-    output_of(sys.executable, ROOT / "fmu" / "package.py", tmp_path / "again.fmu", *entries)
-    assert (tmp_path / "again.fmu").read_bytes() == fmu.read_bytes()
-
-
-@pytest.mark.parametrize("entry", ["a=missing.txt", "no-equals-sign", "=x"])
-def test_packing_what_is_not_there_is_refused(tmp_path: Path, entry: str) -> None:
-    command = [sys.executable, ROOT / "fmu" / "package.py", tmp_path / "x.fmu", entry]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert result.returncode == 2
-    assert entry in result.stderr and len(result.stderr.splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_the_binary_exports_the_functions_of_the_standard_and_nothing_else(binary: Path) -> None:
     symbols = output_of("nm", "-D", "--defined-only", binary).split("\n")
     exported = {line.split()[-1] for line in symbols if line}

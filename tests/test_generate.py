@@ -248,6 +248,21 @@ REFUSED = {
     "tolerance_negative": ("tolerance = 1e-8", "tolerance = -1.0", ["[experiment]", "tolerance"]),
     "stop_before_start": ("stop = 2.0", "stop = -2.0", ["[experiment]", "stop"]),
     "step_zero": ("step = 0.001", "step = 0.0", ["[experiment]", "step"]),
+    "section_missing": ("[experiment]\n", "[units.x]\n", ["section [experiment] is missing"]),
+    "variable_no_table": ("[variables.m1]", "[variables]\nx = 1\n[variables.m1]", ["x", "table"]),
+    "unit_no_table": ("[units]", "[units]\nx = 1", ["unit x", "not a table of exponents"]),
+    "wrong_initial": ("start = 2.0", 'start = 2.0\ninitial = "approx"', ["m1", "not approx"]),
+    "nominal_zero": (
+        "start = 2.0",
+        "start = 2.0\nnominal = 0.0",
+        ["m1", "nominal must be above 0"],
+    ),
+    "two_times": (
+        "[variables.m1]",
+        '[variables.t]\nreference = 99\nfield = "t"\ncausality = "independent"\n'
+        'variability = "continuous"\nunit = "s"\ndescription = "Time"\n[variables.m1]',
+        ["variable t", "independent variable already"],
+    ),
     "declared_twice": ("[variables.m1]", "[variables.time]", ["time", "declared twice"]),
 }
 REFUSED["start_not_allowed"] = (

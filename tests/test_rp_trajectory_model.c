@@ -128,12 +128,16 @@ static void assert_refused(const char *expected) {
     TEST_ASSERT_EQUAL_STRING(expected, text);
 }
 
+static void assert_accepted(void) {
+    text[0] = '\0';
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.check_parameters(&v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("", text);
+}
+
 static void test_start_values_are_accepted(void) {
     for (size_t motion = 0; motion < 3; motion++) {
         v.parameters.motion = motions[motion];
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_trajectory_model.check_parameters(&v, text, sizeof text));
-        TEST_ASSERT_EQUAL_STRING("", text);
+        assert_accepted();
     }
 }
 
@@ -148,6 +152,21 @@ static void test_a_circle_needs_time_for_its_ramps(void) {
     v.parameters.ramp_time = 0.75;
     assert_refused("turns / |frequency| = 0.5 s is refused: it must be at least ramp_time = 0.75 s "
                    "(turns = 0.25, frequency = -0.5 Hz)");
+    v.parameters.turns = 0.375; // just enough
+    assert_accepted();
+}
+
+static void test_a_path_at_the_smallest_distance_is_refused(void) {
+    v.parameters.motion = RP_TRAJECTORY_LINE;
+    v.parameters.ee_from[0] = 0.5;
+    v.parameters.ee_from[1] = v.parameters.ee_to[1] = 0.125;
+    v.parameters.ee_to[0] = -0.5;
+    v.parameters.a = -0.125;
+    assert_refused(
+        "the path to (0, 0.125) m is refused: there it is 0.125 m from the axis of "
+        "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.125 m");
+    v.parameters.a = -0.1249;
+    assert_accepted();
 }
 
 /* The text gives the nearest point of the path and its distance. */
@@ -167,7 +186,7 @@ static void test_a_circle_about_the_axis_is_everywhere_as_near(void) {
     assert_refused("the path to (0.0625, 0) m is refused: there it is 0.0625 m from the axis of "
                    "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.1 m");
     v.parameters.radius = 0.125;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.check_parameters(&v, text, sizeof text));
+    assert_accepted();
 }
 
 /* A quarter of a circle that does not come to the axis, with either of its ends next to it. */
@@ -196,6 +215,7 @@ int main(void) {
     RUN_TEST(test_start_values_are_accepted);
     RUN_TEST(test_a_circle_needs_a_frequency);
     RUN_TEST(test_a_circle_needs_time_for_its_ramps);
+    RUN_TEST(test_a_path_at_the_smallest_distance_is_refused);
     RUN_TEST(test_a_path_stays_beyond_the_smallest_distance);
     RUN_TEST(test_a_circle_about_the_axis_is_everywhere_as_near);
     RUN_TEST(test_the_nearest_point_of_an_arc_may_be_an_end);
