@@ -29,11 +29,8 @@ void slave_write_field(struct slave *slave, const struct variable *variable, dou
     }
 }
 
-/* An input reads as the value set last, also after a step over which it moved. */
+/* Of a Real. An input reads as the value set last, also after a step over which it moved. */
 static double read_field(struct slave *slave, const struct variable *variable) {
-    if (variable->type == VARIABLE_INTEGER) {
-        return *(const int *)slave_field(slave, variable);
-    }
     if (variable->causality == CAUSALITY_INPUT) {
         return slave->memory.pending[slave_input_index(slave, variable)].d[0];
     }

@@ -74,12 +74,23 @@ enum status slave_set_input_derivatives(struct slave *slave, const unsigned refe
     return STATUS_OK;
 }
 
+/* Of all calculated values, into slave->first and second, which may be NULL. */
+static enum status propagate(struct slave *slave, double dt, char *second) {
+    const double t = slave->state.time.s;
+    const enum status status =
+        slave->model->propagate(slave->memory.values, t, dt, slave->first, second);
+    if (status != STATUS_OK) {
+        message_write(&slave->sink, status, "no derivatives at t = %.17g: %s", t,
+                      status_text(status));
+    }
+    return status;
+}
+
 /* Derivatives along the motion, twice: those of the states are calculated values, whose own
  * derivatives are the states' next ones. */
 static enum status derive_by_time(struct slave *slave) {
     const struct model *model = slave->model;
     const struct slave_memory *memory = &slave->memory;
-    const double t = slave->state.time.s;
     enum status status = slave_update_outputs(slave);
     if (status != STATUS_OK) {
         return status;
@@ -91,7 +102,7 @@ static enum status derive_by_time(struct slave *slave) {
     for (size_t i = 0; i < count_of(model->inputs); i++) {
         doubles_of(slave->first, model->inputs)[i] = memory->current[i].d[1];
     }
-    status = model->propagate(memory->values, t, 1.0, slave->first, NULL);
+    status = propagate(slave, 1.0, NULL);
     if (status != STATUS_OK) {
         return status;
     }
@@ -102,7 +113,7 @@ static enum status derive_by_time(struct slave *slave) {
     for (size_t i = 0; i < count_of(model->inputs); i++) {
         doubles_of(slave->second, model->inputs)[i] = memory->current[i].d[2];
     }
-    return model->propagate(memory->values, t, 1.0, slave->first, slave->second);
+    return propagate(slave, 1.0, slave->second);
 }
 
 static double value_in(const char *structure, const struct variable *variable) {
@@ -184,8 +195,7 @@ enum status slave_get_directional_derivative(struct slave *slave, const unsigned
         const struct variable *variable = variable_of(slave->unit, knowns[i]);
         *(double *)(void *)(slave->first + variable->offset) += v[i];
     }
-    status =
-        slave->model->propagate(slave->memory.values, slave->state.time.s, 0.0, slave->first, NULL);
+    status = propagate(slave, 0.0, NULL);
     if (status != STATUS_OK) {
         return status;
     }

@@ -1,0 +1,122 @@
+/* A model that cannot compute its outputs or their derivatives for a while: each call says so,
+ * gives no value, and works again afterwards. */
+#include "last_text.h"
+#include "oscillator.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static struct model model;
+static struct unit unit;
+static struct slave *slave;
+static bool has_outputs;
+static int propagations_left; /* before one fails */
+
+static enum status outputs(void *values, double t) {
+    return has_outputs ? oscillator_model.outputs(values, t) : STATUS_NOT_FINITE;
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    return propagations_left-- > 0 ? oscillator_model.propagate(values, t, dt, first, second)
+                                   : STATUS_NOT_FINITE;
+}
+
+void setUp(void) {
+    const struct slave_experiment experiment = {.start_time = 0.0};
+    model = oscillator_model;
+    model.outputs = outputs;
+    model.propagate = propagate;
+    unit = oscillator_unit;
+    unit.model = &model;
+    has_outputs = true;
+    propagations_left = 100;
+    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
+    ASSERT_OK(slave_setup_experiment(slave, &experiment));
+    ASSERT_OK(slave_enter_initialization(slave));
+    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
+    last_text[0] = '\0';
+}
+
+void tearDown(void) {
+    slave_destroy(slave);
+}
+
+static const unsigned energy = OSCILLATOR_ENERGY;
+static const unsigned x = OSCILLATOR_X;
+
+static enum status read_energy(double *value) {
+    return slave_get_real(slave, &energy, 1, value);
+}
+
+static enum status derive_energy(double *value) {
+    const int order = 1;
+    return slave_get_output_derivatives(slave, &energy, 1, &order, value);
+}
+
+static enum status derive_energy_by_x(double *value) {
+    const double one = 1.0;
+    return slave_get_directional_derivative(slave, &energy, 1, &x, 1, &one, value);
+}
+
+static void assert_fails(enum status call(double *), const char *expected) {
+    double value = -7.0;
+    last_text[0] = '\0';
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, call(&value));
+    TEST_ASSERT_TRUE(value == -7.0);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, expected), last_text);
+}
+
+static void assert_works(enum status call(double *)) {
+    double value = NAN;
+    ASSERT_OK(call(&value));
+    TEST_ASSERT_TRUE(isfinite(value));
+}
+
+/* Outputs that are valid already are not computed again, so an input is set first. */
+static void without_outputs(void) {
+    const unsigned input = OSCILLATOR_U;
+    const double u = 0.5;
+    has_outputs = false;
+    ASSERT_OK(slave_set_real(slave, &input, 1, &u));
+}
+
+static void test_without_outputs_nothing_is_read_or_derived(void) {
+    without_outputs();
+    assert_fails(read_energy, "no outputs at t = 0.1");
+    assert_fails(derive_energy, "no outputs at t = 0.1");
+    assert_fails(derive_energy_by_x, "no outputs at t = 0.1");
+    has_outputs = true;
+    assert_works(read_energy);
+    assert_works(derive_energy);
+    assert_works(derive_energy_by_x);
+}
+
+static void test_states_are_read_without_outputs(void) {
+    double value = NAN;
+    without_outputs();
+    ASSERT_OK(slave_get_real(slave, &x, 1, &value));
+    TEST_ASSERT_TRUE(isfinite(value));
+}
+
+/* Along time the model propagates twice. */
+static void test_derivatives_fail_with_any_propagation(void) {
+    for (int good = 0; good < 2; good++) {
+        propagations_left = good;
+        assert_fails(derive_energy, "no derivatives at t = 0.1");
+    }
+    propagations_left = 0;
+    assert_fails(derive_energy_by_x, "no derivatives at t = 0.1");
+    propagations_left = 100;
+    assert_works(derive_energy);
+    assert_works(derive_energy_by_x);
+}
+
+int main(void) {
+    UNITY_BEGIN();
+    RUN_TEST(test_without_outputs_nothing_is_read_or_derived);
+    RUN_TEST(test_states_are_read_without_outputs);
+    RUN_TEST(test_derivatives_fail_with_any_propagation);
+    return UNITY_END();
+}
