@@ -2,13 +2,13 @@
 
 import os
 import re
-import shutil
 import subprocess
 import zipfile
 from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from source_copy import copy_sources, run, settings_of
 
 FMUS = ("RPManipulator", "RPTrajectory", "RPController")
 
@@ -84,35 +84,25 @@ def test_it_names_no_path_of_the_machine_that_built_it(binary: Path, fmu: Path) 
 # ---- Two builds ---------------------------------------------------------------------------------
 
 
-def build(sources: Path, folder: Path, fmu: Path) -> Path:
-    """Build the FMUs and the system of sources, without tests; the settings are those of fmu's."""
-    cache = (fmu.parent / "CMakeCache.txt").read_text()
-    keep = ("CMAKE_C_COMPILER:", "CMAKE_BUILD_TYPE:", "FMI_HEADERS_DIR:", "Python3_EXECUTABLE:")
-    keep += ("SUNDIALS_DIR:", "SUNDIALS_LICENSE:", "_Python3_EXECUTABLE:")
-    lines = [line for line in cache.splitlines() if line.startswith(keep)]
-    options = [f"-D{line.removeprefix('_')}" for line in lines]
-    commands = (
-        ["cmake", "-S", sources, "-B", folder, "-DBUILD_TESTING=OFF", *options],
-        ["cmake", "--build", folder, "--parallel", "2"],
-    )
-    for command in commands:
-        result = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert result.returncode == 0, result.stdout + result.stderr
+def build(sources: Path, folder: Path, settings: list[str]) -> Path:
+    """Build the FMUs and the system of sources, without tests."""
+    run("cmake", "-S", sources, "-B", folder, "-DBUILD_TESTING=OFF", *settings)
+    run("cmake", "--build", folder, "--parallel", "2")
     return folder
 
 
 def test_two_builds_in_two_folders_give_the_same_bytes(fmu: Path, tmp_path: Path) -> None:
     """Copies in folders of names of other lengths, at another time and under another umask."""
-    ignored = shutil.ignore_patterns("build", ".git", "__pycache__", "references")
-    first = shutil.copytree(ROOT, tmp_path / "a", ignore=ignored)
-    second = shutil.copytree(ROOT, tmp_path / "a folder with a longer name" / "b", ignore=ignored)
+    first = copy_sources(tmp_path / "a")
+    second = copy_sources(tmp_path / "a folder with a longer name" / "b")
+    settings = settings_of(fmu.parent)
     for path in second.rglob("*"):
         os.utime(path, (1_000_000_000, 1_000_000_000))
     before = os.umask(0o077)
     try:
-        built = build(second, tmp_path / "elsewhere", fmu)
+        built = build(second, tmp_path / "elsewhere", settings)
     finally:
         os.umask(before)
-    expected = build(first, first / "build", fmu)
+    expected = build(first, first / "build", settings)
     for name in [f"{name}.fmu" for name in FMUS] + ["ClosedLoop.ssp"]:
         assert (built / name).read_bytes() == (expected / name).read_bytes(), name
