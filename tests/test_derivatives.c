@@ -153,7 +153,7 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
     const unsigned x = OSCILLATOR_X;
     const unsigned omega = OSCILLATOR_OMEGA;
     const unsigned energy = OSCILLATOR_ENERGY;
-    const unsigned counter_settings = OSCILLATOR_EFFECTIVE_TOLERANCE;
+    const unsigned setting = OSCILLATOR_EFFECTIVE_TOLERANCE;
     const double one = 1.0;
     double value = -7.0;
     ASSERT_OK(slave_get_directional_derivative(slave, &x, 1, &omega, 1, &one, &value));
@@ -161,8 +161,8 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
     value = -7.0;
     const struct {
         const unsigned *unknown, *known;
-    } cases[] = {{&x, &omega}, {&x, &energy}, {&omega, &x}, {&counter_settings, &x}};
-    for (int i = 0; i < 4; i++) {
+    } cases[] = {{&x, &omega}, {&x, &energy}, {&omega, &x}, {&setting, &x}, {&x, &setting}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                               slave_get_directional_derivative(slave, cases[i].unknown, 1,
                                                                cases[i].known, 1, &one, &value));

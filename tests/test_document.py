@@ -184,6 +184,12 @@ def test_only_links_that_work_in_the_fmu_are_kept(model_description: Path, tmp_p
     assert "code site up" in page.text_content()
 
 
+NAMELESS = (
+    '<fmiModelDescription fmiVersion="2.0"><ModelVariables><ScalarVariable/></ModelVariables>'
+    "</fmiModelDescription>"
+)
+
+
 @pytest.mark.parametrize(
     ("readme", "xml", "message"),
     [
@@ -191,6 +197,7 @@ def test_only_links_that_work_in_the_fmu_are_kept(model_description: Path, tmp_p
         ("text", None, "modelDescription.xml: cannot be read: No such file or directory"),
         ("text", "<fmi", "modelDescription.xml: is not valid XML: "),
         ("text", "<html/>", "modelDescription.xml: is not a model description of FMI 2.0"),
+        ("text", NAMELESS, "modelDescription.xml: a ScalarVariable lacks name"),
         (r"at $\nosuch x$", "<html/>", r"README.md: formula $\nosuch x$ does not convert: "),
         (
             "$$\nx +\n\\frac{1}\n$$",

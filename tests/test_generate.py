@@ -257,6 +257,12 @@ REFUSED = {
         "start = 2.0\nnominal = 0.0",
         ["m1", "nominal must be above 0"],
     ),
+    "integer_too_large": (
+        "[variables.m1]",
+        '[variables.n]\nreference = 99\nfield = "n"\ncausality = "parameter"\ntype = "Integer"\n'
+        'variability = "fixed"\nstart = 2147483648\ndescription = "N"\n[variables.m1]',
+        ["variable n", "not an integer of 32 bits"],
+    ),
     "two_times": (
         "[variables.m1]",
         '[variables.t]\nreference = 99\nfield = "t"\ncausality = "independent"\n'
