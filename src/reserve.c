@@ -73,12 +73,13 @@ void reserve_enter(struct reserve *reserve) {
     if (slot == NULL) {
         slot = claim_slot();
     }
+    reserve->slot = (size_t)(slot - slots);
     reserve->outer = slot->reserve;
     slot->reserve = reserve;
 }
 
 void reserve_leave(struct reserve *reserve) {
-    struct slot *slot = own_slot();
+    struct slot *slot = &slots[reserve->slot];
     slot->reserve = reserve->outer;
     if (slot->reserve == NULL) {
         atomic_store_explicit(&slot->thread, NULL, memory_order_release);
@@ -94,7 +95,10 @@ static struct reserve *entered(void) {
 void *reserve_take(size_t size) {
     const size_t alignment = _Alignof(max_align_t);
     struct reserve *reserve = entered();
-    const size_t left = reserve != NULL ? reserve->size - reserve->used : 0;
+    if (reserve == NULL) {
+        return NULL;
+    }
+    const size_t left = reserve->size - reserve->used;
     if (size >= left) { // even a block of no bytes must lie inside
         return NULL;
     }

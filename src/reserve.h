@@ -14,6 +14,7 @@ struct reserve {
     char *block; /* NULL: there is none */
     size_t size; /* bytes */
     size_t used;
+    size_t slot;           /* of the thread that has entered it */
     struct reserve *outer; /* that the thread had entered before */
 };
 

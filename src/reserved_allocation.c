@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <string.h>
 
+// NOLINTBEGIN(bugprone-reserved-identifier, cert-dcl37-c, cert-dcl51-cpp)
 void *__real_malloc(size_t size);
 void *__real_calloc(size_t items, size_t size);
 void *__real_realloc(void *memory, size_t size);
@@ -41,3 +42,4 @@ void __wrap_free(void *memory) {
         __real_free(memory);
     }
 }
+// NOLINTEND(bugprone-reserved-identifier, cert-dcl37-c, cert-dcl51-cpp)

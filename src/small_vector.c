@@ -9,6 +9,7 @@ _Static_assert(sizeof(sunrealtype) == sizeof(double), "SUNDIALS must be built fo
 struct small_vector {
     struct _generic_N_Vector base; /* first: the N_Vector */
     sunindextype length;
+    // cppcheck-suppress unusedStructMember // it does not see through the casts below
     struct small_vector_terms *terms; /* NULL: not noted */
     double data[];
 };

@@ -15,11 +15,11 @@ struct circle {
 };
 
 static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
-    struct circle *circle = context;
-    circle->latest = fmax(circle->latest, t);
-    circle->evaluations++;
+    struct circle *of = context;
+    of->latest = fmax(of->latest, t);
+    of->evaluations++;
     dx[0] = x[1];
-    dx[1] = t >= circle->failing_from ? NAN : -x[0];
+    dx[1] = t >= of->failing_from ? NAN : -x[0];
     return STATUS_OK;
 }
 
