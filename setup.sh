@@ -25,6 +25,8 @@ mkdir -p build 2>/dev/null && [ -w build ] || fail "the folder $PWD cannot be wr
 # ---- system packages
 
 has_libtbb() { compgen -G '/usr/lib/*/libtbb.so.12'; }
+# libFuzzer and sanitizers of clang lie beside this one
+has_clang_runtime() { test -e "$(clang --rtlib=compiler-rt -print-libgcc-file-name)"; }
 has_venv() { python3 -c 'import ensurepip, venv' 2>/dev/null; }
 missing=()
 need() { "${@:2}" >/dev/null 2>&1 || missing+=("$1"); }
@@ -43,6 +45,7 @@ need libtbb12 has_libtbb
 need unzip command -v unzip
 if [ "$dev" = yes ]; then
   need clang command -v clang
+  need libclang-rt-dev has_clang_runtime
   need clang-tidy-14 command -v clang-tidy-14
   need cppcheck command -v cppcheck
   need valgrind command -v valgrind

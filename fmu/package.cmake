@@ -6,6 +6,11 @@
 # references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
+set(FMU_SOURCES
+  ${FMU_SOURCE_DIR}/component.c
+  ${FMU_SOURCE_DIR}/fmi2.c
+  ${FMU_SOURCE_DIR}/fmi2_co_simulation.c
+  ${FMU_SOURCE_DIR}/fmi2_model_exchange.c)
 
 function(add_fmu name)
   cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
@@ -34,11 +39,7 @@ function(add_fmu name)
   target_link_libraries(${name}_unit PUBLIC slave ${ARG_LIBRARY} ${name}_interface)
 
   # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
-  add_library(${name} MODULE
-    ${FMU_SOURCE_DIR}/component.c
-    ${FMU_SOURCE_DIR}/fmi2.c
-    ${FMU_SOURCE_DIR}/fmi2_co_simulation.c
-    ${FMU_SOURCE_DIR}/fmi2_model_exchange.c)
+  add_library(${name} MODULE ${FMU_SOURCES})
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${name} PRIVATE ${name}_unit reserved_allocation)

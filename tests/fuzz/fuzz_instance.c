@@ -1,0 +1,364 @@
+#include "fuzz_instance.h"
+
+#include "unit.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char instance_name[] = "fuzzed";
+
+/* ---- Log ------------------------------------------------------------------------------------- */
+
+static bool is_category(const char *category) {
+    static const char *const categories[] = {"logEvents",        "logStatusWarning",
+                                             "logStatusDiscard", "logStatusError",
+                                             "logStatusFatal",   "logAll"};
+    for (size_t i = 0; i < FUZZ_COUNT(categories); i++) {
+        if (strcmp(category, categories[i]) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void log_text(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                     fmi2String category, fmi2String message, ...) {
+    struct fuzz_instance *instance = environment;
+    if (instance == NULL || name == NULL || category == NULL || message == NULL ||
+        message[0] == '\0' || strchr(message, '%') != NULL || !is_category(category) ||
+        status > fmi2Pending) {
+        fuzz_fail("malformed text in the log: '%s', category '%s'",
+                  message != NULL ? message : "(null)", category != NULL ? category : "(null)");
+    }
+    instance->told[status]++;
+    snprintf(instance->text, sizeof instance->text, "%s", message);
+}
+
+/* ---- Life ------------------------------------------------------------------------------------ */
+
+fmi2CallbackFunctions fuzz_callbacks(struct fuzz_instance *instance, bool has_logger) {
+    return (fmi2CallbackFunctions){
+        .logger = has_logger ? log_text : NULL,
+        .allocateMemory = calloc,
+        .freeMemory = free,
+        .componentEnvironment = instance,
+    };
+}
+
+struct fuzz_instance *fuzz_instance_create(fmi2Type kind, bool has_logger, bool logging_on) {
+    struct fuzz_instance *instance = fuzz_array(1, sizeof *instance);
+    fmi2CallbackFunctions *callbacks = fuzz_array(1, sizeof *callbacks);
+    *callbacks = fuzz_callbacks(instance, has_logger);
+    instance->kind = kind;
+    instance->has_logger = has_logger;
+    instance->tells_refusals = has_logger;
+    instance->component =
+        FUZZ_CALL(fmi2Instantiate(instance_name, kind, RP_MANIPULATOR_GUID, NULL, callbacks,
+                                  fmi2False, logging_on ? fmi2True : fmi2False));
+    free(callbacks); // valid during the call only
+    if (instance->component == NULL) {
+        fuzz_fail("no instance is made");
+    }
+    fuzz_instance_count++;
+    return instance;
+}
+
+void fuzz_instance_free(struct fuzz_instance *instance) {
+    if (instance != NULL) {
+        fuzz_call_count++;
+        fmi2FreeInstance(instance->component);
+        free(instance);
+    }
+}
+
+/* ---- Status ---------------------------------------------------------------------------------- */
+
+/* What may still succeed after an fmi2Error: sections 3.2.3 and 4.2.4. */
+static bool works_in_error(enum fmu_function function) {
+    switch (function) {
+    case FMU_SetDebugLogging:
+    case FMU_Reset:
+    case FMU_GetReal:
+    case FMU_GetInteger:
+    case FMU_GetBoolean:
+    case FMU_GetString:
+    case FMU_GetFMUstate:
+    case FMU_SetFMUstate:
+    case FMU_FreeFMUstate:
+    case FMU_SerializedFMUstateSize:
+    case FMU_SerializeFMUstate:
+    case FMU_DeSerializeFMUstate:
+    case FMU_GetDirectionalDerivative:
+    case FMU_GetRealOutputDerivatives:
+    case FMU_GetDerivatives:
+    case FMU_GetEventIndicators:
+    case FMU_GetContinuousStates:
+    case FMU_GetNominalsOfContinuousStates:
+        return true;
+    default:
+        return false;
+    }
+}
+
+fmi2Status fuzz_check(struct fuzz_instance *instance, enum fmu_function function,
+                      fmi2Status status) {
+    const char *name = fmu_function_names[function];
+    if (status != fmi2OK && status != fmi2Discard && status != fmi2Error) {
+        fuzz_fail("%s returns the status %d", name, (int)status);
+    }
+    if (instance->tells_refusals && status != fmi2OK && instance->told[status] == 0) {
+        fuzz_fail("%s returns the status %d without a text", name, (int)status);
+    }
+    if (instance->in_error && status != fmi2Error && !works_in_error(function)) {
+        fuzz_fail("%s returns the status %d in the error state", name, (int)status);
+    }
+    if (status == fmi2Error) {
+        instance->in_error = true;
+        instance->had_error = true;
+    }
+    memset(instance->told, 0, sizeof instance->told);
+    return status;
+}
+
+void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit) {
+    const fmi2ValueReference reference = RP_MANIPULATOR_max_internal_steps;
+    if (FUZZ_CHECKED(instance, SetInteger, &reference, 1, &limit) != fmi2OK) {
+        fuzz_fail("max_internal_steps of a new instance cannot be set");
+    }
+}
+
+static void reset(struct fuzz_instance *instance) {
+    if (FUZZ_CHECKED_PLAIN(instance, Reset) != fmi2OK) {
+        fuzz_fail("fmi2Reset fails");
+    }
+    instance->in_error = false;
+    instance->time = 0.0;
+}
+
+void fuzz_reset(struct fuzz_instance *instance) {
+    reset(instance);
+    fuzz_limit_steps(instance, FUZZ_MAX_INTERNAL_STEPS);
+}
+
+fmi2Status fuzz_initialize(struct fuzz_instance *instance, double tolerance, double start) {
+    fmi2Status status =
+        FUZZ_CHECKED(instance, SetupExperiment, tolerance != 0.0, tolerance, start, fmi2False, 0.0);
+    if (status == fmi2OK) {
+        instance->time = start;
+        status = FUZZ_CHECKED_PLAIN(instance, EnterInitializationMode);
+    }
+    return status == fmi2OK ? FUZZ_CHECKED_PLAIN(instance, ExitInitializationMode) : status;
+}
+
+fmi2Status fuzz_step(struct fuzz_instance *instance, double length) {
+    const fmi2Status status = FUZZ_CHECKED(instance, DoStep, instance->time, length, fmi2True);
+    if (status == fmi2OK) {
+        instance->time += length;
+    }
+    return status;
+}
+
+/* ---- Values ---------------------------------------------------------------------------------- */
+
+void fuzz_assert_written(fmi2Status status, const double values[], size_t count, const char *what) {
+    if (status != fmi2OK) {
+        if (!fuzz_is_poisoned(values, count)) {
+            fuzz_fail("%s writes values though its status is %d", what, (int)status);
+        }
+        return;
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (!isfinite(values[i])) {
+            fuzz_fail("%s returns fmi2OK with the value %g in place %zu", what, values[i], i);
+        }
+    }
+}
+
+static fmi2Status read_real(struct fuzz_instance *instance, fmi2ValueReference reference,
+                            double *value) {
+    double read;
+    fuzz_poison(&read, 1);
+    const fmi2Status status = FUZZ_CHECKED(instance, GetReal, &reference, 1, &read);
+    fuzz_assert_written(status, &read, 1, "fmi2GetReal");
+    if (status == fmi2Error) {
+        fuzz_fail("the variable with the reference %u cannot be read", reference);
+    }
+    *value = status == fmi2OK ? read : 0.0;
+    return status;
+}
+
+void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
+    fmi2ValueReference references[FUZZ_VARIABLE_CAPACITY];
+    double reals[FUZZ_VARIABLE_CAPACITY];
+    size_t count = 0;
+    memset(values, 0, sizeof *values);
+    values->status = fmi2OK;
+    if (unit.variable_count > FUZZ_VARIABLE_CAPACITY) {
+        fuzz_fail("more variables than FUZZ_VARIABLE_CAPACITY");
+    }
+    for (size_t i = 0; i < unit.variable_count; i++) {
+        if (unit.variables[i].type == VARIABLE_REAL) {
+            references[count++] = unit.variables[i].reference;
+        } else if (FUZZ_CHECKED(instance, GetInteger, &unit.variables[i].reference, 1,
+                                &values->integers[i]) != fmi2OK) {
+            fuzz_fail("%s cannot be read", unit.variables[i].name);
+        }
+    }
+    fuzz_poison(reals, count);
+    const fmi2Status status = FUZZ_CHECKED(instance, GetReal, references, count, reals);
+    fuzz_assert_written(status, reals, count, "fmi2GetReal");
+    count = 0;
+    for (size_t i = 0; i < unit.variable_count; i++) {
+        if (unit.variables[i].type != VARIABLE_REAL) {
+            continue;
+        }
+        if (status == fmi2OK) {
+            values->reals[i] = reals[count++];
+        } else if (read_real(instance, unit.variables[i].reference, &values->reals[i]) != fmi2OK) {
+            values->status = fmi2Discard;
+        }
+    }
+    if (status != values->status) {
+        fuzz_fail("all variables together have the status %d, alone %d", (int)status,
+                  (int)values->status);
+    }
+}
+
+double fuzz_value(const struct fuzz_values *values, fmi2ValueReference reference) {
+    return values->reals[unit.row_of_reference[reference]];
+}
+
+fmi2Integer fuzz_integer_value(const struct fuzz_values *values, fmi2ValueReference reference) {
+    return values->integers[unit.row_of_reference[reference]];
+}
+
+void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_values *actual,
+                      const char *what) {
+    for (size_t i = 0; i < unit.variable_count; i++) {
+        if (memcmp(&expected->reals[i], &actual->reals[i], sizeof expected->reals[i]) != 0 ||
+            expected->integers[i] != actual->integers[i]) {
+            fuzz_fail("%s: %s is %.17g (%d), not %.17g (%d)", what, unit.variables[i].name,
+                      actual->reals[i], actual->integers[i], expected->reals[i],
+                      expected->integers[i]);
+        }
+    }
+    if (expected->status != actual->status) {
+        fuzz_fail("%s: the status is %d, not %d", what, (int)actual->status, (int)expected->status);
+    }
+}
+
+/* ---- After an error -------------------------------------------------------------------------- */
+
+enum { RUN_STEPS = 6, BYTES_CAPACITY = 4096 };
+
+/* A short simulation, and the serialized state before it. */
+struct run {
+    bool is_known;
+    size_t byte_count;
+    fmi2Byte bytes[BYTES_CAPACITY];
+    struct fuzz_values after[RUN_STEPS];
+};
+
+static void require(fmi2Status status, const char *what) {
+    if (status != fmi2OK) {
+        fuzz_fail("%s in a run of a new or reset instance has the status %d", what, (int)status);
+    }
+}
+
+static void serialize(struct fuzz_instance *instance, struct run *run) {
+    fmi2FMUstate state = NULL;
+    require(FUZZ_CHECKED(instance, GetFMUstate, &state), "fmi2GetFMUstate");
+    require(FUZZ_CHECKED(instance, SerializedFMUstateSize, state, &run->byte_count),
+            "fmi2SerializedFMUstateSize");
+    if (run->byte_count > BYTES_CAPACITY) {
+        fuzz_fail("%zu bytes of a state are more than BYTES_CAPACITY", run->byte_count);
+    }
+    require(FUZZ_CHECKED(instance, SerializeFMUstate, state, run->bytes, run->byte_count),
+            "fmi2SerializeFMUstate");
+    require(FUZZ_CHECKED(instance, FreeFMUstate, &state), "fmi2FreeFMUstate");
+}
+
+static void run_co_simulation(struct fuzz_instance *instance, struct run *run) {
+    static const double lengths[RUN_STEPS] = {1.0 / 64, 1.0 / 64, 0.25, 1e-3, 1e-3, 0.5};
+    const fmi2ValueReference inputs[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
+    const fmi2Integer orders[] = {1, 2};
+    for (int i = 0; i < RUN_STEPS; i++) {
+        const double efforts[] = {0.5 * i, 9.81 - i};
+        if (i != 1 && i != 2) {
+            require(FUZZ_CHECKED(instance, SetReal, inputs, 2, efforts), "fmi2SetReal");
+        }
+        if (i == 4) {
+            require(FUZZ_CHECKED(instance, SetRealInputDerivatives, inputs, 2, orders, efforts),
+                    "fmi2SetRealInputDerivatives");
+        }
+        require(fuzz_step(instance, lengths[i]), "fmi2DoStep");
+        fuzz_read(instance, &run->after[i]);
+    }
+}
+
+static void run_model_exchange(struct fuzz_instance *instance, struct run *run) {
+    double x[4];
+    double dx[4];
+    require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode), "fmi2EnterContinuousTimeMode");
+    require(FUZZ_CHECKED(instance, GetContinuousStates, x, 4), "fmi2GetContinuousStates");
+    for (int i = 0; i < RUN_STEPS; i++) {
+        require(FUZZ_CHECKED(instance, GetDerivatives, dx, 4), "fmi2GetDerivatives");
+        for (int k = 0; k < 4; k++) {
+            x[k] += 0.01 * dx[k];
+        }
+        instance->time += 0.01;
+        require(FUZZ_CHECKED(instance, SetTime, instance->time), "fmi2SetTime");
+        require(FUZZ_CHECKED(instance, SetContinuousStates, x, 4), "fmi2SetContinuousStates");
+        fuzz_read(instance, &run->after[i]);
+    }
+}
+
+/* From an instance that was just made or reset. */
+static void make_run(struct fuzz_instance *instance, unsigned variant, struct run *run) {
+    const fmi2ValueReference starts[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_dq2, RP_MANIPULATOR_m2};
+    const double values[] = {-1.0, 0.25, 1.5};
+    const fmi2ValueReference method = RP_MANIPULATOR_solver_method;
+    const fmi2Integer method_value = 1 + (fmi2Integer)(variant % 3);
+    serialize(instance, run);
+    if (variant < 3) {
+        require(FUZZ_CHECKED(instance, SetReal, starts, FUZZ_COUNT(starts), values), "fmi2SetReal");
+    }
+    require(FUZZ_CHECKED(instance, SetInteger, &method, 1, &method_value), "fmi2SetInteger");
+    require(fuzz_initialize(instance, variant < 3 ? 0.0 : 1e-6, variant < 3 ? 0.0 : 1000.0),
+            "the initialization");
+    if (instance->kind == fmi2CoSimulation) {
+        run_co_simulation(instance, run);
+    } else {
+        run_model_exchange(instance, run);
+    }
+}
+
+static const struct run *run_of_fresh(fmi2Type kind, unsigned variant) {
+    static struct run runs[2][FUZZ_RUN_VARIANTS];
+    struct run *run = &runs[kind == fmi2CoSimulation][variant];
+    if (!run->is_known) {
+        struct fuzz_instance *fresh = fuzz_instance_create(kind, false, false);
+        make_run(fresh, variant, run);
+        fuzz_instance_free(fresh);
+        run->is_known = true;
+    }
+    return run;
+}
+
+void fuzz_assert_as_new(struct fuzz_instance *instance, unsigned variant) {
+    static struct run run;
+    variant %= FUZZ_RUN_VARIANTS;
+    const struct run *expected = run_of_fresh(instance->kind, variant);
+    reset(instance);
+    make_run(instance, variant, &run);
+    if (run.byte_count != expected->byte_count ||
+        memcmp(run.bytes, expected->bytes, run.byte_count) != 0) {
+        fuzz_fail("the serialized state after fmi2Reset is not that of a new instance");
+    }
+    for (int i = 0; i < RUN_STEPS; i++) {
+        fuzz_assert_same(&expected->after[i], &run.after[i], "a run after fmi2Reset");
+    }
+    fuzz_reset(instance);
+}

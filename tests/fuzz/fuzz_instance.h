@@ -1,0 +1,90 @@
+/* An instance under fuzzing, with what holds for every call of every target. */
+#ifndef FUZZ_INSTANCE_H
+#define FUZZ_INSTANCE_H
+
+#include "fmu_library.h"
+#include "fuzz.h"
+#include "value_references.h"
+
+#include <fmi2Functions.h>
+
+/* Internal steps that one communication step may take here, so that executions are quick. */
+enum { FUZZ_MAX_INTERNAL_STEPS = 300 };
+
+struct fuzz_instance {
+    fmi2Component component;
+    fmi2Type kind;
+    bool has_logger;
+    bool tells_refusals;            /* errors and discards must come with a text */
+    bool in_error;                  /* since an fmi2Error (section 4.2.4) */
+    bool had_error;                 /* once in its life */
+    double time;                    /* s: where it is, as far as the calls tell */
+    unsigned told[fmi2Pending + 1]; /* texts by status since the last fuzz_check */
+    char text[256];                 /* the last one */
+};
+
+/* NULL and false where has_logger is false: logging_on then means nothing. Freed by
+ * fuzz_instance_free. */
+struct fuzz_instance *fuzz_instance_create(fmi2Type kind, bool has_logger, bool logging_on);
+void fuzz_instance_free(struct fuzz_instance *instance);
+
+/* Callbacks whose environment is the instance. */
+fmi2CallbackFunctions fuzz_callbacks(struct fuzz_instance *instance, bool has_logger);
+
+/* What holds for the status of every call: OK, Discard or Error; a text with the latter two; in
+ * the error state Error from all but what the standard allows there. Returns the status. */
+fmi2Status fuzz_check(struct fuzz_instance *instance, enum fmu_function function,
+                      fmi2Status status);
+
+#define FUZZ_CHECKED(instance, name, ...)                                                          \
+    fuzz_check(instance, FMU_##name, FUZZ_CALL(fmi2##name((instance)->component, __VA_ARGS__)))
+#define FUZZ_CHECKED_PLAIN(instance, name)                                                         \
+    fuzz_check(instance, FMU_##name, FUZZ_CALL(fmi2##name((instance)->component)))
+
+/* fmi2Reset, and max_internal_steps as above. */
+void fuzz_reset(struct fuzz_instance *instance);
+
+/* Limits max_internal_steps of an instance that was just made or reset. */
+void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit);
+
+/* SetupExperiment to ExitInitializationMode; the first status that is not fmi2OK. */
+fmi2Status fuzz_initialize(struct fuzz_instance *instance, double tolerance, double start);
+
+/* From where the instance is; keeps time. */
+fmi2Status fuzz_step(struct fuzz_instance *instance, double length);
+
+/* ---- Values ---------------------------------------------------------------------------------- */
+
+enum { FUZZ_VARIABLE_CAPACITY = 64 };
+
+/* All variables, in the order of the unit's table; what is not of the type, or cannot be computed,
+ * is 0. */
+struct fuzz_values {
+    double reals[FUZZ_VARIABLE_CAPACITY];
+    fmi2Integer integers[FUZZ_VARIABLE_CAPACITY];
+    fmi2Status status; /* OK or Discard */
+};
+
+/* Reads all variables; a value that is not finite is a finding. */
+void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values);
+
+/* The value of a Real or an Integer variable. */
+double fuzz_value(const struct fuzz_values *values, fmi2ValueReference reference);
+fmi2Integer fuzz_integer_value(const struct fuzz_values *values, fmi2ValueReference reference);
+
+/* Same bits, or a finding that names the variable. */
+void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_values *actual,
+                      const char *what);
+
+/* Finite values, if the status is OK; nothing written otherwise (values were poisoned). */
+void fuzz_assert_written(fmi2Status status, const double values[], size_t count, const char *what);
+
+/* ---- After an error -------------------------------------------------------------------------- */
+
+enum { FUZZ_RUN_VARIANTS = 6 };
+
+/* fmi2Reset makes the instance equal to a fresh one of its kind: same bytes when serialized, same
+ * bits in a run. Resets it again at the end. */
+void fuzz_assert_as_new(struct fuzz_instance *instance, unsigned variant);
+
+#endif

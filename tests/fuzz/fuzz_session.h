@@ -1,0 +1,43 @@
+/* The instances, FMU states and serialized states that the calls of one input work on, mixed up as
+ * the input says. */
+#ifndef FUZZ_SESSION_H
+#define FUZZ_SESSION_H
+
+#include "fuzz_instance.h"
+
+enum { FUZZ_INSTANCES = 3, FUZZ_STATES = 5, FUZZ_SERIALIZED = 3 };
+
+struct fuzz_session {
+    struct fuzz_input *input;
+    struct fuzz_instance *instances[FUZZ_INSTANCES]; /* NULL: not made yet, or freed */
+    struct fuzz_state {
+        fmi2FMUstate handle;         /* NULL: none */
+        struct fuzz_instance *owner; /* the instance that made it */
+        bool in_error;               /* and what was known of it then */
+        double time;                 /* s */
+    } states[FUZZ_STATES];
+    struct fuzz_serialized {
+        fmi2Byte *bytes; /* NULL: none */
+        size_t size;
+        fmi2Type kind;
+        bool in_error;
+        double time; /* s */
+    } serialized[FUZZ_SERIALIZED];
+};
+
+/* The instance that the input says; made where there is none. */
+struct fuzz_instance *fuzz_session_instance(struct fuzz_session *session);
+
+/* Frees the instance, and with it the states that it made. */
+void fuzz_session_free_instance(struct fuzz_session *session, struct fuzz_instance *instance);
+
+void fuzz_session_end(struct fuzz_session *session);
+
+/* One call of each function, with arguments that the input says, and what holds for it:
+ * fuzz_calls.c, of values fuzz_access.c, of states fuzz_session.c. */
+typedef void fuzz_operation(struct fuzz_session *session, struct fuzz_instance *instance);
+#define FUZZ_OPERATION(name) fuzz_operation fuzz_call_##name;
+FMU_FUNCTION_LIST(FUZZ_OPERATION)
+#undef FUZZ_OPERATION
+
+#endif

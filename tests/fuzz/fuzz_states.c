@@ -1,0 +1,336 @@
+/* Deserialization of mutated states, and what an instance does that goes on from one that was
+ * taken. README.md tells how an input is decoded. */
+#include "fuzz_instance.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *const fuzz_target_name = "fuzz_states";
+
+enum { BASES = 12, BYTES_CAPACITY = 2048, MAX_MUTATIONS = 12, MAX_OPERATIONS = 10 };
+
+/* An instance that goes on from a restored state is not asked for more internal steps than this. */
+enum { MAX_INTERNAL_STEPS = 3000 };
+
+struct bytes {
+    size_t size;
+    unsigned char data[BYTES_CAPACITY];
+};
+
+static void require(fmi2Status status, const char *what) {
+    if (status != fmi2OK) {
+        fuzz_fail("%s has the status %d", what, (int)status);
+    }
+}
+
+/* ---- States to mutate ------------------------------------------------------------------------ */
+
+static void step_with_efforts(struct fuzz_instance *instance, unsigned base) {
+    const fmi2ValueReference inputs[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
+    const double efforts[] = {1.0, 9.0};
+    const fmi2Integer orders[] = {1, 3};
+    require(FUZZ_CHECKED(instance, SetReal, inputs, 2, efforts), "fmi2SetReal");
+    for (int i = 0; i < 5; i++) {
+        require(fuzz_step(instance, 0.0625 * (1 + i % 2)), "fmi2DoStep");
+    }
+    if (base >= 6) {
+        require(FUZZ_CHECKED(instance, SetRealInputDerivatives, inputs, 2, orders, efforts),
+                "fmi2SetRealInputDerivatives");
+    }
+    if (base >= 9) {
+        require(fuzz_step(instance, 0.25), "fmi2DoStep");
+    }
+}
+
+/* Co-Simulation with each method, between steps, with input derivatives and after them; of both
+ * kinds, new, in initialization mode, terminated and in the error state. */
+static void bring_to_base(struct fuzz_instance *instance, unsigned base) {
+    const fmi2ValueReference method_reference = RP_MANIPULATOR_solver_method;
+    const fmi2Integer method = 1 + (fmi2Integer)(base % 3);
+    require(FUZZ_CHECKED(instance, SetInteger, &method_reference, 1, &method), "fmi2SetInteger");
+    if (base == 0) {
+        return;
+    }
+    require(fuzz_initialize(instance, base % 2 == 0 ? 0.0 : 1e-4, base < 8 ? 0.0 : 100.0),
+            "the initialization");
+    if (instance->kind == fmi2CoSimulation) {
+        step_with_efforts(instance, base);
+    } else if (base % 2 == 0) {
+        require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode),
+                "fmi2EnterContinuousTimeMode");
+    }
+    if (base == 1) {
+        require(FUZZ_CHECKED_PLAIN(instance, Terminate), "fmi2Terminate");
+    }
+    if (base == 2) {
+        (void)FUZZ_CHECKED_PLAIN(instance, ExitInitializationMode); // is refused
+    }
+}
+
+static void serialize(struct fuzz_instance *instance, fmi2FMUstate state, struct bytes *bytes) {
+    require(FUZZ_CHECKED(instance, SerializedFMUstateSize, state, &bytes->size),
+            "fmi2SerializedFMUstateSize");
+    if (bytes->size > BYTES_CAPACITY / 2) {
+        fuzz_fail("%zu bytes of a state are too many for BYTES_CAPACITY", bytes->size);
+    }
+    require(FUZZ_CHECKED(instance, SerializeFMUstate, state, (fmi2Byte *)bytes->data, bytes->size),
+            "fmi2SerializeFMUstate");
+}
+
+static const struct bytes *base_bytes(fmi2Type kind, unsigned base) {
+    static struct bytes known[2][BASES];
+    struct bytes *bytes = &known[kind == fmi2CoSimulation][base];
+    if (bytes->size == 0) {
+        struct fuzz_instance *instance = fuzz_instance_create(kind, false, false);
+        fmi2FMUstate state = NULL;
+        fuzz_limit_steps(instance, FUZZ_MAX_INTERNAL_STEPS);
+        bring_to_base(instance, base);
+        require(FUZZ_CHECKED(instance, GetFMUstate, &state), "fmi2GetFMUstate");
+        serialize(instance, state, bytes);
+        fuzz_instance_free(instance);
+    }
+    return bytes;
+}
+
+/* ---- Mutations ------------------------------------------------------------------------------- */
+
+/* src/snapshot.h: magic, version, length and length of the GUID, the GUID, fields of 8 bytes, hash
+ */
+static const size_t fields_begin = 20 + sizeof RP_MANIPULATOR_GUID - 1;
+enum { LENGTH_AT = 12, HASH_SIZE = 8, FIELD_SIZE = 8 };
+
+static void write_number(unsigned char *to, uint64_t number, size_t size) {
+    for (size_t i = 0; i < size; i++) {
+        to[i] = (unsigned char)(number >> (8 * i));
+    }
+}
+
+static void write_field(struct bytes *bytes, unsigned field, uint64_t bits) {
+    const size_t count = (bytes->size - fields_begin - HASH_SIZE) / FIELD_SIZE;
+    write_number(bytes->data + fields_begin + FIELD_SIZE * (field % count), bits, FIELD_SIZE);
+}
+
+static void mutate(struct fuzz_input *input, fmi2Type kind, struct bytes *bytes) {
+    const unsigned at = fuzz_byte(input);
+    double value;
+    uint64_t bits;
+    const struct bytes *other;
+    switch (fuzz_below(input, 8)) {
+    case 0: // one byte anywhere
+        bytes->data[(at + 256u * fuzz_byte(input)) % bytes->size] ^=
+            (unsigned char)(1 + fuzz_below(input, 255));
+        break;
+    case 1: // a field of another state
+        other = base_bytes(kind, fuzz_below(input, BASES));
+        if (at * FIELD_SIZE + fields_begin + FIELD_SIZE <= other->size &&
+            other->size == bytes->size) {
+            memcpy(bytes->data + fields_begin + at * FIELD_SIZE,
+                   other->data + fields_begin + at * FIELD_SIZE, FIELD_SIZE);
+        }
+        break;
+    case 2:
+    case 3:
+        write_field(bytes, at, (uint64_t)(int64_t)fuzz_integer(input));
+        break;
+    case 4: // a small integer, or one at the end of the range
+        bits = fuzz_byte(input);
+        write_field(bytes, at, bits < 240 ? bits : INT64_MAX - (bits - 240));
+        break;
+    default:
+        value = fuzz_real(input);
+        memcpy(&bits, &value, sizeof bits);
+        write_field(bytes, at, bits);
+        break;
+    }
+}
+
+/* FNV-1a, as src/snapshot.h says. */
+static void repair_hash(struct bytes *bytes) {
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i + HASH_SIZE < bytes->size; i++) {
+        hash = (hash ^ bytes->data[i]) * 0x100000001b3u;
+    }
+    write_number(bytes->data + bytes->size - HASH_SIZE, hash, HASH_SIZE);
+}
+
+/* Cut off or lengthened, with the length that is stated repaired or not. */
+static void change_size(struct fuzz_input *input, struct bytes *bytes) {
+    const unsigned change = fuzz_byte(input) + 256u * fuzz_below(input, 4);
+    const bool states_it = fuzz_below(input, 2) == 0;
+    bytes->size = change < bytes->size ? bytes->size - change : bytes->size + change % 64;
+    if (states_it && bytes->size >= LENGTH_AT + 4) {
+        write_number(bytes->data + LENGTH_AT, bytes->size, 4);
+    }
+}
+
+/* ---- Going on -------------------------------------------------------------------------------- */
+
+static void read_derivatives(struct fuzz_instance *instance) {
+    const fmi2ValueReference outputs[] = {RP_MANIPULATOR_ddq1, RP_MANIPULATOR_ee_vx,
+                                          RP_MANIPULATOR_total_energy};
+    const fmi2Integer orders[] = {1, 2, 1};
+    const fmi2ValueReference knowns[] = {RP_MANIPULATOR_q2, RP_MANIPULATOR_f2};
+    const double seed[] = {1.0, -0.5};
+    double values[4];
+    fuzz_poison(values, 4);
+    fmi2Status status =
+        FUZZ_CHECKED(instance, GetDirectionalDerivative, outputs, 3, knowns, 2, seed, values);
+    fuzz_assert_written(status, values, 3, "fmi2GetDirectionalDerivative");
+    fuzz_poison(values, 4);
+    status = instance->kind == fmi2CoSimulation
+                 ? FUZZ_CHECKED(instance, GetRealOutputDerivatives, outputs, 3, orders, values)
+                 : FUZZ_CHECKED(instance, GetDerivatives, values, 4);
+    fuzz_assert_written(status, values, instance->kind == fmi2CoSimulation ? 3 : 4,
+                        "a call for derivatives");
+}
+
+static void set_input(struct fuzz_input *input, struct fuzz_instance *instance) {
+    const fmi2ValueReference reference =
+        fuzz_below(input, 2) == 0 ? RP_MANIPULATOR_tau1 : RP_MANIPULATOR_f2;
+    const fmi2Integer order = (fmi2Integer)fuzz_below(input, 4);
+    const double value = fuzz_real(input);
+    if (order == 0 || instance->kind == fmi2ModelExchange) {
+        FUZZ_CHECKED(instance, SetReal, &reference, 1, &value);
+    } else {
+        FUZZ_CHECKED(instance, SetRealInputDerivatives, &reference, 1, &order, &value);
+    }
+}
+
+static void set_states(struct fuzz_input *input, struct fuzz_instance *instance) {
+    const double x[] = {fuzz_real(input), 0.5, fuzz_real(input), 1.0};
+    FUZZ_CHECKED(instance, SetTime, instance->time);
+    FUZZ_CHECKED(instance, SetContinuousStates, x, 4);
+}
+
+/* The same step twice, from the state and again from it. */
+static void repeat_step(struct fuzz_instance *instance, fmi2FMUstate state, double length) {
+    struct fuzz_values values[2];
+    fmi2Status statuses[2];
+    memset(values, 0, sizeof values);
+    for (int i = 0; i < 2; i++) {
+        require(FUZZ_CHECKED(instance, SetFMUstate, state), "fmi2SetFMUstate of an accepted state");
+        instance->in_error = false; // or not: the state may hold it
+        if (FUZZ_CHECKED(instance, GetReal, &(fmi2ValueReference){RP_MANIPULATOR_time}, 1,
+                         &instance->time) != fmi2OK) {
+            return; // it was saved before initialization
+        }
+        statuses[i] = fuzz_step(instance, length);
+        if (statuses[i] != fmi2Error) {
+            fuzz_read(instance, &values[i]);
+        }
+    }
+    if (statuses[0] != statuses[1]) {
+        fuzz_fail("a step repeated from a restored state has the status %d, not %d",
+                  (int)statuses[1], (int)statuses[0]);
+    }
+    fuzz_assert_same(&values[0], &values[1], "a step repeated from a restored state");
+}
+
+static double any_step(struct fuzz_input *input) {
+    return fuzz_below(input, 8) != 0 ? fuzz_magnitude(input, 1e-6, 10.0) : fuzz_real(input);
+}
+
+static void go_on(struct fuzz_input *input, struct fuzz_instance *instance, fmi2FMUstate state) {
+    const fmi2ValueReference limit_reference = RP_MANIPULATOR_max_internal_steps;
+    const fmi2ValueReference time_reference = RP_MANIPULATOR_time;
+    fmi2Integer limit = 0;
+    double time = 0.0;
+    const bool reads = FUZZ_CHECKED(instance, GetInteger, &limit_reference, 1, &limit) == fmi2OK &&
+                       FUZZ_CHECKED(instance, GetReal, &time_reference, 1, &time) == fmi2OK;
+    if (!reads || limit > MAX_INTERNAL_STEPS) {
+        return;
+    }
+    instance->time = time;
+    if (fuzz_below(input, 2) == 0) {
+        repeat_step(instance, state, any_step(input));
+    }
+    struct fuzz_values values;
+    for (int i = 0; i < MAX_OPERATIONS && input->left > 0 && !instance->in_error; i++) {
+        const bool steps = instance->kind == fmi2CoSimulation;
+        switch (fuzz_below(input, 4)) {
+        case 0:
+            set_input(input, instance);
+            break;
+        case 1:
+            read_derivatives(instance);
+            break;
+        default:
+            if (steps) {
+                fuzz_step(instance, any_step(input));
+            } else {
+                set_states(input, instance);
+            }
+            break;
+        }
+        if (!instance->in_error) {
+            fuzz_read(instance, &values);
+        }
+    }
+}
+
+/* A state that was taken is served like any other, and comes out as the bytes that went in. */
+static void use(struct fuzz_input *input, struct fuzz_instance *instance, fmi2FMUstate state,
+                const struct bytes *bytes) {
+    static struct bytes again;
+    serialize(instance, state, &again);
+    if (again.size != bytes->size || memcmp(again.data, bytes->data, bytes->size) != 0) {
+        fuzz_fail("an accepted state is serialized to other bytes");
+    }
+    if (FUZZ_CHECKED(instance, SetFMUstate, state) != fmi2OK) {
+        fuzz_fail("fmi2SetFMUstate of an accepted state fails: %s", instance->text);
+    }
+    go_on(input, instance, state);
+}
+
+/* ---- The target ------------------------------------------------------------------------------ */
+
+void fuzz_target_run(struct fuzz_input *input) {
+    static struct bytes bytes;
+    const unsigned selector = fuzz_byte(input);
+    const fmi2Type kind = selector & 0x80 ? fmi2ModelExchange : fmi2CoSimulation;
+    const fmi2Type reader = (selector & 0x70) == 0x70 ? fmi2ModelExchange : kind;
+    const struct bytes *base = base_bytes(kind, (selector & 15) % BASES);
+    const unsigned variant = fuzz_byte(input);
+    const unsigned mutations = fuzz_below(input, MAX_MUTATIONS);
+    const bool repairs = fuzz_below(input, 8) != 0;
+    const bool resizes = fuzz_below(input, 32) == 1;
+    bytes = *base;
+    for (unsigned i = 0; i < mutations; i++) {
+        mutate(input, kind, &bytes);
+    }
+    if (resizes) {
+        change_size(input, &bytes);
+    }
+    if (repairs && bytes.size > HASH_SIZE) {
+        repair_hash(&bytes);
+    }
+
+    struct fuzz_instance *instance = fuzz_instance_create(reader, true, (variant & 0x80) != 0);
+    fmi2FMUstate state = NULL;
+    fmi2Byte *exact = fuzz_array(bytes.size > 0 ? bytes.size : 1, 1); // nothing lies behind them
+    memcpy(exact, bytes.data, bytes.size);
+    const fmi2Status status =
+        FUZZ_CHECKED(instance, DeSerializeFMUstate, exact, bytes.size, &state);
+    free(exact);
+    const bool is_changed =
+        bytes.size != base->size || memcmp(bytes.data, base->data, base->size) != 0;
+    if ((status == fmi2OK) != (state != NULL)) {
+        fuzz_fail("fmi2DeSerializeFMUstate has the status %d and leaves %s", (int)status,
+                  state != NULL ? "a state" : "none");
+    }
+    if (!is_changed && reader == kind && status != fmi2OK) {
+        fuzz_fail("a state that was not changed is refused");
+    }
+    if (status == fmi2OK && (bytes.size != base->size || (is_changed && !repairs))) {
+        fuzz_fail("a state with the wrong %s is accepted",
+                  bytes.size != base->size ? "length" : "checksum");
+    }
+    if (status == fmi2OK) {
+        use(input, instance, state, &bytes);
+    }
+    if (instance->had_error || variant % 4 == 0) {
+        fuzz_assert_as_new(instance, variant);
+    }
+    fuzz_instance_free(instance);
+}
