@@ -31,6 +31,10 @@ step "ThreadSanitizer; the test with many threads"
 build tsan
 ctest --preset tsan --progress
 
+step "libFuzzer, ten seconds a target"
+build fuzz
+ctest --preset fuzz --progress -j 2
+
 step "other importers, each in an environment of its own"
 # without network the tests of those that are missing are skipped; CI must have them
 tests/importers/install.sh || [ -z "${CI-}" ]
@@ -41,6 +45,7 @@ ctest --preset default -j 2 "$@"
 
 if [ "$long" = yes ]; then
   step "long campaigns"
+  ctest --preset fuzz -C Long -L long -j 2
   ctest --preset default -C Long -L long
-  python3 tests/figures.py build/Testing/Temporary/LastTest.log
+  python3 tests/figures.py build/{fuzz/,}Testing/Temporary/LastTest.log
 fi

@@ -42,12 +42,14 @@ def table(lines: list[str]) -> str:
 
 
 def main() -> None:
-    if len(sys.argv) != 2:
-        sys.exit(f"usage: {sys.argv[0]} build/Testing/Temporary/LastTest.log")
-    text = Path(sys.argv[1]).read_text(encoding="utf-8", errors="replace")
-    lines = [line.strip() for line in text.splitlines() if line.startswith(PREFIX)]
+    if len(sys.argv) < 2:
+        sys.exit(f"usage: {sys.argv[0]} build/Testing/Temporary/LastTest.log ...")
+    texts = [Path(name).read_text(encoding="utf-8", errors="replace") for name in sys.argv[1:]]
+    lines = [
+        line.strip() for text in texts for line in text.splitlines() if line.startswith(PREFIX)
+    ]
     if not lines:
-        sys.exit(f"{sys.argv[1]} tells of no campaign")
+        sys.exit("the logs tell of no campaign")
     print(table(lines))
 
 
