@@ -51,7 +51,7 @@ int main(int count, char **arguments) {
         if (strcmp(arguments[i], "--quick") == 0) {
             bench.quick = true;
         } else if (strcmp(arguments[i], "--repeats") == 0 && has_value) {
-            bench.repeats = atoi(arguments[++i]);
+            bench.repeats = (int)strtol(arguments[++i], NULL, 10);
         } else if (strcmp(arguments[i], "--json") == 0 && has_value) {
             json = arguments[++i];
         } else if (strcmp(arguments[i], "--only") == 0 && has_value) {

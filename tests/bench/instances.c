@@ -57,7 +57,7 @@ static void measure_counts(struct bench *bench, struct problem *problems[], enum
     fmi2Component *instances = calloc(10000, sizeof instances[0]);
     double(*states)[STEPS][4] = calloc(STARTS, sizeof states[0]);
     double us[COUNTS][MOST_REPEATS];
-    double errors[COUNTS];
+    double errors[COUNTS] = {0.0};
     require(instances != NULL && states != NULL, "no memory");
     for (int repeat = 0; repeat < bench->repeats; repeat++) {
         for (int i = 0; i < measured; i++) {
@@ -121,7 +121,7 @@ struct worker {
     double error;
 };
 
-static void *work(void *argument) {
+static void *run_worker(void *argument) {
     struct worker *worker = argument;
     struct fmu_counts counts;
     double(*states)[4] = calloc((size_t)worker->problem->steps, sizeof states[0]);
@@ -153,7 +153,7 @@ static void create_on_own_core(pthread_t *thread, int index, struct worker *work
     CPU_SET(chosen, &own);
     require(pthread_attr_init(&attributes) == 0 &&
                 pthread_attr_setaffinity_np(&attributes, sizeof own, &own) == 0 &&
-                pthread_create(thread, &attributes, work, worker) == 0,
+                pthread_create(thread, &attributes, run_worker, worker) == 0,
             "no thread");
     pthread_attr_destroy(&attributes);
 }
@@ -193,7 +193,7 @@ static void measure_two(struct bench *bench, const struct problem *problem, enum
     double throughput[MOST_REPEATS];
     double undisturbed[MOST_REPEATS]; // the same if no thread had to wait for its core
     double shares[MOST_REPEATS];
-    struct worker workers[2];
+    struct worker workers[2] = {{0}};
     for (int repeat = 0; repeat < bench->repeats; repeat++) {
         double worked_one;
         double worked_two;

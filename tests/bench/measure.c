@@ -3,7 +3,6 @@
 #include "measure.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
@@ -43,11 +42,4 @@ double quantile(double values[], size_t count, double part) {
 
 double median(double values[], int count) {
     return quantile(values, (size_t)count, 0.5);
-}
-
-void require(bool condition, const char *what) {
-    if (!condition) {
-        fprintf(stderr, "bench: %s\n", what);
-        exit(1);
-    }
 }

@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 /* s since some point in the past */
 double now(void);
@@ -20,6 +22,11 @@ double quantile(double values[], size_t count, double part);
 double median(double values[], int count);
 
 /* Ends the program with a line on stderr where the condition does not hold. */
-void require(bool condition, const char *what);
+static inline void require(bool condition, const char *what) {
+    if (!condition) {
+        fprintf(stderr, "bench: %s\n", what);
+        exit(1);
+    }
+}
 
 #endif

@@ -19,7 +19,7 @@
 static void read_processor(char name[static 128]) {
     char line[256];
     FILE *file = fopen("/proc/cpuinfo", "r");
-    strcpy(name, "unknown");
+    snprintf(name, 128, "unknown");
     while (file != NULL && fgets(line, sizeof line, file) != NULL) {
         if (sscanf(line, "model name : %127[^\n]", name) == 1) {
             break;

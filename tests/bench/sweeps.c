@@ -6,8 +6,9 @@
 
 static void sweep_tolerances(struct bench *bench, const char *name, const struct problem *problem,
                              double decades) {
-    for (double exponent = -4.0; exponent > -11.0 - 0.1; exponent -= decades) {
-        const double tolerance = pow(10.0, exponent);
+    const int count = (int)lround(7.0 / decades);
+    for (int i = 0; i <= count; i++) {
+        const double tolerance = pow(10.0, -4.0 - i * decades);
         struct turns turns = {0};
         turns_add_usual(&turns, &bench->fmu, tolerance);
         turns_take(&turns, &bench->fmu, problem, bench->repeats);
@@ -17,7 +18,10 @@ static void sweep_tolerances(struct bench *bench, const char *name, const struct
 
 static void sweep_mujoco(struct bench *bench, const char *name, const struct problem *problem,
                          double longest) {
-    for (double substep = longest; substep > 2e-5; substep /= bench->quick ? 10.0 : 2.0) {
+    const double ratio = bench->quick ? 10.0 : 2.0;
+    const int count = (int)floor(log(longest / 2e-5) / log(ratio));
+    for (int i = 0; i <= count; i++) {
+        const double substep = longest / pow(ratio, i);
         const int substeps = (int)lround(problem->step / substep);
         if (!mujoco_available() || substeps < 1) {
             continue;

@@ -184,7 +184,7 @@ STATUS_CALL(GetStringStatus, fmi2String)
 
 /* ---- Some calls in a row, to come further ---------------------------------------------------- */
 
-static void start(struct fuzz_session *session, struct fuzz_instance *instance) {
+static void start_stepping(struct fuzz_session *session, struct fuzz_instance *instance) {
     struct fuzz_input *input = session->input;
     const fmi2ValueReference method_reference = RP_MANIPULATOR_solver_method;
     const fmi2Integer method = 1 + (fmi2Integer)fuzz_below(input, 3);
@@ -266,7 +266,7 @@ static void compare_with_new(struct fuzz_session *session, struct fuzz_instance 
 static fuzz_operation *const operations[] = {
     FMU_FUNCTION_LIST(CALL_OF)
     // in a row, and what leads further, several times
-    start,
+    start_stepping,
     step,
     step,
     step,
@@ -292,7 +292,7 @@ static fuzz_operation *const operations[] = {
 /* Most calls lead an instance into the error state, where little is left to be tried. */
 static void recover(struct fuzz_session *session, struct fuzz_instance *instance) {
     if (instance->in_error && fuzz_below(session->input, 4) != 0) {
-        start(session, instance);
+        start_stepping(session, instance);
     }
 }
 

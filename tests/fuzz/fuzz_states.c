@@ -113,20 +113,19 @@ static void write_field(struct bytes *bytes, unsigned field, uint64_t bits) {
 
 static void mutate(struct fuzz_input *input, fmi2Type kind, struct bytes *bytes) {
     const unsigned at = fuzz_byte(input);
+    const size_t field = fields_begin + (size_t)at * FIELD_SIZE;
     double value;
     uint64_t bits;
     const struct bytes *other;
     switch (fuzz_below(input, 8)) {
     case 0: // one byte anywhere
-        bytes->data[(at + 256u * fuzz_byte(input)) % bytes->size] ^=
+        bytes->data[(at + (size_t)256 * fuzz_byte(input)) % bytes->size] ^=
             (unsigned char)(1 + fuzz_below(input, 255));
         break;
     case 1: // a field of another state
         other = base_bytes(kind, fuzz_below(input, BASES));
-        if (at * FIELD_SIZE + fields_begin + FIELD_SIZE <= other->size &&
-            other->size == bytes->size) {
-            memcpy(bytes->data + fields_begin + at * FIELD_SIZE,
-                   other->data + fields_begin + at * FIELD_SIZE, FIELD_SIZE);
+        if (field + FIELD_SIZE <= other->size && other->size == bytes->size) {
+            memcpy(bytes->data + field, other->data + field, FIELD_SIZE);
         }
         break;
     case 2:
