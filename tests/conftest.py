@@ -2,9 +2,14 @@
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from cosim.unit import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -17,3 +22,23 @@ def fmu() -> Path:
     if not path.is_file():
         pytest.fail(f"{path}: no such file, ./run.sh builds it")
     return path
+
+
+@pytest.fixture(scope="module")
+def opened(fmu: Path) -> Iterator["Fmu"]:
+    from cosim.unit import Fmu
+
+    with Fmu(fmu) as unit:
+        yield unit
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the project with two scenarios, for the command line to work in."""
+    from cosim_project import copy_project
+
+    from cosim import __main__ as cli
+
+    copy_project(tmp_path)
+    monkeypatch.setattr(cli, "ROOT", tmp_path)
+    return tmp_path
