@@ -231,7 +231,7 @@ static bool has_reached(const struct integrator *integrator, double t) {
 static bool interpolate(struct integrator *integrator, double t, double x[]) {
     const size_t count = integrator->ode.state_count;
     if (!(integrator->internal >= t) || !integrator->method->has_history ||
-        integrator->method->interpolate(integrator, t) != 0 ||
+        !integrator->method->interpolate(integrator, t) ||
         !integrator_are_finite(small_vector_data(integrator->x), count)) {
         return false;
     }

@@ -155,8 +155,27 @@ static int restart(struct integrator *integrator) {
     return CVodeReInit(integrator->solver, 0.0, integrator->x);
 }
 
+/* CVODE interpolates by combining the columns of its Nordsieck array, up to 13, which stay as they
+ * are until the next internal step. It computes the powers of the time with a product for each
+ * factor: most of the cost of a short communication step. So it tells the columns once per internal
+ * step, and all points within the step come from Horner's scheme. */
+static void evaluate_history(struct integrator *integrator, double t) {
+    double internal = 0.0;
+    double last_step = 0.0;
+    (void)CVodeGetCurrentTime(integrator->solver, &internal);
+    (void)CVodeGetLastStep(integrator->solver, &last_step);
+    small_vector_polynomial(&integrator->columns, (t - internal) / last_step, integrator->x);
+}
+
+static bool interpolate(struct integrator *integrator, double t) {
+    if (integrator->columns.count == 0) {
+        return false;
+    }
+    evaluate_history(integrator, t);
+    return true;
+}
+
 static int advance(struct integrator *integrator, double t, long max_steps, double *stopped_at) {
-    integrator->columns.count = 0;
     int flag = CVodeSetMaxNumSteps(integrator->solver, max_steps);
     if (flag == CV_SUCCESS && integrator->reached == 0.0) {
         flag = CVodeSetInitStep(integrator->solver, fmin(integrator->first_step, t));
@@ -165,8 +184,18 @@ static int advance(struct integrator *integrator, double t, long max_steps, doub
         // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
         flag = CVodeSetStopTime(integrator->solver, integrator->span);
     }
-    return flag != CV_SUCCESS ? flag
-                              : CVode(integrator->solver, t, integrator->x, stopped_at, CV_NORMAL);
+    if (flag != CV_SUCCESS) {
+        return flag;
+    }
+    integrator->columns.count = 0;
+    small_vector_note_terms(integrator->x, &integrator->columns);
+    flag = CVode(integrator->solver, t, integrator->x, stopped_at, CV_NORMAL);
+    small_vector_note_terms(integrator->x, NULL);
+    if (flag == CV_SUCCESS && integrator->columns.count > 0) {
+        evaluate_history(integrator,
+                         t); // as at all other points: where the stops are does not matter
+    }
+    return flag;
 }
 
 /* The error of a step h of order 1 is about h^2 x'' / 2. */
@@ -204,25 +233,6 @@ static double internal_time(const struct integrator *integrator) {
     double t = 0.0;
     (void)CVodeGetCurrentTime(integrator->solver, &t);
     return t;
-}
-
-/* CVodeGetDky combines the columns of the Nordsieck array, up to 13, which stay as they are until
- * the next internal step. It computes the powers of the time with a product for each factor: most
- * of the cost of a short communication step. So it is asked once per internal step, for the
- * columns, and Horner's scheme does the rest. */
-static int interpolate(struct integrator *integrator, double t) {
-    struct small_vector_terms *columns = &integrator->columns;
-    if (columns->count == 0) {
-        small_vector_note_terms(integrator->work, columns);
-        const int flag = CVodeGetDky(integrator->solver, t, 0, integrator->work);
-        small_vector_note_terms(integrator->work, NULL);
-        if (flag != CV_SUCCESS || columns->count == 0) {
-            return flag != CV_SUCCESS ? flag : CV_MEM_FAIL;
-        }
-    }
-    const double steps = (t - integrator->internal) / integrator->counted.last_step;
-    small_vector_polynomial(columns, steps, integrator->x);
-    return CV_SUCCESS;
 }
 
 #define COMMON                                                                                     \

@@ -69,8 +69,9 @@ struct method {
     void (*count)(const struct integrator *integrator, struct integrator_statistics *now);
     double (*internal_time)(const struct integrator *integrator);
 
-    /* Writes the state at t, between the last two internal steps, to x; NULL with no history. */
-    int (*interpolate)(struct integrator *integrator, double t);
+    /* Writes the state at t, between the last two internal steps, to x; false where it cannot. NULL
+     * with no history. */
+    bool (*interpolate)(struct integrator *integrator, double t);
 
     enum status (*status_of_flag)(const struct integrator *integrator, int flag);
 };

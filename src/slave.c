@@ -8,8 +8,8 @@
 /* The integrator runs at this fraction of the tolerance asked for.
  * CVODE: each restart, one per change of an input, adds an error of the order of the local
  * tolerance, and thousands of them add up. Larger: faster and less accurate.
- * erk: the largest at which its error is no larger than that of CVODE, measured with steps of 1 ms
- * to 2 s; with shorter steps its error is that of rounding. */
+ * erk: the largest power of ten at which its error, measured with steps of 1 ms to 2 s, is that of
+ * CVODE or less (at one of 31 points a fifth more); with shorter steps it is that of rounding. */
 static const double tolerance_fractions[INTEGRATOR_METHODS] = {
     [INTEGRATOR_CVODE_ADAMS] = 2e-3,
     [INTEGRATOR_CVODE_BDF] = 2e-3,

@@ -152,8 +152,8 @@ OPERATION double weighted_norm(sunindextype n, const double *x, const double *w)
 /* z = sum c[k] X[k]; z may be one of X. Element by element, so that sums stay in registers. */
 OPERATION void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
                                   double *z) {
-    if (n <= 6) {
-        double sum[6];
+    if (n <= 4) {
+        double sum[4];
         scale(n, c[0], small_vector_data(X[0]), sum);
         for (int k = 1; k < count; k++) {
             linear_sum(n, 1.0, sum, c[k], small_vector_data(X[k]), sum);
@@ -194,9 +194,14 @@ OPERATION void polynomial(sunindextype n, const struct small_vector_terms *terms
 }
 
 void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x) {
-    if (length_of(x) == 4) {
+    switch (length_of(x)) {
+    case 2:
+        polynomial(2, terms, s, small_vector_data(x));
+        break;
+    case 4:
         polynomial(4, terms, s, small_vector_data(x));
-    } else {
+        break;
+    default:
         polynomial(length_of(x), terms, s, small_vector_data(x));
     }
 }
@@ -227,49 +232,60 @@ OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, dou
 
 /* ---- Tables of operations ------------------------------------------------------------------- */
 
-/* The operations above as SUNDIALS calls them, for vectors of the length n, an expression of the
- * vector x: a number, or length_of(x). */
+OPERATION sunindextype two(N_Vector x) {
+    (void)x;
+    return 2;
+}
+
+OPERATION sunindextype four(N_Vector x) {
+    (void)x;
+    return 4;
+}
+
+/* The operations above as SUNDIALS calls them, for vectors x of length(x): two, four or length_of.
+ */
 // clang-format off
-#define DEFINE_TABLE(name, n)                                                                      \
+#define DEFINE_TABLE(name, length)                                                                 \
     static void name##_linear_sum(sunrealtype a, N_Vector x, sunrealtype b, N_Vector y,            \
                                   N_Vector z) {                                                    \
-        linear_sum(n, a, small_vector_data(x), b, small_vector_data(y), small_vector_data(z));     \
+        linear_sum(length(x), a, small_vector_data(x), b, small_vector_data(y),                    \
+                   small_vector_data(z));                                                          \
     }                                                                                              \
     static void name##_constant(sunrealtype c, N_Vector x) {                                       \
-        constant(n, c, small_vector_data(x));                                                      \
+        constant(length(x), c, small_vector_data(x));                                              \
     }                                                                                              \
     static void name##_product(N_Vector x, N_Vector y, N_Vector z) {                               \
-        product(n, small_vector_data(x), small_vector_data(y), small_vector_data(z));              \
+        product(length(x), small_vector_data(x), small_vector_data(y), small_vector_data(z));      \
     }                                                                                              \
     static void name##_quotient(N_Vector x, N_Vector y, N_Vector z) {                              \
-        quotient(n, small_vector_data(x), small_vector_data(y), small_vector_data(z));             \
+        quotient(length(x), small_vector_data(x), small_vector_data(y), small_vector_data(z));     \
     }                                                                                              \
     static void name##_scale(sunrealtype c, N_Vector x, N_Vector z) {                              \
-        scale(n, c, small_vector_data(x), small_vector_data(z));                                   \
+        scale(length(x), c, small_vector_data(x), small_vector_data(z));                           \
     }                                                                                              \
     static void name##_absolute(N_Vector x, N_Vector z) {                                          \
-        absolute(n, small_vector_data(x), small_vector_data(z));                                   \
+        absolute(length(x), small_vector_data(x), small_vector_data(z));                           \
     }                                                                                              \
     static void name##_inverse(N_Vector x, N_Vector z) {                                           \
-        inverse(n, small_vector_data(x), small_vector_data(z));                                    \
+        inverse(length(x), small_vector_data(x), small_vector_data(z));                            \
     }                                                                                              \
     static void name##_add_constant(N_Vector x, sunrealtype b, N_Vector z) {                       \
-        add_constant(n, small_vector_data(x), b, small_vector_data(z));                            \
+        add_constant(length(x), small_vector_data(x), b, small_vector_data(z));                    \
     }                                                                                              \
     static sunrealtype name##_dot_product(N_Vector x, N_Vector y) {                                \
-        return dot_product(n, small_vector_data(x), small_vector_data(y));                         \
+        return dot_product(length(x), small_vector_data(x), small_vector_data(y));                 \
     }                                                                                              \
     static sunrealtype name##_max_norm(N_Vector x) {                                               \
-        return max_norm(n, small_vector_data(x));                                                  \
+        return max_norm(length(x), small_vector_data(x));                                          \
     }                                                                                              \
     static sunrealtype name##_minimum(N_Vector x) {                                                \
-        return minimum(n, small_vector_data(x));                                                   \
+        return minimum(length(x), small_vector_data(x));                                           \
     }                                                                                              \
     static sunrealtype name##_weighted_norm(N_Vector x, N_Vector w) {                              \
-        return weighted_norm(n, small_vector_data(x), small_vector_data(w));                       \
+        return weighted_norm(length(x), small_vector_data(x), small_vector_data(w));               \
     }                                                                                              \
     static int name##_linear_combination(int count, sunrealtype *c, N_Vector *X, N_Vector x) {     \
-        linear_combination(n, count, c, X, small_vector_data(x));                                  \
+        linear_combination(length(x), count, c, X, small_vector_data(x));                          \
         if (terms_of(x) != NULL) {                                                                 \
             note(terms_of(x), count, X);                                                           \
         }                                                                                          \
@@ -277,20 +293,16 @@ OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, dou
     }                                                                                              \
     static int name##_scale_add_multi(int count, sunrealtype *a, N_Vector x, N_Vector *Y,          \
                                       N_Vector *Z) {                                               \
-        scale_add_multi(n, count, a, small_vector_data(x), Y, Z);                                  \
+        scale_add_multi(length(x), count, a, small_vector_data(x), Y, Z);                          \
         return 0;                                                                                  \
     }                                                                                              \
     static int name##_scale_vectors(int count, sunrealtype *c, N_Vector *X, N_Vector *Z) {         \
-        const N_Vector x = X[0];                                                                   \
-        (void)x;                                                                                   \
-        scale_vectors(n, count, c, X, Z);                                                          \
+        scale_vectors(length(X[0]), count, c, X, Z);                                               \
         return 0;                                                                                  \
     }                                                                                              \
     static int name##_sum_vectors(int count, sunrealtype a, N_Vector *X, sunrealtype b,            \
                                   N_Vector *Y, N_Vector *Z) {                                      \
-        const N_Vector x = X[0];                                                                   \
-        (void)x;                                                                                   \
-        sum_vectors(n, count, a, X, b, Y, Z);                                                      \
+        sum_vectors(length(X[0]), count, a, X, b, Y, Z);                                           \
         return 0;                                                                                  \
     }                                                                                              \
     static const struct _generic_N_Vector_Ops name = {                                             \
@@ -319,13 +331,12 @@ OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, dou
     };
 // clang-format on
 
-DEFINE_TABLE(of_2, 2)
-DEFINE_TABLE(of_4, 4)
-DEFINE_TABLE(of_6, 6)
-DEFINE_TABLE(of_any, length_of(x))
+DEFINE_TABLE(of_2, two)
+DEFINE_TABLE(of_4, four)
+DEFINE_TABLE(of_any, length_of)
 
 N_Vector small_vector_create(sunindextype length, SUNContext context) {
-    const struct _generic_N_Vector_Ops *const tables[] = {[2] = &of_2, [4] = &of_4, [6] = &of_6};
+    const struct _generic_N_Vector_Ops *const tables[] = {[2] = &of_2, [4] = &of_4};
     const struct _generic_N_Vector_Ops *table = &of_any;
     if (length < (sunindextype)(sizeof tables / sizeof tables[0]) && tables[length] != NULL) {
         table = tables[length];

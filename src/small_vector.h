@@ -1,5 +1,5 @@
 /* An N_Vector of SUNDIALS for few doubles: one block of memory per vector, a table of operations
- * shared by all, loops whose length the compiler knows where it is 2, 4 or 6. N_VNew_Serial does
+ * shared by all, loops whose length the compiler knows where it is 2 or 4. N_VNew_Serial does
  * the same at any length and several times the cost per operation.
  *
  * Beyond what every integrator of SUNDIALS asks for it has the fused operations that CVODE and

@@ -154,6 +154,7 @@ static enum status restart(struct slave *slave, struct clock_time end) {
     } else {
         state->next_step = 0.0; // with others the instance is as good as new
     }
+    state->has_history = false; // until the first advance has succeeded
     memcpy(memory->held, memory->values, slave->model->values_size);
     memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
     prepare_inputs(slave);
@@ -166,7 +167,6 @@ static enum status restart(struct slave *slave, struct clock_time end) {
         const struct clock_time stop = {.s = state->experiment.stop_time};
         state->span = fmax(clock_difference(stop, state->time), target);
     }
-    state->has_history = true;
     state->restart_time = state->time;
     state->first_time = target;
     state->steps_before_restart = state->statistics.steps;
