@@ -17,10 +17,14 @@ int integrator_evaluate_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *integr
     return 1; // a smaller step is tried
 }
 
+/* Whoever receives the text may allocate: not from the reserve, which ends with the integrator. */
 static void forward_text(int error_code, const char *text, void *integrator_pointer) {
     const struct integrator *integrator = integrator_pointer;
+    struct reserve none = {0};
+    reserve_enter(&none);
     message_write(&integrator->sink, integrator->method->status_of_flag(integrator, error_code),
                   "%s: %s", integrator->method->name, text);
+    reserve_leave(&none);
 }
 
 /* Bytes: about twice what SUNDIALS 6.4 allocates for a context and the method that needs most, the

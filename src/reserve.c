@@ -109,12 +109,13 @@ void *reserve_take(size_t size) {
 }
 
 size_t reserve_rest(const void *memory) {
-    const struct reserve *reserve = entered();
-    if (reserve == NULL) {
-        return 0;
+    for (const struct reserve *reserve = entered(); reserve != NULL; reserve = reserve->outer) {
+        const uintptr_t from_start = (uintptr_t)memory - (uintptr_t)reserve->block;
+        if (from_start < reserve->size) {
+            return reserve->size - from_start;
+        }
     }
-    const uintptr_t from_start = (uintptr_t)memory - (uintptr_t)reserve->block;
-    return from_start < reserve->size ? reserve->size - from_start : 0;
+    return 0;
 }
 
 void reserve_cut(struct reserve *reserve, size_t used) {

@@ -26,7 +26,8 @@ __attribute__((nonnull, warn_unused_result)) bool reserve_create(struct reserve 
 __attribute__((nonnull)) void reserve_destroy(struct reserve *reserve);
 
 /* Between the two, which the same thread calls, its allocations are served from the reserve. Pairs
- * may be nested, as where a logger that SUNDIALS calls makes another instance. */
+ * of different reserves may be nested; within a pair of an empty one, allocations are the program's
+ * own again. */
 __attribute__((nonnull)) void reserve_enter(struct reserve *reserve);
 __attribute__((nonnull)) void reserve_leave(struct reserve *reserve);
 
@@ -34,8 +35,8 @@ __attribute__((nonnull)) void reserve_leave(struct reserve *reserve);
  * entered, or there is not enough left. */
 void *reserve_take(size_t size);
 
-/* Bytes from memory to the end of the reserve that this thread entered last; 0 where it lies
- * elsewhere. A block that the reserve gave out is never freed by itself. */
+/* Bytes from memory to the end of the reserve that it lies in, of those that this thread has
+ * entered; 0 where it lies elsewhere. A block that a reserve gave out is never freed by itself. */
 size_t reserve_rest(const void *memory);
 
 /* Takes back all that was given out since used was as much. */

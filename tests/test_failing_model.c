@@ -12,14 +12,21 @@ static struct unit unit;
 static struct slave *slave;
 static bool has_outputs;
 static int propagations_left; /* before one fails */
+static bool is_infinite;      /* what propagations give */
 
 static enum status outputs(void *values, double t) {
     return has_outputs ? oscillator_model.outputs(values, t) : STATUS_NOT_FINITE;
 }
 
 static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    return propagations_left-- > 0 ? oscillator_model.propagate(values, t, dt, first, second)
-                                   : STATUS_NOT_FINITE;
+    if (propagations_left-- <= 0) {
+        return STATUS_NOT_FINITE;
+    }
+    const enum status status = oscillator_model.propagate(values, t, dt, first, second);
+    if (is_infinite) {
+        ((struct oscillator_values *)first)->energy = INFINITY;
+    }
+    return status;
 }
 
 void setUp(void) {
@@ -31,6 +38,7 @@ void setUp(void) {
     unit.model = &model;
     has_outputs = true;
     propagations_left = 100;
+    is_infinite = false;
     ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
     ASSERT_OK(slave_setup_experiment(slave, &experiment));
     ASSERT_OK(slave_enter_initialization(slave));
@@ -113,10 +121,20 @@ static void test_derivatives_fail_with_any_propagation(void) {
     assert_works(derive_energy_by_x);
 }
 
+static void test_a_derivative_that_is_not_finite_is_not_given(void) {
+    is_infinite = true;
+    assert_fails(derive_energy, "energy at t = 0.1");
+    assert_fails(derive_energy_by_x, "energy at t = 0.1");
+    is_infinite = false;
+    assert_works(derive_energy);
+    assert_works(derive_energy_by_x);
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_without_outputs_nothing_is_read_or_derived);
     RUN_TEST(test_states_are_read_without_outputs);
     RUN_TEST(test_derivatives_fail_with_any_propagation);
+    RUN_TEST(test_a_derivative_that_is_not_finite_is_not_given);
     return UNITY_END();
 }

@@ -148,6 +148,23 @@ static void test_a_mismatch_of_rounding_is_followed(void) {
     }
 }
 
+/* Within the slack of rounding, but it would end where the instance is. */
+static void test_a_step_that_ends_where_the_instance_is_is_refused(void) {
+    const double at = 1e6;
+    const double before = nextafter(at, 0.0);
+    static const struct {
+        int ulps;
+        fmi2Status status;
+    } cases[] = {{1, fmi2Error}, {2, fmi2OK}};
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_initialized(&messages, at);
+        const double h = cases[i].ulps * (at - before);
+        TEST_ASSERT_EQUAL_INT(cases[i].status, fmu.DoStep(c, before, h, fmi2True));
+        TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_time) >= at);
+        fmu_free(c);
+    }
+}
+
 static void test_masters_may_add_up_or_multiply(void) {
     static const double lengths[] = {1e-3, 1.0 / 60.0, 0.1};
     for (size_t i = 0; i < FMU_COUNT(lengths); i++) {
@@ -342,6 +359,7 @@ int main(int argc, char **argv) {
     RUN_TEST(test_a_finer_tolerance_takes_more_internal_steps);
     RUN_TEST(test_steps_that_are_refused);
     RUN_TEST(test_a_mismatch_of_rounding_is_followed);
+    RUN_TEST(test_a_step_that_ends_where_the_instance_is_is_refused);
     RUN_TEST(test_masters_may_add_up_or_multiply);
     RUN_TEST(test_a_step_past_the_stop_time_is_refused);
     RUN_TEST(test_the_stop_time_itself_is_reached_within_slack);

@@ -59,7 +59,7 @@ static void test_no_more_than_there_is_is_given_out(void) {
     reserve_leave(&reserve);
 }
 
-static void test_only_the_reserve_entered_last_is_asked(void) {
+static void test_the_reserve_entered_last_gives(void) {
     struct reserve inner;
     TEST_ASSERT_TRUE(reserve_create(&inner, 64));
     TEST_ASSERT_NULL(reserve_take(1));
@@ -67,8 +67,8 @@ static void test_only_the_reserve_entered_last_is_asked(void) {
     reserve_enter(&reserve);
     void *outside = reserve_take(1);
     reserve_enter(&inner);
-    TEST_ASSERT_FALSE(is_inside(outside));
-    TEST_ASSERT_TRUE(is_inside(reserve_take(1)));
+    TEST_ASSERT_TRUE(is_inside(outside));
+    TEST_ASSERT_EQUAL_PTR(inner.block, reserve_take(1));
     reserve_leave(&inner);
     TEST_ASSERT_TRUE(is_inside(outside));
     reserve_leave(&reserve);
@@ -157,6 +157,20 @@ static void test_allocations_come_from_the_reserve_while_there_is_room(void) {
     free(before);
     TEST_ASSERT_EQUAL_INT(outstanding - 3, allocator_outstanding());
     reserve_leave(&reserve);
+}
+
+static void test_within_an_empty_one_allocations_are_the_program_s_own(void) {
+    struct reserve none = {0};
+    reserve_enter(&reserve);
+    void *volatile taken = malloc(10);
+    reserve_enter(&none);
+    void *volatile own = malloc(10);
+    free(taken); // from the outer one: nothing happens
+    reserve_leave(&none);
+    TEST_ASSERT_TRUE(is_inside(taken));
+    TEST_ASSERT_FALSE(is_inside(own));
+    reserve_leave(&reserve);
+    free(own);
 }
 
 static void test_a_block_that_grows_keeps_what_is_in_it(void) {
@@ -248,10 +262,11 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_blocks_are_zeroed_aligned_and_apart);
     RUN_TEST(test_no_more_than_there_is_is_given_out);
-    RUN_TEST(test_only_the_reserve_entered_last_is_asked);
+    RUN_TEST(test_the_reserve_entered_last_gives);
     RUN_TEST(test_each_thread_has_its_own_reserve);
     RUN_TEST(test_without_memory_the_reserve_is_empty);
     RUN_TEST(test_allocations_come_from_the_reserve_while_there_is_room);
+    RUN_TEST(test_within_an_empty_one_allocations_are_the_program_s_own);
     RUN_TEST(test_a_block_that_grows_keeps_what_is_in_it);
     RUN_TEST(test_a_product_that_overflows_is_no_small_block);
     RUN_TEST(test_the_reserve_of_an_integrator_is_enough);
