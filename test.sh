@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest.
 #   ./test.sh [--long] [ARGUMENTS]
-# --long: then also the long campaigns (some hours), with a table of their figures at the end.
+# --long: then also the long campaigns (two hours), with a table of their figures at the end.
 # ARGUMENTS go to the ctest that runs everything: ./test.sh -R slave
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
@@ -45,7 +45,10 @@ ctest --preset default -j 2 "$@"
 
 if [ "$long" = yes ]; then
   step "long campaigns"
-  ctest --preset fuzz -C Long -L long -j 2
-  ctest --preset default -C Long -L long
-  python3 tests/figures.py build/{fuzz/,}Testing/Temporary/LastTest.log
+  failed=0
+  ctest --preset tsan -C Long || failed=1
+  ctest --preset fuzz -C Long -L long -j 2 || failed=1
+  ctest --preset default -C Long -R '^(long_|test_faults_)' || failed=1
+  python3 tests/figures.py build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log
+  exit "$failed"
 fi

@@ -4,6 +4,7 @@ import codecs
 import csv
 import math
 import stat
+import struct
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -94,6 +95,30 @@ def check_archive(path: Path) -> None:
                 f"{file.filename} has {file.file_size / 1e6:.0f} MB, expected at most "
                 f"{LARGEST_XML / 1e6:.0f} MB"
             )
+
+
+def check_library(path: Path) -> None:
+    """Refuse a shared object (ELF, 64 bit) that is cut off: the process would die where it is used.
+
+    Raises
+    ------
+    UnreadableError
+    """
+    with path.open("rb") as file:
+        header = file.read(64)
+        if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:
+            return  # of another kind: the loader says what is wrong
+        table = struct.unpack_from("<Q", header, 32)[0]
+        entry_size, count = struct.unpack_from("<HH", header, 54)
+        file.seek(table)
+        entries = file.read(entry_size * count)
+    size = path.stat().st_size
+    for at in range(0, len(entries) - 39, max(entry_size, 40)):
+        kind, _, offset, _, _, length = struct.unpack_from("<IIQQQQ", entries, at)
+        if kind == 1 and offset + length > size:
+            raise UnreadableError(f"is cut off: {size} bytes, {offset + length} are loaded")
+    if len(entries) < entry_size * count:
+        raise UnreadableError(f"is cut off: {size} bytes")
 
 
 def write_csv(path: Path, times: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:

@@ -1,5 +1,6 @@
 """Co-simulation units and their instances, through fmpy."""
 
+import re
 from collections import deque
 from collections.abc import Sequence
 from contextlib import chdir
@@ -15,11 +16,13 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from cosim.errors import UserError
-from cosim.files import UnreadableError, check_archive
+from cosim.files import UnreadableError, check_archive, check_library
+from cosim.outputs import reason
 from cosim.scenario import Scenario
 
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")
 MESSAGES_KEPT = 20
+LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
 
 
 class Fmu:
@@ -39,15 +42,30 @@ class Fmu:
         self.folder = Path(self._unpacked.name)
         try:
             fmpy.extract(self.path, self.folder)
+        except OSError as error:
+            self.close()
+            raise UserError(f"{self.path}: cannot be unpacked: {reason(error)}") from error
         except Exception as error:  # fmpy raises bare exceptions, zlib its own
             self.close()
             raise UserError(f"{self.path}: cannot be unpacked: {_one_line(error)}") from error
+        library = self.folder / "binaries" / fmpy.platform / f"{self.identifier}{LIBRARY_SUFFIX}"
+        try:
+            check_library(library)
+        except (OSError, UnreadableError) as error:
+            self.close()
+            text = error if isinstance(error, UnreadableError) else reason(error)
+            raise UserError(f"{self.path}: {library.name}: {text}") from error
 
     def __enter__(self) -> "Fmu":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    @property
+    def identifier(self) -> str:
+        """Name of the shared object without its suffix."""
+        return self.description.coSimulation.modelIdentifier
 
     def close(self) -> None:
         """Remove the unpacked copy."""
@@ -92,7 +110,7 @@ class Instance:
             with chdir("."):  # fmpy changes the folder, and not back where the library is refused
                 return fmi2.FMU2Slave(
                     guid=description.guid,
-                    modelIdentifier=description.coSimulation.modelIdentifier,
+                    modelIdentifier=self.fmu.identifier,
                     unzipDirectory=str(self.fmu.folder),
                     instanceName=self._label,
                 )
@@ -210,6 +228,9 @@ def _read_description(path: Path) -> ModelDescription:
         kinds = [("model exchange", description.modelExchange)]
         found = f"FMI {description.fmiVersion}" + "".join(f" for {k}" for k, v in kinds if v)
         raise UserError(f"{path}: expected an FMU of FMI 2.0 for co-simulation, found {found}")
+    identifier = description.coSimulation.modelIdentifier
+    if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
+        raise UserError(f"{path}: expected a C identifier as modelIdentifier, found {identifier!r}")
     if fmpy.platform not in platforms:
         raise UserError(
             f"{path}: has no binary for {fmpy.platform} (has: {', '.join(platforms) or 'none'})"

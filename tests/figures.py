@@ -4,11 +4,13 @@ A campaign prints one line, `figures: WHAT; executions N; seconds N; findings N;
 ctest keeps a copy in its log.
 """
 
+import re
 import sys
 from pathlib import Path
 
 COLUMNS = ("executions", "calls", "instances", "cycles", "seconds", "findings")
 PREFIX = "figures: "
+TEST = re.compile(r"^\d+/\d+ Test: (\S+)$")
 
 
 def parse(line: str) -> tuple[str, dict[str, str], list[str]]:
@@ -23,6 +25,19 @@ def parse(line: str) -> tuple[str, dict[str, str], list[str]]:
         else:
             others.append(field)
     return what, known, others
+
+
+def failures(text: str) -> list[str]:
+    """Tests of a log that did not pass: those that crashed may tell no figures."""
+    names: dict[str, bool] = {}
+    name = ""
+    for line in text.splitlines():
+        if match := TEST.match(line):
+            name = match[1]
+            names[name] = False
+        elif line == "Test Passed.":
+            names[name] = True
+    return [name for name, passed in names.items() if not passed]
 
 
 def table(lines: list[str]) -> str:
@@ -51,6 +66,9 @@ def main() -> None:
     if not lines:
         sys.exit("the logs tell of no campaign")
     print(table(lines))
+    for text in texts:
+        for name in failures(text):
+            print(f"FAILED: {name}")
 
 
 if __name__ == "__main__":

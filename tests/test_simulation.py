@@ -169,6 +169,26 @@ def test_fmu_with_a_damaged_binary(project: Path, fmu: Path, tmp_path: Path) -> 
     assert Path.cwd() == here
 
 
+@pytest.mark.parametrize("kept", [40, 100, 3_000, 300_000])
+def test_fmu_with_a_binary_that_is_cut_off(fmu: Path, tmp_path: Path, kept: int) -> None:
+    library = "binaries/linux64/RPManipulator.so"
+    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(tmp_path / "cut.fmu", "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content[:kept] if name == library else content)
+    refused = r"cut\.fmu: (RPManipulator\.so: is cut off: |cannot be loaded: )"
+    with pytest.raises(UserError, match=refused), Fmu(tmp_path / "cut.fmu") as other:
+        simulation.simulate(other, load(SHORT))
+
+
+def test_fmu_whose_identifier_is_a_path(fmu: Path, tmp_path: Path) -> None:
+    def change(text: str) -> str:
+        return text.replace('modelIdentifier="RPManipulator"', 'modelIdentifier="../../x"')
+
+    with pytest.raises(UserError, match=r"expected a C identifier .*'\.\./\.\./x'"):
+        Fmu(repacked(fmu, tmp_path / "path.fmu", change))
+
+
 def test_fmu_without_a_variable_of_the_scenario(project: Path, fmu: Path, tmp_path: Path) -> None:
     def change(xml: str) -> str:
         return xml.replace('name="l1"', 'name="length1"')
