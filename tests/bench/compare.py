@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import statistics
 import subprocess
 import sys
@@ -184,7 +185,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=build / "report/benchmark")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
-    parser.add_argument("--readme", action="store_true", help="put the tables into README.md too")
+    parser.add_argument("--readme", action="store_true", help="put it all into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
     for path in (options.bench, options.library, options.fmu):
@@ -224,6 +225,8 @@ def main() -> None:
     print(text)
     for path in draw(result["rows"], options.output):
         print(path)
+        if options.readme:
+            shutil.copy(path, Path(__file__).parent)
 
 
 if __name__ == "__main__":
