@@ -191,9 +191,9 @@ static int advance(struct integrator *integrator, double t, long max_steps, doub
     small_vector_note_terms(integrator->x, &integrator->columns);
     flag = CVode(integrator->solver, t, integrator->x, stopped_at, CV_NORMAL);
     small_vector_note_terms(integrator->x, NULL);
+    // as at all other points within the step: where the stops are does not matter
     if (flag == CV_SUCCESS && integrator->columns.count > 0) {
-        evaluate_history(integrator,
-                         t); // as at all other points: where the stops are does not matter
+        evaluate_history(integrator, t);
     }
     return flag;
 }
