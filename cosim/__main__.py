@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from cosim.accuracy import Run, Runs, Sweep
     from cosim.convergence import Convergence
     from cosim.scenario import Scenario
-    from cosim.ssp import Ssp
+    from cosim.system.ssp import Ssp
     from cosim.unit import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -209,7 +209,8 @@ def _run(options: argparse.Namespace) -> int:
 
 def _system(options: argparse.Namespace) -> int:
     os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
-    from cosim import ssp, system
+    from cosim.system import runs as system
+    from cosim.system import ssp
 
     path = options.ssp or system.SYSTEM
     if options.ssp is None and not path.exists():
@@ -230,7 +231,8 @@ def _system(options: argparse.Namespace) -> int:
 
 def _remove_results(folder: Path) -> None:
     """Of a system that cannot be run nothing older is left that might be taken for its results."""
-    from cosim import system, system_report
+    from cosim.system import report as system_report
+    from cosim.system import runs as system
 
     with written(folder):
         system_report.remove(folder, [x.name for x in system.REFERENCES.iterdir() if x.is_dir()])
@@ -238,7 +240,8 @@ def _remove_results(folder: Path) -> None:
 
 def _run_system(ssp: Ssp, chosen: Sequence[str], folder: Path) -> int:
     """Run variants; a row appears as one ends, and its files are written then."""
-    from cosim import system, system_report
+    from cosim.system import report as system_report
+    from cosim.system import runs as system
 
     with written(folder):
         system_report.remove(folder, chosen)
@@ -271,7 +274,7 @@ def _run_system(ssp: Ssp, chosen: Sequence[str], folder: Path) -> int:
 
 def _coupling(options: argparse.Namespace) -> int:
     os.environ.setdefault("MPLCONFIGDIR", str(ROOT / "build" / "matplotlib"))
-    from cosim import coupling
+    from cosim.coupling import report as coupling
 
     return 0 if coupling.run(options.report, options.ssp) else 1
 

@@ -22,9 +22,11 @@ sys.path[:0] = [str(ROOT), str(ROOT / "fmu")]
 import generate  # noqa: E402
 from description import DescriptionError  # noqa: E402
 
-from cosim import reference, ssp, system  # noqa: E402
+from cosim import reference  # noqa: E402
 from cosim import scenario as scenarios  # noqa: E402
 from cosim.errors import UserError  # noqa: E402
+from cosim.system import runs as system  # noqa: E402
+from cosim.system import ssp  # noqa: E402
 
 SLOWEST = 20.0  # s, of one file
 MODEL = "rp_manipulator"

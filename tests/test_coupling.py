@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from cosim import coupling, coupling_doubling, coupling_study
-from cosim.coupling_doubling import CORNERS, FAST, FAST_AND_SLOW, STATES, FastAndSlow
-from cosim.coupling_study import METHODS, REFERENCE_AHEAD, REFERENCES, Loop
+from cosim.coupling import doubling as coupling_doubling
+from cosim.coupling import report as coupling
+from cosim.coupling import study as coupling_study
+from cosim.coupling.doubling import CORNERS, FAST, FAST_AND_SLOW, STATES, FastAndSlow
+from cosim.coupling.study import METHODS, REFERENCE_AHEAD, REFERENCES, Loop
 from cosim.errors import UserError
 
 VARIANTS = (

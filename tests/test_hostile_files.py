@@ -12,9 +12,11 @@ import pytest
 from conftest import ROOT
 from ssp_files import SSP, Edit, edited, replace
 
-from cosim import coupling_study, reference, ssp, variables
+from cosim import reference, variables
 from cosim import scenario as scenarios
+from cosim.coupling import study as coupling_study
 from cosim.errors import UserError
+from cosim.system import ssp
 from cosim.unit import Fmu
 
 MODEL = "rp_manipulator"

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from conftest import ROOT
 
-from cosim import step_control
+from cosim.coupling import step_control
+from cosim.coupling.master import Master, Snapshot
 from cosim.errors import UserError
-from cosim.master import Master, Snapshot
-from cosim.ssp import Connection
+from cosim.system.ssp import Connection
 from cosim.unit import Fmu
 
 H, STEPS = 0.05, 40

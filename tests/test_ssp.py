@@ -10,9 +10,9 @@ from conftest import ROOT
 from lxml import etree
 from ssp_files import SSP, Edit, edited, edited_fmu, replace
 
-from cosim import ssp
 from cosim.__main__ import main
 from cosim.errors import UserError
+from cosim.system import ssp
 
 sys.path.insert(0, str(ROOT / "fmu"))
 import package  # noqa: E402

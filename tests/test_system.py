@@ -16,9 +16,10 @@ from fmpy.validation import validate_fmu
 from ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, replace
 from test_importers import folder_of
 
-from cosim import ecos, ssp, system
 from cosim.__main__ import main
 from cosim.errors import UserError
+from cosim.system import ecos, ssp
+from cosim.system import runs as system
 
 FMUS = ("RPTrajectory", "RPController", "RPManipulator")
 VARIANTS = (

@@ -1,7 +1,7 @@
 """Makes the reference of the study of the coupling: a motion with a fast and a slow part.
 
 The closed loop in continuous time, by the functions that make the other references; the motion is
-that of cosim/coupling_doubling.py. Writes models/closed_loop/coupling/fast_and_slow.csv.
+that of cosim/coupling/doubling.py. Writes models/closed_loop/coupling/fast_and_slow.csv.
 """
 
 import argparse
@@ -14,7 +14,7 @@ FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
-from cosim.coupling_doubling import FAST, FAST_AND_SLOW, FAST_STOP, STATES  # noqa: E402
+from cosim.coupling.doubling import FAST, FAST_AND_SLOW, FAST_STOP, STATES  # noqa: E402
 from cosim.files import write_csv  # noqa: E402
 from models.closed_loop.references.closed_loop import monolithic  # noqa: E402
 

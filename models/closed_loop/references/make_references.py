@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT))
 
 from cosim.errors import UserError
 from cosim.files import write_csv
-from cosim.system import STEPS_PER_SECOND, STOP
+from cosim.system.runs import STEPS_PER_SECOND, STOP
 from models.closed_loop.references.closed_loop import (
     COLUMNS,
     COMPONENTS,

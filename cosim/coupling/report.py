@@ -1,6 +1,6 @@
 """The study of the coupling as tables, a picture and verdicts.
 
-What is measured is in cosim/coupling_study.py and cosim/coupling_doubling.py, what is expected on
+What is measured is in cosim/coupling/study.py and cosim/coupling/doubling.py, what is expected on
 the page models/closed_loop/coupling.md.
 """
 
@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from cosim import coupling_study as study
 from cosim import report
-from cosim.coupling_doubling import LOCAL, Doubling, study_doubling
-from cosim.coupling_study import Convergence, Payload, Tracking
+from cosim.coupling import study
+from cosim.coupling.doubling import LOCAL, Doubling, study_doubling
+from cosim.coupling.study import Convergence, Payload, Tracking
 from cosim.outputs import from_here, written
 
 LARGEST_ERROR = 1e-3  # m, of the end effector on the circle at 1 ms in Jacobi order

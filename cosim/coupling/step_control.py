@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.coupling.master import Master, Snapshot
 from cosim.errors import UserError
-from cosim.master import Master, Snapshot
 
 SAFETY = 0.9  # of the step that would just reach the tolerance
 SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next

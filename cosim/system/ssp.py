@@ -143,9 +143,9 @@ def unpacked(path: Path) -> Iterator[Ssp]:
     Raises
     ------
     UserError
-        If it is damaged, or no system that can be run: `cosim.ssp_checks` tells what that is.
+        If it is damaged, or no system that can be run (what that is: `cosim.system.ssp_checks`).
     """
-    from cosim import ssp_checks
+    from cosim.system import ssp_checks
 
     path = Path(path)
     with TemporaryDirectory(prefix="cosim-") as name:

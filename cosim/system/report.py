@@ -25,8 +25,8 @@ from cosim.report import (
     table,
     verdict,
 )
-from cosim.ssp import Ssp
-from cosim.system import BOUND, Outcome
+from cosim.system.runs import BOUND, Outcome
+from cosim.system.ssp import Ssp
 
 JOINTS = (("q1", "rad"), ("q2", "m"))
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))

@@ -8,7 +8,7 @@ from fmpy.model_description import ModelVariable
 
 from cosim.errors import UserError, did_you_mean
 from cosim.files import check_archive, is_file
-from cosim.ssp import Component, Connector, Parameter, Ssp
+from cosim.system.ssp import Component, Connector, Parameter, Ssp
 
 # type of a variable -> types of a parameter's value that engines can give it
 SETTABLE = {

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim import step_control
-from cosim.coupling_study import FINEST, ROOT, STATES, Loop, Method, read_reference
+from cosim.coupling import step_control
+from cosim.coupling.study import FINEST, ROOT, STATES, Loop, Method, read_reference
 
 FAST_AND_SLOW = ROOT / "models" / "closed_loop" / "coupling" / "fast_and_slow.csv"
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")

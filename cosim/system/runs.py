@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 from fmpy import read_model_description
 
-from cosim import ecos, reference
+from cosim import reference
 from cosim.errors import UserError, did_you_mean
 from cosim.files import read_csv
-from cosim.ssp import Ssp
+from cosim.system import ecos
+from cosim.system.ssp import Ssp
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SYSTEM = ROOT / "build" / "ClosedLoop.ssp"
 REFERENCES = ROOT / "models" / "closed_loop" / "references"
 REFERENCE = "ecos.csv"  # of Jacobi stepping, read after inputs are set

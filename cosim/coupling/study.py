@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import ssp
 from cosim.convergence import slope
+from cosim.coupling.master import Master
+from cosim.coupling.part import Part
 from cosim.errors import UserError
 from cosim.files import read_csv
-from cosim.master import Master
-from cosim.part import Part
-from cosim.ssp import Connection
+from cosim.system import ssp
+from cosim.system.ssp import Connection
 from cosim.unit import Fmu
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 SYSTEM = ROOT / "build" / "ClosedLoop.ssp"
 REFERENCES = ROOT / "models" / "closed_loop" / "references"
 

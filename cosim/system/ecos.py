@@ -2,7 +2,7 @@
 
 Ecos goes on when a component fails, tells so in its log at level debug alone, and leaves its
 temporary files behind. So the run is a child process whose log is read and whose temporary folder
-is removed: `python -m cosim.ecos FOLDER` is that child.
+is removed: `python -m cosim.system.ecos FOLDER` is that child.
 """
 
 import ctypes
@@ -25,13 +25,13 @@ import numpy as np
 from cosim.errors import UserError
 
 if TYPE_CHECKING:
-    from cosim.ssp import Ssp
+    from cosim.system.ssp import Ssp
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
 # of an FMU: [path of the FMU] status text
 MESSAGE = re.compile(r"\[(?P<fmu>[^\]]*\.fmu)\] (?P<status>fmi2\w+) (?P<text>.*)")
 BAD = ("fmi2Discard", "fmi2Error", "fmi2Fatal")
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +102,7 @@ def _start(folder: Path) -> int:
     environment = os.environ | {"TMPDIR": str(folder), "PYTHONUNBUFFERED": "1"}
     with (folder / LOG).open("wb") as log:
         child = subprocess.Popen(
-            [sys.executable, "-m", "cosim.ecos", str(folder)],
+            [sys.executable, "-m", "cosim.system.ecos", str(folder)],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,

@@ -20,9 +20,9 @@ import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
+from cosim.coupling.part import Part
 from cosim.errors import UserError
-from cosim.part import Part
-from cosim.ssp import Connection
+from cosim.system.ssp import Connection
 from cosim.unit import Fmu
 
 ORDERS = ("jacobi", "gauss_seidel")
