@@ -1,6 +1,7 @@
 /* The reference motions: geometry, continuity, what is refused, and a unit without states. */
 #include "last_text.h"
 #include "rp_manipulator.h"
+#include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
 #include "snapshot.h"
 #include "unit.h"
@@ -13,29 +14,10 @@
 static const double pi = 3.14159265358979323846;
 static const struct rp_trajectory_parameters at_rest;
 
-/* The circle is that of the start values of variables.toml, beside the axis of joint 1. */
-static const struct rp_trajectory_parameters beside = {
-    .motion = RP_TRAJECTORY_CIRCLE,
-    .branch = RP_TRAJECTORY_FORWARD,
-    .l1 = 0.5,
-    .a = 0.1,
-    .start_time = 0.5,
-    .duration = 1.25,
-    .q_from = {0.2, -0.1},
-    .q_to = {-1.0, 0.3},
-    .ee_from = {-0.5, 0.2},
-    .ee_to = {-0.3, -0.35},
-    .center = {0.4, 0.1},
-    .radius = 0.1,
-    .start_angle = 0.0,
-    .frequency = 0.5,
-    .turns = 2.0,
-    .ramp_time = 1.0,
-};
 static struct rp_trajectory_parameters p;
 
 void setUp(void) {
-    p = beside;
+    p = rp_trajectory_example;
     last_text[0] = '\0';
 }
 void tearDown(void) {}
@@ -72,7 +54,7 @@ static void set_kind(int kind) {
         RP_TRAJECTORY_CIRCLE,         RP_TRAJECTORY_CIRCLE, RP_TRAJECTORY_CIRCLE,
         RP_TRAJECTORY_CIRCLE,
     };
-    p = beside;
+    p = rp_trajectory_example;
     if (kind >= 5) {
         set_around();
     }

@@ -1,4 +1,5 @@
 /* The reference motions as the slave sees them: fields, their derivatives, what is refused. */
+#include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
 
 #include <math.h>
@@ -10,27 +11,9 @@ static const double pi = 3.14159265358979323846;
 static struct rp_trajectory_values v;
 static char text[512];
 
-static const struct rp_trajectory_parameters circle = {
-    .motion = RP_TRAJECTORY_CIRCLE,
-    .branch = RP_TRAJECTORY_FORWARD,
-    .l1 = 0.5,
-    .a = 0.1,
-    .start_time = 0.5,
-    .duration = 1.25,
-    .q_from = {0.2, -0.1},
-    .q_to = {-1.0, 0.3},
-    .ee_from = {-0.5, 0.2},
-    .ee_to = {-0.3, -0.35},
-    .center = {0.4, 0.1},
-    .radius = 0.1,
-    .start_angle = 0.25,
-    .frequency = 0.5,
-    .turns = 2.0,
-    .ramp_time = 1.0,
-};
-
 void setUp(void) {
-    v = (struct rp_trajectory_values){.parameters = circle};
+    v = (struct rp_trajectory_values){.parameters = rp_trajectory_example};
+    v.parameters.start_angle = 0.25;
     text[0] = '\0';
 }
 void tearDown(void) {}
