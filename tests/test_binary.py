@@ -40,7 +40,7 @@ def test_it_names_no_folder_to_load_from(binary: Path) -> None:
 
 def test_it_needs_the_glibc_that_the_readme_states(binary: Path) -> None:
     stated = re.search(
-        r"The binary needs glibc (\d+)\.(\d+) or later", (ROOT / "README.md").read_text()
+        r"The binary needs glibc (\d+)\.(\d+)\s+or later", (ROOT / "README.md").read_text()
     )
     versions = re.findall(r"GLIBC_(\d+)\.(\d+)", readelf("--version-info", binary))
     newest = max((int(major), int(minor)) for major, minor in versions)
