@@ -165,10 +165,12 @@ static void test_within_an_empty_one_allocations_are_the_program_s_own(void) {
     void *volatile taken = malloc(10);
     reserve_enter(&none);
     void *volatile own = malloc(10);
-    free(taken); // from the outer one: nothing happens
-    reserve_leave(&none);
     TEST_ASSERT_TRUE(is_inside(taken));
     TEST_ASSERT_FALSE(is_inside(own));
+    const long outstanding = allocator_outstanding();
+    free(taken); // from the outer one: nothing happens
+    TEST_ASSERT_EQUAL_INT(outstanding, allocator_outstanding());
+    reserve_leave(&none);
     reserve_leave(&reserve);
     free(own);
 }
