@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest.
 #   ./test.sh [--long] [ARGUMENTS]
-# --long: then also the long campaigns (two hours), with a table of their figures at the end.
+# --long: then also the long campaigns (an hour and a half), with a table of their figures at the end.
 # ARGUMENTS go to the ctest that runs everything: ./test.sh -R slave
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
