@@ -78,9 +78,30 @@ def _drop_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _stop(number: int, _: object) -> NoReturn:
-    """A request to end: like Ctrl-C, temporary files are removed on the way out."""
-    raise SystemExit(128 + number)
+def _as_program() -> int:
+    """`main`, ended by the user's Ctrl-C, SIGTERM or SIGHUP: temporary files are removed then.
+
+    Compiled code of libraries may turn the exception of a signal into one of its own: whatever
+    arrives after a signal is its end.
+    """
+    received: list[int] = []
+
+    def stop(number: int, _: object) -> NoReturn:
+        received.append(number)
+        raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)
+
+    for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        # else it is ignored: nohup does so
+        if signal.getsignal(ending) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(ending, stop)
+    try:
+        return main()
+    except Exception:
+        if not received:
+            raise
+        if received[0] == signal.SIGINT:
+            print("interrupted", file=sys.stderr)
+        return 128 + received[0]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -187,6 +208,8 @@ def _run(options: argparse.Namespace) -> int:
         runs = Runs(fmus)
         for scenario in chosen:
             runs.reference(scenario)  # a missing one shows before anything has run
+        with written(options.report):  # and so does a report without a place
+            options.report.mkdir(parents=True, exist_ok=True)
         if options.tolerance is not None:
             done, sweeps = _print_runs(runs, chosen, options.tolerance), []
         else:
@@ -403,7 +426,4 @@ def _count(things: Sequence[object], name: str) -> str:
 
 
 if __name__ == "__main__":
-    for ending in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(ending) is signal.SIG_DFL:  # nohup ignores SIGHUP
-            signal.signal(ending, _stop)
-    sys.exit(main())
+    sys.exit(_as_program())

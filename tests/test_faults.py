@@ -231,6 +231,38 @@ def test_stopped_in_the_middle(
     place.assert_clean()
 
 
+@pytest.mark.parametrize(
+    ("stop", "code", "told"),
+    [("SIGINT", 130, "interrupted\n"), ("SIGTERM", 143, "")],
+    ids=["Ctrl-C", "SIGTERM"],
+)
+def test_a_library_may_hide_that_it_was_stopped(stop: str, code: int, told: str) -> None:
+    program = f"""
+import os, signal, sys
+from cosim import __main__ as cli
+
+def main():
+    try:
+        os.kill(os.getpid(), signal.{stop})
+        signal.pause()
+    except BaseException:
+        raise ValueError("Invalid affine transformation matrix")
+
+cli.main = main
+sys.exit(cli._as_program())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (code, told)
+
+
 # ---- surroundings ------------------------------------------------------------------------------
 
 

@@ -32,7 +32,10 @@ def run(report_folder: Path, system: Path | None = None) -> bool:
     UserError
         If the system or a reference is missing, an FMU fails, or the picture cannot be written.
     """
+    path = Path(report_folder) / PICTURE
     with study.opened(system or study.SYSTEM) as loop:
+        with written(path):  # a place that cannot be written shows before anything has run
+            path.parent.mkdir(parents=True, exist_ok=True)
         convergence = study.study_convergence(loop)
         show(convergence_lines(convergence))
         tracking = study.study_tracking(loop)
@@ -41,9 +44,7 @@ def run(report_folder: Path, system: Path | None = None) -> bool:
         show(payload_lines(payload))
         doubling = study_doubling(loop)
         show(doubling_lines(doubling))
-    path = Path(report_folder) / PICTURE
     with written(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
         report.save(figure(convergence, tracking, doubling), path)
     print(f"\npicture: {from_here(path)}")
     return (

@@ -141,11 +141,12 @@ void turns_tune(struct run *run, const struct fmu_functions *fmu, const struct p
     struct fmu_counts counts;
     require(states != NULL, "no memory");
     if (run->solver == MUJOCO) {
-        for (run->substeps = 10; run->substeps < 1000000; run->substeps += run->substeps / 4 + 1) {
+        run->substeps = 10;
+        run_once(run, fmu, problem, states, &counts);
+        while (problem_error(problem, states) > bound) {
+            run->substeps += run->substeps / 4 + 1;
+            require(run->substeps < 1000000, "no time step of MuJoCo meets the error asked for");
             run_once(run, fmu, problem, states, &counts);
-            if (problem_error(problem, states) <= bound) {
-                break;
-            }
         }
     } else {
         double best = 0.0;
