@@ -213,9 +213,9 @@ class _Reader:
     def in_range(self, low: float, high: float, variable: dict[str, Any], key: str) -> None:
         unit = f" {variable['unit']}" if "unit" in variable else ""
         if low < variable.get("min", -math.inf):
-            self.fail(key, f"expected at least {variable['min']!r}{unit}, got {low!r}")
+            self.fail(key, f"expected at least {show(variable['min'])}{unit}, got {low!r}")
         if high > variable.get("max", math.inf):
-            self.fail(key, f"expected at most {variable['max']!r}{unit}, got {high!r}")
+            self.fail(key, f"expected at most {show(variable['max'])}{unit}, got {high!r}")
 
     def values(self, content: dict[str, Any], section: str) -> dict[str, float]:
         """Section [parameters] or [initial]: name = value, or an Enumeration's item as a text."""

@@ -235,3 +235,11 @@ def test_scenario_outside_a_model(tmp_path: Path) -> None:
     path.write_text(HEAD + TIME)
     with pytest.raises(UserError, match="expected in models/<model>/scenarios/"):
         scenario.load(path)
+
+
+def test_a_bound_too_long_to_write_is_told(write) -> None:
+    path = write(f"{HEAD}{TIME}[parameters]\nmass = 1.0\n")
+    declared = path.parents[1] / "variables.toml"
+    declared.write_text(declared.read_text().replace("min = 0.5", f"min = 0x{'f' * 5000}"))
+    with pytest.raises(UserError, match="expected at least a very large number kg, got 1.0"):
+        scenario.load(path)
