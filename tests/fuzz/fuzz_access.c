@@ -99,14 +99,18 @@ void fuzz_call_SetReal(struct fuzz_session *session, struct fuzz_instance *insta
     free(values);
 }
 
-void fuzz_call_GetInteger(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_INTEGER, false);
-    fmi2Integer *values = fuzz_array(count, sizeof *values);
-    FUZZ_CHECKED(instance, GetInteger, references, count, values);
-    free(references);
-    free(values);
-}
+#define GETTER_OF_VALUES(type, variables)                                                          \
+    void fuzz_call_Get##type(struct fuzz_session *session, struct fuzz_instance *instance) {       \
+        const size_t count = any_count(session->input);                                            \
+        fmi2ValueReference *references = any_references(session->input, count, variables, false);  \
+        fmi2##type *values = fuzz_array(count, sizeof *values);                                    \
+        FUZZ_CHECKED(instance, Get##type, references, count, values);                              \
+        free(references);                                                                          \
+        free(values);                                                                              \
+    }
+GETTER_OF_VALUES(Integer, VARIABLE_INTEGER)
+GETTER_OF_VALUES(Boolean, VARIABLE_REAL)
+GETTER_OF_VALUES(String, VARIABLE_REAL)
 
 void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
@@ -125,29 +129,11 @@ void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *in
     free(values);
 }
 
-void fuzz_call_GetBoolean(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, false);
-    fmi2Boolean *values = fuzz_array(count, sizeof *values);
-    FUZZ_CHECKED(instance, GetBoolean, references, count, values);
-    free(references);
-    free(values);
-}
-
 void fuzz_call_SetBoolean(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
     fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, true);
     fmi2Boolean *values = any_integers(session->input, count);
     FUZZ_CHECKED(instance, SetBoolean, references, count, values);
-    free(references);
-    free(values);
-}
-
-void fuzz_call_GetString(struct fuzz_session *session, struct fuzz_instance *instance) {
-    const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, false);
-    fmi2String *values = fuzz_array(count, sizeof *values);
-    FUZZ_CHECKED(instance, GetString, references, count, values);
     free(references);
     free(values);
 }
