@@ -2,7 +2,7 @@
 # Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest.
 #   ./test.sh [--long] [ARGUMENTS]
 # --long: then also the long campaigns (an hour and a half), with a table of their figures at the end.
-# ARGUMENTS go to the ctest that runs everything: ./test.sh -R slave
+# ARGUMENTS go to the ctest that runs everything: ./test.sh -R instance
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"

@@ -1,6 +1,6 @@
 #include "component.h"
 
-#include "unit.h"
+#include "model_description.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -101,7 +101,7 @@ static const struct {
     [SEVERITY_ERROR] = {fmi2Error, LOG_STATUS_ERROR},
 };
 
-static void log_slave_text(void *component, enum status status, const char *text) {
+static void log_instance_text(void *component, enum status status, const char *text) {
     const enum severity severity = status_severity(status);
     component_log(component, of_severity[severity].fmi_status, of_severity[severity].category, "%s",
                   text);
@@ -205,8 +205,8 @@ struct component *component_create(const char *name, fmi2Type kind,
     }
     memcpy(component->name, name, size);
 
-    const struct message_sink sink = {.write = log_slave_text, .context = component};
-    if (slave_create(&unit, &sink, &component->slave) != STATUS_OK) {
+    const struct message_sink sink = {.write = log_instance_text, .context = component};
+    if (instance_create(&model_description, &sink, &component->instance) != STATUS_OK) {
         component_destroy(component);
         return NULL;
     }
@@ -217,7 +217,7 @@ void component_destroy(struct component *component) {
     if (component == NULL) {
         return;
     }
-    slave_destroy(component->slave);
+    instance_destroy(component->instance);
     free(component->name);
     free(component);
 }

@@ -1,9 +1,9 @@
-/* What stands behind an fmi2Component: the slave, the FMI state it is in, and its logger. */
+/* What stands behind an fmi2Component: the instance, the FMI state it is in, and its logger. */
 #ifndef COMPONENT_H
 #define COMPONENT_H
 
 #include "calls.h"
-#include "slave.h"
+#include "instance.h"
 
 #include "fmi2Functions.h"
 
@@ -19,7 +19,7 @@ enum log_category {
 };
 
 struct component {
-    struct slave *slave;
+    struct instance *instance;
     enum fmi_state state;
     fmi2Type kind;
     fmi2CallbackLogger logger; /* NULL: no log */
@@ -42,7 +42,7 @@ struct component *component_enter(fmi2Component c, enum call call);
 bool component_has_arrays(struct component *component, enum call call, size_t count,
                           const void *references, const void *values);
 
-/* FMI status of a slave's status; an error takes the component into STATE_ERROR. */
+/* FMI status of a instance's status; an error takes the component into STATE_ERROR. */
 fmi2Status component_status(struct component *component, enum status status);
 
 /* Error that the adapter itself finds; takes the component into STATE_ERROR. */

@@ -9,7 +9,7 @@ Keys of variables.toml:
     [units]       "name" = { exponents of the SI base units, display.NAME = factor }
     [variables.NAME]
         reference     value reference, unique, 0 to 9999
-        owner         "model" (default) or "slave": the structure that holds the value
+        owner         "model" (default) or "instance": the structure that holds the value
         field         C designator of the value in that structure
         type          "Real" (default), "Integer" or "Enumeration"
         causality, variability, initial, unit, start, min, max, nominal, description
@@ -188,7 +188,7 @@ def checked_variable(where: str, variable: Table) -> Table:
     v = {"owner": "model", "type": "Real", **variable}
     if not 0 <= v["reference"] <= LARGEST_REFERENCE:
         raise DescriptionError(f"{where}: reference must be from 0 to {LARGEST_REFERENCE}")
-    for key, allowed in (("owner", ("model", "slave")), ("type", TYPES)):
+    for key, allowed in (("owner", ("model", "instance")), ("type", TYPES)):
         if v[key] not in allowed:
             raise DescriptionError(f"{where}: {key} '{v[key]}' is not one of {', '.join(allowed)}")
 

@@ -205,7 +205,7 @@ def value_references(description: Table) -> str:
 def variable_table(description: Table) -> str:
     """Text of variables.c: the rows, and the check that each field has the declared type."""
     model, variables = description["model"], description["variables"]
-    structures = {"model": model["values"], "slave": "struct slave_values"}
+    structures = {"model": model["values"], "instance": "struct instance_values"}
     c_types = {"Real": "double", "Integer": "int", "Enumeration": "int"}
     checks, rows = [], []
     for name, v in variables.items():
@@ -234,9 +234,9 @@ def variable_table(description: Table) -> str:
     entries = [str(row_of.get(reference, -1)) for reference in range(max(row_of) + 1)]
     lines = [
         "/* Generated from variables.toml. */",
-        '#include "slave.h"',
+        '#include "instance.h"',
         f'#include "{model["header"]}"',
-        '#include "unit.h"',
+        '#include "model_description.h"',
         "",
         "#include <math.h>",
         "",
@@ -250,7 +250,7 @@ def variable_table(description: Table) -> str:
         *("    " + ", ".join(entries[i : i + 20]) + "," for i in range(0, len(entries), 20)),
         "};",
         "",
-        "const struct unit unit = {",
+        "const struct model_description model_description = {",
         f'    .name = "{model["name"]}",',
         f'    .guid = "{guid(description)}",',
         f"    .default_tolerance = {number(float(description['experiment']['tolerance']))},",

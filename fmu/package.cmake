@@ -2,15 +2,15 @@
 #
 # Builds NAME.fmu in the current build folder from the model's folder (variables.toml, README.md; model.png
 # and pictures of the README where there are any) and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
-# archive), NAME_unit (struct unit as a library), NAME_interface (the generated header with value
+# archive), NAME_description (struct model_description as a library), NAME_interface (the generated header with value
 # references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 set(FMU_SOURCES
   ${FMU_SOURCE_DIR}/component.c
-  ${FMU_SOURCE_DIR}/fmi2.c
-  ${FMU_SOURCE_DIR}/fmi2_co_simulation.c
-  ${FMU_SOURCE_DIR}/fmi2_model_exchange.c)
+  ${FMU_SOURCE_DIR}/fmi2/fmi2.c
+  ${FMU_SOURCE_DIR}/fmi2/fmi2_co_simulation.c
+  ${FMU_SOURCE_DIR}/fmi2/fmi2_model_exchange.c)
 
 function(add_fmu name)
   cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
@@ -19,7 +19,7 @@ function(add_fmu name)
   set(generated ${out}/modelDescription.xml ${out}/variables.c ${out}/value_references.h)
 
   # tables and model description, again whenever a declaration changes
-  file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*.toml)
+  file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
@@ -33,16 +33,16 @@ function(add_fmu name)
   target_include_directories(${name}_interface INTERFACE ${out})
   add_dependencies(${name}_interface ${name}_generated)
 
-  # the unit: the model with its table of variables, run by the slave
-  add_library(${name}_unit STATIC ${out}/variables.c)
-  target_include_directories(${name}_unit PUBLIC ${FMU_SOURCE_DIR})
-  target_link_libraries(${name}_unit PUBLIC slave ${ARG_LIBRARY} ${name}_interface)
+  # the description: the model with its table of variables, run by the instance
+  add_library(${name}_description STATIC ${out}/variables.c)
+  target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR})
+  target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
   # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
   add_library(${name} MODULE ${FMU_SOURCES})
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${name} PRIVATE ${name}_unit reserved_allocation)
+  target_link_libraries(${name} PRIVATE ${name}_description reserved_allocation)
   target_link_options(${name} PRIVATE
     -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed
     -Wl,-z,relro,-z,now,-z,noexecstack,-z,text)

@@ -25,10 +25,10 @@ def copy_project(folder: Path) -> None:
     """A project with two scenarios."""
     model = folder / "models" / "rp_manipulator"
     (model / "scenarios").mkdir(parents=True)
-    (folder / "src").mkdir()
+    (folder / "src" / "instance").mkdir(parents=True)
     shutil.copy(ROOT / "models" / "rp_manipulator" / "variables.toml", model)
-    for file in (ROOT / "src").glob("*.toml"):
-        shutil.copy(file, folder / "src")
+    for file in (ROOT / "src" / "instance").glob("*.toml"):
+        shutil.copy(file, folder / "src" / "instance")
     for name in (SHORT, LONG):
         original = load(name)
         shutil.copy(original.path, model / "scenarios")

@@ -181,7 +181,10 @@ class Fuzz:
         )
 
     def a_declaration(self) -> None:
-        files = [self.model / "variables.toml", *sorted((self.folder / "src").glob("*.toml"))]
+        files = [
+            self.model / "variables.toml",
+            *sorted((self.folder / "src" / "instance").glob("*.toml")),
+        ]
         file = self.chance.choice(files)
         content = self.either_way(file.read_text(encoding="utf-8"))
         for check in (lambda: reference.load(scenarios.load(self.scenario)), self.generate):

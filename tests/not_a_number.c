@@ -1,5 +1,5 @@
-// A co-simulation unit that does nothing but go wrong: every Real variable is 0, but that of value
-// reference BROKEN, which is NaN after STEPS steps. Takes the place of any unit's shared object.
+// An FMU that does nothing but go wrong: every Real variable is 0, but that of value
+// reference BROKEN, which is NaN after STEPS steps. Takes the place of any FMU's shared object.
 #include <math.h>
 #include <stdlib.h>
 

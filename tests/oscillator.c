@@ -61,19 +61,19 @@ const struct model oscillator_model = {
     .check_parameters = check_parameters,
 };
 
-#define OF_MODEL(field)       VARIABLE_REAL, VARIABLE_OF_MODEL, offsetof(struct oscillator_values, field)
-#define OF_SLAVE(type, field) type, VARIABLE_OF_SLAVE, offsetof(struct slave_values, field)
-#define PARAMETER             CAUSALITY_PARAMETER, VARIABILITY_TUNABLE, INITIAL_EXACT
-#define FIXED                 CAUSALITY_PARAMETER, VARIABILITY_FIXED, INITIAL_EXACT
-#define STATE                 CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_EXACT
-#define INPUT                 CAUSALITY_INPUT, VARIABILITY_CONTINUOUS, INITIAL_NONE
-#define OUTPUT                CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_CALCULATED
-#define COUNTER               CAUSALITY_LOCAL, VARIABILITY_DISCRETE, INITIAL_CALCULATED
-#define TIME                  CAUSALITY_INDEPENDENT, VARIABILITY_CONTINUOUS, INITIAL_NONE
-#define ANY                   -INFINITY, INFINITY, 1.0
+#define OF_MODEL(field)          VARIABLE_REAL, VARIABLE_OF_MODEL, offsetof(struct oscillator_values, field)
+#define OF_INSTANCE(type, field) type, VARIABLE_OF_INSTANCE, offsetof(struct instance_values, field)
+#define PARAMETER                CAUSALITY_PARAMETER, VARIABILITY_TUNABLE, INITIAL_EXACT
+#define FIXED                    CAUSALITY_PARAMETER, VARIABILITY_FIXED, INITIAL_EXACT
+#define STATE                    CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_EXACT
+#define INPUT                    CAUSALITY_INPUT, VARIABILITY_CONTINUOUS, INITIAL_NONE
+#define OUTPUT                   CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_CALCULATED
+#define COUNTER                  CAUSALITY_LOCAL, VARIABILITY_DISCRETE, INITIAL_CALCULATED
+#define TIME                     CAUSALITY_INDEPENDENT, VARIABILITY_CONTINUOUS, INITIAL_NONE
+#define ANY                      -INFINITY, INFINITY, 1.0
 
 static const struct variable variables[] = {
-    {0, "time", OF_SLAVE(VARIABLE_REAL, time), TIME, 0.0, ANY},
+    {0, "time", OF_INSTANCE(VARIABLE_REAL, time), TIME, 0.0, ANY},
     {1, "omega", OF_MODEL(omega), PARAMETER, 2.0, -10.0, 100.0, 1.0},
     {2, "gain", OF_MODEL(gain), FIXED, 1.0, ANY},
     {10, "x", OF_MODEL(x), STATE, 1.0, ANY},
@@ -81,16 +81,16 @@ static const struct variable variables[] = {
     {20, "u", OF_MODEL(u), INPUT, 0.0, ANY},
     {30, "energy", OF_MODEL(energy), OUTPUT, 0.0, ANY},
     {31, "a", OF_MODEL(a), OUTPUT, 0.0, ANY},
-    {80, "steps", OF_SLAVE(VARIABLE_INTEGER, solver_steps), COUNTER, 0.0, ANY},
-    {81, "evaluations", OF_SLAVE(VARIABLE_INTEGER, solver_rhs_evaluations), COUNTER, 0.0, ANY},
-    {82, "relative_tolerance", OF_SLAVE(VARIABLE_REAL, relative_tolerance), FIXED, 0.0, 0.0,
+    {80, "steps", OF_INSTANCE(VARIABLE_INTEGER, solver_steps), COUNTER, 0.0, ANY},
+    {81, "evaluations", OF_INSTANCE(VARIABLE_INTEGER, solver_rhs_evaluations), COUNTER, 0.0, ANY},
+    {82, "relative_tolerance", OF_INSTANCE(VARIABLE_REAL, relative_tolerance), FIXED, 0.0, 0.0,
      INFINITY, 1.0},
-    {83, "max_internal_steps", OF_SLAVE(VARIABLE_INTEGER, max_internal_steps), FIXED, 100000.0, 1.0,
-     INFINITY, 1.0},
-    {84, "effective_relative_tolerance", OF_SLAVE(VARIABLE_REAL, effective_relative_tolerance),
+    {83, "max_internal_steps", OF_INSTANCE(VARIABLE_INTEGER, max_internal_steps), FIXED, 100000.0,
+     1.0, INFINITY, 1.0},
+    {84, "effective_relative_tolerance", OF_INSTANCE(VARIABLE_REAL, effective_relative_tolerance),
      CAUSALITY_LOCAL, VARIABILITY_FIXED, INITIAL_CALCULATED, 0.0, ANY},
-    {90, "solver_method", OF_SLAVE(VARIABLE_INTEGER, solver_method), FIXED, 1.0, 1.0, 3.0, 1.0},
-    {91, "max_step", OF_SLAVE(VARIABLE_REAL, max_step), FIXED, 0.0, 0.0, INFINITY, 1.0},
+    {90, "solver_method", OF_INSTANCE(VARIABLE_INTEGER, solver_method), FIXED, 1.0, 1.0, 3.0, 1.0},
+    {91, "max_step", OF_INSTANCE(VARIABLE_REAL, max_step), FIXED, 0.0, 0.0, INFINITY, 1.0},
 };
 
 static const short row_of_reference[] = {
@@ -100,7 +100,7 @@ static const short row_of_reference[] = {
     -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, 8,  9,  10, 11, 12, -1, -1, -1, -1, -1, 13, 14,
 };
 
-const struct unit oscillator_unit = {
+const struct model_description oscillator_description = {
     .name = "Oscillator",
     .guid = "{oscillator}",
     .default_tolerance = 1e-8,

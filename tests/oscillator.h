@@ -1,11 +1,11 @@
 /* A model with a solution that is known in closed form, for the tests of src/ and for the test that
  * a model needs nothing but a folder: a mass on a spring, x'' = -omega^2 x + gain u.
- * oscillator_unit is declared by hand; oscillator/variables.toml declares the same for
+ * oscillator_description is declared by hand; oscillator/variables.toml declares the same for
  * fmu/generate.py. */
 #ifndef OSCILLATOR_H
 #define OSCILLATOR_H
 
-#include "slave.h"
+#include "instance.h"
 
 struct oscillator_values {
     double omega; /* rad/s, tunable, > 0 together with damping */
@@ -36,7 +36,7 @@ enum oscillator_reference {
 };
 
 extern const struct model oscillator_model;
-extern const struct unit oscillator_unit;
+extern const struct model_description oscillator_description;
 
 /* State at time t after start with omega and u held; start and end may be the same array. */
 void oscillator_solution(double omega, double u, double t, const double start[2], double end[2]);

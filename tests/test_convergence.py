@@ -273,10 +273,10 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with one quick scenario, for the command line to work in."""
     model, scenario = tmp_path / "models" / MODEL.name, "constant_effort_single_step"
     (model / "scenarios").mkdir(parents=True)
-    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "instance").mkdir(parents=True)
     shutil.copy(MODEL / "variables.toml", model)
-    for file in (ROOT / "src").glob("*.toml"):
-        shutil.copy(file, tmp_path / "src")
+    for file in (ROOT / "src" / "instance").glob("*.toml"):
+        shutil.copy(file, tmp_path / "src" / "instance")
     shutil.copy(MODEL / "scenarios" / f"{scenario}.toml", model / "scenarios")
     shutil.copytree(PATH.parent, model / "convergence")
     for name in (scenario, PATH.stem):

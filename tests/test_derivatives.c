@@ -5,33 +5,33 @@
 #include <string.h>
 #include <unity.h>
 
-static struct slave *slave;
+static struct instance *instance;
 
 void setUp(void) {
-    const struct slave_experiment experiment = {.start_time = 0.0};
-    ASSERT_OK(slave_create(&oscillator_unit, &last_text_sink, &slave));
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    ASSERT_OK(slave_enter_initialization(slave));
+    const struct instance_experiment experiment = {.start_time = 0.0};
+    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
 }
 
 void tearDown(void) {
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
 static double get(unsigned reference) {
     double value = NAN;
-    ASSERT_OK(slave_get_real(slave, &reference, 1, &value));
+    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
     return value;
 }
 
 static void set_derivative(int order, double value) {
     const unsigned input = OSCILLATOR_U;
-    ASSERT_OK(slave_set_input_derivatives(slave, &input, 1, &order, &value));
+    ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &value));
 }
 
 static double derivative(unsigned reference, int order) {
     double value = NAN;
-    ASSERT_OK(slave_get_output_derivatives(slave, &reference, 1, &order, &value));
+    ASSERT_OK(instance_get_output_derivatives(instance, &reference, 1, &order, &value));
     return value;
 }
 
@@ -43,11 +43,11 @@ static void test_a_step_follows_the_polynomial(void) {
     const double e = 20.0;
     const double w = 2.0;
     const double t = 0.7;
-    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(instance_exit_initialization(instance));
     set_derivative(3, e);
     set_derivative(1, b);
     set_derivative(2, c);
-    ASSERT_OK(slave_do_step(slave, 0.0, t));
+    ASSERT_OK(instance_do_step(instance, 0.0, t));
 
     const double particular =
         (b * t + c * t * t / 2.0 + e * t * t * t / 6.0) / (w * w) - (c + e * t) / (w * w * w * w);
@@ -64,21 +64,21 @@ static void test_a_step_follows_the_polynomial(void) {
 
 static void test_derivatives_apply_to_one_step(void) {
     double exact[2];
-    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(instance_exit_initialization(instance));
     set_derivative(1, 100.0);
-    ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.1));
     const double start[2] = {get(OSCILLATOR_X), get(OSCILLATOR_V)};
-    ASSERT_OK(slave_do_step(slave, 0.1, 0.4));
+    ASSERT_OK(instance_do_step(instance, 0.1, 0.4));
     oscillator_solution(2.0, 0.0, 0.4, start, exact);
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[0], get(OSCILLATOR_X));
 }
 
 static void test_output_derivatives_along_the_motion(void) {
     const double w = 2.0;
-    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(instance_exit_initialization(instance));
     set_derivative(1, 3.0);
     set_derivative(2, -8.0);
-    ASSERT_OK(slave_do_step(slave, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
     const double x = get(OSCILLATOR_X);
     const double v = get(OSCILLATOR_V);
     const double a = get(OSCILLATOR_A);
@@ -96,10 +96,10 @@ static void test_output_derivatives_along_the_motion(void) {
 /* Once anything of an input is set after a step over which it moved, outputs answer for the input
  * that the next step will have: the value set last with the new derivatives. */
 static void test_new_derivatives_start_from_the_value_set_last(void) {
-    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(instance_exit_initialization(instance));
     set_derivative(1, 3.0);
     set_derivative(2, -8.0);
-    ASSERT_OK(slave_do_step(slave, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
     set_derivative(1, 5.0);
     const double x = get(OSCILLATOR_X);
     TEST_ASSERT_EQUAL_DOUBLE(-4.0 * x, get(OSCILLATOR_A));
@@ -116,26 +116,26 @@ static void test_orders_and_variables_that_have_no_derivative_are_refused(void) 
     const int first = 1;
     const double one = 1.0;
     double value = -7.0;
-    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(instance_exit_initialization(instance));
     for (int i = 0; i < 5; i++) {
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              slave_get_output_derivatives(slave, &wrong[i], 1, &first, &value));
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_get_output_derivatives(
+                                                           instance, &wrong[i], 1, &first, &value));
     }
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              slave_get_output_derivatives(slave, &x, 1, &orders[i], &value));
+                              instance_get_output_derivatives(instance, &x, 1, &orders[i], &value));
     }
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
 
     const int fourth = 4;
     const double nan = NAN;
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          slave_set_input_derivatives(slave, &u, 1, &fourth, &one));
+                          instance_set_input_derivatives(instance, &u, 1, &fourth, &one));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "an order from 1 to 3 is expected"));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          slave_set_input_derivatives(slave, &x, 1, &first, &one));
+                          instance_set_input_derivatives(instance, &x, 1, &first, &one));
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
-                          slave_set_input_derivatives(slave, &u, 1, &first, &nan));
+                          instance_set_input_derivatives(instance, &u, 1, &first, &nan));
 }
 
 static void test_directional_derivatives(void) {
@@ -143,7 +143,7 @@ static void test_directional_derivatives(void) {
     const unsigned knowns[] = {OSCILLATOR_X, OSCILLATOR_U, OSCILLATOR_V};
     const double v[] = {0.5, 3.0, 7.0};
     double result[3];
-    ASSERT_OK(slave_get_directional_derivative(slave, unknowns, 3, knowns, 3, v, result));
+    ASSERT_OK(instance_get_directional_derivative(instance, unknowns, 3, knowns, 3, v, result));
     TEST_ASSERT_EQUAL_DOUBLE(-4.0 * 0.5 + 3.0, result[0]);
     TEST_ASSERT_EQUAL_DOUBLE(7.0, result[1]);
     TEST_ASSERT_EQUAL_DOUBLE(0.5, result[2]);
@@ -156,16 +156,16 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
     const unsigned setting = OSCILLATOR_EFFECTIVE_TOLERANCE;
     const double one = 1.0;
     double value = -7.0;
-    ASSERT_OK(slave_get_directional_derivative(slave, &x, 1, &omega, 1, &one, &value));
-    ASSERT_OK(slave_exit_initialization(slave));
+    ASSERT_OK(instance_get_directional_derivative(instance, &x, 1, &omega, 1, &one, &value));
+    ASSERT_OK(instance_exit_initialization(instance));
     value = -7.0;
     const struct {
         const unsigned *unknown, *known;
     } cases[] = {{&x, &omega}, {&x, &energy}, {&omega, &x}, {&setting, &x}, {&x, &setting}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              slave_get_directional_derivative(slave, cases[i].unknown, 1,
-                                                               cases[i].known, 1, &one, &value));
+                              instance_get_directional_derivative(instance, cases[i].unknown, 1,
+                                                                  cases[i].known, 1, &one, &value));
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "is refused"), last_text);
     }
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
@@ -174,31 +174,31 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
 static void test_states_from_outside(void) {
     const double x[2] = {0.25, -1.5};
     double read[2];
-    ASSERT_OK(slave_exit_initialization(slave));
-    ASSERT_OK(slave_enter_continuous_time(slave));
-    ASSERT_OK(slave_set_time(slave, 3.0));
-    ASSERT_OK(slave_set_states(slave, x, 2));
-    ASSERT_OK(slave_get_states(slave, read, 2));
+    ASSERT_OK(instance_exit_initialization(instance));
+    ASSERT_OK(instance_enter_continuous_time(instance));
+    ASSERT_OK(instance_set_time(instance, 3.0));
+    ASSERT_OK(instance_set_states(instance, x, 2));
+    ASSERT_OK(instance_get_states(instance, read, 2));
     TEST_ASSERT_EQUAL_MEMORY(x, read, sizeof x);
-    ASSERT_OK(slave_get_derivatives(slave, read, 2));
+    ASSERT_OK(instance_get_derivatives(instance, read, 2));
     TEST_ASSERT_EQUAL_DOUBLE(-1.5, read[0]);
     TEST_ASSERT_EQUAL_DOUBLE(-1.0, read[1]);
-    ASSERT_OK(slave_get_nominals(slave, read, 2));
+    ASSERT_OK(instance_get_nominals(instance, read, 2));
     TEST_ASSERT_EQUAL_DOUBLE(1.0, read[0]);
     TEST_ASSERT_EQUAL_DOUBLE(3.0, get(OSCILLATOR_TIME));
 
     const double wrong[2] = {0.0, NAN};
-    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_set_states(slave, wrong, 2));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_states(slave, x, 1));
-    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_set_time(slave, INFINITY));
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_set_states(instance, wrong, 2));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_set_states(instance, x, 1));
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_set_time(instance, INFINITY));
     TEST_ASSERT_EQUAL_DOUBLE(0.25, get(OSCILLATOR_X));
 
     const unsigned omega = OSCILLATOR_OMEGA;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_real(slave, &omega, 1, x));
-    slave_enter_event_mode(slave);
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_set_real(instance, &omega, 1, x));
+    instance_enter_event_mode(instance);
     const double negative = -1.0;
-    ASSERT_OK(slave_set_real(slave, &omega, 1, &negative));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_enter_continuous_time(slave));
+    ASSERT_OK(instance_set_real(instance, &omega, 1, &negative));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, instance_enter_continuous_time(instance));
 }
 
 int main(void) {

@@ -8,8 +8,8 @@
 #include <unity.h>
 
 static struct model model;
-static struct unit unit;
-static struct slave *slave;
+static struct model_description model_description;
+static struct instance *instance;
 static bool has_outputs;
 static int propagations_left; /* before one fails */
 static bool is_infinite;      /* what propagations give */
@@ -30,42 +30,42 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 }
 
 void setUp(void) {
-    const struct slave_experiment experiment = {.start_time = 0.0};
+    const struct instance_experiment experiment = {.start_time = 0.0};
     model = oscillator_model;
     model.outputs = outputs;
     model.propagate = propagate;
-    unit = oscillator_unit;
-    unit.model = &model;
+    model_description = oscillator_description;
+    model_description.model = &model;
     has_outputs = true;
     propagations_left = 100;
     is_infinite = false;
-    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    ASSERT_OK(slave_enter_initialization(slave));
-    ASSERT_OK(slave_exit_initialization(slave));
-    ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.1));
     last_text[0] = '\0';
 }
 
 void tearDown(void) {
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
 static const unsigned energy = OSCILLATOR_ENERGY;
 static const unsigned x = OSCILLATOR_X;
 
 static enum status read_energy(double *value) {
-    return slave_get_real(slave, &energy, 1, value);
+    return instance_get_real(instance, &energy, 1, value);
 }
 
 static enum status derive_energy(double *value) {
     const int order = 1;
-    return slave_get_output_derivatives(slave, &energy, 1, &order, value);
+    return instance_get_output_derivatives(instance, &energy, 1, &order, value);
 }
 
 static enum status derive_energy_by_x(double *value) {
     const double one = 1.0;
-    return slave_get_directional_derivative(slave, &energy, 1, &x, 1, &one, value);
+    return instance_get_directional_derivative(instance, &energy, 1, &x, 1, &one, value);
 }
 
 static void assert_fails(enum status call(double *), const char *expected) {
@@ -87,7 +87,7 @@ static void without_outputs(void) {
     const unsigned input = OSCILLATOR_U;
     const double u = 0.5;
     has_outputs = false;
-    ASSERT_OK(slave_set_real(slave, &input, 1, &u));
+    ASSERT_OK(instance_set_real(instance, &input, 1, &u));
 }
 
 static void test_without_outputs_nothing_is_read_or_derived(void) {
@@ -104,7 +104,7 @@ static void test_without_outputs_nothing_is_read_or_derived(void) {
 static void test_states_are_read_without_outputs(void) {
     double value = NAN;
     without_outputs();
-    ASSERT_OK(slave_get_real(slave, &x, 1, &value));
+    ASSERT_OK(instance_get_real(instance, &x, 1, &value));
     TEST_ASSERT_TRUE(isfinite(value));
 }
 

@@ -1,5 +1,5 @@
 /* Serialized FMU states that are damaged, foreign or forged are refused, or at least do no harm.
- * FMI 2.0, section 2.1.8; the form of a serialized state is told in src/snapshot.h. */
+ * FMI 2.0, section 2.1.8; the form of a serialized state is told in src/instance/snapshot.h. */
 #define _POSIX_C_SOURCE 200809L
 #include "fmu_snapshots.h"
 
@@ -105,7 +105,7 @@ static void test_trailing_bytes_are_refused(void) {
 
 enum { MAGIC_SIZE = 8, VERSION_AT = 8, GUID_AT = 20, CHECKSUM_SIZE = 8 };
 
-/* FNV-1a, as src/snapshot.h tells it, over all but the checksum itself. */
+/* FNV-1a, as src/instance/snapshot.h tells it, over all but the checksum itself. */
 static void set_checksum(struct fmu_bytes *bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i < bytes->size - CHECKSUM_SIZE; i++) {

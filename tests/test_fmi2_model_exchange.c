@@ -1,4 +1,4 @@
-/* Model Exchange: an importer integrates the unit. FMI 2.0, chapter 3; which call works when is in
+/* Model Exchange: an importer integrates the model. FMI 2.0, chapter 3; which call works when is in
  * test_fmi2_states.c. */
 #include "fmu_model_exchange.h"
 #include "fmu_snapshots.h"

@@ -55,9 +55,9 @@ def description(tmp_path_factory: pytest.TempPathFactory) -> ET.Element:
 @pytest.fixture
 def model_copy(tmp_path: Path) -> Path:
     """A copy of what the generator reads, to be changed; the path of its variables.toml."""
-    (tmp_path / "src").mkdir()
-    for shared in (ROOT / "src").glob("*.toml"):
-        shutil.copy(shared, tmp_path / "src")
+    (tmp_path / "src" / "instance").mkdir(parents=True)
+    for shared in (ROOT / "src" / "instance").glob("*.toml"):
+        shutil.copy(shared, tmp_path / "src" / "instance")
     folder = tmp_path / "models" / "rp_manipulator"
     folder.mkdir(parents=True)
     return Path(shutil.copy(VARIABLES, folder))
@@ -178,7 +178,17 @@ def test_a_variable_added_to_the_toml_alone_is_built_in(model_copy: Path, tmp_pa
 
 def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
     """Compile the generated variables.c; raise with the compiler's words where that fails."""
-    includes = [f"-I{ROOT / name}" for name in ("src", "fmu", "models", f"models/{model}")]
+    includes = [
+        f"-I{ROOT / name}"
+        for name in (
+            "src/model",
+            "src/integrator",
+            "src/instance",
+            "fmu",
+            "models",
+            f"models/{model}",
+        )
+    ]
     command = ["cc", "-std=c17", "-fsyntax-only", *includes, folder / "variables.c"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     if result.returncode != 0:
@@ -298,9 +308,9 @@ def test_a_wrong_file_is_refused_with_a_reason(model_copy: Path, tmp_path: Path,
 @pytest.fixture
 def trajectory(tmp_path: Path) -> Path:
     """A copy of what the generator reads for RPTrajectory, as model_copy."""
-    (tmp_path / "src").mkdir()
-    for shared in (ROOT / "src").glob("*.toml"):
-        shutil.copy(shared, tmp_path / "src")
+    (tmp_path / "src" / "instance").mkdir(parents=True)
+    for shared in (ROOT / "src" / "instance").glob("*.toml"):
+        shutil.copy(shared, tmp_path / "src" / "instance")
     folder = tmp_path / "models" / "rp_trajectory"
     folder.mkdir(parents=True)
     return Path(shutil.copy(ROOT / "models" / "rp_trajectory" / "variables.toml", folder))

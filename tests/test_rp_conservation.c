@@ -1,38 +1,39 @@
-/* What the motion of the arm conserves, through the slave and the integrator. */
+/* What the motion of the arm conserves, through the instance and the integrator. */
+#include "instance.h"
 #include "last_text.h"
+#include "model_description.h"
 #include "rp_model.h"
-#include "slave.h"
-#include "unit.h"
 #include "value_references.h"
 
 #include <math.h>
 #include <unity.h>
 
-static struct slave *slave;
+static struct instance *instance;
 
 void setUp(void) {
-    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
 }
 
 void tearDown(void) {
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
 static double get(unsigned reference) {
     double value = NAN;
-    ASSERT_OK(slave_get_real(slave, &reference, 1, &value));
+    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
     return value;
 }
 
 static void set(unsigned reference, double value) {
-    ASSERT_OK(slave_set_real(slave, &reference, 1, &value));
+    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
 }
 
 static void initialize(double tolerance) {
-    const struct slave_experiment experiment = {.tolerance_defined = true, .tolerance = tolerance};
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    ASSERT_OK(slave_enter_initialization(slave));
-    ASSERT_OK(slave_exit_initialization(slave));
+    const struct instance_experiment experiment = {.tolerance_defined = true,
+                                                   .tolerance = tolerance};
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
 }
 
 static double momentum(void) {
@@ -44,7 +45,7 @@ static const double tolerances[] = {1e-6, 1e-8, 1e-10};
 
 static void test_free_motion_conserves_energy(void) {
     for (int k = 0; k < 3; k++) {
-        slave_reset(slave);
+        instance_reset(instance);
         set(RP_MANIPULATOR_q1, -1.2);
         set(RP_MANIPULATOR_dq1, 2.0);
         set(RP_MANIPULATOR_dq2, -3.0);
@@ -53,7 +54,7 @@ static void test_free_motion_conserves_energy(void) {
         double scale = 0.0;
         double drift = 0.0;
         for (int i = 0; i < 500; i++) {
-            ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+            ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
             scale = fmax(scale, fabs(get(RP_MANIPULATOR_kinetic_energy)) +
                                     fabs(get(RP_MANIPULATOR_potential_energy)));
             drift = fmax(drift, fabs(get(RP_MANIPULATOR_total_energy) - start));
@@ -66,7 +67,7 @@ static void test_free_motion_conserves_energy(void) {
  * the arm; f2 does work, so energy changes meanwhile. */
 static void test_horizontal_motion_conserves_the_generalized_momentum(void) {
     for (int k = 0; k < 3; k++) {
-        slave_reset(slave);
+        instance_reset(instance);
         set(RP_MANIPULATOR_g, 0.0);
         set(RP_MANIPULATOR_q1, 0.4);
         set(RP_MANIPULATOR_dq1, 3.0);
@@ -78,7 +79,7 @@ static void test_horizontal_motion_conserves_the_generalized_momentum(void) {
         double dq1 = 0.0;
         for (int i = 0; i < 500; i++) {
             set(RP_MANIPULATOR_f2, -9.0 * get(RP_MANIPULATOR_q2));
-            ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+            ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
             scale = fmax(scale, fabs(get(RP_MANIPULATOR_kinetic_energy)));
             drift = fmax(drift, fabs(momentum() - start));
             dq1 = fmax(dq1, fabs(get(RP_MANIPULATOR_dq1) - 3.0));
@@ -97,7 +98,7 @@ static void test_the_energy_gained_is_the_work_of_the_efforts(void) {
     set(RP_MANIPULATOR_f2, force);
     const double start = get(RP_MANIPULATOR_total_energy);
     for (int i = 0; i < 200; i++) {
-        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
         const double work = torque * get(RP_MANIPULATOR_q1) + force * get(RP_MANIPULATOR_q2);
         const double scale = fabs(get(RP_MANIPULATOR_kinetic_energy)) +
                              fabs(get(RP_MANIPULATOR_potential_energy)) + fabs(work);
@@ -112,7 +113,7 @@ static void test_joint_loads_that_drive_are_the_efforts(void) {
         const double force = 9.0 * cos(0.07 * i);
         set(RP_MANIPULATOR_tau1, torque);
         set(RP_MANIPULATOR_f2, force);
-        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
         const double scale = 1.0 + fabs(get(RP_MANIPULATOR_f1_x)) + fabs(get(RP_MANIPULATOR_f2_x));
         TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, torque, get(RP_MANIPULATOR_tau1_y));
         TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, force, get(RP_MANIPULATOR_f2_z));

@@ -1,11 +1,11 @@
-/* The controller: its law with the arm that it drives, and its integral part through the slave and
- * the integrator. tests/test_controller.py compares values and derivatives with sympy. */
+/* The controller: its law with the arm that it drives, and its integral part through the instance
+ * and the integrator. tests/test_controller.py compares values and derivatives with sympy. */
+#include "instance.h"
 #include "last_text.h"
+#include "model_description.h"
 #include "rp_controller_model.h"
 #include "rp_controller_propagation.h"
 #include "rp_test_support.h"
-#include "slave.h"
-#include "unit.h"
 #include "value_references.h"
 
 #include <float.h>
@@ -13,16 +13,16 @@
 #include <string.h>
 #include <unity.h>
 
-static struct slave *slave;
+static struct instance *instance;
 static struct rp_test_random random_source;
 
 void setUp(void) {
-    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
     random_source.state = 4;
 }
 
 void tearDown(void) {
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
 /* ---- The law and the arm -------------------------------------------------------------------- */
@@ -174,12 +174,12 @@ static void test_calculated_fields_are_written_and_not_read(void) {
 
 static double get(unsigned reference) {
     double value = NAN;
-    ASSERT_OK(slave_get_real(slave, &reference, 1, &value));
+    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
     return value;
 }
 
 static void set(unsigned reference, double value) {
-    ASSERT_OK(slave_set_real(slave, &reference, 1, &value));
+    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
 }
 
 /* PD of joint 1, by itself: u = M (Kp e + Kd de + w). */
@@ -189,7 +189,7 @@ static const double e = 0.25, de = -0.5;
 static void start(double gain, double tracking_time, double w) {
     const unsigned mode = RP_CONTROLLER_mode;
     const int pd = RP_CONTROLLER_PD;
-    ASSERT_OK(slave_set_integer(slave, &mode, 1, &pd));
+    ASSERT_OK(instance_set_integer(instance, &mode, 1, &pd));
     set(RP_CONTROLLER_inertia1, M);
     set(RP_CONTROLLER_Kp1, Kp);
     set(RP_CONTROLLER_Kd1, Kd);
@@ -199,14 +199,14 @@ static void start(double gain, double tracking_time, double w) {
     set(RP_CONTROLLER_integral1, w);
     set(RP_CONTROLLER_q1_ref, e);
     set(RP_CONTROLLER_dq1, -de);
-    const struct slave_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    ASSERT_OK(slave_enter_initialization(slave));
-    ASSERT_OK(slave_exit_initialization(slave));
+    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
 }
 
 static void step_to(double t) {
-    ASSERT_OK(slave_do_step(slave, slave_time(slave), t - slave_time(slave)));
+    ASSERT_OK(instance_do_step(instance, instance_time(instance), t - instance_time(instance)));
 }
 
 /* Below the limit w' = Ki e: a ramp. At w = edge the effort meets the limit; from there on
@@ -233,7 +233,7 @@ static void test_integral_ramps_up_and_meets_the_limit(void) {
     for (int i = 1; i <= 100; i++) {
         step_to(0.0137 * i);
         const double w = get(RP_CONTROLLER_integral1);
-        ASSERT_CLOSE(into_the_limit(2.0, slave_time(slave)), w, 1e-9);
+        ASSERT_CLOSE(into_the_limit(2.0, instance_time(instance)), w, 1e-9);
         const double unlimited = M * (Kp * e + Kd * de + w);
         ASSERT_CLOSE(unlimited, get(RP_CONTROLLER_tau1_unlimited), 1e-13);
         TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == fmin(get(RP_CONTROLLER_tau1_unlimited), limit));
@@ -245,7 +245,7 @@ static void test_integral_decays_out_of_the_limit_and_ramps_down(void) {
     set(RP_CONTROLLER_q1_ref, -e);
     for (int i = 1; i <= 100; i++) {
         step_to(0.0137 * i);
-        ASSERT_CLOSE(out_of_the_limit(150.0, slave_time(slave)), get(RP_CONTROLLER_integral1),
+        ASSERT_CLOSE(out_of_the_limit(150.0, instance_time(instance)), get(RP_CONTROLLER_integral1),
                      1e-9);
     }
     TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
@@ -271,7 +271,7 @@ static void test_effort_leaves_the_limit_without_delay(void) {
     ASSERT_CLOSE(limit + M * (Ki * Tt - 2.0 * Kp) * e, get(RP_CONTROLLER_tau1), 1e-9);
     TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
 
-    slave_reset(slave);
+    instance_reset(instance);
     start(Ki, 1e12, 0.0);
     step_to(5.0);
     set(RP_CONTROLLER_q1_ref, -e);
@@ -286,7 +286,7 @@ static void test_effort_leaves_the_limit_without_delay(void) {
 static void test_integral_rests_without_gain(void) {
     const double held[] = {0.1, 1234.5}; // below the limit and beyond it
     for (int k = 0; k < 2; k++) {
-        slave_reset(slave);
+        instance_reset(instance);
         set(RP_CONTROLLER_Ki2, 100.0); // the other joint moves
         set(RP_CONTROLLER_q2_ref, 1.0);
         start(0.0, Tt, held[k]);
@@ -307,7 +307,7 @@ static void test_integral_follows_extrapolated_inputs(void) {
     const unsigned references[] = {RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1};
     const int orders[] = {1, 2, 1};
     const double derivatives[] = {r - 1.0, b, -1.0};
-    ASSERT_OK(slave_set_input_derivatives(slave, references, 3, orders, derivatives));
+    ASSERT_OK(instance_set_input_derivatives(instance, references, 3, orders, derivatives));
     step_to(h);
     ASSERT_CLOSE(1.0 + Ki * (e * h + r * h * h / 2.0 + b * h * h * h / 6.0),
                  get(RP_CONTROLLER_integral1), 1e-10);

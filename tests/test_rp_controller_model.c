@@ -1,5 +1,5 @@
-/* The controller as the slave sees it: the derivatives of its fields along curves, its integrator's
- * view, what is refused. */
+/* The controller as the instance sees it: the derivatives of its fields along curves, its
+ * integrator's view, what is refused. */
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
 

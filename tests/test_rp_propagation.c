@@ -435,7 +435,7 @@ static void test_calculated_fields_are_written_and_not_read(void) {
     }
 }
 
-static void test_model_offers_it_to_the_slave(void) {
+static void test_model_offers_it_to_the_instance(void) {
     next_sample();
     union point first, second, expected_first, expected_second;
     next_seed(&first);
@@ -469,6 +469,6 @@ int main(void) {
     RUN_TEST(test_first_derivatives_are_linear_and_second_ones_quadratic_in_the_seed);
     RUN_TEST(test_motion_obeys_its_balances);
     RUN_TEST(test_calculated_fields_are_written_and_not_read);
-    RUN_TEST(test_model_offers_it_to_the_slave);
+    RUN_TEST(test_model_offers_it_to_the_instance);
     return UNITY_END();
 }

@@ -1,10 +1,10 @@
-/* The reference motions: geometry, continuity, what is refused, and a unit without states. */
+/* The reference motions: geometry, continuity, what is refused, and a model without states. */
 #include "last_text.h"
+#include "model_description.h"
 #include "rp_manipulator.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
 #include "snapshot.h"
-#include "unit.h"
 
 #include <math.h>
 #include <unity.h>
@@ -357,73 +357,73 @@ static void test_what_belongs_to_another_motion_is_not_checked(void) {
     TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
 }
 
-/* ---- A unit without states and inputs ------------------------------------------------------- */
+/* ---- A model without states and inputs ------------------------------------------------------- */
 
 static const unsigned outputs[] = {40, 41, 42, 43, 44, 45, 46, 47, 48, 49};
 
-static struct slave *initialized(void) {
-    const struct slave_experiment experiment = {.start_time = 0.0};
-    struct slave *slave;
-    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    ASSERT_OK(slave_enter_initialization(slave));
-    ASSERT_OK(slave_exit_initialization(slave));
-    return slave;
+static struct instance *initialized(void) {
+    const struct instance_experiment experiment = {.start_time = 0.0};
+    struct instance *instance;
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+    return instance;
 }
 
 static void test_steps_follow_the_motion(void) {
-    struct slave *slave = initialized();
+    struct instance *instance = initialized();
     for (int i = 0; i < 60; i++) {
         double values[COUNT(outputs)];
-        ASSERT_OK(slave_do_step(slave, slave_time(slave), 0.1));
-        ASSERT_OK(slave_get_real(slave, outputs, COUNT(outputs), values));
-        const struct rp_trajectory_point point = at(slave_time(slave));
+        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.1));
+        ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), values));
+        const struct rp_trajectory_point point = at(instance_time(instance));
         TEST_ASSERT_TRUE(values[0] == point.q[0].position.value);
         TEST_ASSERT_TRUE(values[5] == point.q[1].acceleration.value);
         TEST_ASSERT_TRUE(values[8] == point.ee[0].velocity.value);
     }
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
 static void test_snapshots_and_their_bytes_go_back(void) {
-    struct slave *slave = initialized();
-    struct slave *other = initialized();
-    struct slave_snapshot *snapshot = NULL;
-    struct slave_snapshot *read = NULL;
+    struct instance *instance = initialized();
+    struct instance *other = initialized();
+    struct instance_snapshot *snapshot = NULL;
+    struct instance_snapshot *read = NULL;
     unsigned char bytes[1024];
     double expected[COUNT(outputs)];
     double values[COUNT(outputs)];
-    ASSERT_OK(slave_do_step(slave, 0.0, 1.1));
-    ASSERT_OK(slave_save(slave, 7, &snapshot));
-    ASSERT_OK(slave_get_real(slave, outputs, COUNT(outputs), expected));
-    TEST_ASSERT_LESS_OR_EQUAL_UINT64(sizeof bytes, slave_serialized_size(slave));
-    ASSERT_OK(slave_serialize(slave, snapshot, bytes, sizeof bytes));
+    ASSERT_OK(instance_do_step(instance, 0.0, 1.1));
+    ASSERT_OK(instance_save(instance, 7, &snapshot));
+    ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), expected));
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(sizeof bytes, instance_serialized_size(instance));
+    ASSERT_OK(instance_serialize(instance, snapshot, bytes, sizeof bytes));
 
-    ASSERT_OK(slave_do_step(slave, 1.1, 1.0));
-    ASSERT_OK(slave_restore(slave, snapshot));
-    ASSERT_OK(slave_get_real(slave, outputs, COUNT(outputs), values));
+    ASSERT_OK(instance_do_step(instance, 1.1, 1.0));
+    ASSERT_OK(instance_restore(instance, snapshot));
+    ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), values));
     TEST_ASSERT_EQUAL_MEMORY(expected, values, sizeof values);
 
-    ASSERT_OK(slave_deserialize(other, bytes, slave_serialized_size(other), &read));
-    ASSERT_OK(slave_restore(other, read));
-    TEST_ASSERT_TRUE(slave_time(other) == 1.1);
-    ASSERT_OK(slave_get_real(other, outputs, COUNT(outputs), values));
+    ASSERT_OK(instance_deserialize(other, bytes, instance_serialized_size(other), &read));
+    ASSERT_OK(instance_restore(other, read));
+    TEST_ASSERT_TRUE(instance_time(other) == 1.1);
+    ASSERT_OK(instance_get_real(other, outputs, COUNT(outputs), values));
     TEST_ASSERT_EQUAL_MEMORY(expected, values, sizeof values);
-    ASSERT_OK(slave_do_step(other, 1.1, 0.5));
-    slave_destroy(slave);
-    slave_destroy(other);
+    ASSERT_OK(instance_do_step(other, 1.1, 0.5));
+    instance_destroy(instance);
+    instance_destroy(other);
 }
 
 static void test_arrays_of_no_states(void) {
-    struct slave *slave = initialized();
-    TEST_ASSERT_EQUAL_UINT64(0, slave_state_count(slave));
-    ASSERT_OK(slave_set_states(slave, NULL, 0));
-    ASSERT_OK(slave_get_states(slave, NULL, 0));
-    ASSERT_OK(slave_get_derivatives(slave, NULL, 0));
-    ASSERT_OK(slave_get_nominals(slave, NULL, 0));
+    struct instance *instance = initialized();
+    TEST_ASSERT_EQUAL_UINT64(0, instance_state_count(instance));
+    ASSERT_OK(instance_set_states(instance, NULL, 0));
+    ASSERT_OK(instance_get_states(instance, NULL, 0));
+    ASSERT_OK(instance_get_derivatives(instance, NULL, 0));
+    ASSERT_OK(instance_get_nominals(instance, NULL, 0));
     double x = 0.0;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_get_states(slave, &x, 1));
-    slave_destroy(slave);
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_get_states(instance, &x, 1));
+    instance_destroy(instance);
 }
 
 int main(void) {

@@ -1,4 +1,4 @@
-/* The reference motions as the slave sees them: fields, their derivatives, what is refused. */
+/* The reference motions as the instance sees them: fields, their derivatives, what is refused. */
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
 

@@ -1,6 +1,6 @@
 /* From one communication point to the next, with each method, against the solution in closed form.
  */
-#include "slave.h"
+#include "instance.h"
 
 #include "allocations.h"
 #include "last_text.h"
@@ -11,7 +11,7 @@
 #include <string.h>
 #include <unity.h>
 
-static struct slave *slave;
+static struct instance *instance;
 static int method;
 
 /* The oscillator, with a note of how far the integrator has gone. */
@@ -23,28 +23,28 @@ static enum status watched_rhs(const void *values, double t, const double x[], c
     return oscillator_model.right_hand_side(values, t, x, u, dx);
 }
 
-static struct slave *create(void) {
+static struct instance *create(void) {
     static struct model model;
-    static struct unit unit;
+    static struct model_description model_description;
     const unsigned reference = OSCILLATOR_SOLVER_METHOD;
-    struct slave *created = NULL;
+    struct instance *created = NULL;
     model = oscillator_model;
     model.right_hand_side = watched_rhs;
-    unit = oscillator_unit;
-    unit.model = &model;
-    ASSERT_OK(slave_create(&unit, &last_text_sink, &created));
-    ASSERT_OK(slave_set_integer(created, &reference, 1, &method));
+    model_description = oscillator_description;
+    model_description.model = &model;
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &created));
+    ASSERT_OK(instance_set_integer(created, &reference, 1, &method));
     return created;
 }
 
 void setUp(void) {
     memset(last_text, 0, sizeof last_text);
     latest = -INFINITY;
-    slave = create();
+    instance = create();
 }
 
 void tearDown(void) {
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
 /* Back to what setUp gives. */
@@ -53,44 +53,44 @@ static void begin_anew(void) {
     setUp();
 }
 
-static double get(struct slave *from, unsigned reference) {
+static double get(struct instance *from, unsigned reference) {
     double value = NAN;
-    ASSERT_OK(slave_get_real(from, &reference, 1, &value));
+    ASSERT_OK(instance_get_real(from, &reference, 1, &value));
     return value;
 }
 
 static int get_integer(unsigned reference) {
     int value = -1;
-    ASSERT_OK(slave_get_integer(slave, &reference, 1, &value));
+    ASSERT_OK(instance_get_integer(instance, &reference, 1, &value));
     return value;
 }
 
-static enum status set(struct slave *to, unsigned reference, double value) {
-    return slave_set_real(to, &reference, 1, &value);
+static enum status set(struct instance *to, unsigned reference, double value) {
+    return instance_set_real(to, &reference, 1, &value);
 }
 
-static void initialize_until(struct slave *started, double start, double stop) {
-    const struct slave_experiment experiment = {
+static void initialize_until(struct instance *started, double start, double stop) {
+    const struct instance_experiment experiment = {
         .start_time = start, .stop_time_defined = isfinite(stop), .stop_time = stop};
-    ASSERT_OK(slave_setup_experiment(started, &experiment));
-    ASSERT_OK(slave_enter_initialization(started));
-    ASSERT_OK(slave_exit_initialization(started));
+    ASSERT_OK(instance_setup_experiment(started, &experiment));
+    ASSERT_OK(instance_enter_initialization(started));
+    ASSERT_OK(instance_exit_initialization(started));
 }
 
-static void initialize(struct slave *started, double start) {
+static void initialize(struct instance *started, double start) {
     initialize_until(started, start, INFINITY);
 }
 
-static void get_states(struct slave *from, double states[2]) {
+static void get_states(struct instance *from, double states[2]) {
     states[0] = get(from, OSCILLATOR_X);
     states[1] = get(from, OSCILLATOR_V);
 }
 
 /* An experiment whose input changes at every third step. */
-static void run(struct slave *stepped, int steps, double states[2]) {
+static void run(struct instance *stepped, int steps, double states[2]) {
     for (int i = 0; i < steps; i++) {
         ASSERT_OK(set(stepped, OSCILLATOR_U, sin((i / 3) * 0.1)));
-        ASSERT_OK(slave_do_step(stepped, i * 0.01, 0.01));
+        ASSERT_OK(instance_do_step(stepped, i * 0.01, 0.01));
     }
     get_states(stepped, states);
 }
@@ -100,97 +100,97 @@ static void run(struct slave *stepped, int steps, double states[2]) {
 
 static void test_held_inputs_give_the_exact_piecewise_solution(void) {
     double exact[2] = {1.0, 0.0};
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     for (int i = 0; i < 300; i++) {
         const double u = cos(0.3 * i);
-        ASSERT_OK(set(slave, OSCILLATOR_U, u));
-        ASSERT_OK(slave_do_step(slave, 0.02 * i, 0.02));
+        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        ASSERT_OK(instance_do_step(instance, 0.02 * i, 0.02));
         oscillator_solution(2.0, u, 0.02, exact, exact);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(slave, OSCILLATOR_V));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(instance, OSCILLATOR_V));
     }
-    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(slave, OSCILLATOR_TIME));
+    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(instance, OSCILLATOR_TIME));
 }
 
 static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
     double exact[2] = {1.0, 0.0};
-    initialize(slave, 0.0);
-    ASSERT_OK(slave_do_step(slave, 0.0, 0.5));
+    initialize(instance, 0.0);
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
     oscillator_solution(2.0, 0.0, 0.5, exact, exact);
-    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 3.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
-    ASSERT_OK(slave_do_step(slave, 0.5, 0.5));
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 3.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+    ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
     oscillator_solution(3.0, 0.0, 0.5, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
 }
 
 static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
     const unsigned reference = OSCILLATOR_MAX_STEPS;
     const int limit = 20;
     double exact[2] = {1.0, 0.0};
-    ASSERT_OK(slave_set_integer(slave, &reference, 1, &limit));
-    initialize(slave, 5.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, slave_do_step(slave, 5.0, 100.0));
-    const double t = slave_time(slave);
+    ASSERT_OK(instance_set_integer(instance, &reference, 1, &limit));
+    initialize(instance, 5.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 5.0, 100.0));
+    const double t = instance_time(instance);
     TEST_ASSERT_TRUE(t > 5.0 && t < 105.0);
-    TEST_ASSERT_EQUAL_DOUBLE(t, get(slave, OSCILLATOR_TIME));
+    TEST_ASSERT_EQUAL_DOUBLE(t, get(instance, OSCILLATOR_TIME));
     oscillator_solution(2.0, 0.0, t - 5.0, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
     TEST_ASSERT_EQUAL_INT(20, get_integer(OSCILLATOR_STEPS));
 }
 
 static void test_setting_the_same_values_again_changes_nothing(void) {
-    struct slave *untouched = create();
-    initialize(slave, 0.0);
+    struct instance *untouched = create();
+    initialize(instance, 0.0);
     initialize(untouched, 0.0);
     for (int i = 0; i < 100; i++) {
-        ASSERT_OK(set(slave, OSCILLATOR_U, 5.0)); // set and taken back before the step
-        ASSERT_OK(set(slave, OSCILLATOR_U, 0.0));
-        ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 2.0));
-        (void)get(slave, OSCILLATOR_ENERGY);
-        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
-        ASSERT_OK(slave_do_step(untouched, 0.01 * i, 0.01));
-        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_X), get(slave, OSCILLATOR_X));
-        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_V), get(slave, OSCILLATOR_V));
+        ASSERT_OK(set(instance, OSCILLATOR_U, 5.0)); // set and taken back before the step
+        ASSERT_OK(set(instance, OSCILLATOR_U, 0.0));
+        ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 2.0));
+        (void)get(instance, OSCILLATOR_ENERGY);
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(untouched, 0.01 * i, 0.01));
+        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_X), get(instance, OSCILLATOR_X));
+        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_V), get(instance, OSCILLATOR_V));
     }
-    slave_destroy(untouched);
+    instance_destroy(untouched);
 }
 
 static void test_the_sign_of_zero_is_no_change(void) {
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     for (int i = 0; i < 50; i++) {
-        ASSERT_OK(set(slave, OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0));
-        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(set(instance, OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
     }
     const int alternating = get_integer(OSCILLATOR_STEPS);
     begin_anew();
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     for (int i = 0; i < 50; i++) {
-        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
     }
     TEST_ASSERT_EQUAL_INT(get_integer(OSCILLATOR_STEPS), alternating);
 }
 
 static void test_a_restart_happens_only_where_something_changed(void) {
     double states[2];
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     for (int i = 0; i < 100; i++) {
-        ASSERT_OK(slave_do_step(slave, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
     }
     const int held = get_integer(OSCILLATOR_STEPS);
 
     begin_anew();
-    initialize(slave, 0.0);
-    run(slave, 100, states);
+    initialize(instance, 0.0);
+    run(instance, 100, states);
     TEST_ASSERT_TRUE(get_integer(OSCILLATOR_STEPS) > 3 * held);
     TEST_ASSERT_TRUE(get_integer(OSCILLATOR_EVALUATIONS) > get_integer(OSCILLATOR_STEPS));
 }
 
 static void test_steps_allocate_nothing(void) {
     double states[2];
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     const long before = allocation_count();
-    run(slave, 100, states);
+    run(instance, 100, states);
     TEST_ASSERT_EQUAL_INT(before, allocation_count());
 }
 
@@ -198,17 +198,17 @@ static void test_steps_allocate_nothing(void) {
 
 static void step_held(int steps, double h) {
     for (int i = 0; i < steps; i++) {
-        ASSERT_OK(slave_do_step(slave, i * h, h));
+        ASSERT_OK(instance_do_step(instance, i * h, h));
     }
 }
 
 static void test_internal_steps_pass_points_where_nothing_changes(void) {
     const double h = 1.0 / 1024.0;
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     step_held(1024, h);
     TEST_ASSERT_TRUE(latest > 1.0 + h);
     TEST_ASSERT_LESS_THAN_INT(512, get_integer(OSCILLATOR_STEPS));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(slave, OSCILLATOR_X));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(instance, OSCILLATOR_X));
 }
 
 static void test_no_internal_step_passes_the_stop_time(void) {
@@ -216,11 +216,11 @@ static void test_no_internal_step_passes_the_stop_time(void) {
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
         const double h = stops[i] / 100.0;
         begin_anew();
-        initialize_until(slave, 0.0, stops[i]);
+        initialize_until(instance, 0.0, stops[i]);
         step_held(100, h);
         TEST_ASSERT_TRUE(latest <= stops[i] * (1.0 + 1e-12));
         TEST_ASSERT_TRUE(latest >= stops[i] * (1.0 - 1e-12));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(slave, OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(instance, OSCILLATOR_X));
     }
 }
 
@@ -230,12 +230,12 @@ static void test_no_internal_step_passes_the_end_of_a_polynomial(void) {
     const int order = 1;
     const double slope = 0.5;
     const double h = 1.0 / 1024.0;
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     step_held(1024, h);
     for (int i = 1024; i < 1100; i++) {
         latest = -INFINITY;
-        ASSERT_OK(slave_set_input_derivatives(slave, &input, 1, &order, &slope));
-        ASSERT_OK(slave_do_step(slave, i * h, h));
+        ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
+        ASSERT_OK(instance_do_step(instance, i * h, h));
         TEST_ASSERT_TRUE(latest <= (i + 1) * h * (1.0 + 1e-12));
     }
 }
@@ -246,15 +246,15 @@ static void test_a_new_input_acts_from_the_point_on(void) {
     const double length = 0.25;
     double exact[2];
     double states[2];
-    initialize(slave, 0.0);
+    initialize(instance, 0.0);
     step_held(1024, h);
     for (int i = 0; i < 40; i++) {
         const double u = i % 2 == 0 ? 3.0 : -3.0;
-        get_states(slave, states);
-        ASSERT_OK(set(slave, OSCILLATOR_U, u));
-        ASSERT_OK(slave_do_step(slave, 1.0 + i * length, length));
+        get_states(instance, states);
+        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        ASSERT_OK(instance_do_step(instance, 1.0 + i * length, length));
         oscillator_solution(2.0, u, length, states, exact);
-        get_states(slave, states);
+        get_states(instance, states);
         TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[0], states[0]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[1], states[1]);
     }
@@ -266,25 +266,25 @@ static void test_a_new_parameter_makes_a_new_instance(void) {
     const double h = 1.0 / 1024.0;
     double states[2];
     double expected[2];
-    initialize_until(slave, 0.0, 4.0);
+    initialize_until(instance, 0.0, 4.0);
     step_held(1024, h);
-    get_states(slave, states);
-    struct slave *fresh = create();
+    get_states(instance, states);
+    struct instance *fresh = create();
     ASSERT_OK(set(fresh, OSCILLATOR_X, states[0]));
     ASSERT_OK(set(fresh, OSCILLATOR_V, states[1]));
     ASSERT_OK(set(fresh, OSCILLATOR_OMEGA, 3.0));
     ASSERT_OK(set(fresh, OSCILLATOR_U, 1.5));
     initialize_until(fresh, 1.0, 4.0);
-    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 3.0));
-    ASSERT_OK(set(slave, OSCILLATOR_U, 1.5));
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 3.0));
+    ASSERT_OK(set(instance, OSCILLATOR_U, 1.5));
     for (int i = 1024; i < 2048; i++) {
-        ASSERT_OK(slave_do_step(slave, i * h, h));
-        ASSERT_OK(slave_do_step(fresh, i * h, h));
-        get_states(slave, states);
+        ASSERT_OK(instance_do_step(instance, i * h, h));
+        ASSERT_OK(instance_do_step(fresh, i * h, h));
+        get_states(instance, states);
         get_states(fresh, expected);
         TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
     }
-    slave_destroy(fresh);
+    instance_destroy(fresh);
 }
 
 /* ---- Jumps of the input --------------------------------------------------------------------- */
@@ -306,16 +306,16 @@ static double error_with_jumps(double tolerance, double jump, int every) {
     double error = 0.0;
     double scale = 0.0;
     begin_anew();
-    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, tolerance));
-    initialize(slave, 0.0);
+    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, tolerance));
+    initialize(instance, 0.0);
     for (int i = 0; i < 1000; i++) {
         if (i % every == 0) {
             u = 1.0 + jump * random_sign(&random);
         }
-        ASSERT_OK(set(slave, OSCILLATOR_U, u));
-        ASSERT_OK(slave_do_step(slave, i * h, h));
+        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        ASSERT_OK(instance_do_step(instance, i * h, h));
         oscillator_solution(2.0, u, h, exact, exact);
-        get_states(slave, states);
+        get_states(instance, states);
         for (int k = 0; k < 2; k++) {
             error = fmax(error, fabs(states[k] - exact[k]));
             scale = fmax(scale, fabs(exact[k]));

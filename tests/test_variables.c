@@ -13,22 +13,22 @@ void setUp(void) {
 void tearDown(void) {}
 
 static const struct variable *get(unsigned reference) {
-    const struct variable *variable = variable_find(&oscillator_unit, reference);
+    const struct variable *variable = variable_find(&oscillator_description, reference);
     TEST_ASSERT_NOT_NULL(variable);
     return variable;
 }
 
 static void test_every_row_is_found_by_its_reference(void) {
-    for (size_t i = 0; i < oscillator_unit.variable_count; i++) {
-        const struct variable *row = &oscillator_unit.variables[i];
-        TEST_ASSERT_EQUAL_PTR(row, variable_find(&oscillator_unit, row->reference));
+    for (size_t i = 0; i < oscillator_description.variable_count; i++) {
+        const struct variable *row = &oscillator_description.variables[i];
+        TEST_ASSERT_EQUAL_PTR(row, variable_find(&oscillator_description, row->reference));
     }
 }
 
 static void test_other_references_are_not_found(void) {
     const unsigned unknown[] = {3, 9, 79, 85, 86, 10000, 0x80000000u, 0xffffffffu};
     for (size_t i = 0; i < sizeof unknown / sizeof unknown[0]; i++) {
-        TEST_ASSERT_NULL(variable_find(&oscillator_unit, unknown[i]));
+        TEST_ASSERT_NULL(variable_find(&oscillator_description, unknown[i]));
     }
 }
 

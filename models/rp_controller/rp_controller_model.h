@@ -1,4 +1,4 @@
-/* The controller as the slave runs it: its value structure, to which variables.toml binds the
+/* The controller as the instance runs it: its value structure, to which variables.toml binds the
  * variables, and its struct model. */
 #ifndef RP_CONTROLLER_MODEL_H
 #define RP_CONTROLLER_MODEL_H

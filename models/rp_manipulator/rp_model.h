@@ -1,4 +1,4 @@
-/* The manipulator as the slave runs it: its value structure, to which variables.toml binds the
+/* The manipulator as the instance runs it: its value structure, to which variables.toml binds the
  * variables, and its struct model. */
 #ifndef RP_MODEL_H
 #define RP_MODEL_H

@@ -1,4 +1,4 @@
-/* The reference motions as the slave runs them: their value structure, to which variables.toml
+/* The reference motions as the instance runs them: their value structure, to which variables.toml
  * binds the variables, and their struct model. No state and no input. */
 #ifndef RP_TRAJECTORY_MODEL_H
 #define RP_TRAJECTORY_MODEL_H

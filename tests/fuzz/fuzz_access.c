@@ -2,7 +2,7 @@
  * the input says. */
 #include "fuzz_session.h"
 
-#include "unit.h"
+#include "model_description.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,9 +16,10 @@ static fmi2ValueReference any_reference(struct fuzz_input *input, enum variable_
     if (selector >= 248) {
         return selector < 252 ? 9 * (selector - 247) : (fmi2ValueReference)fuzz_word(input);
     }
-    const struct variable *variable = &unit.variables[selector % unit.variable_count];
-    for (size_t i = 0; i < unit.variable_count && selector < 216; i++) {
-        variable = &unit.variables[(selector + i) % unit.variable_count];
+    const struct variable *variable =
+        &model_description.variables[selector % model_description.variable_count];
+    for (size_t i = 0; i < model_description.variable_count && selector < 216; i++) {
+        variable = &model_description.variables[(selector + i) % model_description.variable_count];
         if (variable->type == type && (!sets || variable_is_settable(variable, PHASE_STEPPING))) {
             break;
         }

@@ -3,7 +3,7 @@
 #include "fuzz_instance.h"
 #include "fuzz_session.h"
 
-#include "unit.h"
+#include "model_description.h"
 
 #include <math.h>
 #include <stdlib.h>

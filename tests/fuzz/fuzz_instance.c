@@ -1,6 +1,6 @@
 #include "fuzz_instance.h"
 
-#include "unit.h"
+#include "model_description.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -195,28 +195,29 @@ void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
     size_t count = 0;
     memset(values, 0, sizeof *values);
     values->status = fmi2OK;
-    if (unit.variable_count > FUZZ_VARIABLE_CAPACITY) {
+    if (model_description.variable_count > FUZZ_VARIABLE_CAPACITY) {
         fuzz_fail("more variables than FUZZ_VARIABLE_CAPACITY");
     }
-    for (size_t i = 0; i < unit.variable_count; i++) {
-        if (unit.variables[i].type == VARIABLE_REAL) {
-            references[count++] = unit.variables[i].reference;
-        } else if (FUZZ_CHECKED(instance, GetInteger, &unit.variables[i].reference, 1,
+    for (size_t i = 0; i < model_description.variable_count; i++) {
+        if (model_description.variables[i].type == VARIABLE_REAL) {
+            references[count++] = model_description.variables[i].reference;
+        } else if (FUZZ_CHECKED(instance, GetInteger, &model_description.variables[i].reference, 1,
                                 &values->integers[i]) != fmi2OK) {
-            fuzz_fail("%s cannot be read", unit.variables[i].name);
+            fuzz_fail("%s cannot be read", model_description.variables[i].name);
         }
     }
     fuzz_poison(reals, count);
     const fmi2Status status = FUZZ_CHECKED(instance, GetReal, references, count, reals);
     fuzz_assert_written(status, reals, count, "fmi2GetReal");
     count = 0;
-    for (size_t i = 0; i < unit.variable_count; i++) {
-        if (unit.variables[i].type != VARIABLE_REAL) {
+    for (size_t i = 0; i < model_description.variable_count; i++) {
+        if (model_description.variables[i].type != VARIABLE_REAL) {
             continue;
         }
         if (status == fmi2OK) {
             values->reals[i] = reals[count++];
-        } else if (read_real(instance, unit.variables[i].reference, &values->reals[i]) != fmi2OK) {
+        } else if (read_real(instance, model_description.variables[i].reference,
+                             &values->reals[i]) != fmi2OK) {
             values->status = fmi2Discard;
         }
     }
@@ -227,21 +228,21 @@ void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
 }
 
 double fuzz_value(const struct fuzz_values *values, fmi2ValueReference reference) {
-    return values->reals[unit.row_of_reference[reference]];
+    return values->reals[model_description.row_of_reference[reference]];
 }
 
 fmi2Integer fuzz_integer_value(const struct fuzz_values *values, fmi2ValueReference reference) {
-    return values->integers[unit.row_of_reference[reference]];
+    return values->integers[model_description.row_of_reference[reference]];
 }
 
 void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_values *actual,
                       const char *what) {
-    for (size_t i = 0; i < unit.variable_count; i++) {
+    for (size_t i = 0; i < model_description.variable_count; i++) {
         if (memcmp(&expected->reals[i], &actual->reals[i], sizeof expected->reals[i]) != 0 ||
             expected->integers[i] != actual->integers[i]) {
-            fuzz_fail("%s: %s is %.17g (%d), not %.17g (%d)", what, unit.variables[i].name,
-                      actual->reals[i], actual->integers[i], expected->reals[i],
-                      expected->integers[i]);
+            fuzz_fail("%s: %s is %.17g (%d), not %.17g (%d)", what,
+                      model_description.variables[i].name, actual->reals[i], actual->integers[i],
+                      expected->reals[i], expected->integers[i]);
         }
     }
     if (expected->status != actual->status) {

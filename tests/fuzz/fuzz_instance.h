@@ -57,7 +57,7 @@ fmi2Status fuzz_step(struct fuzz_instance *instance, double length);
 
 enum { FUZZ_VARIABLE_CAPACITY = 64 };
 
-/* All variables, in the order of the unit's table; what is not of the type, or cannot be computed,
+/* All variables, in the order of the table; what is not of the type, or cannot be computed,
  * is 0. */
 struct fuzz_values {
     double reals[FUZZ_VARIABLE_CAPACITY];

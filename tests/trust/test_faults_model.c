@@ -69,25 +69,25 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 static const double start = 5.0;
 static const double before_fault = 0.25; /* s: length of the step before the one that fails */
 static const double step = 1.0;
-static const double tolerance = 1e-6; /* of states, at the unit's 1e-8 */
+static const double tolerance = 1e-6; /* of states, at the default of 1e-8 */
 
-static struct slave *create(int method) {
+static struct instance *create(int method) {
     static struct model model;
-    static struct unit unit;
-    const struct slave_experiment experiment = {.start_time = start};
+    static struct model_description model_description;
+    const struct instance_experiment experiment = {.start_time = start};
     const unsigned reference = OSCILLATOR_SOLVER_METHOD;
-    struct slave *slave = NULL;
+    struct instance *instance = NULL;
     model = oscillator_model;
     model.right_hand_side = right_hand_side;
     model.propagate = propagate;
-    unit = oscillator_unit;
-    unit.model = &model;
-    ASSERT_OK(slave_create(&unit, &last_text_sink, &slave));
-    ASSERT_OK(slave_set_integer(slave, &reference, 1, &method));
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    ASSERT_OK(slave_enter_initialization(slave));
-    ASSERT_OK(slave_exit_initialization(slave));
-    return slave;
+    model_description = oscillator_description;
+    model_description.model = &model;
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+    return instance;
 }
 
 struct state {
@@ -95,10 +95,10 @@ struct state {
     double t;
 };
 
-static struct state state_of(struct slave *slave) {
+static struct state state_of(struct instance *instance) {
     const unsigned references[] = {OSCILLATOR_X, OSCILLATOR_V};
-    struct state state = {.t = slave_time(slave)};
-    ASSERT_OK(slave_get_real(slave, references, 2, state.x));
+    struct state state = {.t = instance_time(instance)};
+    ASSERT_OK(instance_get_real(instance, references, 2, state.x));
     return state;
 }
 
@@ -111,15 +111,15 @@ static void assert_on_solution(const struct state *state, const char *about) {
 
 /* What steps without a fault come to. */
 static struct state expected_end(int method, bool has_first_step) {
-    struct slave *slave = create(method);
+    struct instance *instance = create(method);
     double t = start;
     if (has_first_step) {
-        ASSERT_OK(slave_do_step(slave, t, before_fault));
+        ASSERT_OK(instance_do_step(instance, t, before_fault));
         t += before_fault;
     }
-    ASSERT_OK(slave_do_step(slave, t, step));
-    const struct state end = state_of(slave);
-    slave_destroy(slave);
+    ASSERT_OK(instance_do_step(instance, t, step));
+    const struct state end = state_of(instance);
+    instance_destroy(instance);
     return end;
 }
 
@@ -128,22 +128,22 @@ static char about[120];
 /* One step in which evaluation number fails; whether there was one. */
 static bool try_step(int method, bool has_first_step, long number, enum way way,
                      enum lasting lasting, const struct state *expected) {
-    struct slave_snapshot *snapshot = NULL;
-    struct slave *slave = create(method);
+    struct instance_snapshot *snapshot = NULL;
+    struct instance *instance = create(method);
     if (has_first_step) {
-        ASSERT_OK(slave_do_step(slave, start, before_fault));
+        ASSERT_OK(instance_do_step(instance, start, before_fault));
     }
-    ASSERT_OK(slave_save(slave, 0, &snapshot));
-    const struct state before = state_of(slave);
+    ASSERT_OK(instance_save(instance, 0, &snapshot));
+    const struct state before = state_of(instance);
     snprintf(about, sizeof about, "method %d, first step %d, evaluation %ld, way %d, lasting %d",
              method, has_first_step, number, (int)way, (int)lasting);
 
     last_text[0] = '\0';
     fail_from(number, way, lasting);
-    const enum status status = slave_do_step(slave, before.t, step);
+    const enum status status = instance_do_step(instance, before.t, step);
     fail_no_more();
     const bool has_failed = fault.count > 0;
-    const struct state reached = state_of(slave);
+    const struct state reached = state_of(instance);
     assert_on_solution(&reached, about);
     if (status == STATUS_OK) {
         TEST_ASSERT_TRUE_MESSAGE(!has_failed || lasting == ONCE, about);
@@ -154,11 +154,11 @@ static bool try_step(int method, bool has_first_step, long number, enum way way,
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "a value is not finite"), last_text);
     }
 
-    ASSERT_OK(slave_restore(slave, snapshot));
-    ASSERT_OK(slave_do_step(slave, before.t, step));
-    const struct state again = state_of(slave);
+    ASSERT_OK(instance_restore(instance, snapshot));
+    ASSERT_OK(instance_do_step(instance, before.t, step));
+    const struct state again = state_of(instance);
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, &again, sizeof again, about);
-    slave_destroy(slave);
+    instance_destroy(instance);
     return has_failed;
 }
 

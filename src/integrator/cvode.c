@@ -1,5 +1,5 @@
 /* The multistep methods of CVODE. */
-#include "integrator_method.h"
+#include "method.h"
 
 #include <math.h>
 #include <nvector/nvector_serial.h>

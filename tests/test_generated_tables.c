@@ -1,7 +1,7 @@
 /* The table that fmu/generate.py makes from oscillator/variables.toml is the one written by hand.
  */
+#include "model_description.h"
 #include "oscillator.h"
-#include "unit.h"
 #include "value_references.h"
 
 #include <string.h>
@@ -11,9 +11,9 @@ void setUp(void) {}
 void tearDown(void) {}
 
 static void test_rows_are_those_written_by_hand(void) {
-    for (size_t i = 0; i < oscillator_unit.variable_count; i++) {
-        const struct variable *expected = &oscillator_unit.variables[i];
-        const struct variable *row = variable_find(&unit, expected->reference);
+    for (size_t i = 0; i < oscillator_description.variable_count; i++) {
+        const struct variable *expected = &oscillator_description.variables[i];
+        const struct variable *row = variable_find(&model_description, expected->reference);
         TEST_ASSERT_NOT_NULL(row);
         TEST_ASSERT_EQUAL_INT(expected->type, row->type);
         TEST_ASSERT_EQUAL_INT(expected->owner, row->owner);
@@ -27,21 +27,22 @@ static void test_rows_are_those_written_by_hand(void) {
 }
 
 static void test_every_row_is_found_by_its_reference(void) {
-    for (size_t i = 0; i < unit.variable_count; i++) {
-        TEST_ASSERT_EQUAL_PTR(&unit.variables[i],
-                              variable_find(&unit, unit.variables[i].reference));
+    for (size_t i = 0; i < model_description.variable_count; i++) {
+        TEST_ASSERT_EQUAL_PTR(
+            &model_description.variables[i],
+            variable_find(&model_description, model_description.variables[i].reference));
     }
-    TEST_ASSERT_NULL(variable_find(&unit, unit.reference_count));
+    TEST_ASSERT_NULL(variable_find(&model_description, model_description.reference_count));
 }
 
 static void test_names_and_references_of_the_header(void) {
-    TEST_ASSERT_EQUAL_STRING("Oscillator", unit.name);
-    TEST_ASSERT_EQUAL_STRING(OSCILLATOR_NAME, unit.name);
-    TEST_ASSERT_EQUAL_STRING(OSCILLATOR_GUID, unit.guid);
-    TEST_ASSERT_EQUAL_PTR(&oscillator_model, unit.model);
+    TEST_ASSERT_EQUAL_STRING("Oscillator", model_description.name);
+    TEST_ASSERT_EQUAL_STRING(OSCILLATOR_NAME, model_description.name);
+    TEST_ASSERT_EQUAL_STRING(OSCILLATOR_GUID, model_description.guid);
+    TEST_ASSERT_EQUAL_PTR(&oscillator_model, model_description.model);
     TEST_ASSERT_EQUAL_INT(OSCILLATOR_ENERGY, OSCILLATOR_energy);
-    TEST_ASSERT_EQUAL_STRING("energy", variable_find(&unit, OSCILLATOR_energy)->name);
-    TEST_ASSERT_TRUE(unit.default_tolerance == 1e-8);
+    TEST_ASSERT_EQUAL_STRING("energy", variable_find(&model_description, OSCILLATOR_energy)->name);
+    TEST_ASSERT_TRUE(model_description.default_tolerance == 1e-8);
 }
 
 int main(void) {

@@ -1,4 +1,4 @@
-#include "integrator_method.h"
+#include "method.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,28 +1,28 @@
-/* Inside of an instance, shared by the files that make it up: slave.c (life), stepping.c (from one
- * communication point to the next), access.c (values), derivatives.c, snapshot.c. */
-#ifndef SLAVE_STATE_H
-#define SLAVE_STATE_H
+/* Inside of an instance, shared by the files that make it up: instance.c (life), stepping.c (from
+ * one communication point to the next), access.c (values), derivatives.c, snapshot.c. */
+#ifndef INSTANCE_INTERNALS_H
+#define INSTANCE_INTERNALS_H
 
 #include "clock.h"
+#include "instance.h"
 #include "polynomial.h"
-#include "slave.h"
 
 /* Internal steps after which the integrator restarts though nothing has changed: what a restored
  * snapshot has to replay at most. Larger: fewer restarts, slower rollback. */
-enum { SLAVE_LONGEST_HISTORY = 1000 };
+enum { INSTANCE_LONGEST_HISTORY = 1000 };
 
 /* Bounds of what the integrator can run at: below, rounding stops its error test from converging;
  * above, results have no digit left. */
-#define SLAVE_FINEST_TOLERANCE   1e-14
-#define SLAVE_COARSEST_TOLERANCE 1e-2
+#define INSTANCE_FINEST_TOLERANCE   1e-14
+#define INSTANCE_COARSEST_TOLERANCE 1e-2
 
-/* All that later results depend on, but for the values in struct slave_memory. A plain value: a
+/* All that later results depend on, but for the values in struct instance_memory. A plain value: a
  * snapshot is a copy of it. */
-struct slave_state {
+struct instance_state {
     enum phase phase;
     bool experiment_defined;
-    struct slave_experiment experiment;
-    struct slave_values own;
+    struct instance_experiment experiment;
+    struct instance_values own;
     struct clock_time time;
 
     /* The integrator's history, from which it goes on while nothing changes. It follows from the
@@ -39,7 +39,7 @@ struct slave_state {
 };
 
 /* Parts of one block of memory, of which a snapshot is a copy. */
-struct slave_memory {
+struct instance_memory {
     char *block;
     size_t size;                /* bytes */
     char *values;               /* the model's value structure, as set and read from outside; its
@@ -51,12 +51,12 @@ struct slave_memory {
     struct polynomial *running; /* inputs since the last restart */
 };
 
-struct slave {
-    const struct unit *unit;
+struct instance {
+    const struct model_description *description;
     const struct model *model;
     struct message_sink sink;
-    struct slave_state state;
-    struct slave_memory memory;
+    struct instance_state state;
+    struct instance_memory memory;
 
     bool outputs_are_valid;        /* the calculated values belong to the others */
     bool history_is_lost;          /* the integrator is not where state says: replay first */
@@ -67,8 +67,8 @@ struct slave {
     double *work;     /* one value per input: those that the right-hand side sees */
     char *first;      /* value structures for derivatives */
     char *second;
-    struct slave_snapshot *newest; /* snapshots that belong to the instance, a list */
-    struct slave_snapshot *oldest;
+    struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
+    struct instance_snapshot *oldest;
 };
 
 static inline size_t count_of(struct span span) {
@@ -81,46 +81,46 @@ static inline double *doubles_of(char *values, struct span span) {
 }
 
 /* The place of a variable's value. */
-void *slave_field(struct slave *slave, const struct variable *variable);
+void *instance_field(struct instance *instance, const struct variable *variable);
 
-void slave_write_field(struct slave *slave, const struct variable *variable, double value);
+void instance_write_field(struct instance *instance, const struct variable *variable, double value);
 
 /* Index of an input variable among the inputs. */
-size_t slave_input_index(const struct slave *slave, const struct variable *variable);
+size_t instance_input_index(const struct instance *instance, const struct variable *variable);
 
 /* The variable with this reference and type, or NULL with a text. */
-const struct variable *slave_find(const struct slave *slave, unsigned reference,
-                                  enum variable_type type);
+const struct variable *instance_find(const struct instance *instance, unsigned reference,
+                                     enum variable_type type);
 
 /* Says that what cannot be computed; STATUS_NOT_FINITE. */
-enum status slave_not_finite(const struct slave *slave, const char *what);
+enum status instance_not_finite(const struct instance *instance, const char *what);
 
 /* Brings the calculated values up to date; says why where that fails. */
-enum status slave_update_outputs(struct slave *slave);
+enum status instance_update_outputs(struct instance *instance);
 
 /* Settings that follow from values: the tolerance that the integrator runs at. */
-void slave_update_tolerance(struct slave *slave);
+void instance_update_tolerance(struct instance *instance);
 
-void slave_set_clock(struct slave *slave, struct clock_time time);
+void instance_set_clock(struct instance *instance, struct clock_time time);
 
 /* An experiment that can be run; says why where it cannot. */
-enum status slave_check_experiment(const struct slave *slave,
-                                   const struct slave_experiment *experiment);
+enum status instance_check_experiment(const struct instance *instance,
+                                      const struct instance_experiment *experiment);
 
 /* The parameters go together; says why where they do not. */
-enum status slave_check_parameters(const struct slave *slave);
+enum status instance_check_parameters(const struct instance *instance);
 
 /* Gives the integrator the method, tolerance and limits it has to run with. */
-enum status slave_configure_integrator(struct slave *slave);
+enum status instance_configure_integrator(struct instance *instance);
 
 /* Brings state.next_step up to date, which costs too much to be done after each step. */
-void slave_update_next_step(struct slave *slave);
+void instance_update_next_step(struct instance *instance);
 
 /* What the integrator was configured with is not what the values ask for. */
-bool slave_is_configured_otherwise(const struct slave *slave);
+bool instance_is_configured_otherwise(const struct instance *instance);
 
-/* Right-hand side of the integrator and its derivatives by the states; context: the slave. */
-ode_rhs slave_rhs;
-ode_jacobian slave_jacobian;
+/* Right-hand side of the integrator and its derivatives by the states; context: the instance. */
+ode_rhs instance_rhs;
+ode_jacobian instance_jacobian;
 
 #endif

@@ -91,14 +91,14 @@ const char *codec_check(struct codec *codec, const char *guid, size_t length) {
         return "it is cut off";
     }
     if (memcmp(start, magic, sizeof magic) != 0) {
-        return "it is no saved state of such a unit";
+        return "it is not a saved state of such a model";
     }
     if (version != FORMAT_VERSION) {
         return "it has another version of the format, 1 is expected";
     }
     if (guid_length != strlen(guid) || codec->size - codec->at < guid_length ||
         memcmp(codec->from + codec->at, guid, guid_length) != 0) {
-        return "its GUID is that of another unit";
+        return "its GUID belongs to another model";
     }
     if (stated_length != codec->size || codec->size != length) {
         return "it has the wrong length";

@@ -1,8 +1,8 @@
 /* The functions that Model Exchange and Co-Simulation share (FMI 2.0, section 2.1): checks of
  * arguments that only FMI has, conversion of types and status, and nothing else. */
 #include "component.h"
+#include "model_description.h"
 #include "snapshot.h"
-#include "unit.h"
 
 #include <string.h>
 
@@ -32,12 +32,12 @@ static bool may_instantiate(fmi2String name, fmi2Type type, fmi2String guid,
             (int)type, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
         return false;
     }
-    if (guid == NULL || strcmp(guid, unit.guid) != 0) {
+    if (guid == NULL || strcmp(guid, model_description.guid) != 0) {
         component_log_refusal(
             functions, name,
             "the GUID '%.100s' is refused: '%s' is expected, the model description "
             "belongs to another build",
-            guid != NULL ? guid : "", unit.guid);
+            guid != NULL ? guid : "", model_description.guid);
         return false;
     }
     return functions != NULL;
@@ -103,14 +103,14 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     if (component == NULL) {
         return fmi2Error;
     }
-    const struct slave_experiment experiment = {
+    const struct instance_experiment experiment = {
         .start_time = startTime,
         .stop_time_defined = stopTimeDefined != fmi2False,
         .stop_time = stopTime,
         .tolerance_defined = toleranceDefined != fmi2False,
         .tolerance = tolerance,
     };
-    return component_status(component, slave_setup_experiment(component->slave, &experiment));
+    return component_status(component, instance_setup_experiment(component->instance, &experiment));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
@@ -118,7 +118,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     if (component == NULL) {
         return fmi2Error;
     }
-    const enum status status = slave_enter_initialization(component->slave);
+    const enum status status = instance_enter_initialization(component->instance);
     if (status == STATUS_OK) {
         component->state = STATE_INITIALIZATION;
     }
@@ -130,11 +130,11 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     if (component == NULL) {
         return fmi2Error;
     }
-    const enum status status = slave_exit_initialization(component->slave);
+    const enum status status = instance_exit_initialization(component->instance);
     if (status == STATUS_OK) {
         component->state = component->kind == fmi2CoSimulation ? STATE_STEP_COMPLETE : STATE_EVENT;
         component_log(component, fmi2OK, LOG_EVENTS, "initialized at t = %.17g",
-                      slave_time(component->slave));
+                      instance_time(component->instance));
     }
     return component_status(component, status);
 }
@@ -146,7 +146,7 @@ fmi2Status fmi2Terminate(fmi2Component c) {
     }
     component->state = STATE_TERMINATED;
     component_log(component, fmi2OK, LOG_EVENTS, "terminated at t = %.17g",
-                  slave_time(component->slave));
+                  instance_time(component->instance));
     return fmi2OK;
 }
 
@@ -155,7 +155,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
     if (component == NULL) {
         return fmi2Error;
     }
-    slave_reset(component->slave);
+    instance_reset(component->instance);
     component->state = STATE_INSTANTIATED;
     component_log(component, fmi2OK, LOG_EVENTS, "reset to the start values");
     return fmi2OK;
@@ -169,7 +169,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     if (component == NULL || !component_has_arrays(component, CALL_fmi2GetReal, nvr, vr, value)) {
         return fmi2Error;
     }
-    return component_status(component, slave_get_real(component->slave, vr, nvr, value));
+    return component_status(component, instance_get_real(component->instance, vr, nvr, value));
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -179,7 +179,7 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
         !component_has_arrays(component, CALL_fmi2GetInteger, nvr, vr, value)) {
         return fmi2Error;
     }
-    return component_status(component, slave_get_integer(component->slave, vr, nvr, value));
+    return component_status(component, instance_get_integer(component->instance, vr, nvr, value));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -188,7 +188,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     if (component == NULL || !component_has_arrays(component, CALL_fmi2SetReal, nvr, vr, value)) {
         return fmi2Error;
     }
-    return component_status(component, slave_set_real(component->slave, vr, nvr, value));
+    return component_status(component, instance_set_real(component->instance, vr, nvr, value));
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -198,7 +198,7 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
         !component_has_arrays(component, CALL_fmi2SetInteger, nvr, vr, value)) {
         return fmi2Error;
     }
-    return component_status(component, slave_set_integer(component->slave, vr, nvr, value));
+    return component_status(component, instance_set_integer(component->instance, vr, nvr, value));
 }
 
 /* Units have no Boolean and no String variables: only an access to none of them succeeds. */
@@ -212,7 +212,7 @@ static fmi2Status access_none(fmi2Component c, enum call call, const char *type,
         return component_fail(component,
                               "value reference %u is accessed as %s: %s has no variable "
                               "of that type",
-                              vr[0], type, unit.name);
+                              vr[0], type, model_description.name);
     }
     return fmi2OK;
 }
@@ -246,7 +246,7 @@ static unsigned tag_of(const struct component *component) {
     return (unsigned)component->state | (unsigned)component->kind << TAG_KIND_SHIFT;
 }
 
-/* FMI states that an instance of a kind can be in while its slave is in a phase. */
+/* FMI states that an instance of a kind can be in while its instance is in a phase. */
 static unsigned states_of(fmi2Type kind, enum phase phase) {
     const bool steps = kind == fmi2CoSimulation;
     switch (phase) {
@@ -286,8 +286,8 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
         !component_has_arrays(component, CALL_fmi2GetFMUstate, 1, FMUstate, FMUstate)) {
         return fmi2Error;
     }
-    struct slave_snapshot *snapshot = *FMUstate;
-    const enum status status = slave_save(component->slave, tag_of(component), &snapshot);
+    struct instance_snapshot *snapshot = *FMUstate;
+    const enum status status = instance_save(component->instance, tag_of(component), &snapshot);
     *FMUstate = snapshot;
     return component_status(component, status);
 }
@@ -300,7 +300,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
     }
     unsigned tag = 0;
     enum phase phase = PHASE_COUNT;
-    enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag, &phase);
+    enum status status = instance_snapshot_tag(component->instance, FMUstate, &tag, &phase);
     if (status != STATUS_OK) {
         return component_status(component, status);
     }
@@ -308,7 +308,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
     if (state == 0) {
         return refuse_kind(component, CALL_fmi2SetFMUstate);
     }
-    status = slave_restore(component->slave, FMUstate);
+    status = instance_restore(component->instance, FMUstate);
     if (status == STATUS_OK) {
         component->state = (enum fmi_state)state;
     }
@@ -323,8 +323,8 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     if (FMUstate == NULL || *FMUstate == NULL) {
         return fmi2OK;
     }
-    struct slave_snapshot *snapshot = *FMUstate;
-    const enum status status = slave_forget(component->slave, &snapshot);
+    struct instance_snapshot *snapshot = *FMUstate;
+    const enum status status = instance_forget(component->instance, &snapshot);
     *FMUstate = snapshot;
     return component_status(component, status);
 }
@@ -337,9 +337,9 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
     }
     unsigned tag = 0;
     enum phase phase = PHASE_COUNT;
-    const enum status status = slave_snapshot_tag(component->slave, FMUstate, &tag, &phase);
+    const enum status status = instance_snapshot_tag(component->instance, FMUstate, &tag, &phase);
     if (status == STATUS_OK) {
-        *size = slave_serialized_size(component->slave);
+        *size = instance_serialized_size(component->instance);
     }
     return component_status(component, status);
 }
@@ -351,8 +351,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
                                                    FMUstate, serializedState)) {
         return fmi2Error;
     }
-    return component_status(component, slave_serialize(component->slave, FMUstate,
-                                                       (unsigned char *)serializedState, size));
+    return component_status(component, instance_serialize(component->instance, FMUstate,
+                                                          (unsigned char *)serializedState, size));
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
@@ -362,17 +362,17 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
                                                    serializedState, FMUstate)) {
         return fmi2Error;
     }
-    struct slave_snapshot *snapshot = NULL;
-    enum status status = slave_deserialize(component->slave, (const unsigned char *)serializedState,
-                                           size, &snapshot);
+    struct instance_snapshot *snapshot = NULL;
+    enum status status = instance_deserialize(
+        component->instance, (const unsigned char *)serializedState, size, &snapshot);
     if (status != STATUS_OK) {
         return component_status(component, status);
     }
     unsigned tag = 0;
     enum phase phase = PHASE_COUNT;
-    status = slave_snapshot_tag(component->slave, snapshot, &tag, &phase);
+    status = instance_snapshot_tag(component->instance, snapshot, &tag, &phase);
     if (status != STATUS_OK || state_in(component, tag, phase) == 0) {
-        slave_forget(component->slave, &snapshot);
+        instance_forget(component->instance, &snapshot);
         return refuse_kind(component, CALL_fmi2DeSerializeFMUstate);
     }
     *FMUstate = snapshot;
@@ -393,6 +393,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
         return fmi2Error;
     }
     return component_status(
-        component, slave_get_directional_derivative(component->slave, vUnknown_ref, nUnknown,
-                                                    vKnown_ref, nKnown, dvKnown, dvUnknown));
+        component, instance_get_directional_derivative(component->instance, vUnknown_ref, nUnknown,
+                                                       vKnown_ref, nKnown, dvKnown, dvUnknown));
 }

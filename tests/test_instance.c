@@ -1,4 +1,4 @@
-#include "slave.h"
+#include "instance.h"
 
 #include "last_text.h"
 #include "oscillator.h"
@@ -7,57 +7,58 @@
 #include <string.h>
 #include <unity.h>
 
-static struct slave *slave;
+static struct instance *instance;
 
-static struct slave *create(void) {
-    struct slave *created = NULL;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, slave_create(&oscillator_unit, &last_text_sink, &created));
+static struct instance *create(void) {
+    struct instance *created = NULL;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                          instance_create(&oscillator_description, &last_text_sink, &created));
     return created;
 }
 
 void setUp(void) {
     memset(last_text, 0, sizeof last_text);
-    slave = create();
+    instance = create();
 }
 
 void tearDown(void) {
-    slave_destroy(slave);
+    instance_destroy(instance);
 }
 
-static double get(struct slave *from, unsigned reference) {
+static double get(struct instance *from, unsigned reference) {
     double value = NAN;
-    ASSERT_OK(slave_get_real(from, &reference, 1, &value));
+    ASSERT_OK(instance_get_real(from, &reference, 1, &value));
     return value;
 }
 
-static enum status set(struct slave *to, unsigned reference, double value) {
-    return slave_set_real(to, &reference, 1, &value);
+static enum status set(struct instance *to, unsigned reference, double value) {
+    return instance_set_real(to, &reference, 1, &value);
 }
 
-static void setup(struct slave *started, double start) {
-    const struct slave_experiment experiment = {.start_time = start};
-    ASSERT_OK(slave_setup_experiment(started, &experiment));
+static void setup(struct instance *started, double start) {
+    const struct instance_experiment experiment = {.start_time = start};
+    ASSERT_OK(instance_setup_experiment(started, &experiment));
 }
 
-static void initialize(struct slave *started, double start) {
+static void initialize(struct instance *started, double start) {
     setup(started, start);
-    ASSERT_OK(slave_enter_initialization(started));
-    ASSERT_OK(slave_exit_initialization(started));
+    ASSERT_OK(instance_enter_initialization(started));
+    ASSERT_OK(instance_exit_initialization(started));
 }
 
 /* Through initialization, from 0 s on. */
-static void initialize_until(struct slave *started, double stop) {
-    const struct slave_experiment experiment = {.stop_time_defined = true, .stop_time = stop};
-    ASSERT_OK(slave_setup_experiment(started, &experiment));
-    ASSERT_OK(slave_enter_initialization(started));
-    ASSERT_OK(slave_exit_initialization(started));
+static void initialize_until(struct instance *started, double stop) {
+    const struct instance_experiment experiment = {.stop_time_defined = true, .stop_time = stop};
+    ASSERT_OK(instance_setup_experiment(started, &experiment));
+    ASSERT_OK(instance_enter_initialization(started));
+    ASSERT_OK(instance_exit_initialization(started));
 }
 
 /* An experiment whose input changes at every third step. */
-static void run(struct slave *stepped, int steps, double states[2]) {
+static void run(struct instance *stepped, int steps, double states[2]) {
     for (int i = 0; i < steps; i++) {
         ASSERT_OK(set(stepped, OSCILLATOR_U, sin((i / 3) * 0.1)));
-        ASSERT_OK(slave_do_step(stepped, i * 0.01, 0.01));
+        ASSERT_OK(instance_do_step(stepped, i * 0.01, 0.01));
     }
     states[0] = get(stepped, OSCILLATOR_X);
     states[1] = get(stepped, OSCILLATOR_V);
@@ -69,17 +70,17 @@ static void test_the_start_time_does_not_change_the_motion(void) {
     const double starts[] = {-0.5, 1000.0, 1e6};
     double reference[2];
     double states[2];
-    initialize(slave, 0.0);
-    run(slave, 100, reference);
+    initialize(instance, 0.0);
+    run(instance, 100, reference);
     for (int k = 0; k < 3; k++) {
-        slave_reset(slave);
-        initialize(slave, starts[k]);
+        instance_reset(instance);
+        initialize(instance, starts[k]);
         for (int i = 0; i < 100; i++) {
-            ASSERT_OK(set(slave, OSCILLATOR_U, sin((i / 3) * 0.1)));
-            ASSERT_OK(slave_do_step(slave, starts[k] + i * 0.01, 0.01));
+            ASSERT_OK(set(instance, OSCILLATOR_U, sin((i / 3) * 0.1)));
+            ASSERT_OK(instance_do_step(instance, starts[k] + i * 0.01, 0.01));
         }
-        states[0] = get(slave, OSCILLATOR_X);
-        states[1] = get(slave, OSCILLATOR_V);
+        states[0] = get(instance, OSCILLATOR_X);
+        states[1] = get(instance, OSCILLATOR_V);
         // the communication points of this master are rounded to 1e-10 s at 1e6 s
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, reference[0], states[0]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, reference[1], states[1]);
@@ -87,26 +88,26 @@ static void test_the_start_time_does_not_change_the_motion(void) {
 }
 
 static void test_a_master_that_accumulates_its_time_reaches_the_stop_time(void) {
-    initialize_until(slave, 600.0);
+    initialize_until(instance, 600.0);
     double t = 0.0;
     for (int i = 0; i < 600000; i++) {
-        ASSERT_OK(slave_do_step(slave, t, 1e-3));
+        ASSERT_OK(instance_do_step(instance, t, 1e-3));
         t += 1e-3;
     }
     double exact[2] = {1.0, 0.0};
     oscillator_solution(2.0, 0.0, t, exact, exact);
-    TEST_ASSERT_EQUAL_DOUBLE(t, slave_time(slave));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-5, exact[0], get(slave, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_DOUBLE(t, instance_time(instance));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-5, exact[0], get(instance, OSCILLATOR_X));
 }
 
 static void test_a_small_mismatch_of_the_time_is_integrated(void) {
     double exact[2] = {1.0, 0.0};
-    initialize(slave, 0.0);
-    ASSERT_OK(slave_do_step(slave, 0.0, 1.0));
-    ASSERT_OK(slave_do_step(slave, 1.0 + 1e-10, 0.5));
+    initialize(instance, 0.0);
+    ASSERT_OK(instance_do_step(instance, 0.0, 1.0));
+    ASSERT_OK(instance_do_step(instance, 1.0 + 1e-10, 0.5));
     oscillator_solution(2.0, 0.0, 1.5 + 1e-10, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(slave, OSCILLATOR_X));
-    TEST_ASSERT_EQUAL_DOUBLE(1.5 + 1e-10, slave_time(slave));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_DOUBLE(1.5 + 1e-10, instance_time(instance));
 }
 
 static void test_times_that_do_not_fit_are_refused(void) {
@@ -125,42 +126,43 @@ static void test_times_that_do_not_fit_are_refused(void) {
         {0.0, 2.5, "the stop time is 2"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        slave_reset(slave);
-        initialize_until(slave, 2.0);
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, slave_do_step(slave, cases[i].t, cases[i].h));
+        instance_reset(instance);
+        initialize_until(instance, 2.0);
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME,
+                              instance_do_step(instance, cases[i].t, cases[i].h));
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, cases[i].expected), last_text);
-        TEST_ASSERT_EQUAL_DOUBLE(0.0, slave_time(slave));
-        ASSERT_OK(slave_do_step(slave, 0.0, 0.1));
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, instance_time(instance));
+        ASSERT_OK(instance_do_step(instance, 0.0, 0.1));
     }
 }
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static void test_reset_gives_a_fresh_instance(void) {
-    struct slave *fresh = create();
+    struct instance *fresh = create();
     double expected[2];
     double states[2];
     initialize(fresh, 0.0);
     run(fresh, 50, expected);
 
-    ASSERT_OK(set(slave, OSCILLATOR_X, 7.0));
-    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e-3));
-    initialize(slave, 10.0);
-    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 9.0));
-    ASSERT_OK(slave_do_step(slave, 10.0, 1.0));
-    slave_reset(slave);
-    initialize(slave, 0.0);
-    run(slave, 50, states);
+    ASSERT_OK(set(instance, OSCILLATOR_X, 7.0));
+    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, 1e-3));
+    initialize(instance, 10.0);
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 9.0));
+    ASSERT_OK(instance_do_step(instance, 10.0, 1.0));
+    instance_reset(instance);
+    initialize(instance, 0.0);
+    run(instance, 50, states);
     TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
-    slave_destroy(fresh);
+    instance_destroy(fresh);
 }
 
 static void test_instances_do_not_disturb_each_other(void) {
     enum { COUNT = 20 };
-    struct slave *many[COUNT];
+    struct instance *many[COUNT];
     double expected[2];
-    initialize(slave, 0.0);
-    run(slave, 30, expected);
+    initialize(instance, 0.0);
+    run(instance, 30, expected);
 
     for (int k = 0; k < COUNT; k++) {
         many[k] = create();
@@ -169,40 +171,40 @@ static void test_instances_do_not_disturb_each_other(void) {
     for (int i = 0; i < 30; i++) {
         for (int k = 0; k < COUNT; k++) {
             ASSERT_OK(set(many[k], OSCILLATOR_U, sin((i / 3) * 0.1)));
-            ASSERT_OK(slave_do_step(many[k], i * 0.01, 0.01));
+            ASSERT_OK(instance_do_step(many[k], i * 0.01, 0.01));
         }
     }
     for (int k = 0; k < COUNT; k++) {
         TEST_ASSERT_EQUAL_DOUBLE(expected[0], get(many[k], OSCILLATOR_X));
         TEST_ASSERT_EQUAL_DOUBLE(expected[1], get(many[k], OSCILLATOR_V));
-        slave_destroy(many[k]);
+        instance_destroy(many[k]);
     }
 }
 
 /* As if variables.toml named a calculated field for the input: it compiles and would do nothing. */
 static void test_a_field_of_another_kind_is_refused(void) {
     struct variable variables[16];
-    struct unit wrong = oscillator_unit;
-    struct slave *none = slave;
-    TEST_ASSERT_TRUE(oscillator_unit.variable_count <= 16);
-    for (size_t i = 0; i < oscillator_unit.variable_count; i++) {
-        variables[i] = oscillator_unit.variables[i];
+    struct model_description wrong = oscillator_description;
+    struct instance *none = instance;
+    TEST_ASSERT_TRUE(oscillator_description.variable_count <= 16);
+    for (size_t i = 0; i < oscillator_description.variable_count; i++) {
+        variables[i] = oscillator_description.variables[i];
         if (variables[i].reference == OSCILLATOR_U) {
             variables[i].offset = offsetof(struct oscillator_values, energy);
         }
     }
     wrong.variables = variables;
-    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, slave_create(&wrong, &last_text_sink, &none));
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
     TEST_ASSERT_NULL(none);
 }
 
 static void test_initialization_needs_an_experiment(void) {
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_enter_initialization(slave));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_enter_initialization(instance));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "the experiment must be set up first"));
 }
 
 static void test_an_experiment_that_makes_no_sense_is_refused(void) {
-    const struct slave_experiment cases[] = {
+    const struct instance_experiment cases[] = {
         {.start_time = NAN},
         {.start_time = INFINITY},
         {.start_time = 1.0, .stop_time_defined = true, .stop_time = 0.5},
@@ -212,62 +214,66 @@ static void test_an_experiment_that_makes_no_sense_is_refused(void) {
         {.tolerance_defined = true, .tolerance = NAN},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_setup_experiment(slave, &cases[i]));
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              instance_setup_experiment(instance, &cases[i]));
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "is refused"), last_text);
     }
-    const struct slave_experiment undefined = {.stop_time = NAN, .tolerance = NAN};
-    ASSERT_OK(slave_setup_experiment(slave, &undefined));
+    const struct instance_experiment undefined = {.stop_time = NAN, .tolerance = NAN};
+    ASSERT_OK(instance_setup_experiment(instance, &undefined));
 }
 
 static void test_parameters_must_go_together_at_initialization_and_at_a_step(void) {
-    setup(slave, 0.0);
-    ASSERT_OK(slave_enter_initialization(slave));
-    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, -1.0));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_exit_initialization(slave));
+    setup(instance, 0.0);
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, -1.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, instance_exit_initialization(instance));
     TEST_ASSERT_EQUAL_STRING("omega = -1 is refused: it must be above 0", last_text);
 
-    slave_reset(slave);
-    initialize(slave, 0.0);
-    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 0.0));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, slave_do_step(slave, 0.0, 0.1));
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, slave_time(slave));
+    instance_reset(instance);
+    initialize(instance, 0.0);
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 0.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, instance_do_step(instance, 0.0, 0.1));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, instance_time(instance));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
 static void test_the_parameter_wins_over_the_experiment_over_the_default(void) {
-    const struct slave_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-6};
-    const double by_default = get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE);
+    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-6};
+    const double by_default = get(instance, OSCILLATOR_EFFECTIVE_TOLERANCE);
     TEST_ASSERT_TRUE(by_default > 0.0 && by_default <= 1e-8);
 
-    ASSERT_OK(slave_setup_experiment(slave, &experiment));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e2 * by_default, get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE));
-    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e-9));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e-1 * by_default, get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e2 * by_default,
+                              get(instance, OSCILLATOR_EFFECTIVE_TOLERANCE));
+    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, 1e-9));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-20, 1e-1 * by_default,
+                              get(instance, OSCILLATOR_EFFECTIVE_TOLERANCE));
 
     // what cannot be kept is not promised
-    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e-300));
-    TEST_ASSERT_TRUE(get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE) >= 1e-15);
-    ASSERT_OK(set(slave, OSCILLATOR_RELATIVE_TOLERANCE, 1e300));
-    TEST_ASSERT_TRUE(get(slave, OSCILLATOR_EFFECTIVE_TOLERANCE) < 1.0);
+    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, 1e-300));
+    TEST_ASSERT_TRUE(get(instance, OSCILLATOR_EFFECTIVE_TOLERANCE) >= 1e-15);
+    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, 1e300));
+    TEST_ASSERT_TRUE(get(instance, OSCILLATOR_EFFECTIVE_TOLERANCE) < 1.0);
 }
 
 static void test_outputs_follow_what_was_set_last(void) {
-    initialize(slave, 0.0);
-    TEST_ASSERT_EQUAL_DOUBLE(2.0, get(slave, OSCILLATOR_ENERGY));
-    ASSERT_OK(set(slave, OSCILLATOR_OMEGA, 4.0));
-    TEST_ASSERT_EQUAL_DOUBLE(8.0, get(slave, OSCILLATOR_ENERGY));
+    initialize(instance, 0.0);
+    TEST_ASSERT_EQUAL_DOUBLE(2.0, get(instance, OSCILLATOR_ENERGY));
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 4.0));
+    TEST_ASSERT_EQUAL_DOUBLE(8.0, get(instance, OSCILLATOR_ENERGY));
 }
 
 static void test_a_vector_is_set_as_a_whole_or_not_at_all(void) {
     const unsigned references[] = {OSCILLATOR_X, OSCILLATOR_OMEGA, 99};
     const double values[] = {3.0, 1e6, 1.0};
-    TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, slave_set_real(slave, references, 2, values));
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, get(slave, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, instance_set_real(instance, references, 2, values));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get(instance, OSCILLATOR_X));
 
     const unsigned unknown_last[] = {OSCILLATOR_X, 99};
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_real(slave, unknown_last, 2, values));
-    TEST_ASSERT_EQUAL_DOUBLE(1.0, get(slave, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_set_real(instance, unknown_last, 2, values));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, get(instance, OSCILLATOR_X));
     TEST_ASSERT_EQUAL_STRING("value reference 99 is unknown: Oscillator has no such variable",
                              last_text);
 }
@@ -275,44 +281,46 @@ static void test_a_vector_is_set_as_a_whole_or_not_at_all(void) {
 static void test_a_vector_is_read_as_a_whole_or_not_at_all(void) {
     const unsigned references[] = {OSCILLATOR_X, OSCILLATOR_STEPS};
     double values[] = {-7.0, -7.0};
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_get_real(slave, references, 2, values));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_get_real(instance, references, 2, values));
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, values[0]);
     TEST_ASSERT_EQUAL_STRING(
         "steps (value reference 80) is accessed as Real: it is of type Integer", last_text);
 
     int integers[] = {-7, -7};
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          slave_get_integer(slave, references, 1, integers));
+                          instance_get_integer(instance, references, 1, integers));
     TEST_ASSERT_EQUAL_INT(-7, integers[0]);
 }
 
 static void test_a_result_that_is_not_finite_is_not_given(void) {
     const unsigned reference = OSCILLATOR_ENERGY;
     double value = -7.0;
-    ASSERT_OK(set(slave, OSCILLATOR_V, 1e200));
-    initialize(slave, 0.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, slave_get_real(slave, &reference, 1, &value));
+    ASSERT_OK(set(instance, OSCILLATOR_V, 1e200));
+    initialize(instance, 0.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_get_real(instance, &reference, 1, &value));
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);
     TEST_ASSERT_NOT_NULL(strstr(last_text, "energy"));
-    TEST_ASSERT_EQUAL_DOUBLE(1e200, get(slave, OSCILLATOR_V));
+    TEST_ASSERT_EQUAL_DOUBLE(1e200, get(instance, OSCILLATOR_V));
 }
 
 static void test_settings_are_closed_after_initialization(void) {
     const unsigned limit = OSCILLATOR_MAX_STEPS;
     const int value = 5;
-    initialize(slave, 0.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, slave_set_integer(slave, &limit, 1, &value));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(slave, OSCILLATOR_X, 2.0));
+    initialize(instance, 0.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_set_integer(instance, &limit, 1, &value));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(instance, OSCILLATOR_X, 2.0));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "only inputs and tunable parameters can"));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(slave, OSCILLATOR_GAIN, 2.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set(instance, OSCILLATOR_GAIN, 2.0));
 }
 
 static void test_no_values_are_fine(void) {
-    ASSERT_OK(slave_set_real(slave, NULL, 0, NULL));
-    ASSERT_OK(slave_get_real(slave, NULL, 0, NULL));
-    ASSERT_OK(slave_set_integer(slave, NULL, 0, NULL));
-    ASSERT_OK(slave_get_integer(slave, NULL, 0, NULL));
-    slave_destroy(NULL);
+    ASSERT_OK(instance_set_real(instance, NULL, 0, NULL));
+    ASSERT_OK(instance_get_real(instance, NULL, 0, NULL));
+    ASSERT_OK(instance_set_integer(instance, NULL, 0, NULL));
+    ASSERT_OK(instance_get_integer(instance, NULL, 0, NULL));
+    instance_destroy(NULL);
 }
 
 int main(void) {

@@ -9,7 +9,7 @@ fmi2Status fmi2EnterEventMode(fmi2Component c) {
     if (component == NULL) {
         return fmi2Error;
     }
-    slave_enter_event_mode(component->slave);
+    instance_enter_event_mode(component->instance);
     component->state = STATE_EVENT;
     return fmi2OK;
 }
@@ -36,7 +36,7 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
     if (component == NULL) {
         return fmi2Error;
     }
-    const enum status status = slave_enter_continuous_time(component->slave);
+    const enum status status = instance_enter_continuous_time(component->instance);
     if (status == STATUS_OK) {
         component->state = STATE_CONTINUOUS_TIME;
     }
@@ -66,7 +66,7 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
     if (component == NULL) {
         return fmi2Error;
     }
-    return component_status(component, slave_set_time(component->slave, time));
+    return component_status(component, instance_set_time(component->instance, time));
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
@@ -75,7 +75,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
         !component_has_arrays(component, CALL_fmi2SetContinuousStates, nx, x, x)) {
         return fmi2Error;
     }
-    return component_status(component, slave_set_states(component->slave, x, nx));
+    return component_status(component, instance_set_states(component->instance, x, nx));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
@@ -84,7 +84,8 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx
         !component_has_arrays(component, CALL_fmi2GetDerivatives, nx, derivatives, derivatives)) {
         return fmi2Error;
     }
-    return component_status(component, slave_get_derivatives(component->slave, derivatives, nx));
+    return component_status(component,
+                            instance_get_derivatives(component->instance, derivatives, nx));
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
@@ -105,7 +106,7 @@ fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
         !component_has_arrays(component, CALL_fmi2GetContinuousStates, nx, x, x)) {
         return fmi2Error;
     }
-    return component_status(component, slave_get_states(component->slave, x, nx));
+    return component_status(component, instance_get_states(component->instance, x, nx));
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
@@ -114,5 +115,5 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
     if (component == NULL || !component_has_arrays(component, call, nx, x_nominal, x_nominal)) {
         return fmi2Error;
     }
-    return component_status(component, slave_get_nominals(component->slave, x_nominal, nx));
+    return component_status(component, instance_get_nominals(component->instance, x_nominal, nx));
 }

@@ -11,8 +11,8 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
         !component_has_arrays(component, call, nvr, order, order)) {
         return fmi2Error;
     }
-    return component_status(component,
-                            slave_set_input_derivatives(component->slave, vr, nvr, order, value));
+    return component_status(
+        component, instance_set_input_derivatives(component->instance, vr, nvr, order, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -23,8 +23,8 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
         !component_has_arrays(component, call, nvr, order, order)) {
         return fmi2Error;
     }
-    return component_status(component,
-                            slave_get_output_derivatives(component->slave, vr, nvr, order, value));
+    return component_status(
+        component, instance_get_output_derivatives(component->instance, vr, nvr, order, value));
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
@@ -38,7 +38,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
         return fmi2Error;
     }
     const enum status status =
-        slave_do_step(component->slave, currentCommunicationPoint, communicationStepSize);
+        instance_do_step(component->instance, currentCommunicationPoint, communicationStepSize);
     if (status_severity(status) == SEVERITY_DISCARD) {
         component->state = STATE_STEP_FAILED;
     }
@@ -76,7 +76,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
     if (s != fmi2LastSuccessfulTime) {
         return status_unknown(component, CALL_fmi2GetRealStatus);
     }
-    *value = slave_time(component->slave);
+    *value = instance_time(component->instance);
     return fmi2OK;
 }
 
@@ -99,7 +99,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     if (s != fmi2Terminated) {
         return status_unknown(component, CALL_fmi2GetBooleanStatus);
     }
-    *value = fmi2False; // the unit never ends a simulation by itself
+    *value = fmi2False; // the FMU never ends a simulation by itself
     return fmi2OK;
 }
 

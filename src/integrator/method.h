@@ -1,7 +1,7 @@
 /* Inside of the integrator, shared by integrator.c and the files of its methods. The only header
  * with types of SUNDIALS beside sundials_compat.h and small_vector.h. */
-#ifndef INTEGRATOR_METHOD_H
-#define INTEGRATOR_METHOD_H
+#ifndef INTEGRATOR_METHOD_INTERNALS_H
+#define INTEGRATOR_METHOD_INTERNALS_H
 
 #include "integrator.h"
 #include "reserve.h"

@@ -11,8 +11,8 @@
 
 enum variable_type { VARIABLE_REAL, VARIABLE_INTEGER };
 
-/* The structure that holds the value: the model's own or struct slave_values. */
-enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_SLAVE };
+/* The structure that holds the value: the model's own or struct instance_values. */
+enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_INSTANCE };
 
 enum causality {
     CAUSALITY_PARAMETER,
@@ -46,8 +46,8 @@ struct variable {
     double nominal; /* > 0 */
 };
 
-/* One kind of unit: a model and its variables, as declared in variables.toml. */
-struct unit {
+/* A model and its variables, as declared in variables.toml. */
+struct model_description {
     const char *name; /* model name and identifier */
     const char *guid;
     double default_tolerance; /* relative, where neither experiment nor parameter gives one */
@@ -67,17 +67,19 @@ enum phase {
     PHASE_COUNT,
 };
 
-/* Of a reference that the unit is known to have. */
-static inline const struct variable *variable_of(const struct unit *unit, unsigned reference) {
-    return &unit->variables[unit->row_of_reference[reference]];
+/* Of a reference that is known to exist. */
+static inline const struct variable *variable_of(const struct model_description *description,
+                                                 unsigned reference) {
+    return &description->variables[description->row_of_reference[reference]];
 }
 
-/* NULL where the unit has no such reference. */
-static inline const struct variable *variable_find(const struct unit *unit, unsigned reference) {
-    if (reference >= unit->reference_count || unit->row_of_reference[reference] < 0) {
+/* NULL where no variable has this reference. */
+static inline const struct variable *variable_find(const struct model_description *description,
+                                                   unsigned reference) {
+    if (reference >= description->reference_count || description->row_of_reference[reference] < 0) {
         return NULL;
     }
-    return variable_of(unit, reference);
+    return variable_of(description, reference);
 }
 
 /* Before and during initialization: start values and inputs; later: inputs and tunable parameters.

@@ -1,5 +1,6 @@
-/* What a model gives to the slave that runs it. A model keeps all its values in one structure of
- * its own, made of doubles and ints; the slave reads and writes them through the generated table.
+/* What a model gives to the instance that runs it. A model keeps all its values in one structure of
+ * its own, made of doubles and ints; the instance reads and writes them through the generated
+ * table.
  */
 #ifndef MODEL_H
 #define MODEL_H

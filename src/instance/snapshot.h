@@ -9,7 +9,7 @@
  *     8 bytes      "COSIMSTA"
  *     u32          version of the format, 1
  *     u32          length of the whole in bytes
- *     u32, bytes   length of the GUID of the unit, GUID
+ *     u32, bytes   length of the GUID, GUID
  *     8 bytes each fields, in the order of transfer_state() in snapshot.c
  *     u64          FNV-1a hash of all bytes before it
  *
@@ -18,40 +18,41 @@
 #ifndef SNAPSHOT_H
 #define SNAPSHOT_H
 
-#include "slave.h"
+#include "instance.h"
 
-struct slave_snapshot;
+struct instance_snapshot;
 
 /* Saves the instance into *snapshot: a new one where that is NULL, otherwise over that one. tag: a
- * number that the caller wants back. A snapshot is owned by its instance: slave_destroy frees it.
+ * number that the caller wants back. A snapshot is owned by its instance: instance_destroy frees
+ * it.
  */
 __attribute__((nonnull, warn_unused_result)) enum status
-slave_save(struct slave *slave, unsigned tag, struct slave_snapshot **snapshot);
+instance_save(struct instance *instance, unsigned tag, struct instance_snapshot **snapshot);
 
 /* The snapshot stays valid. */
 __attribute__((nonnull, warn_unused_result)) enum status
-slave_restore(struct slave *slave, struct slave_snapshot *snapshot);
+instance_restore(struct instance *instance, struct instance_snapshot *snapshot);
 
 /* Frees *snapshot and sets it to NULL. */
-__attribute__((nonnull)) enum status slave_forget(struct slave *slave,
-                                                  struct slave_snapshot **snapshot);
+__attribute__((nonnull)) enum status instance_forget(struct instance *instance,
+                                                     struct instance_snapshot **snapshot);
 
 /* The tag that the snapshot was saved with, and the phase the instance was in. */
 __attribute__((nonnull, warn_unused_result)) enum status
-slave_snapshot_tag(struct slave *slave, struct slave_snapshot *snapshot, unsigned *tag,
-                   enum phase *phase);
+instance_snapshot_tag(struct instance *instance, struct instance_snapshot *snapshot, unsigned *tag,
+                      enum phase *phase);
 
-/* Bytes that slave_serialize writes. */
-__attribute__((nonnull)) size_t slave_serialized_size(const struct slave *slave);
+/* Bytes that instance_serialize writes. */
+__attribute__((nonnull)) size_t instance_serialized_size(const struct instance *instance);
 
-/* bytes: size bytes, size at least slave_serialized_size. */
+/* bytes: size bytes, size at least instance_serialized_size. */
 __attribute__((nonnull, warn_unused_result)) enum status
-slave_serialize(struct slave *slave, struct slave_snapshot *snapshot, unsigned char bytes[],
-                size_t size);
+instance_serialize(struct instance *instance, struct instance_snapshot *snapshot,
+                   unsigned char bytes[], size_t size);
 
-/* A new snapshot from what slave_serialize of any instance of the same unit wrote. */
+/* A new snapshot from what instance_serialize of any instance of the same model wrote. */
 __attribute__((nonnull, warn_unused_result)) enum status
-slave_deserialize(struct slave *slave, const unsigned char bytes[], size_t size,
-                  struct slave_snapshot **snapshot);
+instance_deserialize(struct instance *instance, const unsigned char bytes[], size_t size,
+                     struct instance_snapshot **snapshot);
 
 #endif

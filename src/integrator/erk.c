@@ -1,6 +1,6 @@
 /* Explicit Runge-Kutta steps of ARKODE. Each advance starts ERKStep anew, so that nothing but the
  * length of the next step connects one with the next. */
-#include "integrator_method.h"
+#include "method.h"
 
 #include <float.h>
 #include <math.h>

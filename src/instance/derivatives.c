@@ -1,0 +1,218 @@
+/* Derivatives of an instance's values: with respect to time, and to other variables. */
+#include "internals.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The variable, or NULL with a text that says for what it would have to serve. */
+static const struct variable *
+find_as(const struct instance *instance, unsigned reference,
+        bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
+    const struct variable *variable = instance_find(instance, reference, VARIABLE_REAL);
+    if (variable != NULL && !serves(instance, variable)) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "%s (value reference %u) is refused: %s is expected", variable->name,
+                      reference, expected);
+        return NULL;
+    }
+    return variable;
+}
+
+/* ---- Derivatives with respect to time ------------------------------------------------------- */
+
+static bool is_continuous_input(const struct instance *instance, const struct variable *variable) {
+    (void)instance;
+    return variable->causality == CAUSALITY_INPUT &&
+           variable->variability == VARIABILITY_CONTINUOUS;
+}
+
+static bool is_output(const struct instance *instance, const struct variable *variable) {
+    (void)instance;
+    return variable->causality == CAUSALITY_OUTPUT && variable->owner == VARIABLE_OF_MODEL;
+}
+
+static enum status check_order(const struct instance *instance, const struct variable *variable,
+                               int order, int largest) {
+    if (order >= 1 && order <= largest) {
+        return STATUS_OK;
+    }
+    message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                  "derivative of %s of order %d is refused: an order from 1 to %d is expected",
+                  variable->name, order, largest);
+    return STATUS_INVALID_ARGUMENT;
+}
+
+enum status instance_set_input_derivatives(struct instance *instance, const unsigned references[],
+                                           size_t count, const int orders[],
+                                           const double values[]) {
+    for (size_t i = 0; i < count; i++) {
+        const struct variable *variable =
+            find_as(instance, references[i], is_continuous_input, "a continuous input");
+        if (variable == NULL) {
+            return STATUS_INVALID_ARGUMENT;
+        }
+        const enum status status = check_order(instance, variable, orders[i], POLYNOMIAL_DEGREE);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        if (!isfinite(values[i])) {
+            message_write(&instance->sink, STATUS_NOT_FINITE,
+                          "derivative %g of %s is refused: a finite value is expected", values[i],
+                          variable->name);
+            return STATUS_NOT_FINITE;
+        }
+    }
+    for (size_t i = 0; i < count; i++) {
+        const struct variable *variable = variable_of(instance->description, references[i]);
+        const size_t input = instance_input_index(instance, variable);
+        struct polynomial *pending = &instance->memory.pending[input];
+        pending->d[orders[i]] = values[i];
+        // from now on outputs answer for the input of the next step, as after instance_set_real
+        instance->memory.current[input] = *pending;
+        doubles_of(instance->memory.values, instance->model->inputs)[input] = pending->d[0];
+        instance->outputs_are_valid = false;
+    }
+    return STATUS_OK;
+}
+
+/* Of all calculated values, into instance->first and second, which may be NULL. */
+static enum status propagate(struct instance *instance, double dt, char *second) {
+    const double t = instance->state.time.s;
+    const enum status status =
+        instance->model->propagate(instance->memory.values, t, dt, instance->first, second);
+    if (status != STATUS_OK) {
+        message_write(&instance->sink, status, "no derivatives at t = %.17g: %s", t,
+                      status_text(status));
+    }
+    return status;
+}
+
+/* Derivatives along the motion, twice: those of the states are calculated values, whose own
+ * derivatives are the states' next ones. */
+static enum status derive_by_time(struct instance *instance) {
+    const struct model *model = instance->model;
+    const struct instance_memory *memory = &instance->memory;
+    enum status status = instance_update_outputs(instance);
+    if (status != STATUS_OK) {
+        return status;
+    }
+
+    memset(instance->first, 0, model->values_size);
+    memcpy(doubles_of(instance->first, model->states),
+           doubles_of(memory->values, model->derivatives), model->states.size);
+    for (size_t i = 0; i < count_of(model->inputs); i++) {
+        doubles_of(instance->first, model->inputs)[i] = memory->current[i].d[1];
+    }
+    status = propagate(instance, 1.0, NULL);
+    if (status != STATUS_OK) {
+        return status;
+    }
+
+    memset(instance->second, 0, model->values_size);
+    memcpy(doubles_of(instance->second, model->states),
+           doubles_of(instance->first, model->derivatives), model->states.size);
+    for (size_t i = 0; i < count_of(model->inputs); i++) {
+        doubles_of(instance->second, model->inputs)[i] = memory->current[i].d[2];
+    }
+    return propagate(instance, 1.0, instance->second);
+}
+
+static double value_in(const char *structure, const struct variable *variable) {
+    return *(const double *)(const void *)(structure + variable->offset);
+}
+
+enum status instance_get_output_derivatives(struct instance *instance, const unsigned references[],
+                                            size_t count, const int orders[], double values[]) {
+    for (size_t i = 0; i < count; i++) {
+        const struct variable *variable =
+            find_as(instance, references[i], is_output, "an output of type Real");
+        if (variable == NULL) {
+            return STATUS_INVALID_ARGUMENT;
+        }
+        const enum status status = check_order(instance, variable, orders[i], 2);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    }
+    const enum status status = count > 0 ? derive_by_time(instance) : STATUS_OK;
+    if (status != STATUS_OK) {
+        return status;
+    }
+    for (int writing = 0; writing < 2; writing++) {
+        for (size_t i = 0; i < count; i++) {
+            const struct variable *variable = variable_of(instance->description, references[i]);
+            const double value =
+                value_in(orders[i] == 1 ? instance->first : instance->second, variable);
+            if (!isfinite(value)) {
+                return instance_not_finite(instance, variable->name);
+            }
+            if (writing) {
+                values[i] = value;
+            }
+        }
+    }
+    return STATUS_OK;
+}
+
+/* ---- Derivatives with respect to other variables -------------------------------------------- */
+
+static bool is_unknown(const struct instance *instance, const struct variable *variable) {
+    (void)instance;
+    return variable->owner == VARIABLE_OF_MODEL &&
+           (variable->causality == CAUSALITY_OUTPUT || variable->causality == CAUSALITY_LOCAL);
+}
+
+static bool is_known(const struct instance *instance, const struct variable *variable) {
+    if (variable->owner != VARIABLE_OF_MODEL) {
+        return false;
+    }
+    const size_t from_states = variable->offset - instance->model->states.offset;
+    return variable->causality == CAUSALITY_INPUT || from_states < instance->model->states.size ||
+           (variable->causality == CAUSALITY_PARAMETER &&
+            instance->state.phase == PHASE_INITIALIZATION);
+}
+
+enum status instance_get_directional_derivative(struct instance *instance,
+                                                const unsigned unknowns[], size_t unknown_count,
+                                                const unsigned knowns[], size_t known_count,
+                                                const double v[], double result[]) {
+    for (size_t i = 0; i < unknown_count; i++) {
+        if (find_as(instance, unknowns[i], is_unknown, "an output, a local or a derivative") ==
+            NULL) {
+            return STATUS_INVALID_ARGUMENT;
+        }
+    }
+    for (size_t i = 0; i < known_count; i++) {
+        if (find_as(instance, knowns[i], is_known,
+                    "an input, a state or, in initialization mode, a parameter") == NULL) {
+            return STATUS_INVALID_ARGUMENT;
+        }
+    }
+    enum status status = instance_update_outputs(instance);
+    if (status != STATUS_OK) {
+        return status;
+    }
+
+    memset(instance->first, 0, instance->model->values_size);
+    for (size_t i = 0; i < known_count; i++) {
+        const struct variable *variable = variable_of(instance->description, knowns[i]);
+        *(double *)(void *)(instance->first + variable->offset) += v[i];
+    }
+    status = propagate(instance, 0.0, NULL);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    for (int writing = 0; writing < 2; writing++) {
+        for (size_t i = 0; i < unknown_count; i++) {
+            const struct variable *variable = variable_of(instance->description, unknowns[i]);
+            const double value = value_in(instance->first, variable);
+            if (!isfinite(value)) {
+                return instance_not_finite(instance, variable->name);
+            }
+            if (writing) {
+                result[i] = value;
+            }
+        }
+    }
+    return STATUS_OK;
+}
