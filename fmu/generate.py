@@ -219,7 +219,7 @@ def variable_table(description: Table) -> str:
             f'{value}");'
             for value, item in enumerate(v.get("items", {}).values(), start=1)
         ]
-        kind = "REAL" if v["type"] == "Real" else "INTEGER"
+        kind = "FLOAT64" if v["type"] == "Real" else "INT32"
         rows.append(
             f'    {{{v["reference"]}, "{name}", VARIABLE_{kind}, '
             f"VARIABLE_OF_{v['owner'].upper()}, offsetof({structure}, {v['field']}),\n"

@@ -61,7 +61,8 @@ const struct model oscillator_model = {
     .check_parameters = check_parameters,
 };
 
-#define OF_MODEL(field)          VARIABLE_REAL, VARIABLE_OF_MODEL, offsetof(struct oscillator_values, field)
+#define OF_MODEL(field)                                                                            \
+    VARIABLE_FLOAT64, VARIABLE_OF_MODEL, offsetof(struct oscillator_values, field)
 #define OF_INSTANCE(type, field) type, VARIABLE_OF_INSTANCE, offsetof(struct instance_values, field)
 #define PARAMETER                CAUSALITY_PARAMETER, VARIABILITY_TUNABLE, INITIAL_EXACT
 #define FIXED                    CAUSALITY_PARAMETER, VARIABILITY_FIXED, INITIAL_EXACT
@@ -73,7 +74,7 @@ const struct model oscillator_model = {
 #define ANY                      -INFINITY, INFINITY, 1.0
 
 static const struct variable variables[] = {
-    {0, "time", OF_INSTANCE(VARIABLE_REAL, time), TIME, 0.0, ANY},
+    {0, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
     {1, "omega", OF_MODEL(omega), PARAMETER, 2.0, -10.0, 100.0, 1.0},
     {2, "gain", OF_MODEL(gain), FIXED, 1.0, ANY},
     {10, "x", OF_MODEL(x), STATE, 1.0, ANY},
@@ -81,16 +82,17 @@ static const struct variable variables[] = {
     {20, "u", OF_MODEL(u), INPUT, 0.0, ANY},
     {30, "energy", OF_MODEL(energy), OUTPUT, 0.0, ANY},
     {31, "a", OF_MODEL(a), OUTPUT, 0.0, ANY},
-    {80, "steps", OF_INSTANCE(VARIABLE_INTEGER, solver_steps), COUNTER, 0.0, ANY},
-    {81, "evaluations", OF_INSTANCE(VARIABLE_INTEGER, solver_rhs_evaluations), COUNTER, 0.0, ANY},
-    {82, "relative_tolerance", OF_INSTANCE(VARIABLE_REAL, relative_tolerance), FIXED, 0.0, 0.0,
+    {80, "steps", OF_INSTANCE(VARIABLE_INT32, solver_steps), COUNTER, 0.0, ANY},
+    {81, "evaluations", OF_INSTANCE(VARIABLE_INT32, solver_rhs_evaluations), COUNTER, 0.0, ANY},
+    {82, "relative_tolerance", OF_INSTANCE(VARIABLE_FLOAT64, relative_tolerance), FIXED, 0.0, 0.0,
      INFINITY, 1.0},
-    {83, "max_internal_steps", OF_INSTANCE(VARIABLE_INTEGER, max_internal_steps), FIXED, 100000.0,
+    {83, "max_internal_steps", OF_INSTANCE(VARIABLE_INT32, max_internal_steps), FIXED, 100000.0,
      1.0, INFINITY, 1.0},
-    {84, "effective_relative_tolerance", OF_INSTANCE(VARIABLE_REAL, effective_relative_tolerance),
-     CAUSALITY_LOCAL, VARIABILITY_FIXED, INITIAL_CALCULATED, 0.0, ANY},
-    {90, "solver_method", OF_INSTANCE(VARIABLE_INTEGER, solver_method), FIXED, 1.0, 1.0, 3.0, 1.0},
-    {91, "max_step", OF_INSTANCE(VARIABLE_REAL, max_step), FIXED, 0.0, 0.0, INFINITY, 1.0},
+    {84, "effective_relative_tolerance",
+     OF_INSTANCE(VARIABLE_FLOAT64, effective_relative_tolerance), CAUSALITY_LOCAL,
+     VARIABILITY_FIXED, INITIAL_CALCULATED, 0.0, ANY},
+    {90, "solver_method", OF_INSTANCE(VARIABLE_INT32, solver_method), FIXED, 1.0, 1.0, 3.0, 1.0},
+    {91, "max_step", OF_INSTANCE(VARIABLE_FLOAT64, max_step), FIXED, 0.0, 0.0, INFINITY, 1.0},
 };
 
 static const short row_of_reference[] = {

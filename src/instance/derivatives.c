@@ -8,7 +8,7 @@
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
-    const struct variable *variable = instance_find(instance, reference, VARIABLE_REAL);
+    const struct variable *variable = instance_find(instance, reference, VARIABLE_FLOAT64);
     if (variable != NULL && !serves(instance, variable)) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
                       "%s (value reference %u) is refused: %s is expected", variable->name,

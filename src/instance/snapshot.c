@@ -169,7 +169,7 @@ static void transfer_values(struct codec *codec, const struct model_description 
         if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
             continue;
         }
-        if (variable->type == VARIABLE_REAL) {
+        if (variable->type == VARIABLE_FLOAT64) {
             codec_real(codec, field);
         } else {
             codec_int(codec, field);
@@ -267,7 +267,7 @@ static bool are_settable(const struct instance *instance, const char *values) {
             continue;
         }
         const double value =
-            variable->type == VARIABLE_REAL ? *(const double *)field : *(const int *)field;
+            variable->type == VARIABLE_FLOAT64 ? *(const double *)field : *(const int *)field;
         if (variable_check_value(variable, value, &quiet) != STATUS_OK) {
             return false;
         }

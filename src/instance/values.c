@@ -18,7 +18,7 @@ size_t instance_input_index(const struct instance *instance, const struct variab
 
 void instance_write_field(struct instance *instance, const struct variable *variable,
                           double value) {
-    if (variable->type == VARIABLE_INTEGER) {
+    if (variable->type == VARIABLE_INT32) {
         *(int *)instance_field(instance, variable) = (int)value;
         return;
     }
@@ -40,7 +40,7 @@ static double read_field(struct instance *instance, const struct variable *varia
 
 /* Element i of an array of the C type that belongs to type; every int is exact as a double. */
 static double element(enum variable_type type, const void *values, size_t i) {
-    return type == VARIABLE_REAL ? ((const double *)values)[i] : ((const int *)values)[i];
+    return type == VARIABLE_FLOAT64 ? ((const double *)values)[i] : ((const int *)values)[i];
 }
 
 enum status instance_update_outputs(struct instance *instance) {
@@ -131,18 +131,18 @@ static enum status set(struct instance *instance, enum variable_type type,
 
 enum status instance_set_real(struct instance *instance, const unsigned references[], size_t count,
                               const double values[]) {
-    return set(instance, VARIABLE_REAL, references, count, values);
+    return set(instance, VARIABLE_FLOAT64, references, count, values);
 }
 
 enum status instance_set_integer(struct instance *instance, const unsigned references[],
                                  size_t count, const int values[]) {
-    return set(instance, VARIABLE_INTEGER, references, count, values);
+    return set(instance, VARIABLE_INT32, references, count, values);
 }
 
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
                               double values[]) {
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = instance_find(instance, references[i], VARIABLE_REAL);
+        const struct variable *variable = instance_find(instance, references[i], VARIABLE_FLOAT64);
         if (variable == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
@@ -165,7 +165,7 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
 enum status instance_get_integer(struct instance *instance, const unsigned references[],
                                  size_t count, int values[]) {
     for (size_t i = 0; i < count; i++) {
-        if (instance_find(instance, references[i], VARIABLE_INTEGER) == NULL) {
+        if (instance_find(instance, references[i], VARIABLE_INT32) == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
     }

@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum variable_type { VARIABLE_REAL, VARIABLE_INTEGER };
+enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32 };
 
 /* The structure that holds the value: the model's own or struct instance_values. */
 enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_INSTANCE };

@@ -77,7 +77,7 @@ static double *unwritten(size_t count) {
 
 void fuzz_call_GetReal(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, false);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_FLOAT64, false);
     double *values = unwritten(count);
     const fmi2Status status = FUZZ_CHECKED(instance, GetReal, references, count, values);
     fuzz_assert_written(status, values, count, "fmi2GetReal");
@@ -87,7 +87,7 @@ void fuzz_call_GetReal(struct fuzz_session *session, struct fuzz_instance *insta
 
 void fuzz_call_SetReal(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, true);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_FLOAT64, true);
     double *values = any_reals(session->input, count);
     if (FUZZ_CHECKED(instance, SetReal, references, count, values) == fmi2OK) {
         for (size_t i = 0; i < count; i++) {
@@ -109,13 +109,13 @@ void fuzz_call_SetReal(struct fuzz_session *session, struct fuzz_instance *insta
         free(references);                                                                          \
         free(values);                                                                              \
     }
-GETTER_OF_VALUES(Integer, VARIABLE_INTEGER)
-GETTER_OF_VALUES(Boolean, VARIABLE_REAL)
-GETTER_OF_VALUES(String, VARIABLE_REAL)
+GETTER_OF_VALUES(Integer, VARIABLE_INT32)
+GETTER_OF_VALUES(Boolean, VARIABLE_FLOAT64)
+GETTER_OF_VALUES(String, VARIABLE_FLOAT64)
 
 void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_INTEGER, true);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_INT32, true);
     fmi2Integer *values = any_integers(session->input, count);
     for (size_t i = 0; i < count; i++) {
         if (references[i] == RP_MANIPULATOR_max_internal_steps &&
@@ -132,7 +132,7 @@ void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *in
 
 void fuzz_call_SetBoolean(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, true);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_FLOAT64, true);
     fmi2Boolean *values = any_integers(session->input, count);
     FUZZ_CHECKED(instance, SetBoolean, references, count, values);
     free(references);
@@ -141,7 +141,7 @@ void fuzz_call_SetBoolean(struct fuzz_session *session, struct fuzz_instance *in
 
 void fuzz_call_SetString(struct fuzz_session *session, struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, true);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_FLOAT64, true);
     fmi2String *values = fuzz_array(count, sizeof *values);
     for (size_t i = 0; i < count; i++) {
         values[i] = "%s%n";
@@ -155,8 +155,8 @@ void fuzz_call_GetDirectionalDerivative(struct fuzz_session *session,
                                         struct fuzz_instance *instance) {
     const size_t unknowns = any_count(session->input);
     const size_t knowns = any_count(session->input);
-    fmi2ValueReference *unknown = any_references(session->input, unknowns, VARIABLE_REAL, false);
-    fmi2ValueReference *known = any_references(session->input, knowns, VARIABLE_REAL, false);
+    fmi2ValueReference *unknown = any_references(session->input, unknowns, VARIABLE_FLOAT64, false);
+    fmi2ValueReference *known = any_references(session->input, knowns, VARIABLE_FLOAT64, false);
     double *seed = any_reals(session->input, knowns);
     double *result = unwritten(unknowns);
     const fmi2Status status = FUZZ_CHECKED(instance, GetDirectionalDerivative, unknown, unknowns,
@@ -201,7 +201,7 @@ GETTER_OF_STATES(GetNominalsOfContinuousStates)
 void fuzz_call_SetRealInputDerivatives(struct fuzz_session *session,
                                        struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, true);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_FLOAT64, true);
     if (count > 0 && fuzz_below(session->input, 4) != 0) {
         references[0] = RP_MANIPULATOR_tau1;
     }
@@ -216,7 +216,7 @@ void fuzz_call_SetRealInputDerivatives(struct fuzz_session *session,
 void fuzz_call_GetRealOutputDerivatives(struct fuzz_session *session,
                                         struct fuzz_instance *instance) {
     const size_t count = any_count(session->input);
-    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_REAL, false);
+    fmi2ValueReference *references = any_references(session->input, count, VARIABLE_FLOAT64, false);
     fmi2Integer *orders = any_orders(session->input, count);
     double *values = unwritten(count);
     const fmi2Status status =

@@ -199,7 +199,7 @@ void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
         fuzz_fail("more variables than FUZZ_VARIABLE_CAPACITY");
     }
     for (size_t i = 0; i < model_description.variable_count; i++) {
-        if (model_description.variables[i].type == VARIABLE_REAL) {
+        if (model_description.variables[i].type == VARIABLE_FLOAT64) {
             references[count++] = model_description.variables[i].reference;
         } else if (FUZZ_CHECKED(instance, GetInteger, &model_description.variables[i].reference, 1,
                                 &values->integers[i]) != fmi2OK) {
@@ -211,7 +211,7 @@ void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
     fuzz_assert_written(status, reals, count, "fmi2GetReal");
     count = 0;
     for (size_t i = 0; i < model_description.variable_count; i++) {
-        if (model_description.variables[i].type != VARIABLE_REAL) {
+        if (model_description.variables[i].type != VARIABLE_FLOAT64) {
             continue;
         }
         if (status == fmi2OK) {
