@@ -15,9 +15,10 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from source_copy import ROOT, copy_sources, run, settings_of
+from tests.support.paths import ROOT
+from tests.support.source_copy import copy_sources, run, settings_of
 
 TIME_LIMIT = 120.0  # s, of a test that a mutant may have made endless
 
