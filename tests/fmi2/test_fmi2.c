@@ -9,15 +9,6 @@
 #include <string.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 /* ---- A whole run ---------------------------------------------------------------------------- */
 
 /* The inputs are held over a step: their work in it is tau1 dq1 + f2 dq2 of the displacements. */
@@ -260,24 +251,4 @@ static void test_threads_do_not_disturb_each_other(void) {
         TEST_ASSERT_EQUAL_UINT_MESSAGE(0, work[i].differences, work[i].log.texts);
         TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&work[i].log), work[i].log.texts);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_energy_is_the_work_of_the_inputs);
-    RUN_TEST(test_instantiate_says_what_it_refuses);
-    RUN_TEST(test_instantiate_without_functions_gives_no_instance);
-    RUN_TEST(test_instantiate_without_logger_gives_no_crash);
-    RUN_TEST(test_the_other_callbacks_may_be_null);
-    RUN_TEST(test_nothing_passed_to_instantiate_is_kept);
-    RUN_TEST(test_free_of_nothing_does_nothing);
-    RUN_TEST(test_reset_brings_back_start_values_and_no_experiment);
-    RUN_TEST(test_reset_right_after_instantiate_and_twice);
-    RUN_TEST(test_free_works_in_the_middle_of_a_run);
-    RUN_TEST(test_interleaved_instances_do_not_disturb_each_other);
-    RUN_TEST(test_threads_do_not_disturb_each_other);
-    return UNITY_END();
 }

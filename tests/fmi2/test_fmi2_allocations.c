@@ -1,21 +1,12 @@
 /* Between initialization and Terminate an instance allocates memory for FMU states alone: steps and
  * values cost no call of the allocator, whatever the method and whatever happens. */
 #include "allocations.h"
+#include "each_method.h"
 #include "fmu_sequences.h"
 #include "fmu_snapshots.h"
 
 #include <math.h>
 #include <unity.h>
-
-static struct fmu_log messages;
-static fmi2Integer method;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
 
 static const double h = 0.01; // s
 
@@ -68,7 +59,7 @@ static void assert_steps_allocate_nothing(fmi2Component c, double start, change 
     TEST_ASSERT_EQUAL_INT(fmi2OK, status);
 }
 
-static void test_the_allocations_of_the_fmu_are_counted(void) {
+EACH_METHOD static void test_the_allocations_of_the_fmu_are_counted(void) {
     const long before = allocation_count();
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     const long initialized = allocation_count();
@@ -78,7 +69,7 @@ static void test_the_allocations_of_the_fmu_are_counted(void) {
     fmu_forget(c, &state);
 }
 
-static void test_steps_and_values_allocate_nothing(void) {
+EACH_METHOD static void test_steps_and_values_allocate_nothing(void) {
     static change *const each[] = {change_nothing, change_inputs, set_slopes, change_parameters};
     for (size_t i = 0; i < FMU_COUNT(each); i++) {
         const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
@@ -92,7 +83,7 @@ static void test_steps_and_values_allocate_nothing(void) {
 }
 
 /* Thousands of internal steps, past where the integrator restarts by itself. */
-static void test_a_long_hold_allocates_nothing(void) {
+EACH_METHOD static void test_a_long_hold_allocates_nothing(void) {
     const double length = 20.0;
     const fmi2Component c = fmu_lasting(method, &messages);
     const long before = allocation_count();
@@ -107,7 +98,7 @@ static void test_a_long_hold_allocates_nothing(void) {
 }
 
 /* Its history is found again, or the integrator becomes one of the state's method. */
-static void test_steps_after_a_rollback_allocate_nothing(void) {
+EACH_METHOD static void test_steps_after_a_rollback_allocate_nothing(void) {
     for (fmi2Integer other = FMU_CVODE_ADAMS; other < FMU_METHODS; other++) {
         const fmi2Component source = fmu_initialized_with(method, &messages, 0.0);
         assert_steps_allocate_nothing(source, 0.0, change_nothing);
@@ -129,7 +120,7 @@ static void test_steps_after_a_rollback_allocate_nothing(void) {
     }
 }
 
-static void test_what_is_refused_allocates_nothing(void) {
+EACH_METHOD static void test_what_is_refused_allocates_nothing(void) {
     const fmi2ValueReference reference = RP_MANIPULATOR_tau1;
     const double not_a_number = NAN;
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
@@ -149,7 +140,7 @@ static void test_what_is_refused_allocates_nothing(void) {
 
 /* For want of internal steps, and at a slope that overflows: messages of the solver are passed on.
  */
-static void test_a_step_that_fails_allocates_nothing(void) {
+EACH_METHOD static void test_a_step_that_fails_allocates_nothing(void) {
     for (int overflows = 0; overflows < 2; overflows++) {
         const fmi2Component c = fmu_instantiate(&messages, false);
         fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
@@ -167,20 +158,4 @@ static void test_a_step_that_fails_allocates_nothing(void) {
         assert_steps_allocate_nothing(c, 200.0 * h, change_inputs);
         fmu_free(c);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
-        RUN_TEST(test_the_allocations_of_the_fmu_are_counted);
-        RUN_TEST(test_steps_and_values_allocate_nothing);
-        RUN_TEST(test_a_long_hold_allocates_nothing);
-        RUN_TEST(test_steps_after_a_rollback_allocate_nothing);
-        RUN_TEST(test_what_is_refused_allocates_nothing);
-        RUN_TEST(test_a_step_that_fails_allocates_nothing);
-    }
-    return UNITY_END();
 }

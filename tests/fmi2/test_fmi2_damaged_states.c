@@ -1,6 +1,7 @@
 /* Serialized FMU states that are damaged, foreign or forged are refused, or at least do no harm.
  * FMI 2.0, section 2.1.8; the form of a serialized state is told in src/instance/snapshot.h. */
 #define _POSIX_C_SOURCE 200809L
+#include "each_method.h"
 #include "fmu_snapshots.h"
 
 #include <math.h>
@@ -9,16 +10,6 @@
 #include <string.h>
 #include <unistd.h>
 #include <unity.h>
-
-static struct fmu_log messages;
-static fmi2Integer method; /* of the states that are forged */
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
 
 /* ---- Refused bytes -------------------------------------------------------------------------- */
 
@@ -236,7 +227,7 @@ static void forge(fmi2Component c) {
 
 /* Whatever a state with a valid checksum holds: no crash, no hang, and no value that is not finite.
  */
-static void test_forged_states_do_no_harm(void) {
+EACH_METHOD static void test_forged_states_do_no_harm(void) {
     alarm(100); // s: ends the program where one hangs
     forge(fmu_used(method, &messages));
 
@@ -246,20 +237,4 @@ static void test_forged_states_do_no_harm(void) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(held, 0.125, 0.125, fmi2True));
     forge(held);
     alarm(0);
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_every_damaged_byte_is_noticed);
-    RUN_TEST(test_every_truncation_is_noticed);
-    RUN_TEST(test_trailing_bytes_are_refused);
-    RUN_TEST(test_the_form_is_the_documented_one);
-    RUN_TEST(test_foreign_and_newer_states_are_refused);
-    for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
-        RUN_TEST(test_forged_states_do_no_harm);
-    }
-    return UNITY_END();
 }

@@ -5,15 +5,6 @@
 #include <math.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 static fmi2Status derive(fmi2Component c, fmi2ValueReference reference, fmi2Integer order,
                          double value) {
     return fmu.SetRealInputDerivatives(c, &reference, 1, &order, &value);
@@ -321,23 +312,4 @@ static void test_input_derivatives_that_are_refused(void) {
         }
         fmu_free(c);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_every_order_counts);
-    RUN_TEST(test_derivatives_may_be_set_before_the_first_step);
-    RUN_TEST(test_what_is_not_refreshed_no_longer_applies);
-    RUN_TEST(test_inputs_are_refreshed_one_by_one);
-    RUN_TEST(test_the_order_of_calls_does_not_matter);
-    RUN_TEST(test_a_polynomial_may_be_told_in_parts);
-    RUN_TEST(test_a_polynomial_is_what_many_held_values_tend_to);
-    RUN_TEST(test_no_internal_step_passes_the_end);
-    RUN_TEST(test_outputs_use_the_polynomials_at_the_end);
-    RUN_TEST(test_setting_the_value_again_ends_the_polynomial);
-    RUN_TEST(test_input_derivatives_that_are_refused);
-    return UNITY_END();
 }

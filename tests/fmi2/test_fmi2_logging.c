@@ -8,15 +8,6 @@
 #include <unistd.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 static const char *const categories[] = {"logEvents",      "logStatusWarning", "logStatusDiscard",
                                          "logStatusError", "logStatusFatal",   "logAll"};
 
@@ -277,26 +268,4 @@ static void test_nothing_is_written_to_the_standard_streams(void) {
     TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2Error]); // the last step: all went as planned
     TEST_ASSERT_GREATER_THAN_UINT(1, messages.count[fmi2Discard]);
     fmu_assert_logged(&messages, "CVODE");
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_the_categories_are_those_declared);
-    RUN_TEST(test_the_category_belongs_to_the_status);
-    RUN_TEST(test_unknown_categories_are_named);
-    RUN_TEST(test_missing_categories_are_an_error);
-    RUN_TEST(test_logging_off_still_tells_what_failed);
-    RUN_TEST(test_logging_on_tells_events);
-    RUN_TEST(test_set_debug_logging_silences_all);
-    RUN_TEST(test_only_the_categories_named_are_on);
-    RUN_TEST(test_named_categories_can_be_switched_off);
-    RUN_TEST(test_log_all_shows_every_call);
-    RUN_TEST(test_reset_keeps_the_logging_settings);
-    RUN_TEST(test_messages_carry_the_name_of_the_instance);
-    RUN_TEST(test_hostile_texts_are_made_harmless);
-    RUN_TEST(test_nothing_is_written_to_the_standard_streams);
-    return UNITY_END();
 }

@@ -8,15 +8,6 @@
 #include <string.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 static const fmi2ValueReference states[FMU_STATES] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                       RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
 
@@ -273,24 +264,4 @@ static void test_results_without_a_place_are_errors(void) {
     c = fmu_me_initialized(&messages, 0.0);
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CompletedIntegratorStep(c, fmi2True, &flag, NULL));
     fmu_assert_in_error(c);
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_the_trajectory_is_that_of_co_simulation);
-    RUN_TEST(test_states_are_the_variables);
-    RUN_TEST(test_the_description_declares_the_states);
-    RUN_TEST(test_start_values_are_the_first_states);
-    RUN_TEST(test_nominals_are_positive);
-    RUN_TEST(test_states_that_are_not_finite_are_discarded);
-    RUN_TEST(test_derivatives_that_overflow_are_discarded);
-    RUN_TEST(test_wrong_sizes_and_missing_arrays_are_errors);
-    RUN_TEST(test_time_is_what_is_set);
-    RUN_TEST(test_a_time_that_is_not_finite_is_refused);
-    RUN_TEST(test_there_are_no_events);
-    RUN_TEST(test_results_without_a_place_are_errors);
-    return UNITY_END();
 }

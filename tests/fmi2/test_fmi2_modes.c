@@ -8,15 +8,6 @@
 #include <string.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 /* ---- What may be set ------------------------------------------------------------------------ */
 
 /* Letters of the modes in which the variable can be set: notes of the table of section 3.2.3. */
@@ -186,19 +177,4 @@ static void test_reset_keeps_the_kind(void) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_enter_continuous_time(c, 0.0));
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, 0.0, 0.1, fmi2True));
     fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after a reset");
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_what_may_be_set_in_which_mode);
-    RUN_TEST(test_parameters_tuned_at_an_event_keep_the_states);
-    RUN_TEST(test_parameters_without_inertia_are_refused);
-    RUN_TEST(test_rollback_is_exact);
-    RUN_TEST(test_another_instance_goes_on_from_the_bytes);
-    RUN_TEST(test_both_kinds_side_by_side);
-    RUN_TEST(test_reset_keeps_the_kind);
-    return UNITY_END();
 }

@@ -6,15 +6,6 @@
 #include <math.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 static void step(fmi2Component c, double time, double length) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, time, length, fmi2True));
 }
@@ -175,17 +166,4 @@ static void test_missing_arrays(void) {
         fmu_assert_in_error(c);
         fmu_free(c);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_output_derivatives_of_the_slide);
-    RUN_TEST(test_output_derivatives_agree_with_each_other);
-    RUN_TEST(test_output_derivatives_follow_what_is_set);
-    RUN_TEST(test_output_derivatives_that_are_refused);
-    RUN_TEST(test_missing_arrays);
-    return UNITY_END();
 }

@@ -5,15 +5,6 @@
 #include <math.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 static const fmi2ValueReference state_references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                       RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
 
@@ -197,18 +188,4 @@ static void test_no_value_that_is_not_finite_comes_with_ok(void) {
         fmu_assert_reset_is_fresh(c, "after an extreme run");
         fmu_free(c);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_get_after_set_answers_for_the_new_inputs);
-    RUN_TEST(test_only_the_inputs_at_the_step_count);
-    RUN_TEST(test_tunable_parameters_keep_the_states);
-    RUN_TEST(test_get_of_an_overflow_is_discarded);
-    RUN_TEST(test_a_step_into_overflow_is_discarded);
-    RUN_TEST(test_no_value_that_is_not_finite_comes_with_ok);
-    return UNITY_END();
 }

@@ -1,22 +1,13 @@
 /* Rollback to a saved state is exact to the bit and leaves no trace, wherever and however often it
  * happens. FMI 2.0, section 2.1.8. */
 #define _POSIX_C_SOURCE 200809L
+#include "each_method.h"
 #include "fmu_sequences.h"
 #include "fmu_snapshots.h"
 
 #include <stdio.h>
 #include <time.h>
 #include <unity.h>
-
-static struct fmu_log messages;
-static fmi2Integer method; /* of tests without sequences, which have methods of their own */
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
 
 static struct fmu_sequence sequence;
 static struct fmu_trace expected;
@@ -210,7 +201,7 @@ static void test_rollback_is_exact_in_random_sequences(void) {
 
 /* The integrator's counters too are those of the state, where a step takes no internal step at all:
  * the first slope of the new input overflows. */
-static void test_rollback_is_exact_where_the_first_slope_fails(void) {
+EACH_METHOD static void test_rollback_is_exact_where_the_first_slope_fails(void) {
     struct fmu_values outcomes[2];
     for (int with_detour = 0; with_detour < 2; with_detour++) {
         const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
@@ -246,7 +237,7 @@ static void step_held(fmi2Component c, unsigned step, struct fmu_values *values)
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, values));
 }
 
-static void test_rollback_is_exact_where_nothing_is_set_for_long(void) {
+EACH_METHOD static void test_rollback_is_exact_where_nothing_is_set_for_long(void) {
     static struct fmu_values run[HELD_STEPS];
     const fmi2Component plain = fmu_lasting(method, &messages);
     for (unsigned step = 0; step < HELD_STEPS; step++) {
@@ -281,7 +272,7 @@ static void test_rollback_is_exact_where_nothing_is_set_for_long(void) {
 }
 
 /* Single steps of thousands of internal steps each, repeated after a detour. */
-static void test_rollback_is_exact_over_steps_of_many_internal_steps(void) {
+EACH_METHOD static void test_rollback_is_exact_over_steps_of_many_internal_steps(void) {
     const double length = 20.0;
     struct fmu_values first;
     struct fmu_values again;
@@ -312,7 +303,7 @@ static double seconds(void) {
 }
 
 /* Figures, no assertion: times depend on the machine. */
-static void test_what_a_snapshot_costs_where_inputs_change_at_every_step(void) {
+EACH_METHOD static void test_what_a_snapshot_costs_where_inputs_change_at_every_step(void) {
     enum { STEPS = 5000 };
     const double h = 1e-3;
     double in_save = 0.0;
@@ -347,20 +338,4 @@ static void test_what_a_snapshot_costs_where_inputs_change_at_every_step(void) {
              method, 1e9 * in_save / STEPS, 1e9 * in_restore / STEPS, 1e9 * in_repeat / STEPS,
              1e9 * in_first / STEPS);
     TEST_MESSAGE(text);
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_saving_at_every_step_changes_nothing);
-    RUN_TEST(test_rollback_is_exact_in_random_sequences);
-    for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
-        RUN_TEST(test_rollback_is_exact_where_the_first_slope_fails);
-        RUN_TEST(test_rollback_is_exact_where_nothing_is_set_for_long);
-        RUN_TEST(test_rollback_is_exact_over_steps_of_many_internal_steps);
-        RUN_TEST(test_what_a_snapshot_costs_where_inputs_change_at_every_step);
-    }
-    return UNITY_END();
 }

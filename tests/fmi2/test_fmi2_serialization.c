@@ -1,6 +1,7 @@
 /* Serialized FMU states: always the same bytes, good in other instances and processes. FMI 2.0,
  * section 2.1.8. */
 #define _POSIX_C_SOURCE 200809L
+#include "each_method.h"
 #include "fmu_sequences.h"
 #include "fmu_snapshots.h"
 #include "fmu_states.h"
@@ -12,20 +13,9 @@
 #include <unistd.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-static fmi2Integer method;
-static char **arguments; /* of this program */
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 /* ---- The same bytes ------------------------------------------------------------------------- */
 
-static void test_a_state_is_always_the_same_bytes(void) {
+EACH_METHOD static void test_a_state_is_always_the_same_bytes(void) {
     const fmi2Component c = fmu_used(method, &messages);
     fmi2FMUstate state = fmu_save(c);
     struct fmu_bytes first = fmu_serialize(c, state);
@@ -70,7 +60,7 @@ static void test_instances_in_the_same_state_give_the_same_bytes(void) {
     }
 }
 
-static void test_a_large_buffer_is_filled_as_far_as_needed(void) {
+EACH_METHOD static void test_a_large_buffer_is_filled_as_far_as_needed(void) {
     const fmi2Component c = fmu_used(method, &messages);
     fmi2FMUstate state = fmu_save(c);
     struct fmu_bytes exact = fmu_serialize(c, state);
@@ -85,7 +75,7 @@ static void test_a_large_buffer_is_filled_as_far_as_needed(void) {
     fmu_bytes_free(&large);
 }
 
-static void test_a_small_buffer_is_refused(void) {
+EACH_METHOD static void test_a_small_buffer_is_refused(void) {
     const fmi2Component c = fmu_used(method, &messages);
     fmi2FMUstate state = fmu_save(c);
     struct fmu_bytes exact = fmu_serialize(c, state);
@@ -106,7 +96,7 @@ static void test_a_small_buffer_is_refused(void) {
 }
 
 /* On entry the handle says nothing: importers leave it uninitialized. */
-static void test_the_new_handle_is_only_written(void) {
+EACH_METHOD static void test_the_new_handle_is_only_written(void) {
     int nothing = 0;
     fmi2FMUstate made = &nothing;
     const fmi2Component c = fmu_used(method, &messages);
@@ -146,39 +136,14 @@ static void test_states_of_the_other_kind_are_refused(void) {
 
 /* ---- Another process ------------------------------------------------------------------------ */
 
-/* Restores the state in a file and steps on; writes the values, and the state from before the step
- * serialized anew, to another file. */
-static void continue_from_file(const char *from, const char *to) {
-    static fmi2Byte data[65536];
-    struct fmu_values values;
-    FILE *file = fopen(from, "rb");
-    TEST_ASSERT_NOT_NULL(file);
-    const struct fmu_bytes bytes = {.data = data, .size = fread(data, 1, sizeof data, file)};
-    fclose(file);
-
-    const fmi2Component c = fmu_instantiate(&messages, false);
-    fmu_restore_bytes(c, &bytes);
-    struct fmu_bytes again = fmu_save_bytes(c);
-    fmu_used_step(c, &values);
-    file = fopen(to, "wb");
-    TEST_ASSERT_NOT_NULL(file);
-    TEST_ASSERT_EQUAL_UINT(1, fwrite(&values, sizeof values, 1, file));
-    TEST_ASSERT_EQUAL_UINT(again.size, fwrite(again.data, 1, again.size, file));
-    TEST_ASSERT_EQUAL_INT(0, fclose(file));
-    fmu_bytes_free(&again);
-}
-
-static void test_the_child(void) {
-    continue_from_file(arguments[3], arguments[4]);
-}
-
+/* continue_state.c */
 static void run_child(char *from, char *to) {
     fflush(NULL);
     const pid_t child = fork();
     TEST_ASSERT_TRUE(child >= 0);
     if (child == 0) {
-        char *const child_arguments[] = {arguments[0], arguments[1], arguments[2], from, to, NULL};
-        execv(arguments[0], child_arguments);
+        char *const arguments[] = {CONTINUE_STATE, from, to, NULL};
+        execv(arguments[0], arguments);
         _exit(127);
     }
     int status = -1;
@@ -187,7 +152,7 @@ static void run_child(char *from, char *to) {
     TEST_ASSERT_EQUAL_INT(0, WEXITSTATUS(status));
 }
 
-static void test_another_process_goes_on_with_the_same_bits(void) {
+EACH_METHOD static void test_another_process_goes_on_with_the_same_bits(void) {
     struct fmu_values expected;
     struct fmu_values values;
     char from[] = "fmu-state-XXXXXX";
@@ -215,26 +180,4 @@ static void test_another_process_goes_on_with_the_same_bits(void) {
     fmu_assert_same_bytes(&bytes, &again, "serialized in another process");
     fmu_bytes_free(&bytes);
     fmu_bytes_free(&again);
-}
-
-int main(int argc, char **argv) {
-    arguments = argv;
-    if (!fmu_load(argc == 5 ? 3 : argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    if (argc == 5) {
-        RUN_TEST(test_the_child);
-        return UNITY_END();
-    }
-    RUN_TEST(test_instances_in_the_same_state_give_the_same_bytes);
-    RUN_TEST(test_states_of_the_other_kind_are_refused);
-    for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
-        RUN_TEST(test_a_state_is_always_the_same_bytes);
-        RUN_TEST(test_a_large_buffer_is_filled_as_far_as_needed);
-        RUN_TEST(test_a_small_buffer_is_refused);
-        RUN_TEST(test_the_new_handle_is_only_written);
-        RUN_TEST(test_another_process_goes_on_with_the_same_bits);
-    }
-    return UNITY_END();
 }

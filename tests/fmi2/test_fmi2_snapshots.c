@@ -1,5 +1,6 @@
 /* Handles of FMU states: what they hold in each state of an instance, whose they are, and who frees
  * them. FMI 2.0, section 2.1.8. That rollback is exact: test_fmi2_rollback.c. */
+#include "each_method.h"
 #include "fmu_model_exchange.h"
 #include "fmu_snapshots.h"
 #include "fmu_states.h"
@@ -7,16 +8,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <unity.h>
-
-static struct fmu_log messages;
-static fmi2Integer method; /* of tests that step */
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
 
 static const fmi2Type types[] = {fmi2CoSimulation, fmi2ModelExchange};
 
@@ -104,7 +95,7 @@ static void test_the_time_of_a_failed_step_is_restored(void) {
 }
 
 /* A step that failed is repeated from before it in two halves: section 4.2.2. */
-static void test_a_failed_step_is_repeated_in_smaller_ones(void) {
+EACH_METHOD static void test_a_failed_step_is_repeated_in_smaller_ones(void) {
     const fmi2Component c = fmu_instantiate(&messages, false);
     fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
     fmu_set_integer(c, RP_MANIPULATOR_max_internal_steps, 60);
@@ -122,7 +113,7 @@ static void test_a_failed_step_is_repeated_in_smaller_ones(void) {
 
 /* ---- Handles -------------------------------------------------------------------------------- */
 
-static void test_get_into_a_handle_reuses_it(void) {
+EACH_METHOD static void test_get_into_a_handle_reuses_it(void) {
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     fmi2FMUstate state = fmu_save(c);
     const fmi2FMUstate first = state;
@@ -135,7 +126,7 @@ static void test_get_into_a_handle_reuses_it(void) {
     TEST_ASSERT_TRUE(q1 == fmu_get(c, RP_MANIPULATOR_q1));
 }
 
-static void test_a_restored_copy_stays_valid(void) {
+EACH_METHOD static void test_a_restored_copy_stays_valid(void) {
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     struct fmu_values expected;
     struct fmu_values values;
@@ -156,7 +147,7 @@ static void test_a_restored_copy_stays_valid(void) {
     fmu_bytes_free(&after);
 }
 
-static void test_handles_survive_a_reset_and_an_error(void) {
+EACH_METHOD static void test_handles_survive_a_reset_and_an_error(void) {
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     step(c, 0.0);
     fmi2FMUstate saved = fmu_save(c);
@@ -310,7 +301,7 @@ static void test_null_arguments_are_errors(void) {
 /* ---- Memory --------------------------------------------------------------------------------- */
 
 /* Masters save at every step and never free; FreeInstance does, as the leak check sees. */
-static void test_thousands_that_are_never_freed_do_no_harm(void) {
+EACH_METHOD static void test_thousands_that_are_never_freed_do_no_harm(void) {
     enum { SNAPSHOTS = 20000 };
     const double h = 1.0 / 1024.0;
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
@@ -329,25 +320,4 @@ static void test_thousands_that_are_never_freed_do_no_harm(void) {
     step(c, 0.0);
     step(other, 0.0);
     TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_q1) == fmu_get(other, RP_MANIPULATOR_q1));
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_every_state_is_restored);
-    RUN_TEST(test_the_time_of_a_failed_step_is_restored);
-    RUN_TEST(test_free_sets_null_and_takes_null);
-    RUN_TEST(test_handles_of_others_are_refused);
-    RUN_TEST(test_what_is_no_handle_is_refused);
-    RUN_TEST(test_null_arguments_are_errors);
-    for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
-        RUN_TEST(test_a_failed_step_is_repeated_in_smaller_ones);
-        RUN_TEST(test_get_into_a_handle_reuses_it);
-        RUN_TEST(test_a_restored_copy_stays_valid);
-        RUN_TEST(test_handles_survive_a_reset_and_an_error);
-        RUN_TEST(test_thousands_that_are_never_freed_do_no_harm);
-    }
-    return UNITY_END();
 }

@@ -1,20 +1,11 @@
 /* The parameters of the integrator: solver_method and max_step. That all methods give the same
  * motion: test_solver_methods.py. */
+#include "each_method.h"
 #include "fmu_harness.h"
 
 #include <limits.h>
 #include <math.h>
 #include <unity.h>
-
-static struct fmu_log messages;
-static fmi2Integer method;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
 
 /* ---- What is refused ------------------------------------------------------------------------ */
 
@@ -63,7 +54,7 @@ static void test_both_are_fixed_after_initialization(void) {
 
 /* ---- The method ----------------------------------------------------------------------------- */
 
-static void test_the_order_is_one_of_the_method(void) {
+EACH_METHOD static void test_the_order_is_one_of_the_method(void) {
     static const int highest[FMU_METHODS] = {
         [FMU_CVODE_ADAMS] = 12, [FMU_CVODE_BDF] = 5, [FMU_ERK] = 5};
     static const int lowest_of_last[FMU_METHODS] = {
@@ -81,7 +72,7 @@ static void test_the_order_is_one_of_the_method(void) {
                                      fmu_get_integer(c, RP_MANIPULATOR_solver_last_order));
 }
 
-static void test_a_reset_brings_the_default_method_back(void) {
+EACH_METHOD static void test_a_reset_brings_the_default_method_back(void) {
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     TEST_ASSERT_EQUAL_INT(method, fmu_get_integer(c, RP_MANIPULATOR_solver_method));
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.1, fmi2True));
@@ -91,7 +82,7 @@ static void test_a_reset_brings_the_default_method_back(void) {
 
 /* Also of the solver nothing is left over: the same method again, after steps of all kinds that
  * failed. */
-static void test_a_reset_leaves_nothing_of_what_failed(void) {
+EACH_METHOD static void test_a_reset_leaves_nothing_of_what_failed(void) {
     static const struct {
         fmi2ValueReference reference;
         double value, length;
@@ -120,7 +111,7 @@ static void test_a_reset_leaves_nothing_of_what_failed(void) {
 }
 
 /* CVODE goes past communication points with held inputs; the Runge-Kutta method ends there. */
-static void test_internal_steps_over_communication_points(void) {
+EACH_METHOD static void test_internal_steps_over_communication_points(void) {
     enum { STEPS = 1000 };
     const double h = 1.0 / 1024.0;
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
@@ -167,7 +158,7 @@ static fmi2Component limited(double limit) {
     return c;
 }
 
-static void test_no_internal_step_is_longer_than_the_limit(void) {
+EACH_METHOD static void test_no_internal_step_is_longer_than_the_limit(void) {
     static const double limits[] = {1e-4, 1e-3, 0.01, 0.05};
     static const double lengths[] = {1.0 / 128.0, 0.25};
     struct fmu_values values;
@@ -182,7 +173,7 @@ static void test_no_internal_step_is_longer_than_the_limit(void) {
     }
 }
 
-static void test_no_limit_and_one_that_is_not_reached_change_nothing(void) {
+EACH_METHOD static void test_no_limit_and_one_that_is_not_reached_change_nothing(void) {
     struct fmu_values expected;
     struct fmu_values values;
     const fmi2Component plain = fmu_instantiate(&messages, false);
@@ -209,7 +200,7 @@ static void test_no_limit_and_one_that_is_not_reached_change_nothing(void) {
 }
 
 /* A limit so short that a step cannot end. */
-static void test_a_limit_that_is_too_short_is_told(void) {
+EACH_METHOD static void test_a_limit_that_is_too_short_is_told(void) {
     static const double limits[] = {1e-7, 1e-20, 1e-300, 5e-324};
     for (size_t i = 0; i < FMU_COUNT(limits); i++) {
         const fmi2Component c = limited(limits[i]);
@@ -221,24 +212,4 @@ static void test_a_limit_that_is_too_short_is_told(void) {
         fmu_assert_reset_is_fresh(c, "after a limit that is too short");
         fmu_free(c);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_methods_that_do_not_exist_are_refused);
-    RUN_TEST(test_limits_that_make_no_sense_are_refused);
-    RUN_TEST(test_both_are_fixed_after_initialization);
-    for (method = FMU_CVODE_ADAMS; method < FMU_METHODS; method++) {
-        RUN_TEST(test_the_order_is_one_of_the_method);
-        RUN_TEST(test_a_reset_brings_the_default_method_back);
-        RUN_TEST(test_a_reset_leaves_nothing_of_what_failed);
-        RUN_TEST(test_internal_steps_over_communication_points);
-        RUN_TEST(test_no_internal_step_is_longer_than_the_limit);
-        RUN_TEST(test_no_limit_and_one_that_is_not_reached_change_nothing);
-        RUN_TEST(test_a_limit_that_is_too_short_is_told);
-    }
-    return UNITY_END();
 }

@@ -8,15 +8,6 @@
 #include <string.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 /* The tables of the standard; the letters are those of fmu_states.h. No step is ever pending, so
  * that CancelStep never fits. */
 static const struct {
@@ -242,25 +233,4 @@ static void test_no_instance_is_an_error_and_no_crash(void) {
                                       fmu_call((enum fmu_function)function, NULL, 0.0, step),
                                       fmu_function_names[function]);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_co_simulation_instantiated);
-    RUN_TEST(test_co_simulation_initialization_mode);
-    RUN_TEST(test_co_simulation_step_complete);
-    RUN_TEST(test_co_simulation_step_failed);
-    RUN_TEST(test_co_simulation_terminated);
-    RUN_TEST(test_co_simulation_error);
-    RUN_TEST(test_model_exchange_instantiated);
-    RUN_TEST(test_model_exchange_initialization_mode);
-    RUN_TEST(test_model_exchange_event_mode);
-    RUN_TEST(test_model_exchange_continuous_time_mode);
-    RUN_TEST(test_model_exchange_terminated);
-    RUN_TEST(test_model_exchange_error);
-    RUN_TEST(test_no_instance_is_an_error_and_no_crash);
-    return UNITY_END();
 }

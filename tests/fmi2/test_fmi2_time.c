@@ -7,15 +7,6 @@
 #include <stdio.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 /* ---- Experiments ---------------------------------------------------------------------------- */
 
 static void test_experiments_that_are_refused(void) {
@@ -345,29 +336,4 @@ static void test_status_into_nothing_is_an_error(void) {
         fmu_assert_in_error(c);
         fmu_free(c);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_experiments_that_are_refused);
-    RUN_TEST(test_what_is_not_defined_is_not_looked_at);
-    RUN_TEST(test_initialization_needs_an_experiment);
-    RUN_TEST(test_the_tolerance_parameter_wins_over_the_experiment);
-    RUN_TEST(test_a_finer_tolerance_takes_more_internal_steps);
-    RUN_TEST(test_steps_that_are_refused);
-    RUN_TEST(test_a_mismatch_of_rounding_is_followed);
-    RUN_TEST(test_a_step_that_ends_where_the_instance_is_is_refused);
-    RUN_TEST(test_masters_may_add_up_or_multiply);
-    RUN_TEST(test_a_step_past_the_stop_time_is_refused);
-    RUN_TEST(test_the_stop_time_itself_is_reached_within_slack);
-    RUN_TEST(test_the_start_time_does_not_matter);
-    RUN_TEST(test_the_rollback_hint_changes_nothing);
-    RUN_TEST(test_an_endless_step_is_discarded);
-    RUN_TEST(test_a_failed_step_tells_how_far_it_got);
-    RUN_TEST(test_status_tells_what_can_be_known);
-    RUN_TEST(test_status_into_nothing_is_an_error);
-    return UNITY_END();
 }

@@ -9,15 +9,6 @@
 #include <string.h>
 #include <unity.h>
 
-static struct fmu_log messages;
-
-void setUp(void) {
-    fmu_log_clear(&messages);
-}
-void tearDown(void) {
-    fmu_tear_down(&messages);
-}
-
 /* What a call must not write over. */
 static const double untouched = -12345.678;
 
@@ -379,26 +370,4 @@ static void test_every_variable_is_readable_in_initialization_mode(void) {
             messages.texts);
         TEST_ASSERT_TRUE(fmu_variables[i].is_real ? isfinite(real) : integer >= 0);
     }
-}
-
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_unknown_references_are_named);
-    RUN_TEST(test_type_mismatches_are_named);
-    RUN_TEST(test_missing_arrays);
-    RUN_TEST(test_a_vector_is_set_as_a_whole_or_not_at_all);
-    RUN_TEST(test_a_vector_is_got_as_a_whole_or_not_at_all);
-    RUN_TEST(test_values_out_of_range_are_discarded);
-    RUN_TEST(test_the_bounds_themselves_are_accepted);
-    RUN_TEST(test_an_integer_out_of_range_is_discarded);
-    RUN_TEST(test_no_inertia_at_the_end_of_initialization);
-    RUN_TEST(test_no_inertia_between_steps);
-    RUN_TEST(test_what_cannot_be_set_between_steps);
-    RUN_TEST(test_what_is_calculated_cannot_be_set_before_either);
-    RUN_TEST(test_start_values_and_inputs_are_accepted_before_steps);
-    RUN_TEST(test_every_variable_is_readable_in_initialization_mode);
-    return UNITY_END();
 }

@@ -13,6 +13,8 @@ char *fmu_description;
 struct fmu_variable fmu_variables[FMU_VARIABLE_CAPACITY];
 size_t fmu_variable_count;
 
+struct fmu_log messages;
+
 /* ---- Loading -------------------------------------------------------------------------------- */
 
 static bool load_description(const char *path) {
@@ -45,13 +47,11 @@ static bool load_description(const char *path) {
     return true;
 }
 
-bool fmu_load(int argc, char **argv) {
-    if (argc != 3) {
-        fprintf(stderr, "usage: %s FMU.so modelDescription.xml\n", argv[0]);
-        return false;
-    }
+void fmu_load(void) {
     // never closed: leak reports need the names of its functions
-    return fmu_library_open(argv[1], &fmu) != NULL && load_description(argv[2]);
+    if (fmu_library_open(FMU_LIBRARY, &fmu) == NULL || !load_description(FMU_DESCRIPTION)) {
+        exit(2);
+    }
 }
 
 /* ---- Messages ------------------------------------------------------------------------------- */

@@ -25,9 +25,9 @@ enum { FMU_VARIABLE_CAPACITY = 96 };
 extern struct fmu_variable fmu_variables[FMU_VARIABLE_CAPACITY];
 extern size_t fmu_variable_count;
 
-/* argv[1]: path of the shared object, argv[2]: of its modelDescription.xml. Says what is missing
- * and returns false where one cannot be used. */
-bool fmu_load(int argc, char **argv);
+/* Loads the FMU of this build; says what is missing and ends the program where it cannot be used.
+ */
+void fmu_load(void);
 
 /* ---- Messages ------------------------------------------------------------------------------- */
 
@@ -43,6 +43,9 @@ struct fmu_log {
     char instance_name[64]; /* of the last message */
     unsigned malformed;     /* NULL or empty strings, a '%', a '#' that is not doubled */
 };
+
+/* Of the running test. */
+extern struct fmu_log messages;
 
 fmi2CallbackFunctions fmu_callbacks(struct fmu_log *log);
 void fmu_log_clear(struct fmu_log *log);

@@ -3,9 +3,6 @@
 #include <math.h>
 #include <unity.h>
 
-void setUp(void) {}
-void tearDown(void) {}
-
 static void test_no_time_is_lost_where_doubles_are_coarse(void) {
     // at 1e6 s doubles are 1.2e-10 s apart: each of these steps would be rounded by up to half of
     // it
@@ -53,15 +50,4 @@ static void test_slack_is_small_against_time_and_step(void) {
 static void test_slack_covers_the_rounding_of_a_communication_point(void) {
     const double spacing = nextafter(1e6, INFINITY) - 1e6;
     TEST_ASSERT_TRUE(clock_slack(1e6, 2.0 * spacing) >= spacing);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_no_time_is_lost_where_doubles_are_coarse);
-    RUN_TEST(test_accumulated_steps_meet_their_exact_sum);
-    RUN_TEST(test_time_is_the_rounded_sum);
-    RUN_TEST(test_difference_has_the_sign_of_later_minus_earlier);
-    RUN_TEST(test_slack_is_small_against_time_and_step);
-    RUN_TEST(test_slack_covers_the_rounding_of_a_communication_point);
-    return UNITY_END();
 }

@@ -17,9 +17,6 @@ struct fields {
 
 static const struct fields some = {-0.1, LONG_MIN, INT_MAX, UINT_MAX, true};
 
-void setUp(void) {}
-void tearDown(void) {}
-
 static void transfer(struct codec *codec, struct fields *fields) {
     codec_real(codec, &fields->real);
     codec_long(codec, &fields->number);
@@ -114,14 +111,4 @@ static void test_values_that_a_type_does_not_have_fail(void) {
     int number = 0;
     codec_int(&codec, &number);
     TEST_ASSERT_TRUE(codec.failed);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_what_is_written_is_read);
-    RUN_TEST(test_the_layout_is_little_endian);
-    RUN_TEST(test_any_changed_byte_is_noticed);
-    RUN_TEST(test_any_other_length_is_noticed);
-    RUN_TEST(test_values_that_a_type_does_not_have_fail);
-    return UNITY_END();
 }

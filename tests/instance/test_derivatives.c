@@ -200,16 +200,3 @@ static void test_states_from_outside(void) {
     ASSERT_OK(instance_set_real(instance, &omega, 1, &negative));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, instance_enter_continuous_time(instance));
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_step_follows_the_polynomial);
-    RUN_TEST(test_derivatives_apply_to_one_step);
-    RUN_TEST(test_output_derivatives_along_the_motion);
-    RUN_TEST(test_new_derivatives_start_from_the_value_set_last);
-    RUN_TEST(test_orders_and_variables_that_have_no_derivative_are_refused);
-    RUN_TEST(test_directional_derivatives);
-    RUN_TEST(test_knowns_and_unknowns_that_are_none_are_refused);
-    RUN_TEST(test_states_from_outside);
-    return UNITY_END();
-}

@@ -129,12 +129,3 @@ static void test_a_derivative_that_is_not_finite_is_not_given(void) {
     assert_works(derive_energy);
     assert_works(derive_energy_by_x);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_without_outputs_nothing_is_read_or_derived);
-    RUN_TEST(test_states_are_read_without_outputs);
-    RUN_TEST(test_derivatives_fail_with_any_propagation);
-    RUN_TEST(test_a_derivative_that_is_not_finite_is_not_given);
-    return UNITY_END();
-}

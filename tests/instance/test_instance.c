@@ -322,25 +322,3 @@ static void test_no_values_are_fine(void) {
     ASSERT_OK(instance_get_integer(instance, NULL, 0, NULL));
     instance_destroy(NULL);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_the_start_time_does_not_change_the_motion);
-    RUN_TEST(test_a_master_that_accumulates_its_time_reaches_the_stop_time);
-    RUN_TEST(test_a_small_mismatch_of_the_time_is_integrated);
-    RUN_TEST(test_times_that_do_not_fit_are_refused);
-    RUN_TEST(test_reset_gives_a_fresh_instance);
-    RUN_TEST(test_instances_do_not_disturb_each_other);
-    RUN_TEST(test_a_field_of_another_kind_is_refused);
-    RUN_TEST(test_initialization_needs_an_experiment);
-    RUN_TEST(test_an_experiment_that_makes_no_sense_is_refused);
-    RUN_TEST(test_parameters_must_go_together_at_initialization_and_at_a_step);
-    RUN_TEST(test_the_parameter_wins_over_the_experiment_over_the_default);
-    RUN_TEST(test_outputs_follow_what_was_set_last);
-    RUN_TEST(test_a_vector_is_set_as_a_whole_or_not_at_all);
-    RUN_TEST(test_a_vector_is_read_as_a_whole_or_not_at_all);
-    RUN_TEST(test_a_result_that_is_not_finite_is_not_given);
-    RUN_TEST(test_settings_are_closed_after_initialization);
-    RUN_TEST(test_no_values_are_fine);
-    return UNITY_END();
-}

@@ -2,9 +2,6 @@
 
 #include <unity.h>
 
-void setUp(void) {}
-void tearDown(void) {}
-
 /* 2 - 3 t + 5 t^2 / 2 + 7 t^3 / 6, whose values at small integers are exact to rounding. */
 static const struct polynomial cubic = {{2.0, -3.0, 5.0, 7.0}};
 
@@ -30,12 +27,4 @@ static void test_a_shifted_polynomial_is_the_same_function(void) {
     TEST_ASSERT_EQUAL_DOUBLE(-3.0 + 5.0 * 1.5 + 3.5 * 2.25, shifted.d[1]);
     TEST_ASSERT_EQUAL_DOUBLE(5.0 + 7.0 * 1.5, shifted.d[2]);
     TEST_ASSERT_EQUAL_DOUBLE(7.0, shifted.d[3]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_values_of_a_cubic);
-    RUN_TEST(test_a_held_value_stays_bit_for_bit);
-    RUN_TEST(test_a_shifted_polynomial_is_the_same_function);
-    return UNITY_END();
 }

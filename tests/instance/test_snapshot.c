@@ -1,5 +1,6 @@
 #include "snapshot.h"
 
+#include "each_method.h"
 #include "last_text.h"
 #include "oscillator.h"
 
@@ -9,7 +10,6 @@
 #include <unity.h>
 
 static struct instance *instance;
-static int method;
 
 static struct instance *started(void) {
     struct instance *created = NULL;
@@ -63,7 +63,7 @@ static void step(struct instance *stepped, double h) {
 }
 
 /* Inputs that change at every step, so that each restart relies on the step before. */
-static void test_a_run_of_restarts_goes_on_bit_for_bit(void) {
+EACH_METHOD static void test_a_run_of_restarts_goes_on_bit_for_bit(void) {
     struct instance *other = started();
     struct instance_snapshot *snapshot = NULL;
     struct instance_snapshot *copy = NULL;
@@ -96,7 +96,7 @@ static void test_a_run_of_restarts_goes_on_bit_for_bit(void) {
 }
 
 /* A snapshot from before initialization carries another method. */
-static void test_a_state_of_another_method_can_be_restored(void) {
+EACH_METHOD static void test_a_state_of_another_method_can_be_restored(void) {
     struct instance *other = started();
     struct instance_snapshot *snapshot = NULL;
     struct instance_snapshot *copy = NULL;
@@ -121,7 +121,7 @@ static void test_a_state_of_another_method_can_be_restored(void) {
     instance_destroy(other);
 }
 
-static void test_a_run_goes_on_from_its_history_bit_for_bit(void) {
+EACH_METHOD static void test_a_run_goes_on_from_its_history_bit_for_bit(void) {
     struct instance *other = started();
     struct instance_snapshot *snapshot = NULL;
     for (int i = 0; i < 137; i++) {
@@ -141,7 +141,7 @@ static void test_a_run_goes_on_from_its_history_bit_for_bit(void) {
     instance_destroy(other);
 }
 
-static void test_saving_at_every_step_changes_nothing(void) {
+EACH_METHOD static void test_saving_at_every_step_changes_nothing(void) {
     struct instance *other = started();
     struct instance_snapshot *snapshot = NULL;
     for (int i = 0; i < 200; i++) {
@@ -155,7 +155,7 @@ static void test_saving_at_every_step_changes_nothing(void) {
 
 /* Long enough for restarts without any change; wherever it is restored, they come at the same step.
  */
-static void test_restarts_without_a_change_are_part_of_the_state(void) {
+EACH_METHOD static void test_restarts_without_a_change_are_part_of_the_state(void) {
     struct instance *other = started();
     struct instance_snapshot *snapshot = NULL;
     for (int i = 0; i < 400; i++) {
@@ -172,7 +172,7 @@ static void test_restarts_without_a_change_are_part_of_the_state(void) {
     instance_destroy(other);
 }
 
-static void test_bytes_carry_a_state_to_another_instance(void) {
+EACH_METHOD static void test_bytes_carry_a_state_to_another_instance(void) {
     struct instance *other = started();
     struct instance_snapshot *snapshot = NULL;
     struct instance_snapshot *copy = NULL;
@@ -205,7 +205,7 @@ static void test_bytes_carry_a_state_to_another_instance(void) {
     instance_destroy(other);
 }
 
-static void test_input_derivatives_are_part_of_the_state(void) {
+EACH_METHOD static void test_input_derivatives_are_part_of_the_state(void) {
     struct instance_snapshot *snapshot = NULL;
     const unsigned input = OSCILLATOR_U;
     const int order = 2;
@@ -220,7 +220,7 @@ static void test_input_derivatives_are_part_of_the_state(void) {
     TEST_ASSERT_EQUAL_MEMORY(&expected, &repeated, sizeof expected);
 }
 
-static void test_snapshots_of_others_are_refused(void) {
+EACH_METHOD static void test_snapshots_of_others_are_refused(void) {
     struct instance *other = started();
     struct instance_snapshot *foreign = NULL;
     unsigned char bytes[4096];
@@ -240,7 +240,7 @@ static void test_snapshots_of_others_are_refused(void) {
     instance_destroy(other);
 }
 
-static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
+EACH_METHOD static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
     struct instance_snapshot *snapshots[5] = {NULL};
     static const int order[] = {2, 4, 0, 3, 1};
     for (int i = 0; i < 5; i++) {
@@ -257,7 +257,7 @@ static void test_a_snapshot_can_be_forgotten_in_any_order(void) {
     }
 }
 
-static void test_bytes_that_are_not_sound_are_refused(void) {
+EACH_METHOD static void test_bytes_that_are_not_sound_are_refused(void) {
     struct instance_snapshot *snapshot = NULL;
     struct instance_snapshot *read_back = NULL;
     unsigned char bytes[4096];
@@ -279,21 +279,4 @@ static void test_bytes_that_are_not_sound_are_refused(void) {
     const struct readings after = read(instance);
     TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
     TEST_ASSERT_NULL(read_back);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    for (method = INTEGRATOR_CVODE_ADAMS; method < INTEGRATOR_METHODS; method++) {
-        RUN_TEST(test_a_run_goes_on_from_its_history_bit_for_bit);
-        RUN_TEST(test_a_run_of_restarts_goes_on_bit_for_bit);
-        RUN_TEST(test_a_state_of_another_method_can_be_restored);
-        RUN_TEST(test_saving_at_every_step_changes_nothing);
-        RUN_TEST(test_restarts_without_a_change_are_part_of_the_state);
-        RUN_TEST(test_bytes_carry_a_state_to_another_instance);
-        RUN_TEST(test_input_derivatives_are_part_of_the_state);
-        RUN_TEST(test_snapshots_of_others_are_refused);
-        RUN_TEST(test_a_snapshot_can_be_forgotten_in_any_order);
-        RUN_TEST(test_bytes_that_are_not_sound_are_refused);
-    }
-    return UNITY_END();
 }

@@ -3,6 +3,7 @@
 #include "instance.h"
 
 #include "allocations.h"
+#include "each_method.h"
 #include "last_text.h"
 #include "oscillator.h"
 
@@ -12,7 +13,6 @@
 #include <unity.h>
 
 static struct instance *instance;
-static int method;
 
 /* The oscillator, with a note of how far the integrator has gone. */
 static double latest; /* s: latest time that the right-hand side was evaluated at */
@@ -98,7 +98,7 @@ static void run(struct instance *stepped, int steps, double states[2]) {
 /* ---- Solutions ----------------------------------------------------------------------------------
  */
 
-static void test_held_inputs_give_the_exact_piecewise_solution(void) {
+EACH_METHOD static void test_held_inputs_give_the_exact_piecewise_solution(void) {
     double exact[2] = {1.0, 0.0};
     initialize(instance, 0.0);
     for (int i = 0; i < 300; i++) {
@@ -112,7 +112,7 @@ static void test_held_inputs_give_the_exact_piecewise_solution(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(instance, OSCILLATOR_TIME));
 }
 
-static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
+EACH_METHOD static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
     double exact[2] = {1.0, 0.0};
     initialize(instance, 0.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
@@ -124,7 +124,7 @@ static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
 }
 
-static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
+EACH_METHOD static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
     const unsigned reference = OSCILLATOR_MAX_STEPS;
     const int limit = 20;
     double exact[2] = {1.0, 0.0};
@@ -139,7 +139,7 @@ static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
     TEST_ASSERT_EQUAL_INT(20, get_integer(OSCILLATOR_STEPS));
 }
 
-static void test_setting_the_same_values_again_changes_nothing(void) {
+EACH_METHOD static void test_setting_the_same_values_again_changes_nothing(void) {
     struct instance *untouched = create();
     initialize(instance, 0.0);
     initialize(untouched, 0.0);
@@ -156,7 +156,7 @@ static void test_setting_the_same_values_again_changes_nothing(void) {
     instance_destroy(untouched);
 }
 
-static void test_the_sign_of_zero_is_no_change(void) {
+EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
     initialize(instance, 0.0);
     for (int i = 0; i < 50; i++) {
         ASSERT_OK(set(instance, OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0));
@@ -171,7 +171,7 @@ static void test_the_sign_of_zero_is_no_change(void) {
     TEST_ASSERT_EQUAL_INT(get_integer(OSCILLATOR_STEPS), alternating);
 }
 
-static void test_a_restart_happens_only_where_something_changed(void) {
+EACH_CVODE_METHOD static void test_a_restart_happens_only_where_something_changed(void) {
     double states[2];
     initialize(instance, 0.0);
     for (int i = 0; i < 100; i++) {
@@ -186,7 +186,7 @@ static void test_a_restart_happens_only_where_something_changed(void) {
     TEST_ASSERT_TRUE(get_integer(OSCILLATOR_EVALUATIONS) > get_integer(OSCILLATOR_STEPS));
 }
 
-static void test_steps_allocate_nothing(void) {
+EACH_METHOD static void test_steps_allocate_nothing(void) {
     double states[2];
     initialize(instance, 0.0);
     const long before = allocation_count();
@@ -202,7 +202,7 @@ static void step_held(int steps, double h) {
     }
 }
 
-static void test_internal_steps_pass_points_where_nothing_changes(void) {
+EACH_CVODE_METHOD static void test_internal_steps_pass_points_where_nothing_changes(void) {
     const double h = 1.0 / 1024.0;
     initialize(instance, 0.0);
     step_held(1024, h);
@@ -211,7 +211,7 @@ static void test_internal_steps_pass_points_where_nothing_changes(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(instance, OSCILLATOR_X));
 }
 
-static void test_no_internal_step_passes_the_stop_time(void) {
+EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
     static const double stops[] = {0.5, 0.7, 1.0};
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
         const double h = stops[i] / 100.0;
@@ -225,7 +225,7 @@ static void test_no_internal_step_passes_the_stop_time(void) {
 }
 
 /* In the step with a derivative and in one right after steps that went beyond. */
-static void test_no_internal_step_passes_the_end_of_a_polynomial(void) {
+EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(void) {
     const unsigned input = OSCILLATOR_U;
     const int order = 1;
     const double slope = 0.5;
@@ -241,7 +241,7 @@ static void test_no_internal_step_passes_the_end_of_a_polynomial(void) {
 }
 
 /* What lies beyond is dropped: the solution with the new input begins in the state at the point. */
-static void test_a_new_input_acts_from_the_point_on(void) {
+EACH_METHOD static void test_a_new_input_acts_from_the_point_on(void) {
     const double h = 1.0 / 1024.0;
     const double length = 0.25;
     double exact[2];
@@ -262,7 +262,7 @@ static void test_a_new_input_acts_from_the_point_on(void) {
 
 /* With another parameter there is no first step from before either: bit for bit a new instance that
  * starts in the state at the point, the times being exact. */
-static void test_a_new_parameter_makes_a_new_instance(void) {
+EACH_METHOD static void test_a_new_parameter_makes_a_new_instance(void) {
     const double h = 1.0 / 1024.0;
     double states[2];
     double expected[2];
@@ -325,7 +325,7 @@ static double error_with_jumps(double tolerance, double jump, int every) {
 }
 
 /* No size of jump is so small that going on costs accuracy, or so large that a restart does. */
-static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
+EACH_METHOD static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
     static const double tolerances[] = {1e-4, 1e-6, 1e-8, 1e-10};
     static const int intervals[] = {1, 25};
     for (int i = 0; i < 8; i++) {
@@ -337,32 +337,4 @@ static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
             TEST_ASSERT_TRUE(error <= 2.0 * smallest);
         }
     }
-}
-
-/* All tests with one method. */
-static void run_with(int with) {
-    method = with;
-    RUN_TEST(test_held_inputs_give_the_exact_piecewise_solution);
-    RUN_TEST(test_a_tunable_parameter_acts_from_the_next_step_on);
-    RUN_TEST(test_a_step_that_ends_early_tells_how_far_it_got);
-    RUN_TEST(test_setting_the_same_values_again_changes_nothing);
-    RUN_TEST(test_the_sign_of_zero_is_no_change);
-    RUN_TEST(test_steps_allocate_nothing);
-    RUN_TEST(test_no_internal_step_passes_the_stop_time);
-    RUN_TEST(test_no_internal_step_passes_the_end_of_a_polynomial);
-    RUN_TEST(test_a_new_input_acts_from_the_point_on);
-    RUN_TEST(test_a_new_parameter_makes_a_new_instance);
-    RUN_TEST(test_jumps_of_all_sizes_keep_the_accuracy);
-    if (method != INTEGRATOR_ERK) {
-        RUN_TEST(test_a_restart_happens_only_where_something_changed);
-        RUN_TEST(test_internal_steps_pass_points_where_nothing_changes);
-    }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    run_with(INTEGRATOR_CVODE_ADAMS);
-    run_with(INTEGRATOR_CVODE_BDF);
-    run_with(INTEGRATOR_ERK);
-    return UNITY_END();
 }

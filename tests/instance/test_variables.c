@@ -10,8 +10,6 @@ static const struct message_sink quiet;
 void setUp(void) {
     last_text[0] = '\0';
 }
-void tearDown(void) {}
-
 static const struct variable *get(unsigned reference) {
     const struct variable *variable = variable_find(&oscillator_description, reference);
     TEST_ASSERT_NOT_NULL(variable);
@@ -73,14 +71,4 @@ static void test_values_that_are_not_finite_are_refused_without_a_range_too(void
         TEST_ASSERT_NOT_NULL(strstr(last_text, "x = "));
         TEST_ASSERT_NOT_NULL(strstr(last_text, "a finite value is expected"));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_row_is_found_by_its_reference);
-    RUN_TEST(test_other_references_are_not_found);
-    RUN_TEST(test_what_may_be_set_when);
-    RUN_TEST(test_bounds_belong_to_the_range);
-    RUN_TEST(test_values_that_are_not_finite_are_refused_without_a_range_too);
-    return UNITY_END();
 }

@@ -1,6 +1,7 @@
 #include "integrator.h"
 
 #include "allocations.h"
+#include "each_method.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -41,7 +42,6 @@ static enum status always_failing(double t, const double x[], double dx[], void 
 
 static struct circle circle;
 static struct integrator *integrator;
-static enum integrator_method method;
 static long step_limit;
 static int message_count;
 static enum status message_status;
@@ -91,7 +91,7 @@ void tearDown(void) {
     integrator_destroy(integrator);
 }
 
-static void test_the_state_is_that_of_the_time_asked_for(void) {
+EACH_METHOD static void test_the_state_is_that_of_the_time_asked_for(void) {
     double x[2];
     restart(INFINITY);
     for (int i = 1; i <= 1000; i++) {
@@ -103,7 +103,7 @@ static void test_the_state_is_that_of_the_time_asked_for(void) {
     TEST_ASSERT_EQUAL_INT(0, message_count);
 }
 
-static void test_the_error_follows_the_tolerance(void) {
+EACH_METHOD static void test_the_error_follows_the_tolerance(void) {
     double coarse = INFINITY;
     for (int digits = 4; digits <= 12; digits += 2) {
         double x[2];
@@ -120,7 +120,7 @@ static void test_the_error_follows_the_tolerance(void) {
     }
 }
 
-static void test_asking_for_more_points_costs_no_steps(void) {
+EACH_CVODE_METHOD static void test_asking_for_more_points_costs_no_steps(void) {
     double x[2];
     struct integrator_statistics few;
     struct integrator_statistics many;
@@ -139,7 +139,7 @@ static void test_asking_for_more_points_costs_no_steps(void) {
 }
 
 /* To the bit: where else there was a stop does not matter. */
-static void test_many_points_lie_where_each_lies_alone(void) {
+EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
     enum { POINTS = 300 };
     const double first_step = 1e-6; // otherwise it depends on the first point
     double many[POINTS][2];
@@ -156,7 +156,7 @@ static void test_many_points_lie_where_each_lies_alone(void) {
     }
 }
 
-static void test_a_restart_begins_at_time_zero_from_its_state(void) {
+EACH_METHOD static void test_a_restart_begins_at_time_zero_from_its_state(void) {
     double first[2];
     double again[2];
     restart(INFINITY);
@@ -166,7 +166,7 @@ static void test_a_restart_begins_at_time_zero_from_its_state(void) {
     TEST_ASSERT_EQUAL_MEMORY(first, again, sizeof first);
 }
 
-static void test_nothing_is_evaluated_beyond_the_span(void) {
+EACH_METHOD static void test_nothing_is_evaluated_beyond_the_span(void) {
     double x[2];
     restart(1.0);
     for (int i = 1; i <= 100; i++) {
@@ -182,7 +182,7 @@ static void test_nothing_is_evaluated_beyond_the_span(void) {
 }
 
 /* What a snapshot relies on: where the stops were in between does not matter. */
-static void test_a_run_can_be_repeated_with_two_stops(void) {
+EACH_CVODE_METHOD static void test_a_run_can_be_repeated_with_two_stops(void) {
     double x[2];
     double repeated[2];
     struct integrator_statistics first;
@@ -215,7 +215,7 @@ static void test_a_run_can_be_repeated_with_two_stops(void) {
     TEST_ASSERT_EQUAL_MEMORY(&whole, &second, sizeof whole);
 }
 
-static void test_statistics_add_up_over_restarts(void) {
+EACH_METHOD static void test_statistics_add_up_over_restarts(void) {
     double x[2];
     struct integrator_statistics once;
     struct integrator_statistics thrice;
@@ -238,7 +238,7 @@ static void test_statistics_add_up_over_restarts(void) {
     TEST_ASSERT_EQUAL_INT(0, once.steps);
 }
 
-static void test_too_many_steps_leave_a_valid_state(void) {
+EACH_METHOD static void test_too_many_steps_leave_a_valid_state(void) {
     double x[2];
     double reached;
     configure(1e-10);
@@ -252,7 +252,7 @@ static void test_too_many_steps_leave_a_valid_state(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, message_status);
 }
 
-static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(void) {
+EACH_METHOD static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(void) {
     double x[2];
     double reached;
     circle.failing_from = 1.0;
@@ -264,7 +264,7 @@ static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(vo
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, -sin(reached), x[1]);
 }
 
-static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
+EACH_METHOD static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
     double x[2];
     double reached;
     circle.failing_from = 0.0;
@@ -283,7 +283,7 @@ static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
 }
 
-static void test_a_restart_after_a_failure_works(void) {
+EACH_METHOD static void test_a_restart_after_a_failure_works(void) {
     double x[2];
     double reached;
     circle.failing_from = 1.0;
@@ -295,7 +295,7 @@ static void test_a_restart_after_a_failure_works(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
 }
 
-static void test_nothing_is_allocated_after_creation(void) {
+EACH_METHOD static void test_nothing_is_allocated_after_creation(void) {
     double x[2];
     const long before = allocation_count();
     configure(1e-8);
@@ -309,7 +309,7 @@ static void test_nothing_is_allocated_after_creation(void) {
 }
 
 /* The limit of a new integrator, and of one that had another. */
-static void test_no_step_is_longer_than_the_limit(void) {
+EACH_METHOD static void test_no_step_is_longer_than_the_limit(void) {
     static const double limits[] = {1e-4, 0.0, 0.01};
     double x[2];
     const double absolute[2] = {1e-6, 1e-6};
@@ -335,7 +335,7 @@ static void test_no_step_is_longer_than_the_limit(void) {
 }
 
 /* Whatever state the one before ended with. */
-static void test_another_method_may_take_over(void) {
+EACH_METHOD static void test_another_method_may_take_over(void) {
     static const double not_finite[2] = {NAN, INFINITY};
     const double absolute[2] = {1e-12, 1e-12};
     double x[2];
@@ -355,7 +355,7 @@ static void test_another_method_may_take_over(void) {
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
 }
 
-static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
+EACH_METHOD static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
     static const double limits[] = {1e-3, 1e-9, 5e-324, 1e300};
     const double absolute[2] = {1e-16, 1e-16};
     struct integrator_settings settings = {
@@ -368,7 +368,7 @@ static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
     }
 }
 
-static void test_a_vanishing_step_ends_in_the_same_way_each_time(void) {
+EACH_METHOD static void test_a_vanishing_step_ends_in_the_same_way_each_time(void) {
     static const double lengths[] = {5e-324, 1e-300, 1e-200};
     for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
         enum status statuses[2];
@@ -388,39 +388,6 @@ static void test_a_vanishing_step_ends_in_the_same_way_each_time(void) {
     }
 }
 
-static void test_destroying_nothing_is_allowed(void) {
+EACH_METHOD static void test_destroying_nothing_is_allowed(void) {
     integrator_destroy(NULL);
-}
-
-/* All tests with one method. */
-static void run_with(enum integrator_method with) {
-    method = with;
-    RUN_TEST(test_the_state_is_that_of_the_time_asked_for);
-    RUN_TEST(test_the_error_follows_the_tolerance);
-    RUN_TEST(test_a_restart_begins_at_time_zero_from_its_state);
-    RUN_TEST(test_nothing_is_evaluated_beyond_the_span);
-    RUN_TEST(test_statistics_add_up_over_restarts);
-    RUN_TEST(test_too_many_steps_leave_a_valid_state);
-    RUN_TEST(test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before);
-    RUN_TEST(test_a_right_hand_side_that_fails_at_once_leaves_the_state);
-    RUN_TEST(test_a_restart_after_a_failure_works);
-    RUN_TEST(test_nothing_is_allocated_after_creation);
-    RUN_TEST(test_no_step_is_longer_than_the_limit);
-    RUN_TEST(test_another_method_may_take_over);
-    RUN_TEST(test_a_new_handle_takes_any_limit_and_tolerance);
-    RUN_TEST(test_a_vanishing_step_ends_in_the_same_way_each_time);
-    RUN_TEST(test_destroying_nothing_is_allowed);
-    if (method != INTEGRATOR_ERK) {
-        RUN_TEST(test_asking_for_more_points_costs_no_steps);
-        RUN_TEST(test_many_points_lie_where_each_lies_alone);
-        RUN_TEST(test_a_run_can_be_repeated_with_two_stops);
-    }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    run_with(INTEGRATOR_CVODE_ADAMS);
-    run_with(INTEGRATOR_CVODE_BDF);
-    run_with(INTEGRATOR_ERK);
-    return UNITY_END();
 }

@@ -259,18 +259,3 @@ static void test_the_reserve_of_an_integrator_is_enough(void) {
         integrator_destroy(integrator);
     }
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_blocks_are_zeroed_aligned_and_apart);
-    RUN_TEST(test_no_more_than_there_is_is_given_out);
-    RUN_TEST(test_the_reserve_entered_last_gives);
-    RUN_TEST(test_each_thread_has_its_own_reserve);
-    RUN_TEST(test_without_memory_the_reserve_is_empty);
-    RUN_TEST(test_allocations_come_from_the_reserve_while_there_is_room);
-    RUN_TEST(test_within_an_empty_one_allocations_are_the_program_s_own);
-    RUN_TEST(test_a_block_that_grows_keeps_what_is_in_it);
-    RUN_TEST(test_a_product_that_overflows_is_no_small_block);
-    RUN_TEST(test_the_reserve_of_an_integrator_is_enough);
-    return UNITY_END();
-}

@@ -280,18 +280,3 @@ static void test_a_vector_is_one_block_and_operations_take_none(void) {
     N_VDestroy(another);
     destroy();
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_linear_sum);
-    RUN_TEST(test_elementwise_operations);
-    RUN_TEST(test_reductions);
-    RUN_TEST(test_linear_combination);
-    RUN_TEST(test_operations_on_arrays_of_vectors);
-    RUN_TEST(test_polynomial_of_noted_terms);
-    RUN_TEST(test_more_terms_than_there_is_room_for_are_not_noted);
-    RUN_TEST(test_length);
-    RUN_TEST(test_nan_stays_in_the_norm);
-    RUN_TEST(test_a_vector_is_one_block_and_operations_take_none);
-    return UNITY_END();
-}

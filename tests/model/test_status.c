@@ -3,9 +3,6 @@
 #include <string.h>
 #include <unity.h>
 
-void setUp(void) {}
-void tearDown(void) {}
-
 #define LISTED(code, severity, text) code,
 static const enum status all[] = {STATUS_LIST(LISTED)};
 enum { COUNT = sizeof all / sizeof all[0] };
@@ -57,14 +54,4 @@ static void test_a_long_message_is_cut_and_none_is_needed(void) {
 
     const struct message_sink none = {0};
     message_write(&none, STATUS_OK, "%s", longer);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_every_status_has_a_text_of_its_own);
-    RUN_TEST(test_only_ok_is_without_severity);
-    RUN_TEST(test_an_unknown_status_is_an_error);
-    RUN_TEST(test_a_message_arrives_formatted);
-    RUN_TEST(test_a_long_message_is_cut_and_none_is_needed);
-    return UNITY_END();
 }

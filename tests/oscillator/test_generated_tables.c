@@ -7,9 +7,6 @@
 #include <string.h>
 #include <unity.h>
 
-void setUp(void) {}
-void tearDown(void) {}
-
 static void test_rows_are_those_written_by_hand(void) {
     for (size_t i = 0; i < oscillator_description.variable_count; i++) {
         const struct variable *expected = &oscillator_description.variables[i];
@@ -43,12 +40,4 @@ static void test_names_and_references_of_the_header(void) {
     TEST_ASSERT_EQUAL_INT(OSCILLATOR_ENERGY, OSCILLATOR_energy);
     TEST_ASSERT_EQUAL_STRING("energy", variable_find(&model_description, OSCILLATOR_energy)->name);
     TEST_ASSERT_TRUE(model_description.default_tolerance == 1e-8);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rows_are_those_written_by_hand);
-    RUN_TEST(test_every_row_is_found_by_its_reference);
-    RUN_TEST(test_names_and_references_of_the_header);
-    return UNITY_END();
 }

@@ -24,7 +24,6 @@ enum { METHODS = 3, MIDDLE = 5 /* step of the run that faults happen after */ };
 
 static struct fmu_run expected[2][METHODS + 1]; /* by kind and method */
 static struct fmu_run actual;
-static struct fmu_log messages;
 static char about[200];
 static unsigned faults;
 
@@ -272,20 +271,9 @@ static void test_the_rest_allocates_nothing(void) {
     }
 }
 
-/* ---- Main ----------------------------------------------------------------------------------- */
+/* ---- Begin and end of each test ------------------------------------------------------------- */
 
-void setUp(void) {
-    fmu_log_clear(&messages);
-    captured_stderr_begin();
-}
-
-void tearDown(void) {
-    (void)allocator_stop();
-    TEST_ASSERT_EQUAL_STRING_MESSAGE("", captured_stderr_end(), about);
-    fmu_tear_down(&messages);
-}
-
-static void test_runs_without_faults(void) {
+static void run_without_faults(void) {
     for (int kind = fmi2ModelExchange; kind <= fmi2CoSimulation; kind++) {
         for (int method = 1; method <= METHODS; method++) {
             const struct subject subject = {(fmi2Type)kind, method, true};
@@ -299,18 +287,23 @@ static void test_runs_without_faults(void) {
     }
 }
 
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_runs_without_faults);
-    RUN_TEST(test_instantiate);
-    RUN_TEST(test_snapshots);
-    RUN_TEST(test_initialization_allocates_nothing);
-    RUN_TEST(test_restoring_allocates_nothing);
-    RUN_TEST(test_the_rest_allocates_nothing);
-    const int result = UNITY_END();
-    printf("figures: allocation faults; executions %u; findings %d\n", faults, result);
-    return result;
+void suiteSetUp(void) {
+    fmu_load();
+}
+
+void setUp(void) {
+    fmu_log_clear(&messages);
+    captured_stderr_begin();
+    run_without_faults();
+}
+
+void tearDown(void) {
+    (void)allocator_stop();
+    TEST_ASSERT_EQUAL_STRING_MESSAGE("", captured_stderr_end(), about);
+    fmu_tear_down(&messages);
+}
+
+int suiteTearDown(int failures) {
+    printf("figures: allocation faults; executions %u; findings %d\n", faults, failures);
+    return failures;
 }

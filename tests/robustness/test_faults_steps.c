@@ -12,7 +12,6 @@
 
 enum { METHODS = 3, MOST_STEPS = 400 };
 
-static struct fmu_log messages;
 static char about[120];
 static unsigned discarded;
 
@@ -192,6 +191,10 @@ static void test_erk(void) {
     overcome_all(3);
 }
 
+void suiteSetUp(void) {
+    fmu_load();
+}
+
 void setUp(void) {
     fmu_log_clear(&messages);
     captured_stderr_begin();
@@ -202,15 +205,7 @@ void tearDown(void) {
     fmu_tear_down(&messages);
 }
 
-int main(int argc, char **argv) {
-    if (!fmu_load(argc, argv)) {
-        return 2;
-    }
-    UNITY_BEGIN();
-    RUN_TEST(test_cvode_adams);
-    RUN_TEST(test_cvode_bdf);
-    RUN_TEST(test_erk);
-    const int result = UNITY_END();
-    printf("figures: step faults; executions %u; findings %d\n", discarded, result);
-    return result;
+int suiteTearDown(int failures) {
+    printf("figures: step faults; executions %u; findings %d\n", discarded, failures);
+    return failures;
 }

@@ -176,13 +176,14 @@ static unsigned run_threads(unsigned thread_count, unsigned instance_count) {
 }
 
 int main(int argc, char **argv) {
-    const long threads = argc == 5 ? strtol(argv[3], NULL, 10) : 0;
-    const long instances = argc == 5 ? strtol(argv[4], NULL, 10) : 0;
+    const long threads = argc == 3 ? strtol(argv[1], NULL, 10) : 0;
+    const long instances = argc == 3 ? strtol(argv[2], NULL, 10) : 0;
     if (threads < 1 || threads > MOST_THREADS || instances < 1) {
-        fprintf(stderr, "usage: %s FMU.so modelDescription.xml THREADS INSTANCES\n", argv[0]);
+        fprintf(stderr, "usage: %s THREADS INSTANCES\n", argv[0]);
         return 2;
     }
-    if (!fmu_load(3, argv) || !run_alone()) {
+    fmu_load();
+    if (!run_alone()) {
         return 2;
     }
     return run_threads((unsigned)threads, (unsigned)instances) == 0 ? 0 : 1;

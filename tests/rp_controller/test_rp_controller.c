@@ -312,19 +312,3 @@ static void test_integral_follows_extrapolated_inputs(void) {
     ASSERT_CLOSE(1.0 + Ki * (e * h + r * h * h / 2.0 + b * h * h * h / 6.0),
                  get(RP_CONTROLLER_integral1), 1e-10);
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_computed_torque_makes_the_error_dynamics_linear);
-    RUN_TEST(test_gravity_compensation_holds_the_arm);
-    RUN_TEST(test_pd_is_computed_torque_of_two_free_masses);
-    RUN_TEST(test_efforts_stay_within_their_limits);
-    RUN_TEST(test_calculated_fields_are_written_and_not_read);
-    RUN_TEST(test_integral_ramps_up_and_meets_the_limit);
-    RUN_TEST(test_integral_decays_out_of_the_limit_and_ramps_down);
-    RUN_TEST(test_unlimited_effort_exceeds_the_limit_by_what_is_predicted);
-    RUN_TEST(test_effort_leaves_the_limit_without_delay);
-    RUN_TEST(test_integral_rests_without_gain);
-    RUN_TEST(test_integral_follows_extrapolated_inputs);
-    return UNITY_END();
-}

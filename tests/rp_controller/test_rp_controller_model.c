@@ -29,8 +29,6 @@ void setUp(void) {
     random_source.state = 7;
     text[0] = '\0';
 }
-void tearDown(void) {}
-
 /* Gains of the integral part at joint 2 alone; limits that are far or exceeded everywhere. */
 static void next_point(int mode, bool is_limited) {
     memset(&at, 0, sizeof at);
@@ -118,12 +116,4 @@ static void test_an_arm_without_inertia_is_refused(void) {
     TEST_ASSERT_EQUAL_STRING("the inertia m1 lc1^2 + I1z + I2z = 0 is refused: it must be above 0 "
                              "(m1 = 2, lc1 = 0, I1z = 0, I2z = 0)",
                              text);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_derivatives_along_curves_are_those_of_the_fields);
-    RUN_TEST(test_what_is_integrated_are_the_rates_that_are_output);
-    RUN_TEST(test_an_arm_without_inertia_is_refused);
-    return UNITY_END();
 }

@@ -119,12 +119,3 @@ static void test_joint_loads_that_drive_are_the_efforts(void) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, force, get(RP_MANIPULATOR_f2_z));
     }
 }
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_free_motion_conserves_energy);
-    RUN_TEST(test_horizontal_motion_conserves_the_generalized_momentum);
-    RUN_TEST(test_the_energy_gained_is_the_work_of_the_efforts);
-    RUN_TEST(test_joint_loads_that_drive_are_the_efforts);
-    return UNITY_END();
-}

@@ -16,8 +16,6 @@ static struct rp_test_state s;
 void setUp(void) {
     random_source.state = 7;
 }
-void tearDown(void) {}
-
 static void next_sample(void) {
     rp_test_random_parameters(&random_source, &p);
     rp_test_random_state(&random_source, &s);
@@ -450,26 +448,4 @@ static void test_link_1_needs_some_inertia(void) {
     expect_valid(true, &p.I1z, 1e-12);
     expect_valid(true, &p.I2z, 1e-12);
     expect_valid(false, &p.I2z, -1e-12);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_mass_matrix_is_the_jacobian_form);
-    RUN_TEST(test_mass_matrix_is_symmetric_positive_definite);
-    RUN_TEST(test_christoffel_symbols_are_their_definition);
-    RUN_TEST(test_mass_matrix_rate_less_twice_coriolis_is_skew);
-    RUN_TEST(test_potential_energy_is_weight_times_height);
-    RUN_TEST(test_gravity_forces_are_the_gradient_of_the_potential);
-    RUN_TEST(test_kinetic_energy_is_that_of_two_moving_bodies);
-    RUN_TEST(test_inverse_dynamics_is_14_and_15);
-    RUN_TEST(test_forward_dynamics_inverts_inverse_dynamics);
-    RUN_TEST(test_energy_and_momentum_balance);
-    RUN_TEST(test_dynamics_jacobians_are_the_derivatives);
-    RUN_TEST(test_upright_slide_falls_freely);
-    RUN_TEST(test_centripetal_force_keeps_a_steady_rotation);
-    RUN_TEST(test_massless_slide_leaves_a_compound_pendulum);
-    RUN_TEST(test_weightless_arm_leaves_link_2_a_projectile);
-    RUN_TEST(test_parameters_outside_their_range_are_refused);
-    RUN_TEST(test_link_1_needs_some_inertia);
-    return UNITY_END();
 }

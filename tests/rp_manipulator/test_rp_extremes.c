@@ -1,5 +1,6 @@
 /* Values so extreme that the integrator's own arithmetic underflows or overflows: a step is then
  * right or refused, never wrong. */
+#include "each_method.h"
 #include "instance.h"
 #include "model_description.h"
 #include "value_references.h"
@@ -9,7 +10,6 @@
 #include <unity.h>
 
 static struct instance *instance;
-static int method;
 
 void setUp(void) {
     const struct message_sink quiet = {0};
@@ -49,7 +49,7 @@ static void start_sliding(double dq2, double f2) {
     initialize();
 }
 
-static void test_a_huge_speed_is_integrated_or_refused(void) {
+EACH_METHOD static void test_a_huge_speed_is_integrated_or_refused(void) {
     for (int exponent = 0; exponent <= 304; exponent += 4) {
         const double dq2 = pow(10.0, exponent);
         const double h = 1e-3;
@@ -63,7 +63,7 @@ static void test_a_huge_speed_is_integrated_or_refused(void) {
     }
 }
 
-static void test_a_huge_force_is_integrated_or_refused(void) {
+EACH_METHOD static void test_a_huge_force_is_integrated_or_refused(void) {
     for (int exponent = 0; exponent <= 304; exponent += 4) {
         const double f2 = pow(10.0, exponent);
         start_sliding(0.0, f2);
@@ -79,7 +79,7 @@ static void test_a_huge_force_is_integrated_or_refused(void) {
     }
 }
 
-static void test_tiny_steps_are_done_or_refused(void) {
+EACH_METHOD static void test_tiny_steps_are_done_or_refused(void) {
     for (int exponent = -323; exponent <= -1; exponent++) {
         const double h = pow(10.0, exponent);
         start_sliding(1.0, 0.0);
@@ -93,7 +93,7 @@ static void test_tiny_steps_are_done_or_refused(void) {
     }
 }
 
-static void test_the_state_is_that_of_the_time_reached(void) {
+EACH_METHOD static void test_the_state_is_that_of_the_time_reached(void) {
     set(RP_MANIPULATOR_l1, 1e212);
     set(RP_MANIPULATOR_g, -9e-20);
     initialize();
@@ -103,15 +103,4 @@ static void test_the_state_is_that_of_the_time_reached(void) {
                           status_severity(status));
     TEST_ASSERT_EQUAL_DOUBLE(status == STATUS_OK ? 4e209 : 0.0, instance_time(instance));
     TEST_ASSERT_TRUE(isfinite(get(RP_MANIPULATOR_q1)) && isfinite(get(RP_MANIPULATOR_q2)));
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    for (method = INTEGRATOR_CVODE_ADAMS; method < INTEGRATOR_METHODS; method++) {
-        RUN_TEST(test_a_huge_speed_is_integrated_or_refused);
-        RUN_TEST(test_a_huge_force_is_integrated_or_refused);
-        RUN_TEST(test_tiny_steps_are_done_or_refused);
-        RUN_TEST(test_the_state_is_that_of_the_time_reached);
-    }
-    return UNITY_END();
 }

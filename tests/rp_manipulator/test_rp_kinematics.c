@@ -16,8 +16,6 @@ static struct rp_test_state s;
 void setUp(void) {
     random_source.state = 11;
 }
-void tearDown(void) {}
-
 static void next_sample(void) {
     rp_test_random_parameters(&random_source, &p);
     rp_test_random_state(&random_source, &s);
@@ -357,24 +355,4 @@ static void test_inverse_kinematics_refuses_what_it_cannot_reach(void) {
         expect_refused(bad[i], INFINITY); /* hypot(NAN, INFINITY) is INFINITY */
     }
     expect_refused(DBL_MAX, DBL_MAX); /* finite, but its distance is not */
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_angular_jacobian_turns_about_z0);
-    RUN_TEST(test_linear_jacobians_are_derivatives_of_positions);
-    RUN_TEST(test_linear_jacobians_are_3);
-    RUN_TEST(test_dh_table_is_that_of_the_notes);
-    RUN_TEST(test_dh_transform_is_the_product_of_its_four_motions);
-    RUN_TEST(test_forward_kinematics_is_the_pose_in_the_figure);
-    RUN_TEST(test_end_effector_position_is_that_of_frame_2);
-    RUN_TEST(test_end_effector_velocity);
-    RUN_TEST(test_inverse_kinematics_gives_back_the_joint_variables);
-    RUN_TEST(test_inverse_kinematics_reaches_the_target_on_both_branches);
-    RUN_TEST(test_inverse_kinematics_keeps_q1_in_range_on_the_axes);
-    RUN_TEST(test_inverse_kinematics_at_the_smallest_distance);
-    RUN_TEST(test_inverse_kinematics_of_the_origin);
-    RUN_TEST(test_inverse_kinematics_over_the_whole_range_of_double);
-    RUN_TEST(test_inverse_kinematics_refuses_what_it_cannot_reach);
-    return UNITY_END();
 }

@@ -20,8 +20,6 @@ static double s1, c1, q2, L, dq1, dq2, ddq1, ddq2;
 void setUp(void) {
     random_source.state = 13;
 }
-void tearDown(void) {}
-
 static void next_sample(void) {
     rp_test_random_parameters(&random_source, &p);
     rp_test_random_state(&random_source, &s);
@@ -238,17 +236,4 @@ static void test_recursion_as_printed_is_short_of_14(void) {
         largest = fmax(largest, fabs(missing) / bound);
     }
     TEST_ASSERT_TRUE(largest > 1e9); /* far above the rounding */
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_link_motion_is_16_to_18);
-    RUN_TEST(test_link_accelerations_are_second_derivatives_of_positions);
-    RUN_TEST(test_joint_loads_are_19_to_25);
-    RUN_TEST(test_torque_is_the_moment_of_both_links_about_the_joint_axis);
-    RUN_TEST(test_plane_motion_loads_nothing_out_of_the_plane);
-    RUN_TEST(test_both_recursions_together_are_one_after_the_other);
-    RUN_TEST(test_newton_euler_gives_the_generalized_forces_of_euler_lagrange);
-    RUN_TEST(test_recursion_as_printed_is_short_of_14);
-    return UNITY_END();
 }

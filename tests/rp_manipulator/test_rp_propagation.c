@@ -71,8 +71,6 @@ static union point bounds; /* its majorants */
 void setUp(void) {
     random_source.state = 17;
 }
-void tearDown(void) {}
-
 /* The functions whose derivatives are tested. */
 static void calculate(union point *point) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_model.outputs(point, 0.0));
@@ -457,18 +455,4 @@ static void test_model_offers_it_to_the_instance(void) {
     memcpy(rates, (const char *)&x + rp_model.derivatives.offset, sizeof rates);
     TEST_ASSERT_TRUE(rates[0] == x.v.dq[0] && rates[1] == x.v.dq[1]);
     TEST_ASSERT_TRUE(rates[2] == x.v.ddq[0] && rates[3] == x.v.ddq[1]);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_first_derivatives_are_those_of_the_plain_functions);
-    RUN_TEST(test_second_derivatives_are_those_of_the_first_on_curves);
-    RUN_TEST(test_first_derivatives_of_the_accelerations_are_the_jacobians);
-    RUN_TEST(test_fields_change_with_the_units_as_their_dimensions_say);
-    RUN_TEST(test_derivatives_are_zero_exactly_where_nothing_depends);
-    RUN_TEST(test_first_derivatives_are_linear_and_second_ones_quadratic_in_the_seed);
-    RUN_TEST(test_motion_obeys_its_balances);
-    RUN_TEST(test_calculated_fields_are_written_and_not_read);
-    RUN_TEST(test_model_offers_it_to_the_instance);
-    return UNITY_END();
 }

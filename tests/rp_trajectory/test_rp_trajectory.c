@@ -20,8 +20,6 @@ void setUp(void) {
     p = rp_trajectory_example;
     last_text[0] = '\0';
 }
-void tearDown(void) {}
-
 /* The circle that contains the axis of joint 1. */
 static void set_around(void) {
     p.center[0] = 0.05;
@@ -424,27 +422,4 @@ static void test_arrays_of_no_states(void) {
     double x = 0.0;
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_get_states(instance, &x, 1));
     instance_destroy(instance);
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_forward_kinematics_of_the_joints_gives_the_path);
-    RUN_TEST(test_the_start_is_the_principal_solution);
-    RUN_TEST(test_ends_are_reached_exactly);
-    RUN_TEST(test_a_line_along_an_axis_keeps_the_other_coordinate);
-    RUN_TEST(test_joints_are_twice_continuously_differentiable);
-    RUN_TEST(test_the_later_segment_holds_at_a_boundary);
-    RUN_TEST(test_the_later_segment_holds_where_a_ramp_ends_or_begins);
-    RUN_TEST(test_derivatives_along_time_are_the_rates);
-    RUN_TEST(test_it_rests_before_and_after);
-    RUN_TEST(test_q1_goes_on_without_a_jump);
-    RUN_TEST(test_q1_follows_a_line_over_the_negative_axis);
-    RUN_TEST(test_distance_of_a_line);
-    RUN_TEST(test_distance_of_an_arc);
-    RUN_TEST(test_an_arc_may_leave_out_what_is_out_of_reach);
-    RUN_TEST(test_what_belongs_to_another_motion_is_not_checked);
-    RUN_TEST(test_steps_follow_the_motion);
-    RUN_TEST(test_snapshots_and_their_bytes_go_back);
-    RUN_TEST(test_arrays_of_no_states);
-    return UNITY_END();
 }

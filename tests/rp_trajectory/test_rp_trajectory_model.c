@@ -16,8 +16,6 @@ void setUp(void) {
     v.parameters.start_angle = 0.25;
     text[0] = '\0';
 }
-void tearDown(void) {}
-
 /* Calculated fields in the order of the structure. */
 enum { DQ = 2, DDQ = 4, VELOCITY = 8, FIELDS = 10 };
 
@@ -188,19 +186,4 @@ static void test_the_nearest_point_of_an_arc_may_be_an_end(void) {
                               rp_trajectory_model.check_parameters(&v, text, sizeof text));
         TEST_ASSERT_NOT_NULL(strstr(text, "(0.25, 0.25) m is refused: there it is 0.353553 m"));
     }
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_rates_along_time_are_the_fields);
-    RUN_TEST(test_rates_along_parameters_are_those_of_the_fields);
-    RUN_TEST(test_there_is_no_state);
-    RUN_TEST(test_start_values_are_accepted);
-    RUN_TEST(test_a_circle_needs_a_frequency);
-    RUN_TEST(test_a_circle_needs_time_for_its_ramps);
-    RUN_TEST(test_a_path_at_the_smallest_distance_is_refused);
-    RUN_TEST(test_a_path_stays_beyond_the_smallest_distance);
-    RUN_TEST(test_a_circle_about_the_axis_is_everywhere_as_near);
-    RUN_TEST(test_the_nearest_point_of_an_arc_may_be_an_end);
-    return UNITY_END();
 }
