@@ -1,6 +1,6 @@
-/* Several solvers do the same work in turns, again and again. */
-#ifndef BENCH_TURNS_H
-#define BENCH_TURNS_H
+/* Several solvers do the same work in turns, again and again: their times and errors. */
+#ifndef BENCH_RACE_H
+#define BENCH_RACE_H
 
 #include "fmu_run.h"
 #include "mujoco_run.h"
@@ -19,7 +19,7 @@ struct run {
     int substeps; /* of MuJoCo in a communication step */
 };
 
-struct turns {
+struct race {
     int count;
     int repeats;
     struct run runs[MOST_RUNS];
@@ -28,29 +28,29 @@ struct turns {
     struct fmu_counts counts[MOST_RUNS]; /* where the solver is the FMU */
 };
 
-void turns_add(struct turns *turns, struct run run);
+void race_add(struct race *race, struct run run);
 
 /* The plain loop at the tolerance at which the FMU runs with CVODE, and the FMU with each method.
  */
-void turns_add_usual(struct turns *turns, const struct fmu_functions *fmu, double tolerance);
+void race_add_usual(struct race *race, const struct fmu_functions *fmu, double tolerance);
 
-void turns_take(struct turns *turns, const struct fmu_functions *fmu, const struct problem *problem,
-                int repeats);
+void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
+              int repeats);
 
 /* Index of the run with this name, -1: none. */
-int turns_find(const struct turns *turns, const char *name);
+int race_find(const struct race *race, const char *name);
 
 /* Medians over the repeats: time of a communication step, and its ratio to another run's. */
-double turns_us(const struct turns *turns, int run);
-double turns_ratio(const struct turns *turns, int run, int peer);
+double race_us(const struct race *race, int run);
+double race_ratio(const struct race *race, int run, int peer);
 
 /* Prints a line and writes a row for each run; targets of the ratio to the first run, or NULL. */
-void turns_report(const struct turns *turns, struct report *report, const char *group,
-                  const char *work, const struct problem *problem, const struct target *targets);
+void race_report(const struct race *race, struct report *report, const char *group,
+                 const char *work, const struct problem *problem, const struct target *targets);
 
 /* The largest tolerance on a grid of quarter decades from 1e-3 on from which on down to 1e-12 no
  * error is above the bound. MuJoCo: sets the substeps instead. */
-void turns_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
-                double bound);
+void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
+               double bound);
 
 #endif
