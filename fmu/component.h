@@ -4,6 +4,7 @@
 
 #include "calls.h"
 #include "instance.h"
+#include "platform.h"
 
 #include "fmi2Functions.h"
 
@@ -46,18 +47,16 @@ bool component_has_arrays(struct component *component, enum call call, size_t co
 fmi2Status component_status(struct component *component, enum status status);
 
 /* Error that the adapter itself finds; takes the component into STATE_ERROR. */
-__attribute__((format(printf, 2, 3))) fmi2Status component_fail(struct component *component,
-                                                                const char *format, ...);
+PRINTF_FORMAT(2, 3) fmi2Status component_fail(struct component *component, const char *format, ...);
 
-__attribute__((format(printf, 4, 5))) void component_log(const struct component *component,
-                                                         fmi2Status status,
-                                                         enum log_category category,
-                                                         const char *format, ...);
+PRINTF_FORMAT(4, 5)
+void component_log(const struct component *component, fmi2Status status, enum log_category category,
+                   const char *format, ...);
 
 /* Logs an error of a call that has no component yet; functions and name may be NULL. */
-__attribute__((format(printf, 3, 4))) void
-component_log_refusal(const fmi2CallbackFunctions *functions, const char *name, const char *format,
-                      ...);
+PRINTF_FORMAT(3, 4)
+void component_log_refusal(const fmi2CallbackFunctions *functions, const char *name,
+                           const char *format, ...);
 
 /* Switches a category by name, logAll all of them; false where there is none of that name. */
 bool component_set_logged(struct component *component, const char *category, bool on);

@@ -5,17 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The integrator runs at this fraction of the tolerance asked for.
- * CVODE: each restart, one per change of an input, adds an error of the order of the local
- * tolerance, and thousands of them add up. Larger: faster and less accurate.
- * erk: the largest power of ten at which its error, measured with steps of 1 ms to 2 s, is that of
- * CVODE or less (at one of 31 points a fifth more); with shorter steps it is that of rounding. */
-static const double tolerance_fractions[INTEGRATOR_METHODS] = {
-    [INTEGRATOR_CVODE_ADAMS] = 2e-3,
-    [INTEGRATOR_CVODE_BDF] = 2e-3,
-    [INTEGRATOR_ERK] = 1e-2,
-};
-
 /* Absolute tolerance of a state, over relative tolerance times nominal value. */
 static const double absolute_fraction = 1e-2;
 
@@ -130,9 +119,11 @@ void instance_update_tolerance(struct instance *instance) {
     } else if (state->experiment.tolerance_defined) {
         tolerance = state->experiment.tolerance;
     }
-    state->own.effective_relative_tolerance = fmin(
-        fmax(tolerance_fractions[state->own.solver_method] * tolerance, INSTANCE_FINEST_TOLERANCE),
-        INSTANCE_COARSEST_TOLERANCE);
+    state->own.effective_relative_tolerance =
+        fmin(fmax(integrator_tolerance_fraction((enum integrator_method)state->own.solver_method) *
+                      tolerance,
+                  INSTANCE_FINEST_TOLERANCE),
+             INSTANCE_COARSEST_TOLERANCE);
 }
 
 void instance_set_clock(struct instance *instance, struct clock_time time) {

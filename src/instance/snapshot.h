@@ -26,33 +26,32 @@ struct instance_snapshot;
  * number that the caller wants back. A snapshot is owned by its instance: instance_destroy frees
  * it.
  */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_save(struct instance *instance, unsigned tag, struct instance_snapshot **snapshot);
+MUST_CHECK NONNULL enum status instance_save(struct instance *instance, unsigned tag,
+                                             struct instance_snapshot **snapshot);
 
 /* The snapshot stays valid. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_restore(struct instance *instance, struct instance_snapshot *snapshot);
+MUST_CHECK NONNULL enum status instance_restore(struct instance *instance,
+                                                struct instance_snapshot *snapshot);
 
 /* Frees *snapshot and sets it to NULL. */
-__attribute__((nonnull)) enum status instance_forget(struct instance *instance,
-                                                     struct instance_snapshot **snapshot);
+NONNULL enum status instance_forget(struct instance *instance, struct instance_snapshot **snapshot);
 
 /* The tag that the snapshot was saved with, and the phase the instance was in. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_snapshot_tag(struct instance *instance, struct instance_snapshot *snapshot, unsigned *tag,
-                      enum phase *phase);
+MUST_CHECK NONNULL enum status instance_snapshot_tag(struct instance *instance,
+                                                     struct instance_snapshot *snapshot,
+                                                     unsigned *tag, enum phase *phase);
 
 /* Bytes that instance_serialize writes. */
-__attribute__((nonnull)) size_t instance_serialized_size(const struct instance *instance);
+NONNULL size_t instance_serialized_size(const struct instance *instance);
 
 /* bytes: size bytes, size at least instance_serialized_size. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_serialize(struct instance *instance, struct instance_snapshot *snapshot,
-                   unsigned char bytes[], size_t size);
+MUST_CHECK NONNULL enum status instance_serialize(struct instance *instance,
+                                                  struct instance_snapshot *snapshot,
+                                                  unsigned char bytes[], size_t size);
 
 /* A new snapshot from what instance_serialize of any instance of the same model wrote. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_deserialize(struct instance *instance, const unsigned char bytes[], size_t size,
-                     struct instance_snapshot **snapshot);
+MUST_CHECK NONNULL enum status instance_deserialize(struct instance *instance,
+                                                    const unsigned char bytes[], size_t size,
+                                                    struct instance_snapshot **snapshot);
 
 #endif
