@@ -97,6 +97,7 @@ static const struct {
     enum log_category category;
 } of_severity[] = {
     [SEVERITY_NONE] = {fmi2OK, LOG_EVENTS},
+    [SEVERITY_NOTICE] = {fmi2OK, LOG_STATUS_WARNING},
     [SEVERITY_DISCARD] = {fmi2Discard, LOG_STATUS_DISCARD},
     [SEVERITY_ERROR] = {fmi2Error, LOG_STATUS_ERROR},
 };

@@ -2,7 +2,9 @@
  * right or refused, never wrong. */
 #include "instance.h"
 #include "model_description.h"
+#include "stepping.h"
 #include "value_references.h"
+#include "values.h"
 
 #include <float.h>
 #include <math.h>

@@ -3,8 +3,11 @@
 #include "instance.h"
 
 #include "allocations.h"
+#include "derivatives.h"
 #include "last_text.h"
 #include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <math.h>
 #include <stdint.h>

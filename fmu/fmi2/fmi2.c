@@ -1,8 +1,11 @@
 /* The functions that Model Exchange and Co-Simulation share (FMI 2.0, section 2.1): checks of
  * arguments that only FMI has, conversion of types and status, and nothing else. */
 #include "component.h"
+#include "derivatives.h"
 #include "model_description.h"
+#include "serialization.h"
 #include "snapshot.h"
+#include "values.h"
 
 #include <string.h>
 

@@ -1,5 +1,7 @@
 /* The functions of FMI 2.0 that Co-Simulation has of its own (section 4.2). */
 #include "component.h"
+#include "derivatives.h"
+#include "stepping.h"
 
 /* ---- Derivatives of inputs and outputs ------------------------------------------------------- */
 

@@ -1,6 +1,7 @@
 /* The functions of FMI 2.0 that Model Exchange has of its own (section 3.2). Units have no events
  * of their own and no event indicators. */
 #include "component.h"
+#include "continuous_states.h"
 
 /* ---- Modes ---------------------------------------------------------------------------------- */
 
