@@ -8,7 +8,9 @@
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 set(FMU_SOURCES
   ${FMU_SOURCE_DIR}/component.c
+  ${FMU_SOURCE_DIR}/fmu_state.c
   ${FMU_SOURCE_DIR}/fmi2/fmi2.c
+  ${FMU_SOURCE_DIR}/fmi2/fmi2_calls.c
   ${FMU_SOURCE_DIR}/fmi2/fmi2_co_simulation.c
   ${FMU_SOURCE_DIR}/fmi2/fmi2_model_exchange.c)
 
