@@ -1,31 +1,18 @@
 #include "fields.h"
 
-const struct variable *instance_find(const struct instance *instance, unsigned reference,
-                                     enum variable_type type) {
+const struct variable *instance_refuse_reference(const struct instance *instance,
+                                                 unsigned reference, enum variable_type type) {
     const struct variable *variable = variable_find(instance->description, reference);
     if (variable == NULL) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
                       "value reference %u is unknown: %s has no such variable", reference,
                       instance->description->name);
-        return NULL;
-    }
-    if (variable->type != type) {
+    } else {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
                       "%s (value reference %u) is accessed as %s: it is of type %s", variable->name,
                       reference, variable_type_name(type), variable_type_name(variable->type));
-        return NULL;
     }
-    return variable;
-}
-
-void *instance_field(struct instance *instance, const struct variable *variable) {
-    char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
-                                                           : (char *)(void *)&instance->state.own;
-    return structure + variable->offset;
-}
-
-size_t instance_input_index(const struct instance *instance, const struct variable *variable) {
-    return (variable->offset - instance->model->inputs.offset) / sizeof(double);
+    return NULL;
 }
 
 void instance_write_field(struct instance *instance, const struct variable *variable,

@@ -189,12 +189,13 @@ static enum status restart(void *memory, const double x[]) {
  * are until the next internal step. It computes the powers of the time with a product for each
  * factor: most of the cost of a short communication step. So the columns are noted once per
  * internal step, and all points within the step come from Horner's scheme. */
-static void evaluate_history(struct cvode *cvode, double t) {
+static void evaluate_history(struct cvode *cvode, double t, double x[]) {
     double internal = 0.0;
     double last_step = 0.0;
     (void)CVodeGetCurrentTime(cvode->solver, &internal);
     (void)CVodeGetLastStep(cvode->solver, &last_step);
-    small_vector_polynomial(&cvode->columns, (t - internal) / last_step, cvode->base.x);
+    small_vector_polynomial(&cvode->columns, (t - internal) / last_step,
+                            cvode->base.problem->ode.state_count, x);
 }
 
 static bool interpolate(void *memory, double t, double x[]) {
@@ -202,12 +203,12 @@ static bool interpolate(void *memory, double t, double x[]) {
     if (cvode->columns.count == 0) {
         return false;
     }
-    evaluate_history(cvode, t);
-    sundials_get_state(&cvode->base, x);
+    evaluate_history(cvode, t, x);
     return true;
 }
 
-static int integrate(struct cvode *cvode, double t, long max_steps, double *stopped_at) {
+static int integrate(struct cvode *cvode, double t, long max_steps, double *stopped_at,
+                     double x[]) {
     const struct problem *problem = cvode->base.problem;
     int flag = CVodeSetMaxNumSteps(cvode->solver, max_steps);
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
@@ -218,6 +219,7 @@ static int integrate(struct cvode *cvode, double t, long max_steps, double *stop
         flag = CVodeSetStopTime(cvode->solver, problem->span);
     }
     if (flag != CV_SUCCESS) {
+        sundials_get_state(&cvode->base, x);
         return flag;
     }
     cvode->columns.count = 0;
@@ -226,7 +228,9 @@ static int integrate(struct cvode *cvode, double t, long max_steps, double *stop
     small_vector_note_terms(cvode->base.x, NULL);
     // as at all other points within the step: where the stops are does not matter
     if (flag == CV_SUCCESS && cvode->columns.count > 0) {
-        evaluate_history(cvode, t);
+        evaluate_history(cvode, t, x);
+    } else {
+        sundials_get_state(&cvode->base, x);
     }
     return flag;
 }
@@ -253,12 +257,12 @@ static void measure_work(struct cvode *cvode, struct method_work *work) {
     cvode->counted = now;
 }
 
-static enum status advance(void *memory, double t, long max_steps, double *stopped_at, double x[],
-                           struct method_work *work) {
+static enum status advance(void *memory, double t, long max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work) {
     struct cvode *cvode = memory;
-    const int flag = integrate(cvode, t, max_steps, stopped_at);
+    (void)begin_x; // CVODE has it
+    const int flag = integrate(cvode, t, max_steps, stopped_at, x);
     measure_work(cvode, work);
-    sundials_get_state(&cvode->base, x);
     return status_of_flag(cvode->base.problem, flag);
 }
 

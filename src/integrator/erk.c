@@ -138,13 +138,15 @@ static void add_work(const struct erk *erk, struct method_work *work) {
 
 /* Step by step, after ERKStep has failed: it gives up at the first right-hand side that cannot be
  * evaluated, and then reports the time of that evaluation, not the one of its last state. Here ever
- * shorter steps are tried. x: the state at begin, and in the end the last valid one. */
+ * shorter steps are tried. x: the last valid state. */
 static int advance_carefully(struct erk *erk, double begin, double end, long max_steps,
-                             double *stopped_at, double x[], struct method_work *work) {
+                             const double begin_x[], double *stopped_at, double x[],
+                             struct method_work *work) {
     const struct problem *problem = erk->base.problem;
     double step = end - begin;
     double good = begin; // the time of x
-    sundials_set_state(&erk->base, x);
+    sundials_set_state(&erk->base, begin_x);
+    sundials_get_state(&erk->base, x);
     int flag = start(erk, begin, end, erk->next_step);
     for (long steps = 0; flag >= 0 && good < end; steps++) {
         if (steps == max_steps) {
@@ -170,13 +172,13 @@ static int advance_carefully(struct erk *erk, double begin, double end, long max
     return flag;
 }
 
-static int integrate(struct erk *erk, double t, long max_steps, double *stopped_at, double x[],
-                     struct method_work *work) {
+static int integrate(struct erk *erk, double t, long max_steps, const double begin_x[],
+                     double *stopped_at, double x[], struct method_work *work) {
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
-    sundials_set_state(&erk->base, x);
+    sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
         flag = ERK(SetMaxNumSteps)(erk->solver, max_steps);
@@ -186,7 +188,7 @@ static int integrate(struct erk *erk, double t, long max_steps, double *stopped_
     }
     if (flag < 0 && flag != ARK_TOO_MUCH_WORK) {
         add_work(erk, work);
-        flag = advance_carefully(erk, begin, t, max_steps, stopped_at, x, work);
+        flag = advance_carefully(erk, begin, t, max_steps, begin_x, stopped_at, x, work);
     } else {
         sundials_get_state(&erk->base, x);
     }
@@ -194,16 +196,18 @@ static int integrate(struct erk *erk, double t, long max_steps, double *stopped_
     return flag;
 }
 
-static enum status advance(void *memory, double t, long max_steps, double *stopped_at, double x[],
-                           struct method_work *work) {
+static enum status advance(void *memory, double t, long max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work) {
     struct erk *erk = memory;
     const struct problem *problem = erk->base.problem;
     if (t - problem->reached < shortest_advance) {
         erk->next_step = 0.0;
         work->internal = problem->reached;
+        sundials_set_state(&erk->base, begin_x);
+        sundials_get_state(&erk->base, x);
         return status_of_flag(problem, ARK_TOO_CLOSE);
     }
-    const int flag = integrate(erk, t, max_steps, stopped_at, x, work);
+    const int flag = integrate(erk, t, max_steps, begin_x, stopped_at, x, work);
     if (flag < 0 || ERK(GetCurrentStep)(erk->solver, &erk->next_step) < 0 ||
         !isfinite(erk->next_step)) {
         erk->next_step = 0.0;

@@ -18,7 +18,7 @@ struct integrator {
     /* one value per state each, parts of values */
     double *absolute_tolerances;
     double *reached_x; /* the state at problem.reached */
-    double *x;
+    double *x;         /* where the method writes */
     double values[];
 };
 
@@ -177,19 +177,20 @@ static bool has_reached(const struct integrator *integrator, double t) {
            integrator->internal >= t * (1.0 - 1e-12);
 }
 
+/* x becomes the state reached. */
 static void accept(struct integrator *integrator, double t) {
+    double *reached_x = integrator->x;
+    integrator->x = integrator->reached_x;
+    integrator->reached_x = reached_x;
     integrator->problem.reached = t;
-    memcpy(integrator->reached_x, integrator->x,
-           integrator->problem.ode.state_count * sizeof(double));
 }
 
 static enum status advance(struct integrator *integrator, double t, long max_steps) {
     struct problem *problem = &integrator->problem;
     struct method_work work = {0};
     double stopped_at = problem->reached;
-    memcpy(integrator->x, integrator->reached_x, problem->ode.state_count * sizeof(double));
-    enum status status = integrator->method->advance(integrator->memory, t, max_steps, &stopped_at,
-                                                     integrator->x, &work);
+    enum status status = integrator->method->advance(
+        integrator->memory, t, max_steps, integrator->reached_x, &stopped_at, integrator->x, &work);
     add_work(integrator, &work);
     if (status == STATUS_OK) {
         stopped_at = t;

@@ -39,11 +39,12 @@ struct method {
     /* Starts from x at time 0, with what stands in problem. */
     enum status (*restart)(void *memory, const double x[]);
 
-    /* Integrates from problem->reached, where the state is x, to t in max_steps internal steps at
-     * most. Writes the last valid time to *stopped_at, also on failure, and the state there to x.
+    /* Integrates from problem->reached, where the state is begin_x, to t in max_steps internal
+     * steps at most. Writes the last valid time to *stopped_at, also on failure, and the state
+     * there to x.
      */
-    enum status (*advance)(void *memory, double t, long max_steps, double *stopped_at, double x[],
-                           struct method_work *work);
+    enum status (*advance)(void *memory, double t, long max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work);
 
     /* Writes the state at t, which the last internal step has passed, to x; false: it cannot, an
      * advance must. NULL with no history. */

@@ -17,18 +17,43 @@ struct problem {
     long evaluation_count; /* calls of the right-hand side */
 };
 
-/* Writes f(t, x) to dx; STATUS_NOT_FINITE where that fails or is not finite. */
-MUST_CHECK NONNULL enum status problem_rhs(struct problem *problem, double t, const double x[],
-                                           double dx[]);
+/* All values are finite: 0 x is 0 for finite values only. */
+static inline bool problem_are_finite(const double values[], size_t count) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; i++) {
+        sum += 0.0 * values[i];
+    }
+    return sum == 0.0;
+}
+
+/* Writes f(t, x) to dx; STATUS_NOT_FINITE if that fails or is not finite. Inline, as these calls
+ * are most of a step. */
+static inline enum status problem_rhs(struct problem *problem, double t, const double x[],
+                                      double dx[]) {
+    const struct ode *ode = &problem->ode;
+    problem->evaluation_count++;
+    if (ode->rhs(t, x, dx, ode->context) == STATUS_OK && problem_are_finite(dx, ode->state_count)) {
+        return STATUS_OK;
+    }
+    problem->failed_at = t;
+    return STATUS_NOT_FINITE;
+}
 
 /* Writes the Jacobian as in ode.h; fails as problem_rhs. */
-MUST_CHECK NONNULL enum status problem_jacobian(struct problem *problem, double t, const double x[],
-                                                double J[]);
+static inline enum status problem_jacobian(struct problem *problem, double t, const double x[],
+                                           double J[]) {
+    const struct ode *ode = &problem->ode;
+    if (ode->jacobian(t, x, J, ode->context) == STATUS_OK &&
+        problem_are_finite(J, ode->state_count * ode->state_count)) {
+        return STATUS_OK;
+    }
+    problem->failed_at = t;
+    return STATUS_NOT_FINITE;
+}
 
 /* Stuck in front of a time at which the right-hand side cannot be evaluated. */
-NONNULL bool problem_is_stuck(const struct problem *problem);
-
-/* All values are finite. */
-NONNULL bool problem_are_finite(const double values[], size_t count);
+static inline bool problem_is_stuck(const struct problem *problem) {
+    return problem->failed_at >= problem->reached;
+}
 
 #endif

@@ -186,16 +186,17 @@ ALWAYS_INLINE void polynomial(sunindextype n, const struct small_vector_terms *t
     }
 }
 
-void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x) {
-    switch (length_of(x)) {
+void small_vector_polynomial(const struct small_vector_terms *terms, double s, size_t length,
+                             double x[]) {
+    switch (length) {
     case 2:
-        polynomial(2, terms, s, small_vector_data(x));
+        polynomial(2, terms, s, x);
         break;
     case 4:
-        polynomial(4, terms, s, small_vector_data(x));
+        polynomial(4, terms, s, x);
         break;
     default:
-        polynomial(length_of(x), terms, s, small_vector_data(x));
+        polynomial((sunindextype)length, terms, s, x);
     }
 }
 

@@ -111,7 +111,7 @@ enum status sundials_warm_up(void *memory) {
         status = method->restart(memory, x);
     }
     if (status == STATUS_OK) {
-        status = method->advance(memory, 1.0, 100, &stopped_at, x, &work);
+        status = method->advance(memory, 1.0, 100, x, &stopped_at, x, &work);
     }
     *problem = wanted;
     return status;
