@@ -1,5 +1,6 @@
-/* Derivatives of an instance's values: with respect to time, and to other variables. */
-#include "internals.h"
+#include "derivatives.h"
+
+#include "fields.h"
 
 #include <math.h>
 #include <string.h>

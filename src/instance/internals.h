@@ -1,5 +1,5 @@
-/* Inside of an instance, shared by the files that make it up: instance.c (life), stepping.c (from
- * one communication point to the next), access.c (values), derivatives.c, snapshot.c. */
+/* What an instance is made of. Private to this library; its functions are in the header of the same
+ * name as their file. */
 #ifndef INSTANCE_INTERNALS_H
 #define INSTANCE_INTERNALS_H
 
@@ -15,6 +15,10 @@ enum { INSTANCE_LONGEST_HISTORY = 1000 };
  * above, results have no digit left. */
 #define INSTANCE_FINEST_TOLERANCE   1e-14
 #define INSTANCE_COARSEST_TOLERANCE 1e-2
+
+/* The experiment's tolerance is taken up to here: masters pass their own, made for coarser models
+ * (Maestro's is 0.1), and results would lose their digits. */
+#define INSTANCE_COARSEST_EXPERIMENT_TOLERANCE 1e-4
 
 /* All that later results depend on, but for the values in struct instance_memory. A plain value: a
  * snapshot is a copy of it. */
@@ -79,48 +83,5 @@ static inline size_t count_of(struct span span) {
 static inline double *doubles_of(char *values, struct span span) {
     return (double *)(void *)(values + span.offset);
 }
-
-/* The place of a variable's value. */
-void *instance_field(struct instance *instance, const struct variable *variable);
-
-void instance_write_field(struct instance *instance, const struct variable *variable, double value);
-
-/* Index of an input variable among the inputs. */
-size_t instance_input_index(const struct instance *instance, const struct variable *variable);
-
-/* The variable with this reference and type, or NULL with a text. */
-const struct variable *instance_find(const struct instance *instance, unsigned reference,
-                                     enum variable_type type);
-
-/* Says that what cannot be computed; STATUS_NOT_FINITE. */
-enum status instance_not_finite(const struct instance *instance, const char *what);
-
-/* Brings the calculated values up to date; says why where that fails. */
-enum status instance_update_outputs(struct instance *instance);
-
-/* Settings that follow from values: the tolerance that the integrator runs at. */
-void instance_update_tolerance(struct instance *instance);
-
-void instance_set_clock(struct instance *instance, struct clock_time time);
-
-/* An experiment that can be run; says why where it cannot. */
-enum status instance_check_experiment(const struct instance *instance,
-                                      const struct instance_experiment *experiment);
-
-/* The parameters go together; says why where they do not. */
-enum status instance_check_parameters(const struct instance *instance);
-
-/* Gives the integrator the method, tolerance and limits it has to run with. */
-enum status instance_configure_integrator(struct instance *instance);
-
-/* Brings state.next_step up to date, which costs too much to be done after each step. */
-void instance_update_next_step(struct instance *instance);
-
-/* What the integrator was configured with is not what the values ask for. */
-bool instance_is_configured_otherwise(const struct instance *instance);
-
-/* Right-hand side of the integrator and its derivatives by the states; context: the instance. */
-ode_rhs instance_rhs;
-ode_jacobian instance_jacobian;
 
 #endif

@@ -30,8 +30,9 @@ static inline double *small_vector_data(N_Vector vector) {
  * terms NULL: no longer. */
 void small_vector_note_terms(N_Vector x, struct small_vector_terms *terms);
 
-/* x = sum of data[k] s^(count - 1 - k): the terms as the coefficients of a polynomial, that of the
- * highest power first. count > 0. */
-void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x);
+/* x = sum of data[k] s^(count - 1 - k), length elements: the terms as the coefficients of a
+ * polynomial, that of the highest power first. count > 0. */
+void small_vector_polynomial(const struct small_vector_terms *terms, double s, size_t length,
+                             double x[]);
 
 #endif

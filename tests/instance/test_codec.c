@@ -19,10 +19,10 @@ static const struct fields some = {-0.1, LONG_MIN, INT_MAX, UINT_MAX, true};
 
 static void transfer(struct codec *codec, struct fields *fields) {
     codec_real(codec, &fields->real);
-    codec_long(codec, &fields->number);
-    codec_int(codec, &fields->small);
-    codec_unsigned(codec, &fields->natural);
-    codec_bool(codec, &fields->flag);
+    codec_long(codec, "number", &fields->number);
+    codec_int(codec, "small", &fields->small);
+    codec_unsigned(codec, "natural", &fields->natural);
+    codec_bool(codec, "flag", &fields->flag);
 }
 
 static size_t written(unsigned char bytes[128]) {
@@ -37,7 +37,8 @@ static size_t written(unsigned char bytes[128]) {
     transfer(&writing, &fields);
     codec_end(&writing);
     TEST_ASSERT_EQUAL_UINT64(counting.at, writing.at);
-    TEST_ASSERT_FALSE(writing.failed);
+    TEST_ASSERT_FALSE(writing.is_cut_off);
+    TEST_ASSERT_NULL(writing.bad_field);
     return writing.at;
 }
 
@@ -47,7 +48,7 @@ static const char *read(const unsigned char *bytes, size_t size, size_t length,
     const char *fault = codec_check(&reading, guid, length);
     if (fault == NULL) {
         transfer(&reading, fields);
-        fault = reading.failed ? "failed" : NULL;
+        fault = reading.is_cut_off ? "cut off" : reading.bad_field;
     }
     return fault;
 }
@@ -103,12 +104,14 @@ static void test_values_that_a_type_does_not_have_fail(void) {
     unsigned char bytes[8] = {2};
     struct codec codec = codec_reading(bytes, sizeof bytes);
     bool flag = false;
-    codec_bool(&codec, &flag);
-    TEST_ASSERT_TRUE(codec.failed);
+    codec_bool(&codec, "flag", &flag);
+    TEST_ASSERT_EQUAL_STRING("flag", codec.bad_field);
+    TEST_ASSERT_FALSE(flag);
 
     memset(bytes, 0x7f, sizeof bytes);
     codec = codec_reading(bytes, sizeof bytes);
     int number = 0;
-    codec_int(&codec, &number);
-    TEST_ASSERT_TRUE(codec.failed);
+    codec_int(&codec, "number", &number);
+    TEST_ASSERT_EQUAL_STRING("number", codec.bad_field);
+    TEST_ASSERT_EQUAL_INT(0, number);
 }

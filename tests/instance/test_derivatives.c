@@ -1,5 +1,9 @@
+#include "continuous_states.h"
+#include "derivatives.h"
 #include "last_text.h"
 #include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,10 @@
 /* A model that cannot compute its outputs or their derivatives for a while: each call says so,
  * gives no value, and works again afterwards. */
+#include "derivatives.h"
 #include "last_text.h"
 #include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <math.h>
 #include <string.h>

@@ -2,6 +2,8 @@
 
 #include "last_text.h"
 #include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <math.h>
 #include <string.h>

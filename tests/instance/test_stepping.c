@@ -3,9 +3,12 @@
 #include "instance.h"
 
 #include "allocations.h"
+#include "derivatives.h"
 #include "each_method.h"
 #include "last_text.h"
 #include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <math.h>
 #include <stdint.h>

@@ -201,7 +201,7 @@ static void check_polynomial(void) {
         TEST_ASSERT_EQUAL_PTR(small_vector_data(small[0][k]), terms.data[k]);
     }
     N_VConst(0.0, small[2][0]);
-    small_vector_polynomial(&terms, -0.75, small[2][0]);
+    small_vector_polynomial(&terms, -0.75, (size_t)length, small_vector_data(small[2][0]));
     assert_same(COUNT * 256.0 * DBL_EPSILON);
 }
 

@@ -4,6 +4,8 @@
 #include "last_text.h"
 #include "oscillator.h"
 #include "snapshot.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <limits.h>
 #include <math.h>

@@ -1,12 +1,15 @@
 /* The controller: its law with the arm that it drives, and its integral part through the instance
  * and the integrator. test_controller.py compares values and derivatives with sympy. */
+#include "derivatives.h"
 #include "instance.h"
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_controller_model.h"
 #include "rp_controller_propagation.h"
 #include "rp_test_support.h"
+#include "stepping.h"
 #include "value_references.h"
+#include "values.h"
 
 #include <float.h>
 #include <math.h>

@@ -3,7 +3,9 @@
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_model.h"
+#include "stepping.h"
 #include "value_references.h"
+#include "values.h"
 
 #include <math.h>
 #include <unity.h>

@@ -3,7 +3,9 @@
 #include "each_method.h"
 #include "instance.h"
 #include "model_description.h"
+#include "stepping.h"
 #include "value_references.h"
+#include "values.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,10 +1,14 @@
 /* The reference motions: geometry, continuity, what is refused, and a model without states. */
+#include "continuous_states.h"
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_manipulator.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
+#include "serialization.h"
 #include "snapshot.h"
+#include "stepping.h"
+#include "values.h"
 
 #include <math.h>
 #include <unity.h>
