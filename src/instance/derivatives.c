@@ -126,7 +126,7 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
                                             size_t count, const int orders[], double values[]) {
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable =
-            find_as(instance, references[i], is_output, "an output of type Real");
+            find_as(instance, references[i], is_output, "an output of type float64");
         if (variable == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
