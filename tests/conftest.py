@@ -1,18 +1,16 @@
 """What the Python tests share."""
 
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support.paths import ROOT
+
 if TYPE_CHECKING:
     from cosim.unit import Fmu
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
 
 
 @pytest.fixture(scope="session")
@@ -35,9 +33,8 @@ def opened(fmu: Path) -> Iterator["Fmu"]:
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with two scenarios, for the command line to work in."""
-    from cosim_project import copy_project
-
     from cosim import __main__ as cli
+    from tests.support.cosim_project import copy_project
 
     copy_project(tmp_path)
     monkeypatch.setattr(cli, "ROOT", tmp_path)
@@ -47,6 +44,6 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
     """Writes a scenario of a small model and returns its path."""
-    from toy_model import make_model
+    from tests.support.toy_model import make_model
 
     return make_model(tmp_path)
