@@ -12,8 +12,8 @@ import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+from atomic_write import atomic_write
 from description import BASE_UNITS, DescriptionError, Table, is_unknown, load, type_name
-from whole import whole
 
 LOG_CATEGORIES = (
     "logEvents",
@@ -267,7 +267,7 @@ def variable_table(description: Table) -> str:
 def write_if_changed(path: Path, text: str) -> None:
     """Write a file, but leave an equal one alone so that nothing is rebuilt for it."""
     if not path.is_file() or path.read_bytes() != text.encode():
-        with whole(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_bytes(text.encode())
 
 

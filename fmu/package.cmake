@@ -25,7 +25,7 @@ function(add_fmu name)
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
             --output ${out} --version ${PROJECT_VERSION}
     DEPENDS ${folder}/variables.toml ${shared_variables} ${FMU_SOURCE_DIR}/generate.py
-            ${FMU_SOURCE_DIR}/description.py ${FMU_SOURCE_DIR}/whole.py
+            ${FMU_SOURCE_DIR}/description.py ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})
@@ -56,7 +56,7 @@ function(add_fmu name)
             --readme ${folder}/README.md --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
-            ${FMU_SOURCE_DIR}/formula.py ${FMU_SOURCE_DIR}/whole.py ${folder}/README.md
+            ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py ${folder}/README.md
             ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
@@ -73,7 +73,7 @@ function(add_fmu name)
             documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
             documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
     DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
-            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/whole.py
+            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Packing ${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
@@ -102,7 +102,7 @@ function(add_ssp name)
   add_custom_command(
     OUTPUT ${ssp}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${ssp} ${entries}
-    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/whole.py
+    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Packing ${name}.ssp"
     VERBATIM)
   add_custom_target(${name}_ssp ALL DEPENDS ${ssp})
