@@ -73,7 +73,7 @@ def readme_page(readme: Path) -> tuple[str, list[Path]]:
     Returns
     -------
     tuple of str and list of Path
-        the HTML, and the local images it refers to by their name alone.
+        the HTML, and the local images, which it refers to by their names.
     """
 
     def formula(latex: str, options: dict[str, bool]) -> str:

@@ -1,4 +1,4 @@
-"""Packs an FMU: a zip archive whose bytes depend on the contents of its files alone."""
+"""Packs an FMU: a zip archive whose bytes depend only on the contents of its files."""
 
 from __future__ import annotations
 
