@@ -6,6 +6,7 @@ declaration/schema.py describes that file.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from atomic_write import atomic_write
 from declaration.c_tables import value_references, variable_table
 from declaration.load import DeclarationError, load
 from fmi2.model_description import model_description
+from provenance import Provenance, ProvenanceError, build_date, license_texts
 
 
 def write_if_changed(path: Path, text: str) -> None:
@@ -28,18 +30,21 @@ def main() -> int:
     parser.add_argument("variables", type=Path, help="variables.toml of the model")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     parser.add_argument("--version", default="0.0.0", help="version of the project")
+    parser.add_argument("--license", type=Path, help="LICENSE of the project")
     arguments = parser.parse_args()
     try:
         declaration = load(arguments.variables)
+        texts = license_texts(arguments.license) if arguments.license else {}
+        provenance = Provenance(arguments.version, **texts, date=build_date(os.environ))
         files = {
-            "modelDescription.xml": model_description(declaration, arguments.version),
+            "modelDescription.xml": model_description(declaration, provenance),
             "value_references.h": value_references(declaration),
             "variables.c": variable_table(declaration),
         }
         arguments.output.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             write_if_changed(arguments.output / name, text)
-    except (DeclarationError, OSError) as error:
+    except (DeclarationError, ProvenanceError, OSError) as error:
         print(f"generate.py: {error!s:.2000}", file=sys.stderr)
         return 2
     return 0

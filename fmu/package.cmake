@@ -21,12 +21,13 @@ function(add_fmu name)
   # tables and model description, again whenever a declaration changes
   file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
-  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/atomic_write.py)
+  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
+                        ${FMU_SOURCE_DIR}/atomic_write.py)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
-            --output ${out} --version ${PROJECT_VERSION}
-    DEPENDS ${folder}/variables.toml ${shared_variables} ${generator}
+            --output ${out} --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE
+    DEPENDS ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})

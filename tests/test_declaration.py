@@ -11,6 +11,7 @@ from generator import change, copied, generate
 sys.path.insert(0, str(ROOT / "fmu"))
 from declaration.load import DeclarationError, load  # noqa: E402
 from fmi2.model_description import model_description  # noqa: E402
+from provenance import Provenance  # noqa: E402
 
 EXPERIMENT = "[experiment]\nstart = 0.0\nstop = 2.0\ntolerance = 1e-8\nstep = 0.001\n"
 
@@ -102,6 +103,7 @@ MISTAKES = {
         "[variables.m1]",
         ["variable n", "an int32 is not continuous"],
     ),
+    "name_of_an_alias": ("[variables.ee_x]", "[variables.der_q1]", ["der_q1", "FMI 2.0", "dq1"]),
     "declared_twice": ("[variables.m1]", "[variables.time]", ["time", "declared twice"]),
 }
 
@@ -160,7 +162,7 @@ MISTAKES_IN_ENUMERATIONS = {
 def complaint(path: Path) -> str:
     """What is said of a wrong file: one line that begins with a file."""
     with pytest.raises(DeclarationError) as caught:
-        model_description(load(path), "1.0")
+        model_description(load(path), Provenance())
     text = str(caught.value)
     assert re.match(r"[^\n]+\.toml: [^\n]+$", text)
     return text

@@ -5,11 +5,14 @@ import re
 import subprocess
 import tomllib
 import xml.etree.ElementTree as ET
+from datetime import datetime
 from pathlib import Path
 
+import fmpy
 import pytest
 from conftest import ROOT
 from generator import VARIABLES, change, copied, generate, generated, scalars, unknowns
+from lxml import etree
 
 # the table of variables that users rely on: name -> (value reference, causality, unit)
 PUBLISHED = """
@@ -99,15 +102,42 @@ def test_derivatives_point_at_their_states(description: ET.Element) -> None:
         for name, v in scalars(description).items()
         if v[0].get("derivative")
     }
-    assert derivatives == {"dq1": "q1", "dq2": "q2", "ddq1": "dq1", "ddq2": "dq2"}
-    assert unknowns(description, "Derivatives") == list(derivatives)
+    aliases = {"der_q1": "q1", "der_q2": "q2"}
+    accelerations = {"ddq1": "dq1", "ddq2": "dq2"}
+    assert derivatives == {"dq1": "q1", "dq2": "q2"} | aliases | accelerations
+    assert unknowns(description, "Derivatives") == [*aliases, *accelerations]
+
+
+def test_states_that_are_derivatives_have_aliases(description: ET.Element) -> None:
+    """Importers expect each of Derivatives among InitialUnknowns, where no state may be."""
+    variables = scalars(description)
+    for alias, state in (("der_q1", "dq1"), ("der_q2", "dq2")):
+        wanted = dict(variables[state][0].attrib)
+        assert wanted.pop("start") == "0.0"
+        assert variables[alias][0].attrib == wanted
+        assert variables[alias].get("valueReference") == variables[state].get("valueReference")
+        assert variables[alias].get("causality") == "local"
+        assert variables[alias].get("initial") == "calculated"
+    assert set(unknowns(description, "Derivatives")) <= {*unknowns(description, "InitialUnknowns")}
+    references = [v.get("valueReference") for v in variables.values()]
+    assert len(references) - len(set(references)) == 2
+
+
+def test_an_alias_depends_on_its_state(description: ET.Element) -> None:
+    names = list(scalars(description))
+    for section in ("Derivatives", "InitialUnknowns"):
+        for unknown in description.iterfind(f"ModelStructure/{section}/Unknown"):
+            name = names[int(unknown.get("index")) - 1]
+            if name.startswith("der_"):
+                known = names[int(unknown.get("dependencies")) - 1]
+                assert known == name.replace("der_", "d")
 
 
 def test_outputs_are_listed_in_order(description: ET.Element) -> None:
     variables = scalars(description)
     expected = [n for n, v in variables.items() if v.get("causality") == "output"]
     assert unknowns(description, "Outputs") == expected
-    assert unknowns(description, "InitialUnknowns") == expected[4:]
+    assert unknowns(description, "InitialUnknowns") == ["der_q1", "der_q2", *expected[4:]]
 
 
 def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> None:
@@ -122,6 +152,52 @@ def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> N
     assert scalars(description)["q1"][0].get("displayUnit") == "deg"
 
 
+def test_log_categories_are_explained(description: ET.Element) -> None:
+    categories = description.findall("LogCategories/Category")
+    assert len(categories) == 6
+    assert all(category.get("description") for category in categories)
+
+
+def test_where_the_fmu_comes_from(tmp_path: Path) -> None:
+    root = generated(VARIABLES, tmp_path, "--version", "1.2.3", "--license", ROOT / "LICENSE")
+    assert root.get("version") == "1.2.3"
+    assert root.get("generationTool") == "RPManipulator 1.2.3"
+    assert root.get("license") == "BSD-3-Clause"
+    notice = root.get("copyright", "")
+    assert notice in (ROOT / "LICENSE").read_text().splitlines()
+    assert notice.endswith(f", {root.get('author')}")
+    assert "generationDateAndTime" not in root.attrib
+
+
+def test_the_date_is_that_of_the_sources(tmp_path: Path) -> None:
+    dated = generated(VARIABLES, tmp_path, SOURCE_DATE_EPOCH="1700000000")
+    assert dated.get("generationDateAndTime") == "2023-11-14T22:13:20+00:00"
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+    etree.XMLSchema(file=schema).assertValid(etree.parse(tmp_path / "modelDescription.xml"))
+
+
+@pytest.mark.parametrize(
+    ("license_text", "epoch", "message"),
+    [
+        (None, "", "LICENSE: cannot be read"),
+        ("All rights reserved\n", "", "LICENSE: lacks 'NAME License'"),
+        ("MIT License\n", "", "'Copyright (c) YEAR, AUTHOR'"),
+        ("MIT License\nCopyright (c) 2026, Us\n", "soon", "SOURCE_DATE_EPOCH = 'soon'"),
+        ("MIT License\nCopyright (c) 2026, Us\n", "9" * 30, "is not a time in s"),
+    ],
+)
+def test_a_wrong_origin_is_named(
+    tmp_path: Path, license_text: str | None, epoch: str, message: str
+) -> None:
+    if license_text is not None:
+        (tmp_path / "LICENSE").write_text(license_text)
+    options = ("--license", tmp_path / "LICENSE")
+    result = generate(VARIABLES, tmp_path / "out", *options, SOURCE_DATE_EPOCH=epoch)
+    assert result.returncode == 2
+    assert result.stderr.startswith("generate.py: ") and result.stderr.count("\n") == 1
+    assert message in result.stderr
+
+
 def test_the_same_bytes_every_time(tmp_path: Path) -> None:
     generated(VARIABLES, tmp_path / "first")
     generated(VARIABLES, tmp_path / "second")
@@ -131,8 +207,11 @@ def test_the_same_bytes_every_time(tmp_path: Path) -> None:
 
 def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> None:
     built = fmu.parent / "fmu" / "RPManipulator"
-    version = ET.parse(built / "modelDescription.xml").getroot().get("version", "")
-    generated(VARIABLES, tmp_path, "--version", version)
+    root = ET.parse(built / "modelDescription.xml").getroot()
+    date = root.get("generationDateAndTime")
+    epoch = str(int(datetime.fromisoformat(date).timestamp())) if date else ""
+    options = ("--version", root.get("version", ""), "--license", ROOT / "LICENSE")
+    generated(VARIABLES, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
     for name in ("modelDescription.xml", "variables.c", "value_references.h"):
         assert (built / name).read_text() == (tmp_path / name).read_text()
 

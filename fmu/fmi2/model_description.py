@@ -4,35 +4,43 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 
-from declaration.load import Declaration
+from declaration.load import Declaration, DeclarationError
 from declaration.schema import Enumeration, Float64, Unit, Variable
+from provenance import Provenance
 
 TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration"}
 
-LOG_CATEGORIES = (
-    "logEvents",
-    "logStatusWarning",
-    "logStatusDiscard",
-    "logStatusError",
-    "logStatusFatal",
-    "logAll",
-)
+LOG_CATEGORIES = {
+    "logEvents": "Events, for example initialization and reset",
+    "logStatusWarning": "Why a function returns fmi2Warning",
+    "logStatusDiscard": "Why a function returns fmi2Discard",
+    "logStatusError": "Why a function returns fmi2Error",
+    "logStatusFatal": "Why a function returns fmi2Fatal",
+    "logAll": "All messages, and every call",
+}
 
 
-def model_description(declaration: Declaration, version: str) -> str:
+def model_description(declaration: Declaration, provenance: Provenance) -> str:
     """Text of modelDescription.xml."""
     model, experiment = declaration.model, declaration.experiment
-    variables = declaration.variables
+    variables = with_aliases(declaration)
     index = {name: str(i) for i, name in enumerate(variables, start=1)}
 
+    texts = {
+        "author": provenance.author,
+        "version": provenance.version,
+        "copyright": provenance.copyright,
+        "license": provenance.license,
+        "generationTool": f"{model.name} {provenance.version}",
+        "generationDateAndTime": provenance.date,
+    }
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
         modelName=model.name,
         guid=declaration.guid,
         description=model.description,
-        version=version,
-        generationTool=f"{model.name} {version}",
+        **{key: text for key, text in texts.items() if text is not None},
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
     )
@@ -40,8 +48,8 @@ def model_description(declaration: Declaration, version: str) -> str:
     add_units(root, declaration.units)
     add_types(root, variables)
     categories = ET.SubElement(root, "LogCategories")
-    for category in LOG_CATEGORIES:
-        ET.SubElement(categories, "Category", name=category)
+    for name, description in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", name=name, description=description)
     ET.SubElement(
         root,
         "DefaultExperiment",
@@ -56,6 +64,32 @@ def model_description(declaration: Declaration, version: str) -> str:
     add_structure(root, variables, index)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def with_aliases(declaration: Declaration) -> dict[str, Variable]:
+    """All variables, and after each state that is the derivative of another one its alias.
+
+    Importers expect each state derivative among the initial unknowns, and no variable that has a
+    start value, as states do. So the alias, der_STATE, is the derivative: it has the value
+    reference of the state, and no start value.
+    """
+    variables: dict[str, Variable] = {}
+    for name, variable in declaration.variables.items():
+        variables[name] = variable
+        if variable.derivative_of is None or variable.initial != "exact":
+            continue
+        alias = f"der_{variable.derivative_of}"
+        if alias in declaration.variables:
+            place = f"{declaration.path}: variable {alias}"
+            raise DeclarationError(f"{place}: FMI 2.0 needs the name for an alias of {name}")
+        changes = {
+            "causality": "local",
+            "initial": "calculated",
+            "start": None,
+            "description": f"Time derivative of {variable.derivative_of}: alias of {name}",
+        }
+        variables[alias] = variable.model_copy(update=changes)
+    return variables
 
 
 def add_interfaces(root: ET.Element, identifier: str) -> None:
@@ -147,7 +181,7 @@ def add_structure(root: ET.Element, variables: dict[str, Variable], index: dict[
     calculated = {n: v for n, v in variables.items() if v.is_unknown and v.initial == "calculated"}
     for section, unknowns, with_parameters in (
         ("Outputs", {n: v for n, v in variables.items() if v.causality == "output"}, False),
-        ("Derivatives", {n: v for n, v in variables.items() if v.derivative_of}, False),
+        ("Derivatives", {n: v for n, v in calculated.items() if v.derivative_of}, False),
         ("InitialUnknowns", calculated, True),
     ):
         if not unknowns:
