@@ -10,6 +10,7 @@ from cosim.files import UnreadableError, read_text
 
 FILE_NAME = "variables.toml"
 LARGEST_FILE = 10_000_000  # bytes: some seconds of parsing
+TYPE_NAMES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration"}  # of FMI 2.0
 # the parser's time grows with the square of a key's parts: a.b.c
 LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){32}""")
 
@@ -20,8 +21,8 @@ def load(model_folder: Path) -> dict[str, dict[str, Any]]:
     Returns
     -------
     dict
-        The tables ``[variables.*]`` by name, in order of value reference. ``type`` is filled in
-        where the file leaves it to its default, Real. The start value of an Enumeration, which the
+        The tables ``[variables.*]`` by name, in order of value reference. ``type`` is its name
+        in FMI 2.0, Real where the file gives none. The start value of an Enumeration, which the
         file gives by the item's name, is its number, as it is for the FMU; so are min and max.
 
     Raises
@@ -53,13 +54,15 @@ def load(model_folder: Path) -> dict[str, dict[str, Any]]:
             if not isinstance(variable, dict) or "reference" not in variable:
                 raise UserError(f"{path}: [variables.{name}] needs a value reference")
             _check_types(variable, f"{path}: [variables.{name}]")
-            found[name] = _numbered({"type": "Real"} | variable, f"{path}: [variables.{name}]")
+            kind = variable.get("type", "float64")
+            typed = variable | {"type": TYPE_NAMES.get(kind, kind)}
+            found[name] = _numbered(typed, f"{path}: [variables.{name}]")
             origin[name] = path
     return dict(sorted(found.items(), key=lambda item: item[1]["reference"]))
 
 
 def _check_types(variable: dict[str, Any], where: str) -> None:
-    """Check the keys that are used here; fmu/description.py checks all of them."""
+    """Check the keys that are used here; fmu/declaration checks all of them."""
     for key, kind, name in (
         ("reference", int, "a whole number"),
         ("type", str, "a text"),
