@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from cosim.unit import Fmu
+    from cosim.fmu import Fmu
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -26,10 +26,10 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="module")
 def opened(fmu: Path) -> Iterator["Fmu"]:
-    from cosim.unit import Fmu
+    from cosim.fmu import Fmu
 
-    with Fmu(fmu) as unit:
-        yield unit
+    with Fmu(fmu) as opened:
+        yield opened
 
 
 @pytest.fixture
@@ -37,10 +37,8 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with two scenarios, for the command line to work in."""
     from cosim_project import copy_project
 
-    from cosim import __main__ as cli
-
     copy_project(tmp_path)
-    monkeypatch.setattr(cli, "ROOT", tmp_path)
+    monkeypatch.setattr("cosim.project.ROOT", tmp_path)
     return tmp_path
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from cosim_project import declared
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from instances import ERROR, STATES, Instance, Unit, status_of
@@ -188,7 +189,9 @@ def test_states_of_the_initialization_are_restored(unit: Unit) -> None:
 
 def test_master_with_step_doubling(unit: Unit) -> None:
     """A step, undone, and two halves: their difference controls the step, errors go back."""
-    problem = convergence.load(ROOT / "models/rp_manipulator/convergence/smooth_inputs.toml")
+    problem = convergence.load(
+        ROOT / "models/rp_manipulator/convergence/smooth_inputs.toml", declared("rp_manipulator")
+    )
     stop, bound = problem.scenario.stop, 1e-5
 
     def tell(instance: Instance, t: float) -> None:
