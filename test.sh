@@ -49,6 +49,6 @@ if [ "$long" = yes ]; then
   ctest --preset tsan -C Long || failed=1
   ctest --preset fuzz -C Long -L long -j 2 || failed=1
   ctest --preset default -C Long -R '^(long_|test_faults_)' || failed=1
-  python3 tests/figures.py build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log
+  python3 tests/robustness/figures.py build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log
   exit "$failed"
 fi

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim import reference, simulation
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.simulation import Result

@@ -20,7 +20,7 @@ from cosim import scenario as scenarios
 from cosim import simulation
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.model import Model
 from cosim.scenario import Scenario
 from cosim.signals import Sines

@@ -19,7 +19,7 @@ from cosim.errors import UserError, one_line
 from cosim.model import Value
 
 if TYPE_CHECKING:
-    from cosim.fmu import Fmu
+    from cosim.fmu_file import Fmu
 
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")
 MESSAGES_KEPT = 20

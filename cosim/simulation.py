@@ -9,7 +9,7 @@ from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.scenario import Scenario
 
 PROGRESS_EVERY = 0.1  # s

@@ -4,8 +4,9 @@
 
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+/* ---- Log ------------------------------------------------------------------------------------ */
 
 static const char *const category_names[LOG_CATEGORY_COUNT] = {
     [LOG_EVENTS] = "logEvents",
@@ -16,15 +17,13 @@ static const char *const category_names[LOG_CATEGORY_COUNT] = {
     [LOG_ALL] = "logAll",
 };
 
-/* ---- Logging -------------------------------------------------------------------------------- */
+const char *component_category_name(enum log_category category) {
+    return category_names[category];
+}
 
-enum { TEXT_SIZE = 1024 };
-
-/* Importers may pass a text to printf, resolve #r<reference># in it, or do neither: '%' and control
- * characters are replaced and '#' is doubled. */
-static void harmless(const char *text, char out[TEXT_SIZE]) {
+void component_make_harmless(const char *text, char out[LOG_TEXT_SIZE]) {
     size_t length = 0;
-    for (; *text != '\0' && length < TEXT_SIZE - 2; text++) {
+    for (; *text != '\0' && length < LOG_TEXT_SIZE - 2; text++) {
         char c = *text;
         if (c == '%' || (unsigned char)c < ' ' || c == 0x7f) {
             c = '?';
@@ -37,45 +36,34 @@ static void harmless(const char *text, char out[TEXT_SIZE]) {
     out[length] = '\0';
 }
 
-static void send(fmi2CallbackLogger logger, fmi2ComponentEnvironment environment, const char *name,
-                 fmi2Status status, enum log_category category, const char *format,
-                 va_list arguments) {
-    char raw[TEXT_SIZE];
-    char text[TEXT_SIZE];
+static void send_text(const struct component *component, enum component_status status,
+                      enum log_category category, const char *raw) {
+    char text[LOG_TEXT_SIZE];
+    if (component->is_logged[category]) {
+        component_make_harmless(raw, text);
+        component->adapter->send(component, status, category_names[category], text);
+    }
+}
+
+void component_log(const struct component *component, enum component_status status,
+                   enum log_category category, const char *format, ...) {
+    char raw[LOG_TEXT_SIZE];
+    if (!component->is_logged[category]) {
+        return;
+    }
+    va_list arguments;
+    va_start(arguments, format);
     (void)vsnprintf(raw, sizeof raw, format, arguments);
-    harmless(raw, text);
-    logger(environment, name, status, category_names[category], text);
-}
-
-void component_log(const struct component *component, fmi2Status status, enum log_category category,
-                   const char *format, ...) {
-    if (component->logger == NULL || !component->is_logged[category]) {
-        return;
-    }
-    va_list arguments;
-    va_start(arguments, format);
-    send(component->logger, component->environment, component->name, status, category, format,
-         arguments);
     va_end(arguments);
+    send_text(component, status, category, raw);
 }
 
-void component_log_refusal(const fmi2CallbackFunctions *functions, const char *name,
-                           const char *format, ...) {
-    if (functions == NULL || functions->logger == NULL) {
-        return;
-    }
-    va_list arguments;
-    va_start(arguments, format);
-    send(functions->logger, functions->componentEnvironment, name != NULL ? name : "", fmi2Error,
-         LOG_STATUS_ERROR, format, arguments);
-    va_end(arguments);
-}
-
-bool component_set_logged(struct component *component, const char *category, bool on) {
+/* logAll stands for all of them; false if the name is unknown. */
+static bool set_logged(struct component *component, const char *name, bool on) {
+    const bool all = strcmp(name, category_names[LOG_ALL]) == 0;
     bool found = false;
-    const bool all = strcmp(category, category_names[LOG_ALL]) == 0;
     for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
-        if (all || strcmp(category, category_names[i]) == 0) {
+        if (all || strcmp(name, category_names[i]) == 0) {
             component->is_logged[i] = on;
             found = true;
         }
@@ -83,48 +71,64 @@ bool component_set_logged(struct component *component, const char *category, boo
     return found;
 }
 
-/* Status messages are sent even with logging off; what merely tells the course of events is not. */
-static void set_initial_logging(struct component *component, bool logging_on) {
-    for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
-        component->is_logged[i] = logging_on || (i != LOG_EVENTS && i != LOG_ALL);
+enum component_status component_set_logging(struct component *component, bool on, size_t count,
+                                            const char *const names[]) {
+    bool before[LOG_CATEGORY_COUNT];
+    memcpy(before, component->is_logged, sizeof before);
+    if (on || count == 0) {
+        for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
+            component->is_logged[i] = on && count == 0;
+        }
     }
+    for (size_t i = 0; i < count; i++) {
+        if (names[i] == NULL || !set_logged(component, names[i], on)) {
+            memcpy(component->is_logged, before, sizeof before);
+            return component_fail(component,
+                                  "log category '%s' is unknown: the model description lists those "
+                                  "that exist",
+                                  names[i] != NULL ? names[i] : "");
+        }
+    }
+    return COMPONENT_OK;
 }
 
 /* ---- Status --------------------------------------------------------------------------------- */
 
 static const struct {
-    fmi2Status fmi_status;
+    enum component_status status;
     enum log_category category;
 } of_severity[] = {
-    [SEVERITY_NONE] = {fmi2OK, LOG_EVENTS},
-    [SEVERITY_DISCARD] = {fmi2Discard, LOG_STATUS_DISCARD},
-    [SEVERITY_ERROR] = {fmi2Error, LOG_STATUS_ERROR},
+    [SEVERITY_NONE] = {COMPONENT_OK, LOG_EVENTS},
+    [SEVERITY_NOTICE] = {COMPONENT_OK, LOG_STATUS_WARNING},
+    [SEVERITY_DISCARD] = {COMPONENT_DISCARD, LOG_STATUS_DISCARD},
+    [SEVERITY_ERROR] = {COMPONENT_ERROR, LOG_STATUS_ERROR},
 };
 
 static void log_instance_text(void *component, enum status status, const char *text) {
     const enum severity severity = status_severity(status);
-    component_log(component, of_severity[severity].fmi_status, of_severity[severity].category, "%s",
-                  text);
+    send_text(component, of_severity[severity].status, of_severity[severity].category, text);
 }
 
-fmi2Status component_status(struct component *component, enum status status) {
-    const fmi2Status fmi_status = of_severity[status_severity(status)].fmi_status;
-    if (fmi_status == fmi2Error) {
+enum component_status component_result(struct component *component, enum status status) {
+    const enum component_status result = of_severity[status_severity(status)].status;
+    if (result == COMPONENT_ERROR) {
         component->state = STATE_ERROR;
     }
-    return fmi_status;
+    return result;
 }
 
-fmi2Status component_fail(struct component *component, const char *format, ...) {
-    char text[TEXT_SIZE];
+enum component_status component_fail(struct component *component, const char *format, ...) {
+    char raw[LOG_TEXT_SIZE];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(text, sizeof text, format, arguments);
+    (void)vsnprintf(raw, sizeof raw, format, arguments);
     va_end(arguments);
-    component_log(component, fmi2Error, LOG_STATUS_ERROR, "%s", text);
+    send_text(component, COMPONENT_ERROR, LOG_STATUS_ERROR, raw);
     component->state = STATE_ERROR;
-    return fmi2Error;
+    return COMPONENT_ERROR;
 }
+
+/* ---- Calls ---------------------------------------------------------------------------------- */
 
 static const char *state_name(enum fmi_state state) {
     switch (state) {
@@ -148,36 +152,37 @@ static const char *state_name(enum fmi_state state) {
     return "in no known state";
 }
 
-struct component *component_enter(fmi2Component c, enum call call) {
-    static const char *const kind_names[] = {"any kind", "Co-Simulation", "Model Exchange"};
-    struct component *component = c;
-    if (component == NULL) {
-        return NULL;
-    }
-    const struct call_rule *rule = &call_rules[call];
-    const enum call_kind kind =
-        component->kind == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE;
-    if (component->is_logged[LOG_ALL]) {
-        component_log(component, fmi2OK, LOG_ALL, "%s", rule->name);
-    }
-    if (rule->kind != ANY_KIND && rule->kind != kind) {
-        component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
-                       kind_names[rule->kind], kind_names[kind]);
-        return NULL;
-    }
-    if (((unsigned)component->state & rule->allowed) == 0) {
-        component_fail(component, "%s is not allowed while the instance is %s", rule->name,
-                       state_name(component->state));
-        return NULL;
-    }
-    return component;
+const char *component_kind_name(enum fmi_kind kind) {
+    return kind == KIND_CO_SIMULATION ? "Co-Simulation" : "Model Exchange";
 }
 
-bool component_has_arrays(struct component *component, enum call call, size_t count,
+bool component_enter(struct component *component, unsigned call) {
+    if (component == NULL) {
+        return false;
+    }
+    const struct call_rule *rule = &component->adapter->rules[call];
+    if (component->is_logged[LOG_ALL]) {
+        component_log(component, COMPONENT_OK, LOG_ALL, "%s", rule->name);
+    }
+    if ((component->kind & rule->kinds) == 0) {
+        component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
+                       component_kind_name((enum fmi_kind)rule->kinds),
+                       component_kind_name(component->kind));
+        return false;
+    }
+    if ((component->state & rule->states) == 0) {
+        component_fail(component, "%s is not allowed while the instance is %s", rule->name,
+                       state_name(component->state));
+        return false;
+    }
+    return true;
+}
+
+bool component_has_arrays(struct component *component, unsigned call, size_t count,
                           const void *references, const void *values) {
     if (count > 0 && (references == NULL || values == NULL)) {
         component_fail(component, "%s: an array is NULL, %zu values are expected",
-                       call_rules[call].name, count);
+                       component->adapter->rules[call].name, count);
         return false;
     }
     return true;
@@ -185,39 +190,20 @@ bool component_has_arrays(struct component *component, enum call call, size_t co
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-struct component *component_create(const char *name, fmi2Type kind,
-                                   const fmi2CallbackFunctions *functions, bool logging_on) {
-    struct component *component = calloc(1, sizeof *component);
-    if (component == NULL) {
-        return NULL;
-    }
+enum component_status component_begin(struct component *component, const struct adapter *adapter,
+                                      enum fmi_kind kind, bool logging_on) {
+    component->adapter = adapter;
     component->state = STATE_INSTANTIATED;
     component->kind = kind;
-    component->logger = functions->logger;
-    component->environment = functions->componentEnvironment;
-    set_initial_logging(component, logging_on);
-
-    const size_t size = strlen(name) + 1;
-    component->name = malloc(size);
-    if (component->name == NULL) {
-        component_destroy(component);
-        return NULL;
+    for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
+        component->is_logged[i] = logging_on || (adapter->always_logged & 1u << i) != 0;
     }
-    memcpy(component->name, name, size);
-
     const struct message_sink sink = {.write = log_instance_text, .context = component};
-    if (instance_create(&model_description, &sink, &component->instance) != STATUS_OK) {
-        component_destroy(component);
-        return NULL;
-    }
-    return component;
+    return instance_create(&model_description, &sink, &component->instance) == STATUS_OK
+               ? COMPONENT_OK
+               : COMPONENT_ERROR;
 }
 
-void component_destroy(struct component *component) {
-    if (component == NULL) {
-        return;
-    }
+void component_end(struct component *component) {
     instance_destroy(component->instance);
-    free(component->name);
-    free(component);
 }

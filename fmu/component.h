@@ -1,11 +1,20 @@
-/* What stands behind an fmi2Component: the instance, the FMI state it is in, and its logger. */
+/* What all versions of FMI share of an instance: its state, its kind, its log and the rules of its
+ * calls. Knows no version: the adapter of one gives a struct adapter, makes its own structure begin
+ * with a struct component, and converts status and types. */
 #ifndef COMPONENT_H
 #define COMPONENT_H
 
 #include "calls.h"
 #include "instance.h"
 
-#include "fmi2Functions.h"
+/* The numbers are those of fmi2Status and fmi3Status. */
+enum component_status {
+    COMPONENT_OK = 0,
+    COMPONENT_WARNING = 1,
+    COMPONENT_DISCARD = 2,
+    COMPONENT_ERROR = 3,
+    COMPONENT_FATAL = 4,
+};
 
 /* Log categories, in the order of their names in component.c. */
 enum log_category {
@@ -14,52 +23,81 @@ enum log_category {
     LOG_STATUS_DISCARD,
     LOG_STATUS_ERROR,
     LOG_STATUS_FATAL,
-    LOG_ALL, /* of calls, which have no category of their own */
+    LOG_ALL, /* also of calls, for which the standard has no category */
     LOG_CATEGORY_COUNT,
 };
 
+enum { LOG_TEXT_SIZE = 1024 };
+
+struct component;
+
+/* What a version of FMI decides. */
+struct adapter {
+    const struct call_rule *rules; /* by the version's own numbers of calls */
+    unsigned always_logged;        /* bits of 1 << enum log_category: sent with logging off, too */
+
+    /* Sends a finished text to the importer. */
+    void (*send)(const struct component *component, enum component_status status,
+                 const char *category, const char *text);
+};
+
 struct component {
+    const struct adapter *adapter;
     struct instance *instance;
     enum fmi_state state;
-    fmi2Type kind;
-    fmi2CallbackLogger logger; /* NULL: no log */
-    fmi2ComponentEnvironment environment;
-    char *name;
+    enum fmi_kind kind;
     bool is_logged[LOG_CATEGORY_COUNT];
 };
 
-/* Allocates a component; functions and name are copied. NULL where memory is short. */
-struct component *component_create(const char *name, fmi2Type kind,
-                                   const fmi2CallbackFunctions *functions, bool logging_on);
-void component_destroy(struct component *component);
+/* ---- Life ----------------------------------------------------------------------------------- */
 
-/* The component, where the call may run: c is not NULL, of the kind that the call belongs to and in
- * a state that calls.h allows it in. Otherwise NULL: it is said in the log, and the component is in
- * STATE_ERROR. */
-struct component *component_enter(fmi2Component c, enum call call);
+/* component: zeroed; adapter must outlive it. On failure nothing has to be freed. */
+MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
+                                                         const struct adapter *adapter,
+                                                         enum fmi_kind kind, bool logging_on);
 
-/* count values may be accessed: neither array is NULL where there are any. Otherwise fails. */
-bool component_has_arrays(struct component *component, enum call call, size_t count,
-                          const void *references, const void *values);
+/* Frees what component_begin allocated. */
+NONNULL void component_end(struct component *component);
 
-/* FMI status of a instance's status; an error takes the component into STATE_ERROR. */
-fmi2Status component_status(struct component *component, enum status status);
+/* ---- Calls ---------------------------------------------------------------------------------- */
 
-/* Error that the adapter itself finds; takes the component into STATE_ERROR. */
-__attribute__((format(printf, 2, 3))) fmi2Status component_fail(struct component *component,
-                                                                const char *format, ...);
+/* True if the call may run: the component is not NULL, of the right kind and in a state that the
+ * rule allows. Otherwise it fails as component_fail. */
+MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
-__attribute__((format(printf, 4, 5))) void component_log(const struct component *component,
-                                                         fmi2Status status,
-                                                         enum log_category category,
-                                                         const char *format, ...);
+/* True if count values may be accessed: neither array is NULL, unless count is 0. Otherwise it
+ * fails as component_fail. */
+MUST_CHECK NONNULL_ARGUMENTS(1) bool component_has_arrays(struct component *component,
+                                                          unsigned call, size_t count,
+                                                          const void *references,
+                                                          const void *values);
 
-/* Logs an error of a call that has no component yet; functions and name may be NULL. */
-__attribute__((format(printf, 3, 4))) void
-component_log_refusal(const fmi2CallbackFunctions *functions, const char *name, const char *format,
-                      ...);
+/* Converts a status of the instance, which has sent its message. An error leads to STATE_ERROR. */
+NONNULL enum component_status component_result(struct component *component, enum status status);
 
-/* Switches a category by name, logAll all of them; false where there is none of that name. */
-bool component_set_logged(struct component *component, const char *category, bool on);
+/* An error that the adapter finds: logs it, leads to STATE_ERROR, returns COMPONENT_ERROR. */
+NONNULL PRINTF_FORMAT(2, 3) enum component_status
+    component_fail(struct component *component, const char *format, ...);
+
+/* "Co-Simulation" or "Model Exchange" */
+const char *component_kind_name(enum fmi_kind kind);
+
+/* ---- Log ------------------------------------------------------------------------------------ */
+
+NONNULL PRINTF_FORMAT(4, 5) void component_log(const struct component *component,
+                                               enum component_status status,
+                                               enum log_category category, const char *format, ...);
+
+const char *component_category_name(enum log_category category);
+
+/* Sets which categories are sent: with no names all of them; otherwise `on` adds to none, off takes
+ * away. Fails as component_fail, with nothing changed, at a name that is NULL or unknown. */
+NONNULL_ARGUMENTS(1)
+enum component_status component_set_logging(struct component *component, bool on, size_t count,
+                                            const char *const names[]);
+
+/* Makes a text harmless that importers may pass to printf or search for #r<reference>#: '%' and
+ * control characters become '?', '#' is doubled. */
+NONNULL void component_make_harmless(const char *text, char out[LOG_TEXT_SIZE]);
 
 #endif

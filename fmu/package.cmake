@@ -8,7 +8,9 @@
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 set(FMU_SOURCES
   ${FMU_SOURCE_DIR}/component.c
+  ${FMU_SOURCE_DIR}/fmu_state.c
   ${FMU_SOURCE_DIR}/fmi2/fmi2.c
+  ${FMU_SOURCE_DIR}/fmi2/fmi2_calls.c
   ${FMU_SOURCE_DIR}/fmi2/fmi2_co_simulation.c
   ${FMU_SOURCE_DIR}/fmi2/fmi2_model_exchange.c)
 
@@ -40,12 +42,11 @@ function(add_fmu name)
 
   # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
   add_library(${name} MODULE ${FMU_SOURCES})
-  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${out})
+  set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
+                      LIBRARY_OUTPUT_DIRECTORY ${out})
   target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${name} PRIVATE ${name}_description reserved_allocation)
-  target_link_options(${name} PRIVATE
-    -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed
-    -Wl,-z,relro,-z,now,-z,noexecstack,-z,text)
+  target_link_options(${name} PRIVATE ${FMU_LINK_OPTIONS})
 
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
@@ -68,7 +69,7 @@ function(add_fmu name)
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
             modelDescription.xml=${out}/modelDescription.xml
             $<$<BOOL:${icon}>:model.png=${icon}>
-            binaries/linux64/${name}.so=$<TARGET_FILE:${name}>
+            binaries/${FMI2_PLATFORM}/${name}${FMU_LIBRARY_SUFFIX}=$<TARGET_FILE:${name}>
             documentation=${out}/documentation
             documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
             documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}

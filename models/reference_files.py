@@ -15,7 +15,7 @@ import numpy as np
 from cosim import project, trajectory_csv
 from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.fmu import read_model
+from cosim.fmu_file import read_model
 from cosim.output_files import whole
 from cosim.scenario import Scenario
 

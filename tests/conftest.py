@@ -1,18 +1,16 @@
 """What the Python tests share."""
 
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-if TYPE_CHECKING:
-    from cosim.fmu import Fmu
+from tests.support.paths import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+if TYPE_CHECKING:
+    from cosim.fmu_file import Fmu
 
 
 @pytest.fixture(scope="session")
@@ -26,7 +24,7 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="module")
 def opened(fmu: Path) -> Iterator["Fmu"]:
-    from cosim.fmu import Fmu
+    from cosim.fmu_file import Fmu
 
     with Fmu(fmu) as opened:
         yield opened
@@ -35,7 +33,7 @@ def opened(fmu: Path) -> Iterator["Fmu"]:
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with two scenarios, for the command line to work in."""
-    from cosim_project import copy_project
+    from tests.support.cosim_project import copy_project
 
     copy_project(tmp_path)
     monkeypatch.setattr("cosim.project.ROOT", tmp_path)
@@ -45,6 +43,6 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def write(tmp_path: Path) -> Callable[..., Path]:
     """Writes a scenario of a small model and returns its path."""
-    from toy_model import make_model
+    from tests.support.toy_model import make_model
 
     return make_model(tmp_path)

@@ -10,7 +10,7 @@ from cosim import scenario as scenarios
 from cosim.comparison import Run, Runs
 from cosim.convergence import Convergence
 from cosim.errors import UserError
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 from cosim.report import pages

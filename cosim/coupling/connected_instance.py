@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.model import INITIAL, PARAMETERS, Value, Variable, WrongValueError
 
 

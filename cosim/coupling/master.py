@@ -22,7 +22,7 @@ from fmpy.fmi1 import FMICallException
 from cosim.coupling.connected_instance import ConnectedInstance, Wiring
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.model import Value
 from cosim.system.structure import Connection
 

@@ -1,30 +1,34 @@
-/* The functions of FMI 2.0 that Co-Simulation has of its own (section 4.2). */
-#include "component.h"
+/* The functions of FMI 2.0 for Co-Simulation only (section 4.2). */
+#include "derivatives.h"
+#include "fmi2_component.h"
+#include "stepping.h"
 
 /* ---- Derivatives of inputs and outputs ------------------------------------------------------- */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-    const enum call call = CALL_fmi2SetRealInputDerivatives;
-    struct component *component = component_enter(c, call);
-    if (component == NULL || !component_has_arrays(component, call, nvr, vr, value) ||
+    const enum fmi2_call call = CALL_fmi2SetRealInputDerivatives;
+    struct component *component = c;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, nvr, vr, value) ||
         !component_has_arrays(component, call, nvr, order, order)) {
         return fmi2Error;
     }
-    return component_status(
-        component, instance_set_input_derivatives(component->instance, vr, nvr, order, value));
+    return fmi2_result(component,
+                       instance_set_input_derivatives(component->instance, vr, nvr, order, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-    const enum call call = CALL_fmi2GetRealOutputDerivatives;
-    struct component *component = component_enter(c, call);
-    if (component == NULL || !component_has_arrays(component, call, nvr, vr, value) ||
+    const enum fmi2_call call = CALL_fmi2GetRealOutputDerivatives;
+    struct component *component = c;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, nvr, vr, value) ||
         !component_has_arrays(component, call, nvr, order, order)) {
         return fmi2Error;
     }
-    return component_status(
-        component, instance_get_output_derivatives(component->instance, vr, nvr, order, value));
+    return fmi2_result(component,
+                       instance_get_output_derivatives(component->instance, vr, nvr, order, value));
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
@@ -33,8 +37,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     (void)noSetFMUStatePriorToCurrentPoint; // importers say true and roll back all the same
-    struct component *component = component_enter(c, CALL_fmi2DoStep);
-    if (component == NULL) {
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2DoStep)) {
         return fmi2Error;
     }
     const enum status status =
@@ -42,25 +46,25 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
     if (status_severity(status) == SEVERITY_DISCARD) {
         component->state = STATE_STEP_FAILED;
     }
-    return component_status(component, status);
+    return fmi2_result(component, status);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
-    component_enter(c, CALL_fmi2CancelStep);
-    return fmi2Error;
+    // no state allows it: no step is ever pending
+    return component_enter(c, CALL_fmi2CancelStep) ? fmi2OK : fmi2Error;
 }
 
-static fmi2Status status_unknown(struct component *component, enum call call) {
-    component_log(component, fmi2Discard, LOG_STATUS_DISCARD,
+static fmi2Status status_unknown(struct component *component, enum fmi2_call call) {
+    component_log(component, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
                   "%s: this status cannot be known, no step is ever pending",
-                  call_rules[call].name);
+                  fmi2_call_rules[call].name);
     return fmi2Discard;
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
     (void)s;
-    struct component *component = component_enter(c, CALL_fmi2GetStatus);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetStatus) ||
         !component_has_arrays(component, CALL_fmi2GetStatus, 1, value, value)) {
         return fmi2Error;
     }
@@ -68,8 +72,8 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
-    struct component *component = component_enter(c, CALL_fmi2GetRealStatus);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetRealStatus) ||
         !component_has_arrays(component, CALL_fmi2GetRealStatus, 1, value, value)) {
         return fmi2Error;
     }
@@ -82,8 +86,8 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
     (void)s;
-    struct component *component = component_enter(c, CALL_fmi2GetIntegerStatus);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetIntegerStatus) ||
         !component_has_arrays(component, CALL_fmi2GetIntegerStatus, 1, value, value)) {
         return fmi2Error;
     }
@@ -91,8 +95,8 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
-    struct component *component = component_enter(c, CALL_fmi2GetBooleanStatus);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetBooleanStatus) ||
         !component_has_arrays(component, CALL_fmi2GetBooleanStatus, 1, value, value)) {
         return fmi2Error;
     }
@@ -105,8 +109,8 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
     (void)s;
-    struct component *component = component_enter(c, CALL_fmi2GetStringStatus);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetStringStatus) ||
         !component_has_arrays(component, CALL_fmi2GetStringStatus, 1, value, value)) {
         return fmi2Error;
     }

@@ -1,12 +1,12 @@
-/* The functions of FMI 2.0 that Model Exchange has of its own (section 3.2). Units have no events
- * of their own and no event indicators. */
-#include "component.h"
+/* The functions of FMI 2.0 for Model Exchange only (section 3.2). Models have no events so far. */
+#include "continuous_states.h"
+#include "fmi2_component.h"
 
 /* ---- Modes ---------------------------------------------------------------------------------- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    struct component *component = component_enter(c, CALL_fmi2EnterEventMode);
-    if (component == NULL) {
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2EnterEventMode)) {
         return fmi2Error;
     }
     instance_enter_event_mode(component->instance);
@@ -15,9 +15,9 @@ fmi2Status fmi2EnterEventMode(fmi2Component c) {
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
-    const enum call call = CALL_fmi2NewDiscreteStates;
-    struct component *component = component_enter(c, call);
-    if (component == NULL ||
+    const enum fmi2_call call = CALL_fmi2NewDiscreteStates;
+    struct component *component = c;
+    if (!component_enter(component, call) ||
         !component_has_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
         return fmi2Error;
     }
@@ -32,15 +32,15 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    struct component *component = component_enter(c, CALL_fmi2EnterContinuousTimeMode);
-    if (component == NULL) {
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2EnterContinuousTimeMode)) {
         return fmi2Error;
     }
     const enum status status = instance_enter_continuous_time(component->instance);
     if (status == STATUS_OK) {
         component->state = STATE_CONTINUOUS_TIME;
     }
-    return component_status(component, status);
+    return fmi2_result(component, status);
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
@@ -48,9 +48,9 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
     (void)noSetFMUStatePriorToCurrentPoint;
-    const enum call call = CALL_fmi2CompletedIntegratorStep;
-    struct component *component = component_enter(c, call);
-    if (component == NULL ||
+    const enum fmi2_call call = CALL_fmi2CompletedIntegratorStep;
+    struct component *component = c;
+    if (!component_enter(component, call) ||
         !component_has_arrays(component, call, 1, enterEventMode, terminateSimulation)) {
         return fmi2Error;
     }
@@ -62,58 +62,59 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
 /* ---- Time and states ------------------------------------------------------------------------ */
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    struct component *component = component_enter(c, CALL_fmi2SetTime);
-    if (component == NULL) {
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2SetTime)) {
         return fmi2Error;
     }
-    return component_status(component, instance_set_time(component->instance, time));
+    return fmi2_result(component, instance_set_time(component->instance, time));
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    struct component *component = component_enter(c, CALL_fmi2SetContinuousStates);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2SetContinuousStates) ||
         !component_has_arrays(component, CALL_fmi2SetContinuousStates, nx, x, x)) {
         return fmi2Error;
     }
-    return component_status(component, instance_set_states(component->instance, x, nx));
+    return fmi2_result(component, instance_set_states(component->instance, x, nx));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    struct component *component = component_enter(c, CALL_fmi2GetDerivatives);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetDerivatives) ||
         !component_has_arrays(component, CALL_fmi2GetDerivatives, nx, derivatives, derivatives)) {
         return fmi2Error;
     }
-    return component_status(component,
-                            instance_get_derivatives(component->instance, derivatives, nx));
+    return fmi2_result(component, instance_get_derivatives(component->instance, derivatives, nx));
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
     (void)eventIndicators;
-    struct component *component = component_enter(c, CALL_fmi2GetEventIndicators);
-    if (component == NULL) {
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetEventIndicators)) {
         return fmi2Error;
     }
     if (ni > 0) {
-        return component_fail(component, "%zu event indicators are accessed: there are none", ni);
+        return fmi2_status(
+            component_fail(component, "%zu event indicators are accessed: there are none", ni));
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    struct component *component = component_enter(c, CALL_fmi2GetContinuousStates);
-    if (component == NULL ||
+    struct component *component = c;
+    if (!component_enter(component, CALL_fmi2GetContinuousStates) ||
         !component_has_arrays(component, CALL_fmi2GetContinuousStates, nx, x, x)) {
         return fmi2Error;
     }
-    return component_status(component, instance_get_states(component->instance, x, nx));
+    return fmi2_result(component, instance_get_states(component->instance, x, nx));
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    const enum call call = CALL_fmi2GetNominalsOfContinuousStates;
-    struct component *component = component_enter(c, call);
-    if (component == NULL || !component_has_arrays(component, call, nx, x_nominal, x_nominal)) {
+    const enum fmi2_call call = CALL_fmi2GetNominalsOfContinuousStates;
+    struct component *component = c;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, nx, x_nominal, x_nominal)) {
         return fmi2Error;
     }
-    return component_status(component, instance_get_nominals(component->instance, x_nominal, nx));
+    return fmi2_result(component, instance_get_nominals(component->instance, x_nominal, nx));
 }

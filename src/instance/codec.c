@@ -23,7 +23,7 @@ struct codec codec_reading(const unsigned char *from, size_t size) {
 
 static void transfer_bytes(struct codec *codec, void *bytes, size_t count) {
     if (codec->mode != CODEC_COUNTING && count > codec->size - codec->at) {
-        codec->failed = true;
+        codec->is_cut_off = true;
         return;
     }
     if (codec->mode == CODEC_WRITING) {
@@ -87,7 +87,7 @@ const char *codec_check(struct codec *codec, const char *guid, size_t length) {
     transfer_number(codec, &version, 4);
     transfer_number(codec, &stated_length, 4);
     transfer_number(codec, &guid_length, 4);
-    if (codec->failed) {
+    if (codec->is_cut_off) {
         return "it is cut off";
     }
     if (memcmp(start, magic, sizeof magic) != 0) {
@@ -124,31 +124,32 @@ void codec_real(struct codec *codec, double *value) {
     memcpy(value, &bits, sizeof bits);
 }
 
-/* Two's complement; what does not fit between the bounds fails. */
-static long transfer_integer(struct codec *codec, long value, long smallest, long largest) {
-    uint64_t bits = (uint64_t)(int64_t)value;
+/* Two's complement. A value outside the bounds leaves the old one and is noted. */
+static int64_t transfer_integer(struct codec *codec, const char *name, int64_t value,
+                                int64_t smallest, int64_t largest) {
+    uint64_t bits = (uint64_t)value;
     transfer_number(codec, &bits, 8);
     int64_t read;
     memcpy(&read, &bits, sizeof read);
     if (read < smallest || read > largest) {
-        codec->failed = true;
+        codec->bad_field = codec->bad_field != NULL ? codec->bad_field : name;
         return value;
     }
-    return (long)read;
+    return read;
 }
 
-void codec_long(struct codec *codec, long *value) {
-    *value = transfer_integer(codec, *value, LONG_MIN, LONG_MAX);
+void codec_long(struct codec *codec, const char *name, long *value) {
+    *value = (long)transfer_integer(codec, name, *value, LONG_MIN, LONG_MAX);
 }
 
-void codec_int(struct codec *codec, int *value) {
-    *value = (int)transfer_integer(codec, *value, INT_MIN, INT_MAX);
+void codec_int(struct codec *codec, const char *name, int *value) {
+    *value = (int)transfer_integer(codec, name, *value, INT_MIN, INT_MAX);
 }
 
-void codec_unsigned(struct codec *codec, unsigned *value) {
-    *value = (unsigned)transfer_integer(codec, (long)*value, 0, UINT_MAX);
+void codec_unsigned(struct codec *codec, const char *name, unsigned *value) {
+    *value = (unsigned)transfer_integer(codec, name, *value, 0, UINT_MAX);
 }
 
-void codec_bool(struct codec *codec, bool *value) {
-    *value = transfer_integer(codec, *value, 0, 1) != 0;
+void codec_bool(struct codec *codec, const char *name, bool *value) {
+    *value = transfer_integer(codec, name, *value, 0, 1) != 0;
 }

@@ -1,5 +1,5 @@
 /* Reads, writes or counts the fields of a serialized state, by one sequence of calls for all three.
- * The format is told in snapshot.h. */
+ * serialization.h has the format. */
 #ifndef CODEC_H
 #define CODEC_H
 
@@ -10,9 +10,10 @@ struct codec {
     enum { CODEC_COUNTING, CODEC_WRITING, CODEC_READING } mode;
     unsigned char *to;         /* CODEC_WRITING */
     const unsigned char *from; /* CODEC_READING */
-    size_t size;               /* bytes there are */
+    size_t size;               /* bytes available */
     size_t at;                 /* bytes done */
-    bool failed;               /* reading: too few bytes, or a value that its type does not have */
+    bool is_cut_off;           /* there were too few bytes */
+    const char *bad_field; /* first one read with a value that its type does not have; or NULL */
 };
 
 struct codec codec_counting(void);
@@ -23,15 +24,15 @@ struct codec codec_reading(const unsigned char *from, size_t size);
 void codec_begin(struct codec *codec, const char *guid);
 void codec_end(struct codec *codec);
 
-/* Reading: checks all but the fields and goes to the first of them. NULL, or what is wrong;
- * length: bytes that are expected in all. */
+/* Reading: checks all but the fields and goes to the first of them. Returns NULL, or what is wrong.
+ * length: bytes expected in all. */
 const char *codec_check(struct codec *codec, const char *guid, size_t length);
 
-/* One field, 8 bytes. */
+/* One field, 8 bytes. The name is static text. */
 void codec_real(struct codec *codec, double *value);
-void codec_long(struct codec *codec, long *value);
-void codec_int(struct codec *codec, int *value);
-void codec_unsigned(struct codec *codec, unsigned *value);
-void codec_bool(struct codec *codec, bool *value);
+void codec_long(struct codec *codec, const char *name, long *value);
+void codec_int(struct codec *codec, const char *name, int *value);
+void codec_unsigned(struct codec *codec, const char *name, unsigned *value);
+void codec_bool(struct codec *codec, const char *name, bool *value);
 
 #endif

@@ -1,23 +1,13 @@
-#include "internals.h"
+#include "instance.h"
+
+#include "fields.h"
+#include "right_hand_side.h"
+#include "settings.h"
 #include "snapshot.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* The integrator runs at this fraction of the tolerance asked for.
- * CVODE: each restart, one per change of an input, adds an error of the order of the local
- * tolerance, and thousands of them add up. Larger: faster and less accurate.
- * erk: the largest power of ten at which its error, measured with steps of 1 ms to 2 s, is that of
- * CVODE or less (at one of 31 points a fifth more); with shorter steps it is that of rounding. */
-static const double tolerance_fractions[INTEGRATOR_METHODS] = {
-    [INTEGRATOR_CVODE_ADAMS] = 2e-3,
-    [INTEGRATOR_CVODE_BDF] = 2e-3,
-    [INTEGRATOR_ERK] = 1e-2,
-};
-
-/* Absolute tolerance of a state, over relative tolerance times nominal value. */
-static const double absolute_fraction = 1e-2;
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
@@ -31,8 +21,8 @@ static bool lies_in(struct span span, const struct variable *variable) {
     return variable->offset >= span.offset && variable->offset - span.offset < span.size;
 }
 
-/* The fields that variables.toml binds are where the model says that such values are: a wrong
- * binding compiles, but the value would have no effect. */
+/* Each variable is bound to a field of its own kind: a wrong binding compiles, but the value would
+ * have no effect. */
 static enum status check_bindings(const struct model_description *description,
                                   const struct message_sink *sink) {
     for (size_t i = 0; i < description->variable_count; i++) {
@@ -62,12 +52,12 @@ static enum status setup(struct instance *instance) {
 
     memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial);
     memory->block = calloc(1, memory->size);
-    instance->first = calloc(2, values_size);
-    instance->work = calloc(input_count + 1, sizeof(double));
-    if (memory->block == NULL || instance->first == NULL || instance->work == NULL) {
+    instance->first_derivatives = calloc(2, values_size);
+    instance->u = calloc(input_count + 1, sizeof(double));
+    if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
-    instance->second = instance->first + values_size;
+    instance->second_derivatives = instance->first_derivatives + values_size;
     memory->values = memory->block;
     memory->held = memory->values + values_size;
     memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
@@ -115,30 +105,10 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
-    free(instance->work);
-    free(instance->first);
+    free(instance->u);
+    free(instance->first_derivatives);
     free(instance->memory.block);
     free(instance);
-}
-
-/* The parameter wins over the experiment, which wins over the default. */
-void instance_update_tolerance(struct instance *instance) {
-    struct instance_state *state = &instance->state;
-    double tolerance = instance->description->default_tolerance;
-    if (state->own.relative_tolerance > 0.0) {
-        tolerance = state->own.relative_tolerance;
-    } else if (state->experiment.tolerance_defined) {
-        tolerance = state->experiment.tolerance;
-    }
-    state->own.effective_relative_tolerance = fmin(
-        fmax(tolerance_fractions[state->own.solver_method] * tolerance, INSTANCE_FINEST_TOLERANCE),
-        INSTANCE_COARSEST_TOLERANCE);
-}
-
-void instance_set_clock(struct instance *instance, struct clock_time time) {
-    instance->state.time = time;
-    instance->state.own.time = time.s;
-    instance->outputs_are_valid = false;
 }
 
 void instance_reset(struct instance *instance) {
@@ -151,32 +121,6 @@ void instance_reset(struct instance *instance) {
     }
     instance_set_clock(instance, (struct clock_time){0});
     instance_update_tolerance(instance);
-}
-
-enum status instance_check_experiment(const struct instance *instance,
-                                      const struct instance_experiment *experiment) {
-    const double start = experiment->start_time;
-    if (!isfinite(start)) {
-        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "start time %g is refused: a finite time is expected", start);
-        return STATUS_INVALID_ARGUMENT;
-    }
-    if (experiment->stop_time_defined &&
-        !(isfinite(experiment->stop_time) && experiment->stop_time >= start)) {
-        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "stop time %.17g is refused: a finite time, not before the start time %.17g, "
-                      "is expected",
-                      experiment->stop_time, start);
-        return STATUS_INVALID_ARGUMENT;
-    }
-    if (experiment->tolerance_defined &&
-        !(isfinite(experiment->tolerance) && experiment->tolerance > 0.0)) {
-        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "tolerance %g is refused: a finite value above 0 is expected",
-                      experiment->tolerance);
-        return STATUS_INVALID_ARGUMENT;
-    }
-    return STATUS_OK;
 }
 
 enum status instance_setup_experiment(struct instance *instance,
@@ -203,55 +147,10 @@ enum status instance_enter_initialization(struct instance *instance) {
     return STATUS_OK;
 }
 
-enum status instance_check_parameters(const struct instance *instance) {
-    char text[256]; // written where the parameters are refused
-    const enum status status =
-        instance->model->check_parameters(instance->memory.values, text, sizeof text);
-    if (status != STATUS_OK) {
-        message_write(&instance->sink, status, "%s", text);
-    }
-    return status;
-}
-
-static struct integrator_settings settings_of(const struct instance *instance) {
-    const struct instance_values *own = &instance->state.own;
-    return (struct integrator_settings){
-        .method = (enum integrator_method)own->solver_method,
-        .relative_tolerance = own->effective_relative_tolerance,
-        .max_step = own->max_step,
-    };
-}
-
-bool instance_is_configured_otherwise(const struct instance *instance) {
-    const struct integrator_settings wanted = settings_of(instance);
-    return instance->configured.method != wanted.method ||
-           instance->configured.relative_tolerance != wanted.relative_tolerance ||
-           instance->configured.max_step != wanted.max_step;
-}
-
-enum status instance_configure_integrator(struct instance *instance) {
-    const struct span states = instance->model->states;
-    const double tolerance = instance->state.own.effective_relative_tolerance;
-    double *absolute = doubles_of(instance->first, states);
-    for (size_t i = 0; i < instance->description->variable_count; i++) {
-        const struct variable *variable = &instance->description->variables[i];
-        const size_t from_states = variable->offset - states.offset;
-        if (variable->owner == VARIABLE_OF_MODEL && from_states < states.size) {
-            absolute[from_states / sizeof(double)] =
-                absolute_fraction * variable->nominal * tolerance;
-        }
-    }
-    struct integrator_settings settings = settings_of(instance);
-    settings.absolute_tolerances = absolute;
-    const enum status status = integrator_configure(instance->integrator, &settings);
-    instance->configured = status == STATUS_OK ? settings : (struct integrator_settings){0};
-    instance->configured.absolute_tolerances = NULL;
-    return status;
-}
-
 enum status instance_exit_initialization(struct instance *instance) {
     enum status status = instance_check_parameters(instance);
     if (status == STATUS_OK && instance->integrator != NULL) {
+        instance_report_tolerance(instance);
         status = instance_configure_integrator(instance);
         if (status != STATUS_OK) {
             message_write(&instance->sink, status, "initialization failed: %s",
@@ -266,28 +165,4 @@ enum status instance_exit_initialization(struct instance *instance) {
 
 double instance_time(const struct instance *instance) {
     return instance->state.time.s;
-}
-
-/* ---- Integration from outside --------------------------------------------------------------- */
-
-enum status instance_enter_continuous_time(struct instance *instance) {
-    const enum status status = instance_check_parameters(instance);
-    if (status == STATUS_OK) {
-        instance->state.phase = PHASE_CONTINUOUS_TIME;
-    }
-    return status;
-}
-
-void instance_enter_event_mode(struct instance *instance) {
-    instance->state.phase = PHASE_STEPPING;
-}
-
-enum status instance_set_time(struct instance *instance, double time) {
-    if (!isfinite(time)) {
-        message_write(&instance->sink, STATUS_NOT_FINITE,
-                      "time %g is refused: a finite time is expected", time);
-        return STATUS_NOT_FINITE;
-    }
-    instance_set_clock(instance, (struct clock_time){.s = time});
-    return STATUS_OK;
 }

@@ -1,5 +1,6 @@
-/* One instance of a model: its values by reference, its time, and steps from one communication
- * point to the next. Knows no particular model and no FMI.
+/* One instance of a model: its life from creation to the end of initialization. Knows no particular
+ * model and no FMI. Values are in values.h, steps in stepping.h, derivatives in derivatives.h,
+ * integration from outside in continuous_states.h, snapshots in snapshot.h and serialization.h.
  *
  * Every function that can fail reports the status it returns, with one line of text that says what
  * was wrong and what was expected, to the sink given at creation. Functions that set or get values
@@ -8,17 +9,18 @@
 #define INSTANCE_H
 
 #include "integrator.h"
+#include "platform.h"
 #include "variables.h"
 
 struct instance;
 
-/* Values of the variables with owner = "instance" (src/time_variable.toml, solver_variables.toml).
+/* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
  */
 struct instance_values {
     double time;                         /* s */
     int solver_steps;                    /* internal steps since initialization */
     int solver_rhs_evaluations;          /* the integrator's, since initialization */
-    double relative_tolerance;           /* asked for; 0: that of the experiment */
+    double relative_tolerance;           /* 0: that of the experiment */
     int max_internal_steps;              /* per communication step */
     double effective_relative_tolerance; /* what the integrator runs at */
     int solver_restarts;                 /* since initialization */
@@ -39,92 +41,26 @@ struct instance_experiment {
 
 /* Allocates all that the instance needs; steps allocate nothing. description must outlive the
  * instance, sink is copied. On failure *instance is NULL. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_create(const struct model_description *description, const struct message_sink *sink,
-                struct instance **instance);
+MUST_CHECK NONNULL enum status instance_create(const struct model_description *description,
+                                               const struct message_sink *sink,
+                                               struct instance **instance);
 
 /* NULL is allowed. */
 void instance_destroy(struct instance *instance);
 
 /* Back to the state right after instance_create: start values, no experiment. */
-__attribute__((nonnull)) void instance_reset(struct instance *instance);
+NONNULL void instance_reset(struct instance *instance);
 
 /* Before initialization; may be repeated. */
-__attribute__((nonnull, warn_unused_result)) enum status
+MUST_CHECK NONNULL enum status
 instance_setup_experiment(struct instance *instance, const struct instance_experiment *experiment);
 
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_enter_initialization(struct instance *instance);
+MUST_CHECK NONNULL enum status instance_enter_initialization(struct instance *instance);
 
-/* Ends initialization: the parameters must go together. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_exit_initialization(struct instance *instance);
-
-/* count values by reference; the arrays may be NULL where count is 0. Real functions take Real
- * variables only, Integer functions Integer ones. A set value shows at once in what is calculated
- * from it. */
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_set_real(struct instance *instance, const unsigned references[], size_t count,
-                  const double values[]);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_set_integer(struct instance *instance, const unsigned references[], size_t count,
-                     const int values[]);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_real(struct instance *instance, const unsigned references[], size_t count,
-                  double values[]);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_integer(struct instance *instance, const unsigned references[], size_t count,
-                     int values[]);
-
-/* Derivatives of inputs with respect to time, of orders 1 to 3, at the beginning of the next step:
- * over it the inputs are Taylor polynomials. They apply to that step alone. All or nothing. */
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_set_input_derivatives(struct instance *instance, const unsigned references[], size_t count,
-                               const int orders[], const double values[]);
-
-/* Derivatives of Real outputs with respect to time, of orders 1 and 2, at the current time, inputs
- * being the polynomials that apply there. All or nothing. */
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_output_derivatives(struct instance *instance, const unsigned references[],
-                                size_t count, const int orders[], double values[]);
-
-/* Writes J v: J the derivatives of unknowns (Real variables of the model that are not parameters or
- * inputs) with respect to knowns (inputs, states; before the first step parameters too). */
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_directional_derivative(struct instance *instance, const unsigned unknowns[],
-                                    size_t unknown_count, const unsigned knowns[],
-                                    size_t known_count, const double v[], double result[]);
-
-/* Steps from communication_point to communication_point + step (s) with the inputs held, or as
- * polynomials where derivatives were set.
- * STATUS_INVALID_TIME: step not > 0, communication_point not where the instance is (clock_slack),
- * or the end past the stop time. Where the integration ends early (severity discard), instance_time
- * tells how far the instance got, and its states are those of that time. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_do_step(struct instance *instance, double communication_point, double step);
+/* Ends initialization. Inconsistent parameters are refused. */
+MUST_CHECK NONNULL enum status instance_exit_initialization(struct instance *instance);
 
 /* Time that the instance has reached, s. */
-__attribute__((nonnull)) double instance_time(const struct instance *instance);
-
-/* ---- Integration from outside (Model Exchange) ---------------------------------------------- */
-
-/* While the time is continuous only continuous inputs may be set. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_enter_continuous_time(struct instance *instance);
-__attribute__((nonnull)) void instance_enter_event_mode(struct instance *instance);
-
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_set_time(struct instance *instance, double time);
-
-/* count must be instance_state_count; the arrays may be NULL where it is 0. All or nothing. */
-__attribute__((nonnull)) size_t instance_state_count(const struct instance *instance);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_set_states(struct instance *instance, const double x[], size_t count);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_states(struct instance *instance, double x[], size_t count);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_derivatives(struct instance *instance, double dx[], size_t count);
-__attribute__((nonnull(1), warn_unused_result)) enum status
-instance_get_nominals(struct instance *instance, double nominals[], size_t count);
+NONNULL double instance_time(const struct instance *instance);
 
 #endif

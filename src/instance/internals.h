@@ -1,5 +1,5 @@
-/* Inside of an instance, shared by the files that make it up: instance.c (life), stepping.c (from
- * one communication point to the next), access.c (values), derivatives.c, snapshot.c. */
+/* What an instance is made of. Private to this library; its functions are in the header of the same
+ * name as their file. */
 #ifndef INSTANCE_INTERNALS_H
 #define INSTANCE_INTERNALS_H
 
@@ -16,6 +16,10 @@ enum { INSTANCE_LONGEST_HISTORY = 1000 };
 #define INSTANCE_FINEST_TOLERANCE   1e-14
 #define INSTANCE_COARSEST_TOLERANCE 1e-2
 
+/* The experiment's tolerance is taken up to here: masters pass their own, made for coarser models
+ * (Maestro's is 0.1), and results would lose their digits. */
+#define INSTANCE_COARSEST_EXPERIMENT_TOLERANCE 1e-4
+
 /* All that later results depend on, but for the values in struct instance_memory. A plain value: a
  * snapshot is a copy of it. */
 struct instance_state {
@@ -26,7 +30,7 @@ struct instance_state {
     struct clock_time time;
 
     /* The integrator's history, from which it goes on while nothing changes. It follows from the
-     * restart and the first and the last time asked for since then (integrator_advance). */
+     * restart and the first and the last advance since then (integrator_advance). */
     bool has_history;
     struct clock_time restart_time;
     double span;        /* s since the restart that the integrator may not pass */
@@ -34,8 +38,8 @@ struct instance_state {
     double latest_time; /* s since the restart */
     struct integrator_statistics statistics;
     long steps_before_restart; /* internal steps */
-    double restart_step;       /* s: first internal step asked for at the last restart; 0: none */
-    double next_step;          /* s: the same, for a restart now */
+    double restart_step; /* s: first internal step of the last restart; 0: the method found one */
+    double next_step;    /* s: the same, for a restart now */
 };
 
 /* Parts of one block of memory, of which a snapshot is a copy. */
@@ -60,13 +64,13 @@ struct instance {
 
     bool outputs_are_valid;        /* the calculated values belong to the others */
     bool history_is_lost;          /* the integrator is not where state says: replay first */
-    struct integrator *integrator; /* NULL where the model has no states */
+    struct integrator *integrator; /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the
                                               tolerances of the states */
-    bool inputs_move; /* since the last restart; otherwise work holds their values */
-    double *work;     /* one value per input: those that the right-hand side sees */
-    char *first;      /* value structures for derivatives */
-    char *second;
+    bool inputs_move;        /* since the last restart; otherwise u holds their values */
+    double *u;               /* one value per input, as the right-hand side sees them */
+    char *first_derivatives; /* value structures, along a curve (struct model) */
+    char *second_derivatives;
     struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
     struct instance_snapshot *oldest;
 };
@@ -75,52 +79,9 @@ static inline size_t count_of(struct span span) {
     return span.size / sizeof(double);
 }
 
-/* The doubles of a value structure that a span tells. */
+/* The doubles at a span of a value structure. */
 static inline double *doubles_of(char *values, struct span span) {
     return (double *)(void *)(values + span.offset);
 }
-
-/* The place of a variable's value. */
-void *instance_field(struct instance *instance, const struct variable *variable);
-
-void instance_write_field(struct instance *instance, const struct variable *variable, double value);
-
-/* Index of an input variable among the inputs. */
-size_t instance_input_index(const struct instance *instance, const struct variable *variable);
-
-/* The variable with this reference and type, or NULL with a text. */
-const struct variable *instance_find(const struct instance *instance, unsigned reference,
-                                     enum variable_type type);
-
-/* Says that what cannot be computed; STATUS_NOT_FINITE. */
-enum status instance_not_finite(const struct instance *instance, const char *what);
-
-/* Brings the calculated values up to date; says why where that fails. */
-enum status instance_update_outputs(struct instance *instance);
-
-/* Settings that follow from values: the tolerance that the integrator runs at. */
-void instance_update_tolerance(struct instance *instance);
-
-void instance_set_clock(struct instance *instance, struct clock_time time);
-
-/* An experiment that can be run; says why where it cannot. */
-enum status instance_check_experiment(const struct instance *instance,
-                                      const struct instance_experiment *experiment);
-
-/* The parameters go together; says why where they do not. */
-enum status instance_check_parameters(const struct instance *instance);
-
-/* Gives the integrator the method, tolerance and limits it has to run with. */
-enum status instance_configure_integrator(struct instance *instance);
-
-/* Brings state.next_step up to date, which costs too much to be done after each step. */
-void instance_update_next_step(struct instance *instance);
-
-/* What the integrator was configured with is not what the values ask for. */
-bool instance_is_configured_otherwise(const struct instance *instance);
-
-/* Right-hand side of the integrator and its derivatives by the states; context: the instance. */
-ode_rhs instance_rhs;
-ode_jacobian instance_jacobian;
 
 #endif

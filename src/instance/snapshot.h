@@ -1,20 +1,11 @@
-/* Snapshots of an instance: all that later results depend on, in memory and as bytes.
+/* Snapshots of an instance: all that later results depend on.
  *
- * A restored instance gives the same bits as the one saved would have given. The integrator's own
- * history is not in a snapshot: it follows from the last restart and is replayed at the first step,
- * and only where that step goes on from it.
+ * A restored instance gives the same bits as the saved one would have given. A snapshot is constant
+ * in size and does not contain the integrator's own history: that follows from the last restart and
+ * is replayed at the next step, if that step goes on from it.
  *
- * Bytes, all numbers little-endian, reals as IEEE 754 double:
- *
- *     8 bytes      "COSIMSTA"
- *     u32          version of the format, 1
- *     u32          length of the whole in bytes
- *     u32, bytes   length of the GUID, GUID
- *     8 bytes each fields, in the order of transfer_state() in snapshot.c
- *     u64          FNV-1a hash of all bytes before it
- *
- * Functions return STATUS_INVALID_ARGUMENT with a text where a snapshot is not the instance's own
- * or bytes are not what is expected; the instance is then as it was. */
+ * A snapshot belongs to its instance, which frees it at its own end at the latest. Functions refuse
+ * one of another instance with STATUS_INVALID_ARGUMENT and a message. */
 #ifndef SNAPSHOT_H
 #define SNAPSHOT_H
 
@@ -22,37 +13,21 @@
 
 struct instance_snapshot;
 
-/* Saves the instance into *snapshot: a new one where that is NULL, otherwise over that one. tag: a
- * number that the caller wants back. A snapshot is owned by its instance: instance_destroy frees
- * it.
- */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_save(struct instance *instance, unsigned tag, struct instance_snapshot **snapshot);
+/* Saves the instance into *snapshot: a new one if that is NULL, otherwise over that one. tag: a
+ * number that the caller wants back. */
+MUST_CHECK NONNULL enum status instance_save(struct instance *instance, unsigned tag,
+                                             struct instance_snapshot **snapshot);
 
 /* The snapshot stays valid. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_restore(struct instance *instance, struct instance_snapshot *snapshot);
+MUST_CHECK NONNULL enum status instance_restore(struct instance *instance,
+                                                const struct instance_snapshot *snapshot);
 
 /* Frees *snapshot and sets it to NULL. */
-__attribute__((nonnull)) enum status instance_forget(struct instance *instance,
-                                                     struct instance_snapshot **snapshot);
+NONNULL enum status instance_forget(struct instance *instance, struct instance_snapshot **snapshot);
 
-/* The tag that the snapshot was saved with, and the phase the instance was in. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_snapshot_tag(struct instance *instance, struct instance_snapshot *snapshot, unsigned *tag,
-                      enum phase *phase);
-
-/* Bytes that instance_serialize writes. */
-__attribute__((nonnull)) size_t instance_serialized_size(const struct instance *instance);
-
-/* bytes: size bytes, size at least instance_serialized_size. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_serialize(struct instance *instance, struct instance_snapshot *snapshot,
-                   unsigned char bytes[], size_t size);
-
-/* A new snapshot from what instance_serialize of any instance of the same model wrote. */
-__attribute__((nonnull, warn_unused_result)) enum status
-instance_deserialize(struct instance *instance, const unsigned char bytes[], size_t size,
-                     struct instance_snapshot **snapshot);
+/* The tag that the snapshot was saved with, and the phase in which the instance was. */
+MUST_CHECK NONNULL enum status instance_snapshot_tag(const struct instance *instance,
+                                                     const struct instance_snapshot *snapshot,
+                                                     unsigned *tag, enum phase *phase);
 
 #endif

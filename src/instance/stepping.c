@@ -1,65 +1,12 @@
-/* From one communication point to the next. */
-#include "internals.h"
+#include "stepping.h"
+
+#include "fields.h"
+#include "history.h"
+#include "right_hand_side.h"
+#include "settings.h"
 
 #include <limits.h>
 #include <math.h>
-#include <string.h>
-
-static bool is_moving(const struct polynomial inputs[], size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
-            if (inputs[i].d[k] != 0.0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
-/* ---- What the integrator calls -------------------------------------------------------------- */
-
-static void evaluate_inputs(const struct instance *instance, double t) {
-    const size_t input_count = count_of(instance->model->inputs);
-    for (size_t i = 0; i < input_count; i++) {
-        instance->work[i] = polynomial_value(&instance->memory.running[i], t);
-    }
-}
-
-enum status instance_rhs(double t, const double x[], double dx[], void *instance_pointer) {
-    const struct instance *instance = instance_pointer;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
-    return instance->model->right_hand_side(
-        instance->memory.held, instance->state.restart_time.s + t, x, instance->work, dx);
-}
-
-/* Column by column: derivatives along each state. */
-enum status instance_jacobian(double t, const double x[], double J[], void *instance_pointer) {
-    struct instance *instance = instance_pointer;
-    const struct model *model = instance->model;
-    const double time = instance->state.restart_time.s + t;
-    const size_t n = count_of(model->states);
-    char *point = instance->second;
-    if (instance->inputs_move) {
-        evaluate_inputs(instance, t);
-    }
-    memcpy(point, instance->memory.held, model->values_size);
-    memcpy(doubles_of(point, model->states), x, model->states.size);
-    if (model->inputs.size > 0) {
-        memcpy(doubles_of(point, model->inputs), instance->work, model->inputs.size);
-    }
-    enum status status = model->outputs(point, time);
-    for (size_t j = 0; j < n && status == STATUS_OK; j++) {
-        memset(instance->first, 0, model->values_size);
-        doubles_of(instance->first, model->states)[j] = 1.0;
-        status = model->propagate(point, time, 0.0, instance->first, NULL);
-        memcpy(&J[n * j], doubles_of(instance->first, model->derivatives), n * sizeof(double));
-    }
-    return status;
-}
-
-/* ---- Steps ---------------------------------------------------------------------------------- */
 
 static enum status refuse_times(const struct instance *instance, double t, double h) {
     const struct instance_experiment *experiment = &instance->state.experiment;
@@ -92,119 +39,6 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
     return STATUS_OK;
 }
 
-/* The next step's inputs are held at the values that the integrator runs with. Polynomials need no
- * comparison: the span of the integrator ends with the step that they are for. */
-static bool inputs_are_held(const struct instance_memory *memory, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        const double *next = memory->pending[i].d;
-        if (next[0] != memory->running[i].d[0]) {
-            return false;
-        }
-        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
-            if (next[k] != 0.0) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-/* The parameters are those that the integrator runs with. */
-static bool parameters_are_held(const struct instance *instance) {
-    const struct instance_memory *memory = &instance->memory;
-    const struct span parameters = instance->model->parameters;
-    return memcmp(memory->held + parameters.offset, memory->values + parameters.offset,
-                  parameters.size) == 0;
-}
-
-/* The integrator may go on from where it is to target. A pure function of what is set now and what
- * the integrator runs with: how often and in what order values were set does not matter.
- *
- * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms, going on
- * with CVODE's history over a jump has 450 times the error of a restart and is slower where jumps
- * are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only below
- * 1e-9, and rollback would have to replay every jump. */
-static bool can_go_on(const struct instance *instance, double target) {
-    const struct instance_memory *memory = &instance->memory;
-    const struct instance_state *state = &instance->state;
-    const size_t input_count = count_of(instance->model->inputs);
-    return state->has_history && target <= state->span &&
-           state->statistics.steps - state->steps_before_restart < INSTANCE_LONGEST_HISTORY &&
-           parameters_are_held(instance) && inputs_are_held(memory, input_count);
-}
-
-/* For inputs that are held, once instead of at every evaluation. */
-static void prepare_inputs(struct instance *instance) {
-    instance->inputs_move = is_moving(instance->memory.running, count_of(instance->model->inputs));
-    evaluate_inputs(instance, 0.0);
-}
-
-void instance_update_next_step(struct instance *instance) {
-    if (instance->state.has_history && !instance->history_is_lost) {
-        instance->state.next_step = integrator_next_step(instance->integrator);
-    }
-}
-
-static enum status restart(struct instance *instance, struct clock_time end) {
-    struct instance_memory *memory = &instance->memory;
-    struct instance_state *state = &instance->state;
-    const size_t input_count = count_of(instance->model->inputs);
-    if (parameters_are_held(instance)) {
-        instance_update_next_step(instance);
-    } else {
-        state->next_step = 0.0; // with others the instance is as good as new
-    }
-    state->has_history = false; // until the first advance has succeeded
-    memcpy(memory->held, memory->values, instance->model->values_size);
-    memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
-    prepare_inputs(instance);
-
-    const double target = clock_difference(end, state->time);
-    state->span = INFINITY;
-    if (instance->inputs_move) {
-        state->span = target;
-    } else if (state->experiment.stop_time_defined) {
-        const struct clock_time stop = {.s = state->experiment.stop_time};
-        state->span = fmax(clock_difference(stop, state->time), target);
-    }
-    state->restart_time = state->time;
-    state->first_time = target;
-    state->steps_before_restart = state->statistics.steps;
-    state->restart_step = state->next_step;
-    instance->history_is_lost = false;
-    return integrator_restart(instance->integrator,
-                              doubles_of(memory->held, instance->model->states), state->span,
-                              state->restart_step);
-}
-
-/* Brings the integrator to where the restored state says it is, in the internal steps that it says
- * this took: a state whose bytes were forged ends here. */
-static enum status replay(struct instance *instance) {
-    const struct instance_state *state = &instance->state;
-    const struct span states = instance->model->states;
-    const long steps = state->statistics.steps - state->steps_before_restart;
-    double *x = doubles_of(instance->first, states);
-    double reached;
-    prepare_inputs(instance);
-    enum status status =
-        integrator_restart(instance->integrator, doubles_of(instance->memory.held, states),
-                           state->span, state->restart_step);
-    if (status == STATUS_OK) {
-        status = integrator_advance(instance->integrator, state->first_time, steps, &reached, x);
-    }
-    if (status == STATUS_OK && state->latest_time > state->first_time) {
-        status = integrator_advance(instance->integrator, state->latest_time, steps, &reached, x);
-    }
-    integrator_set_statistics(instance->integrator, &state->statistics);
-    instance->history_is_lost = false;
-    if (status != STATUS_OK) {
-        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "the restored state cannot be continued: it contradicts itself");
-        return STATUS_INVALID_ARGUMENT;
-    }
-    return STATUS_OK;
-}
-
 static int saturated(long count) {
     return count > INT_MAX ? INT_MAX : (int)count;
 }
@@ -221,12 +55,12 @@ static void update_statistics(struct instance *instance) {
     own->solver_last_order = statistics->last_order;
 }
 
-/* Inputs at the end of a step of the length elapsed (s); their derivatives applied to it alone. */
+/* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
 static void end_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
     const size_t input_count = count_of(instance->model->inputs);
     double *u = doubles_of(memory->values, instance->model->inputs);
-    if (!is_moving(memory->pending, input_count)) {
+    if (!instance_inputs_move(memory->pending, input_count)) {
         for (size_t i = 0; i < input_count; i++) {
             memory->current[i] = memory->pending[i];
             u[i] = memory->pending[i].d[0];
@@ -243,12 +77,7 @@ static void end_inputs(struct instance *instance, double elapsed) {
 static enum status integrate_to(struct instance *instance, struct clock_time end) {
     struct instance_state *state = &instance->state;
     const struct clock_time begin = state->time;
-    enum status status = STATUS_OK;
-    if (!can_go_on(instance, clock_difference(end, state->restart_time))) {
-        status = restart(instance, end);
-    } else if (instance->history_is_lost) {
-        status = replay(instance);
-    }
+    enum status status = instance_prepare_history(instance, end);
     if (status != STATUS_OK) {
         return status;
     }

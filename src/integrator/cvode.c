@@ -1,8 +1,9 @@
 /* The multistep methods of CVODE. */
-#include "method.h"
+#include "sundials.h"
 
 #include <math.h>
 #include <nvector/nvector_serial.h>
+#include <string.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
@@ -21,8 +22,18 @@ static const double adams_iteration_error = 0.2;
  * ms, the error of the trajectory at 0.1 is a third of that at 0.5, for as many internal steps. */
 static const double first_step_fraction = 0.1;
 
-static enum status status_of_flag(const struct integrator *integrator, int flag) {
-    const bool stuck = integrator_is_stuck(integrator);
+struct cvode {
+    struct sundials base; /* first */
+    void *solver;
+    SUNNonlinearSolver nonlinear_solver;
+    SUNMatrix jacobian;                /* of BDF */
+    SUNLinearSolver linear_solver;     /* of BDF */
+    struct small_vector_terms columns; /* of the last internal step; count 0: not known */
+    struct method_work counted;        /* since the restart, up to the last advance */
+};
+
+static enum status status_of_flag(const struct problem *problem, int flag) {
+    const bool stuck = problem_is_stuck(problem);
     switch (flag) {
     case CV_SUCCESS:
     case CV_TSTOP_RETURN:
@@ -51,194 +62,240 @@ static enum status status_of_flag(const struct integrator *integrator, int flag)
     }
 }
 
+/* ---- Life ----------------------------------------------------------------------------------- */
+
 static int evaluate_jacobian(sunrealtype t, N_Vector x, N_Vector dx, SUNMatrix jacobian,
-                             void *integrator_pointer, N_Vector work1, N_Vector work2,
-                             N_Vector work3) {
-    struct integrator *integrator = integrator_pointer;
-    const struct ode *ode = &integrator->ode;
-    double *J = SUNDenseMatrix_Data(jacobian);
+                             void *user_data, N_Vector work1, N_Vector work2, N_Vector work3) {
+    const struct sundials *base = user_data;
     (void)dx;
     (void)work1;
     (void)work2;
     (void)work3;
-    if (ode->jacobian(t, small_vector_data(x), J, ode->context) == STATUS_OK &&
-        integrator_are_finite(J, ode->state_count * ode->state_count)) {
-        return 0;
-    }
-    integrator->failed_at = t;
-    return 1; // a smaller step is tried
+    return sundials_callback_flag(
+        problem_jacobian(base->problem, t, small_vector_data(x), SUNDenseMatrix_Data(jacobian)));
 }
 
-static void destroy(struct integrator *integrator) {
-    if (integrator->solver != NULL) {
-        CVodeFree(&integrator->solver);
+static void destroy(void *memory) {
+    struct cvode *cvode = memory;
+    if (cvode->solver != NULL) {
+        CVodeFree(&cvode->solver);
     }
-    if (integrator->nonlinear_solver != NULL) {
-        SUNNonlinSolFree(integrator->nonlinear_solver);
-        integrator->nonlinear_solver = NULL;
+    if (cvode->nonlinear_solver != NULL) {
+        SUNNonlinSolFree(cvode->nonlinear_solver);
     }
-    if (integrator->linear_solver != NULL) {
-        SUNLinSolFree(integrator->linear_solver);
-        integrator->linear_solver = NULL;
+    if (cvode->linear_solver != NULL) {
+        SUNLinSolFree(cvode->linear_solver);
     }
-    if (integrator->jacobian != NULL) {
-        SUNMatDestroy(integrator->jacobian);
-        integrator->jacobian = NULL;
+    if (cvode->jacobian != NULL) {
+        SUNMatDestroy(cvode->jacobian);
     }
+    sundials_destroy(cvode);
 }
 
 /* What both methods need. */
-static bool create_solver(struct integrator *integrator, int multistep_method) {
-    integrator->solver = CVodeCreate(multistep_method, integrator->context);
-    return integrator->solver != NULL &&
-           sundials_redirect_cvode(integrator->context, integrator->solver, &integrator->texts) ==
-               0 &&
-           CVodeInit(integrator->solver, integrator_evaluate_rhs, 0.0, integrator->x) ==
-               CV_SUCCESS &&
-           CVodeSetUserData(integrator->solver, integrator) == CV_SUCCESS &&
+static bool create_solver(struct cvode *cvode, int multistep_method) {
+    struct sundials *base = &cvode->base;
+    cvode->solver = CVodeCreate(multistep_method, base->context);
+    return cvode->solver != NULL &&
+           sundials_redirect_cvode(base->context, cvode->solver, &base->texts) == 0 &&
+           CVodeInit(cvode->solver, sundials_rhs, 0.0, base->x) == CV_SUCCESS &&
+           CVodeSetUserData(cvode->solver, base) == CV_SUCCESS &&
            // warnings of steps too short to change the time: SUNDIALS 7 prints them
-           CVodeSetMaxHnilWarns(integrator->solver, -1) == CV_SUCCESS;
+           CVodeSetMaxHnilWarns(cvode->solver, -1) == CV_SUCCESS;
 }
 
-static enum status create_adams(struct integrator *integrator) {
-    if (!create_solver(integrator, CV_ADAMS)) {
-        return STATUS_OUT_OF_MEMORY;
-    }
-    integrator->nonlinear_solver = SUNNonlinSol_FixedPoint(integrator->x, 0, integrator->context);
-    const bool created =
-        integrator->nonlinear_solver != NULL &&
-        CVodeSetNonlinearSolver(integrator->solver, integrator->nonlinear_solver) == CV_SUCCESS &&
-        CVodeSetNonlinConvCoef(integrator->solver, adams_iteration_error) == CV_SUCCESS;
-    return created ? STATUS_OK : STATUS_OUT_OF_MEMORY;
+static bool create_fixed_point_iteration(struct cvode *cvode) {
+    cvode->nonlinear_solver = SUNNonlinSol_FixedPoint(cvode->base.x, 0, cvode->base.context);
+    return cvode->nonlinear_solver != NULL &&
+           CVodeSetNonlinearSolver(cvode->solver, cvode->nonlinear_solver) == CV_SUCCESS &&
+           CVodeSetNonlinConvCoef(cvode->solver, adams_iteration_error) == CV_SUCCESS;
 }
 
-static enum status create_bdf(struct integrator *integrator) {
-    const sunindextype n = (sunindextype)integrator->ode.state_count;
-    if (!create_solver(integrator, CV_BDF)) {
-        return STATUS_OUT_OF_MEMORY;
-    }
-    integrator->jacobian = SUNDenseMatrix(n, n, integrator->context);
-    if (integrator->jacobian == NULL) {
-        return STATUS_OUT_OF_MEMORY;
-    }
-    // the solver is made for any vector with an array, but takes none of an unknown kind for
+static bool create_newton_iteration(struct cvode *cvode) {
+    SUNContext context = cvode->base.context;
+    const sunindextype n = (sunindextype)cvode->base.problem->ode.state_count;
+    cvode->jacobian = SUNDenseMatrix(n, n, context);
+    // SUNLinSol_Dense works with any vector that has an array, but takes only a serial one for
     // pattern
-    N_Vector pattern = N_VNew_Serial(n, integrator->context);
+    N_Vector pattern = cvode->jacobian != NULL ? N_VNew_Serial(n, context) : NULL;
     if (pattern == NULL) {
+        return false;
+    }
+    cvode->linear_solver = SUNLinSol_Dense(pattern, cvode->jacobian, context);
+    N_VDestroy(pattern);
+    cvode->nonlinear_solver = SUNNonlinSol_Newton(cvode->base.x, context);
+    return cvode->linear_solver != NULL && cvode->nonlinear_solver != NULL &&
+           CVodeSetNonlinearSolver(cvode->solver, cvode->nonlinear_solver) == CV_SUCCESS &&
+           CVodeSetLinearSolver(cvode->solver, cvode->linear_solver, cvode->jacobian) ==
+               CV_SUCCESS &&
+           CVodeSetJacFn(cvode->solver, evaluate_jacobian) == CV_SUCCESS;
+}
+
+static enum status create(struct problem *problem, const struct method *method,
+                          int multistep_method, bool (*create_iteration)(struct cvode *),
+                          void **memory) {
+    *memory = NULL;
+    struct cvode *cvode = sundials_create(sizeof *cvode, problem, method, status_of_flag);
+    if (cvode == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
-    integrator->linear_solver = SUNLinSol_Dense(pattern, integrator->jacobian, integrator->context);
-    N_VDestroy(pattern);
-    integrator->nonlinear_solver = SUNNonlinSol_Newton(integrator->x, integrator->context);
-    const bool created =
-        integrator->linear_solver != NULL && integrator->nonlinear_solver != NULL &&
-        CVodeSetNonlinearSolver(integrator->solver, integrator->nonlinear_solver) == CV_SUCCESS &&
-        CVodeSetLinearSolver(integrator->solver, integrator->linear_solver, integrator->jacobian) ==
-            CV_SUCCESS &&
-        CVodeSetJacFn(integrator->solver, evaluate_jacobian) == CV_SUCCESS;
-    return created ? STATUS_OK : STATUS_OUT_OF_MEMORY;
+    enum status status = STATUS_OUT_OF_MEMORY;
+    if (create_solver(cvode, multistep_method) && create_iteration(cvode)) {
+        status = sundials_warm_up(cvode);
+    }
+    if (status != STATUS_OK) {
+        destroy(cvode);
+        return status;
+    }
+    *memory = cvode;
+    return STATUS_OK;
 }
 
-static int configure(struct integrator *integrator) {
-    int flag = CVodeSVtolerances(integrator->solver, integrator->settings.relative_tolerance,
-                                 integrator->absolute_tolerances);
-    if (flag == CV_SUCCESS) {
-        flag = CVodeSetMaxStep(integrator->solver, integrator->settings.max_step);
-    }
-    if (flag == CV_SUCCESS) {
-        flag = CVodeReInit(integrator->solver, 0.0, integrator->x);
-    }
-    return flag;
+static enum status create_adams(struct problem *problem, void **memory) {
+    return create(problem, &integrator_cvode_adams, CV_ADAMS, create_fixed_point_iteration, memory);
 }
 
-static int restart(struct integrator *integrator) {
-    return CVodeReInit(integrator->solver, 0.0, integrator->x);
+static enum status create_bdf(struct problem *problem, void **memory) {
+    return create(problem, &integrator_cvode_bdf, CV_BDF, create_newton_iteration, memory);
+}
+
+static enum status configure(void *memory) {
+    struct cvode *cvode = memory;
+    struct sundials *base = &cvode->base;
+    const struct integrator_settings *settings = &base->problem->settings;
+    memcpy(small_vector_data(base->absolute_tolerances), settings->absolute_tolerances,
+           base->problem->ode.state_count * sizeof(double));
+    int flag =
+        CVodeSVtolerances(cvode->solver, settings->relative_tolerance, base->absolute_tolerances);
+    if (flag == CV_SUCCESS) {
+        flag = CVodeSetMaxStep(cvode->solver, settings->max_step);
+    }
+    if (flag == CV_SUCCESS) {
+        flag = CVodeReInit(cvode->solver, 0.0, base->x);
+    }
+    return status_of_flag(base->problem, flag);
+}
+
+/* ---- Integration ---------------------------------------------------------------------------- */
+
+static enum status restart(void *memory, const double x[]) {
+    struct cvode *cvode = memory;
+    sundials_set_state(&cvode->base, x);
+    cvode->counted = (struct method_work){0};
+    return status_of_flag(cvode->base.problem, CVodeReInit(cvode->solver, 0.0, cvode->base.x));
 }
 
 /* CVODE interpolates by combining the columns of its Nordsieck array, up to 13, which stay as they
  * are until the next internal step. It computes the powers of the time with a product for each
- * factor: most of the cost of a short communication step. So it tells the columns once per internal
- * step, and all points within the step come from Horner's scheme. */
-static void evaluate_history(struct integrator *integrator, double t) {
+ * factor: most of the cost of a short communication step. So the columns are noted once per
+ * internal step, and all points within the step come from Horner's scheme. */
+static void evaluate_history(struct cvode *cvode, double t, double x[]) {
     double internal = 0.0;
     double last_step = 0.0;
-    (void)CVodeGetCurrentTime(integrator->solver, &internal);
-    (void)CVodeGetLastStep(integrator->solver, &last_step);
-    small_vector_polynomial(&integrator->columns, (t - internal) / last_step, integrator->x);
+    (void)CVodeGetCurrentTime(cvode->solver, &internal);
+    (void)CVodeGetLastStep(cvode->solver, &last_step);
+    small_vector_polynomial(&cvode->columns, (t - internal) / last_step,
+                            cvode->base.problem->ode.state_count, x);
 }
 
-static bool interpolate(struct integrator *integrator, double t) {
-    if (integrator->columns.count == 0) {
+static bool interpolate(void *memory, double t, double x[]) {
+    struct cvode *cvode = memory;
+    if (cvode->columns.count == 0) {
         return false;
     }
-    evaluate_history(integrator, t);
+    evaluate_history(cvode, t, x);
     return true;
 }
 
-static int advance(struct integrator *integrator, double t, long max_steps, double *stopped_at) {
-    int flag = CVodeSetMaxNumSteps(integrator->solver, max_steps);
-    if (flag == CV_SUCCESS && integrator->reached == 0.0) {
-        flag = CVodeSetInitStep(integrator->solver, fmin(integrator->first_step, t));
+static int integrate(struct cvode *cvode, double t, long max_steps, double *stopped_at,
+                     double x[]) {
+    const struct problem *problem = cvode->base.problem;
+    int flag = CVodeSetMaxNumSteps(cvode->solver, max_steps);
+    if (flag == CV_SUCCESS && problem->reached == 0.0) {
+        flag = CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
     }
     if (flag == CV_SUCCESS) {
         // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
-        flag = CVodeSetStopTime(integrator->solver, integrator->span);
+        flag = CVodeSetStopTime(cvode->solver, problem->span);
     }
     if (flag != CV_SUCCESS) {
+        sundials_get_state(&cvode->base, x);
         return flag;
     }
-    integrator->columns.count = 0;
-    small_vector_note_terms(integrator->x, &integrator->columns);
-    flag = CVode(integrator->solver, t, integrator->x, stopped_at, CV_NORMAL);
-    small_vector_note_terms(integrator->x, NULL);
+    cvode->columns.count = 0;
+    small_vector_note_terms(cvode->base.x, &cvode->columns);
+    flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_NORMAL);
+    small_vector_note_terms(cvode->base.x, NULL);
     // as at all other points within the step: where the stops are does not matter
-    if (flag == CV_SUCCESS && integrator->columns.count > 0) {
-        evaluate_history(integrator, t);
+    if (flag == CV_SUCCESS && cvode->columns.count > 0) {
+        evaluate_history(cvode, t, x);
+    } else {
+        sundials_get_state(&cvode->base, x);
     }
     return flag;
 }
 
+/* CVODE counts from the last restart on. */
+static void measure_work(struct cvode *cvode, struct method_work *work) {
+    struct method_work now = {0};
+    long iteration_failures = 0;
+    // these calls fail only without CVODE's memory
+    (void)CVodeGetNumSteps(cvode->solver, &now.steps);
+    (void)CVodeGetNumErrTestFails(cvode->solver, &now.failed_steps);
+    (void)CVodeGetNumStepSolveFails(cvode->solver, &iteration_failures);
+    (void)CVodeGetLastStep(cvode->solver, &now.last_step);
+    (void)CVodeGetLastOrder(cvode->solver, &now.last_order);
+    (void)CVodeGetCurrentTime(cvode->solver, &now.internal);
+    now.failed_steps += iteration_failures;
+    if (now.steps == 0) {
+        now.last_order = 0;
+    }
+
+    *work = now;
+    work->steps -= cvode->counted.steps;
+    work->failed_steps -= cvode->counted.failed_steps;
+    cvode->counted = now;
+}
+
+static enum status advance(void *memory, double t, long max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work) {
+    struct cvode *cvode = memory;
+    (void)begin_x; // CVODE has it
+    const int flag = integrate(cvode, t, max_steps, stopped_at, x);
+    measure_work(cvode, work);
+    return status_of_flag(cvode->base.problem, flag);
+}
+
 /* The error of a step h of order 1 is about h^2 x'' / 2. */
-static double next_step(const struct integrator *integrator) {
-    const double relative = integrator->settings.relative_tolerance;
-    const double *absolute = small_vector_data(integrator->absolute_tolerances);
-    const double *x = small_vector_data(integrator->last_x);
-    const double *ddx = small_vector_data(integrator->work);
-    if (integrator->counted.last_order < 2 ||
-        CVodeGetDky(integrator->solver, integrator->reached, 2, integrator->work) != CV_SUCCESS) {
+static double next_step(void *memory, const double x[]) {
+    const struct cvode *cvode = memory;
+    const struct problem *problem = cvode->base.problem;
+    const double relative = problem->settings.relative_tolerance;
+    const double *absolute = problem->settings.absolute_tolerances;
+    const double *ddx = small_vector_data(cvode->base.work);
+    if (cvode->counted.last_order < 2 ||
+        CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
     }
     double sum = 0.0;
-    for (size_t i = 0; i < integrator->ode.state_count; i++) {
+    for (size_t i = 0; i < problem->ode.state_count; i++) {
         const double weighted = ddx[i] / (relative * fabs(x[i]) + absolute[i]);
         sum += weighted * weighted;
     }
-    const double norm = sqrt(sum / (double)integrator->ode.state_count);
+    const double norm = sqrt(sum / (double)problem->ode.state_count);
     const double step = first_step_fraction * sqrt(2.0 / norm);
     return isfinite(step) ? step : 0.0;
 }
 
-static void count(const struct integrator *integrator, struct integrator_statistics *now) {
-    long iteration_failures = 0;
-    // these calls fail only without CVODE's memory
-    (void)CVodeGetNumSteps(integrator->solver, &now->steps);
-    (void)CVodeGetNumErrTestFails(integrator->solver, &now->failed_steps);
-    (void)CVodeGetNumStepSolveFails(integrator->solver, &iteration_failures);
-    (void)CVodeGetLastStep(integrator->solver, &now->last_step);
-    (void)CVodeGetLastOrder(integrator->solver, &now->last_order);
-    now->failed_steps += iteration_failures;
-}
-
-static double internal_time(const struct integrator *integrator) {
-    double t = 0.0;
-    (void)CVodeGetCurrentTime(integrator->solver, &t);
-    return t;
-}
+/* Measured over the scenarios: at 1/500 of the requested tolerance the error after 5000 restarts is
+ * 19 times that tolerance; at 1/100 it is 97 times, for 8 % fewer internal steps. */
+#define TOLERANCE_FRACTION 2e-3
 
 #define COMMON                                                                                     \
-    .has_history = true, .name = "CVODE", .destroy = destroy, .configure = configure,              \
-    .restart = restart, .advance = advance, .next_step = next_step, .count = count,                \
-    .internal_time = internal_time, .interpolate = interpolate, .status_of_flag = status_of_flag
+    .tolerance_fraction = TOLERANCE_FRACTION, .has_history = true,                                 \
+    .memory_size = sundials_memory_size, .destroy = destroy, .configure = configure,               \
+    .restart = restart, .advance = advance, .interpolate = interpolate, .next_step = next_step
 
-const struct method integrator_cvode_adams = {COMMON, .create = create_adams};
-const struct method integrator_cvode_bdf = {COMMON, .create = create_bdf};
+const struct method integrator_cvode_adams = {COMMON, .name = "cvode_adams",
+                                              .create = create_adams};
+const struct method integrator_cvode_bdf = {COMMON, .name = "cvode_bdf", .create = create_bdf};

@@ -1,26 +1,41 @@
 /* Integration of an ode by SUNDIALS, which stays behind this handle: no type or message of it
  * leaves.
  *
- * Time here is counted from the last restart, so that its rounding does not grow with the time of
- * the simulation. CVODE steps past the points asked for and interpolates; a restart drops what lies
- * beyond. The Runge-Kutta method ends its steps at the points asked for and has no history. One
+ * Time is counted from the last restart, so that its rounding does not grow with the time of the
+ * simulation. CVODE steps past the requested times and interpolates; a restart drops what lies
+ * beyond. The Runge-Kutta method ends its steps at the requested times and has no history. One
  * handle serves one thread at a time; handles share nothing. */
 #ifndef INTEGRATOR_H
 #define INTEGRATOR_H
 
-#include "message.h"
 #include "ode.h"
+
+#include "message.h"
+#include "platform.h"
 
 #include <stdbool.h>
 
 struct integrator;
 
+/* Every method: its code, whose number is the value of solver_method, and the struct method that
+ * its file defines. A new method is a file and a line here. */
+#define INTEGRATOR_METHOD_LIST(X)                                                                  \
+    /* CVODE, multistep of orders 1 to 12, fixed-point iteration */                                \
+    X(INTEGRATOR_CVODE_ADAMS, integrator_cvode_adams)                                              \
+    /* CVODE, for stiff equations: orders 1 to 5, Newton with the Jacobian */                      \
+    X(INTEGRATOR_CVODE_BDF, integrator_cvode_bdf)                                                  \
+    /* explicit Runge-Kutta of order 5 (ARKODE's ERKStep) */                                       \
+    X(INTEGRATOR_ERK, integrator_erk)
+
+#define INTEGRATOR_METHOD_CODE(code, symbol) code,
 enum integrator_method {
-    INTEGRATOR_CVODE_ADAMS = 1, /* multistep of orders 1 to 12, fixed-point iteration */
-    INTEGRATOR_CVODE_BDF = 2,   /* for stiff equations: orders 1 to 5, Newton with the Jacobian */
-    INTEGRATOR_ERK = 3,         /* explicit Runge-Kutta of order 5 (ARKODE's ERKStep) */
-    INTEGRATOR_METHODS,
+    INTEGRATOR_NO_METHOD,
+    INTEGRATOR_METHOD_LIST(INTEGRATOR_METHOD_CODE) INTEGRATOR_METHODS,
 };
+#undef INTEGRATOR_METHOD_CODE
+
+/* A method keeps a tolerance over thousands of restarts if it runs at this fraction of it. */
+double integrator_tolerance_fraction(enum integrator_method method);
 
 struct integrator_settings {
     enum integrator_method method;
@@ -41,9 +56,9 @@ struct integrator_statistics {
 
 /* ode and sink are copied, what they point to must outlive the handle. On failure *integrator is
  * NULL. */
-__attribute__((nonnull, warn_unused_result)) enum status
-integrator_create(const struct ode *ode, const struct message_sink *sink,
-                  struct integrator **integrator);
+MUST_CHECK NONNULL enum status integrator_create(const struct ode *ode,
+                                                 const struct message_sink *sink,
+                                                 struct integrator **integrator);
 
 /* NULL is allowed. */
 void integrator_destroy(struct integrator *integrator);
@@ -51,41 +66,37 @@ void integrator_destroy(struct integrator *integrator);
 /* Sets method, tolerances and limits and clears the statistics. Allocates all that the method
  * needs, where it is not the one before (in an FMU from the reserve of the handle, which cannot
  * fail); nothing is allocated later. A restart must follow. On failure it must be called again. */
-__attribute__((nonnull, warn_unused_result)) enum status
-integrator_configure(struct integrator *integrator, const struct integrator_settings *settings);
+MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrator,
+                                                    const struct integrator_settings *settings);
 
-/* After a stop, further advances go on from a history of internal steps. Otherwise each advance
- * starts anew, and a restart there changes nothing. */
-__attribute__((nonnull)) bool integrator_has_history(const struct integrator *integrator);
+/* True: an advance goes on from the internal steps before it. False: each advance starts fresh, and
+ * a restart between two of them changes nothing. */
+NONNULL bool integrator_has_history(const struct integrator *integrator);
 
-/* Starts anew from x at time 0 with no history. span (> 0): the right-hand side is not evaluated at
- * times beyond it, nor may integrator_advance go there; INFINITY where there is no such limit.
+/* Starts from x at time 0 with no history. span (> 0): the right-hand side is not evaluated beyond
+ * it, nor may integrator_advance go there; INFINITY: no limit.
  * first_step: what integrator_next_step gave for a solution like this one, s; 0: none is known. */
-__attribute__((nonnull, warn_unused_result)) enum status
-integrator_restart(struct integrator *integrator, const double x[], double span, double first_step);
+MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator, const double x[],
+                                                  double span, double first_step);
 
-/* After an advance: how long a first internal step can be after a restart here, s; 0 where that
- * cannot be told. */
-__attribute__((nonnull)) double integrator_next_step(const struct integrator *integrator);
+/* After an advance: how long a first internal step can be after a restart here, s; 0: unknown. */
+NONNULL double integrator_next_step(const struct integrator *integrator);
 
 /* Integrates to the time t, not before the one of the last call, in max_steps (>= 1) internal steps
  * at most, and writes the state there to x.
  * Where that fails (STATUS_TOO_MANY_STEPS, STATUS_NO_CONVERGENCE, STATUS_NOT_FINITE), *reached <= t
  * is the last time with a valid state and x that state; on success *reached is t.
  *
- * What follows a restart is a function of its state, span and first step and of the first t after
- * it, which bounds the first internal step; at which further times there was a stop does not matter
- * where the integrator has a history. */
-__attribute__((nonnull, warn_unused_result)) enum status
-integrator_advance(struct integrator *integrator, double t, long max_steps, double *reached,
-                   double x[]);
+ * Deterministic: after a restart, results depend only on its arguments and the first t, which
+ * bounds the first internal step. With a history, stops at further times do not matter. */
+MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
+                                                  long max_steps, double *reached, double x[]);
 
-__attribute__((nonnull)) void integrator_get_statistics(const struct integrator *integrator,
-                                                        struct integrator_statistics *statistics);
+NONNULL void integrator_get_statistics(const struct integrator *integrator,
+                                       struct integrator_statistics *statistics);
 
 /* Overwrites the totals, so that what was only done again does not count. */
-__attribute__((nonnull)) void
-integrator_set_statistics(struct integrator *integrator,
-                          const struct integrator_statistics *statistics);
+NONNULL void integrator_set_statistics(struct integrator *integrator,
+                                       const struct integrator_statistics *statistics);
 
 #endif

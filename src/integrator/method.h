@@ -1,100 +1,63 @@
-/* Inside of the integrator, shared by integrator.c and the files of its methods. The only header
- * with types of SUNDIALS beside sundials_compat.h and small_vector.h. */
-#ifndef INTEGRATOR_METHOD_INTERNALS_H
-#define INTEGRATOR_METHOD_INTERNALS_H
+/* What the file of a method gives to integrator.c. States are arrays here: the types of a solver
+ * library stay in the files that use it. */
+#ifndef METHOD_H
+#define METHOD_H
 
-#include "integrator.h"
-#include "reserve.h"
-#include "small_vector.h"
-#include "sundials_compat.h"
+#include "problem.h"
 
-#include <sundials/sundials_linearsolver.h>
-#include <sundials/sundials_matrix.h>
-#include <sundials/sundials_nonlinearsolver.h>
-
-struct integrator {
-    struct ode ode;
-    struct message_sink sink;
-    struct sundials_texts texts;
-    struct reserve reserve;              /* for context, vectors and solver */
-    size_t without_method;               /* bytes of it */
-    struct integrator_settings settings; /* without the tolerances of the states */
-
-    const struct method *method; /* NULL before integrator_configure */
-    SUNContext context;
-    void *solver; /* of CVODE or ERKStep */
-    SUNNonlinearSolver nonlinear_solver;
-    SUNMatrix jacobian;
-    SUNLinearSolver linear_solver;
-    N_Vector x;
-    N_Vector last_x; /* state at reached */
-    N_Vector absolute_tolerances;
-    N_Vector work;
-    struct small_vector_terms columns; /* of the last internal step; count 0: not known yet */
-
-    // times in s since the restart
-    double span;       /* internal steps must not pass it */
-    double reached;    /* where the last advance ended */
-    double failed_at;  /* the last time that the right-hand side failed at */
-    double internal;   /* where the last internal step ended; -INFINITY before the first */
-    double first_step; /* s: of the next restart or, with no history, advance; 0: unknown */
-
-    struct integrator_statistics statistics;
-    struct integrator_statistics counted; /* what the solver, which counts from the last restart on,
-                                             had counted when statistics was brought up to date */
+/* What an advance did. */
+struct method_work {
+    long steps;        /* internal steps */
+    long failed_steps; /* attempts that the error test or the iteration refused */
+    int last_order;    /* of the last internal step; 0: there was none */
+    double last_step;  /* its length, s */
+    double internal;   /* where it ended, s since the restart */
 };
 
-/* What a file of a method gives. Functions that return an int return a flag of the solver. */
 struct method {
+    /* As in the variable solver_method. */
+    const char *name;
+
+    /* The method runs at this fraction of the requested tolerance, because each restart adds an
+     * error and thousands of them add up. Larger: faster and less accurate. */
+    double tolerance_fraction;
+
+    /* Further advances go on from earlier internal steps, so that a restart makes a difference. */
     bool has_history;
-    const char *name; /* of the solver, in texts */
 
-    /* Allocates all but the context and the vectors of struct integrator. */
-    enum status (*create)(struct integrator *integrator);
-    void (*destroy)(struct integrator *integrator);
+    /* Bytes that create allocates at most, for this number of states. */
+    size_t (*memory_size)(size_t state_count);
 
-    /* Settings and tolerances of the integrator become those of the solver. */
-    int (*configure)(struct integrator *integrator);
+    /* Allocates all that the method needs; nothing is allocated later. problem outlives the memory.
+     * On failure *memory is NULL. */
+    enum status (*create)(struct problem *problem, void **memory);
+    void (*destroy)(void *memory);
 
-    /* From x at time 0. */
-    int (*restart)(struct integrator *integrator);
+    /* Takes over problem->settings. A restart follows. */
+    enum status (*configure)(void *memory);
 
-    /* Integrates from reached to t, with the state in x; *stopped_at is where it came to. */
-    int (*advance)(struct integrator *integrator, double t, long max_steps, double *stopped_at);
+    /* Starts from x at time 0, with what stands in problem. */
+    enum status (*restart)(void *memory, const double x[]);
 
-    /* Estimates first_step from where the solver is. */
-    double (*next_step)(const struct integrator *integrator);
+    /* Integrates from problem->reached, where the state is begin_x, to t in max_steps internal
+     * steps at most. Writes the last valid time to *stopped_at, also on failure, and the state
+     * there to x.
+     */
+    enum status (*advance)(void *memory, double t, long max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work);
 
-    /* Steps, failed steps, last step and its order since the last restart; time of the solver. */
-    void (*count)(const struct integrator *integrator, struct integrator_statistics *now);
-    double (*internal_time)(const struct integrator *integrator);
+    /* Writes the state at t, which the last internal step has passed, to x; false: it cannot, an
+     * advance must. NULL with no history. */
+    bool (*interpolate)(void *memory, double t, double x[]);
 
-    /* Writes the state at t, between the last two internal steps, to x; false where it cannot. NULL
-     * with no history. */
-    bool (*interpolate)(struct integrator *integrator, double t);
-
-    enum status (*status_of_flag)(const struct integrator *integrator, int flag);
+    /* Length of a first internal step after a restart from here, where the state is x, s; 0:
+     * unknown.
+     */
+    double (*next_step)(void *memory, const double x[]);
 };
 
-extern const struct method integrator_cvode_adams;
-extern const struct method integrator_cvode_bdf;
-extern const struct method integrator_erk;
-
-/* The right-hand side as SUNDIALS calls it; user data: the integrator. */
-int integrator_evaluate_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *integrator);
-
-/* Stuck in front of a time that the right-hand side cannot be evaluated at. */
-static inline bool integrator_is_stuck(const struct integrator *integrator) {
-    return integrator->failed_at >= integrator->reached;
-}
-
-/* All values are finite: 0 x is 0 for those alone. */
-static inline bool integrator_are_finite(const double values[], size_t count) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; i++) {
-        sum += 0.0 * values[i];
-    }
-    return sum == 0.0;
-}
+#define METHOD_DECLARATION(code, symbol) extern const struct method symbol;
+INTEGRATOR_METHOD_LIST(METHOD_DECLARATION)
+#undef METHOD_DECLARATION
 
 #endif

@@ -7,6 +7,8 @@
 #ifndef RESERVE_H
 #define RESERVE_H
 
+#include "platform.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -19,17 +21,16 @@ struct reserve {
 };
 
 /* False where memory is short; the reserve is then empty. */
-__attribute__((nonnull, warn_unused_result)) bool reserve_create(struct reserve *reserve,
-                                                                 size_t size);
+MUST_CHECK NONNULL bool reserve_create(struct reserve *reserve, size_t size);
 
 /* Frees all that was given out. Empty is allowed. */
-__attribute__((nonnull)) void reserve_destroy(struct reserve *reserve);
+NONNULL void reserve_destroy(struct reserve *reserve);
 
 /* Between the two, which the same thread calls, its allocations are served from the reserve. Pairs
  * of different reserves may be nested; within a pair of an empty one, allocations are the program's
  * own again. */
-__attribute__((nonnull)) void reserve_enter(struct reserve *reserve);
-__attribute__((nonnull)) void reserve_leave(struct reserve *reserve);
+NONNULL void reserve_enter(struct reserve *reserve);
+NONNULL void reserve_leave(struct reserve *reserve);
 
 /* Zeroed memory for any type from the reserve that this thread entered last. NULL where none is
  * entered, or there is not enough left. */
@@ -40,6 +41,6 @@ void *reserve_take(size_t size);
 size_t reserve_rest(const void *memory);
 
 /* Takes back all that was given out since used was as much. */
-__attribute__((nonnull)) void reserve_cut(struct reserve *reserve, size_t used);
+NONNULL void reserve_cut(struct reserve *reserve, size_t used);
 
 #endif

@@ -1,5 +1,7 @@
 #include "small_vector.h"
 
+#include "platform.h"
+
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -17,13 +19,6 @@ struct small_vector {
 static sunindextype length_of(N_Vector x) {
     return ((const struct small_vector *)(const void *)x)->length;
 }
-
-/* Arguments may be the same vector, but never overlap otherwise. */
-#if defined(__clang__)
-#define INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
-#else
-#define INDEPENDENT _Pragma("GCC ivdep")
-#endif
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
@@ -58,65 +53,63 @@ static N_Vector_ID id(N_Vector x) {
 
 /* ---- Operations, n elements each ------------------------------------------------------------ */
 
-#define OPERATION static inline __attribute__((always_inline))
-
-OPERATION void linear_sum(sunindextype n, double a, const double *x, double b, const double *y,
-                          double *z) {
-    INDEPENDENT
-    for (sunindextype i = 0; i < n; i++) {
+ALWAYS_INLINE void linear_sum(sunindextype n, double a, const double *x, double b, const double *y,
+                              double *z) {
+    INDEPENDENT_ITERATIONS // arguments may be the same vector, but never overlap otherwise
+        for (sunindextype i = 0; i < n; i++) {
         z[i] = a * x[i] + b * y[i];
     }
 }
 
-OPERATION void constant(sunindextype n, double c, double *z) {
+ALWAYS_INLINE void constant(sunindextype n, double c, double *z) {
     for (sunindextype i = 0; i < n; i++) {
         z[i] = c;
     }
 }
 
-OPERATION void product(sunindextype n, const double *x, const double *y, double *z) {
-    INDEPENDENT
+ALWAYS_INLINE void product(sunindextype n, const double *x, const double *y, double *z) {
+    INDEPENDENT_ITERATIONS
     for (sunindextype i = 0; i < n; i++) {
         z[i] = x[i] * y[i];
     }
 }
 
-OPERATION void quotient(sunindextype n, const double *x, const double *y, double *z) {
-    INDEPENDENT
+ALWAYS_INLINE void quotient(sunindextype n, const double *x, const double *y, double *z) {
+    INDEPENDENT_ITERATIONS
     for (sunindextype i = 0; i < n; i++) {
         z[i] = x[i] / y[i];
     }
 }
 
-OPERATION void scale(sunindextype n, double c, const double *x, double *z) {
-    INDEPENDENT
+ALWAYS_INLINE void scale(sunindextype n, double c, const double *x, double *z) {
+    INDEPENDENT_ITERATIONS
     for (sunindextype i = 0; i < n; i++) {
         z[i] = c * x[i];
     }
 }
 
-OPERATION void absolute(sunindextype n, const double *x, double *z) {
-    INDEPENDENT
+ALWAYS_INLINE void absolute(sunindextype n, const double *x, double *z) {
+    INDEPENDENT_ITERATIONS
     for (sunindextype i = 0; i < n; i++) {
         z[i] = fabs(x[i]);
     }
 }
 
-OPERATION void inverse(sunindextype n, const double *x, double *z) {
-    INDEPENDENT
+ALWAYS_INLINE void inverse(sunindextype n, const double *x, double *z) {
+    INDEPENDENT_ITERATIONS
     for (sunindextype i = 0; i < n; i++) {
         z[i] = 1.0 / x[i];
     }
 }
 
-OPERATION void add_constant(sunindextype n, const double *x, double b, double *z) {
-    INDEPENDENT
+ALWAYS_INLINE void add_constant(sunindextype n, const double *x, double b, double *z) {
+    INDEPENDENT_ITERATIONS
     for (sunindextype i = 0; i < n; i++) {
         z[i] = x[i] + b;
     }
 }
 
-OPERATION double dot_product(sunindextype n, const double *x, const double *y) {
+ALWAYS_INLINE double dot_product(sunindextype n, const double *x, const double *y) {
     double sum = 0.0;
     for (sunindextype i = 0; i < n; i++) {
         sum += x[i] * y[i];
@@ -124,7 +117,7 @@ OPERATION double dot_product(sunindextype n, const double *x, const double *y) {
     return sum;
 }
 
-OPERATION double max_norm(sunindextype n, const double *x) {
+ALWAYS_INLINE double max_norm(sunindextype n, const double *x) {
     double largest = 0.0;
     for (sunindextype i = 0; i < n; i++) {
         largest = fabs(x[i]) > largest ? fabs(x[i]) : largest;
@@ -132,7 +125,7 @@ OPERATION double max_norm(sunindextype n, const double *x) {
     return largest;
 }
 
-OPERATION double minimum(sunindextype n, const double *x) {
+ALWAYS_INLINE double minimum(sunindextype n, const double *x) {
     double smallest = x[0];
     for (sunindextype i = 1; i < n; i++) {
         smallest = x[i] < smallest ? x[i] : smallest;
@@ -141,7 +134,7 @@ OPERATION double minimum(sunindextype n, const double *x) {
 }
 
 /* sqrt(sum (x w)^2 / n) */
-OPERATION double weighted_norm(sunindextype n, const double *x, const double *w) {
+ALWAYS_INLINE double weighted_norm(sunindextype n, const double *x, const double *w) {
     double sum = 0.0;
     for (sunindextype i = 0; i < n; i++) {
         sum += x[i] * w[i] * (x[i] * w[i]);
@@ -150,8 +143,8 @@ OPERATION double weighted_norm(sunindextype n, const double *x, const double *w)
 }
 
 /* z = sum c[k] X[k]; z may be one of X. Element by element, so that sums stay in registers. */
-OPERATION void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
-                                  double *z) {
+ALWAYS_INLINE void linear_combination(sunindextype n, int count, const double *c, N_Vector *X,
+                                      double *z) {
     if (n <= 4) {
         double sum[4];
         scale(n, c[0], small_vector_data(X[0]), sum);
@@ -185,45 +178,47 @@ static struct small_vector_terms *terms_of(N_Vector x) {
     return ((const struct small_vector *)(const void *)x)->terms;
 }
 
-OPERATION void polynomial(sunindextype n, const struct small_vector_terms *terms, double s,
-                          double *x) {
+ALWAYS_INLINE void polynomial(sunindextype n, const struct small_vector_terms *terms, double s,
+                              double *x) {
     scale(n, 1.0, terms->data[0], x);
     for (int k = 1; k < terms->count; k++) {
         linear_sum(n, s, x, 1.0, terms->data[k], x);
     }
 }
 
-void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x) {
-    switch (length_of(x)) {
+void small_vector_polynomial(const struct small_vector_terms *terms, double s, size_t length,
+                             double x[]) {
+    switch (length) {
     case 2:
-        polynomial(2, terms, s, small_vector_data(x));
+        polynomial(2, terms, s, x);
         break;
     case 4:
-        polynomial(4, terms, s, small_vector_data(x));
+        polynomial(4, terms, s, x);
         break;
     default:
-        polynomial(length_of(x), terms, s, small_vector_data(x));
+        polynomial((sunindextype)length, terms, s, x);
     }
 }
 
 /* Z[k] = a[k] x + Y[k] */
-OPERATION void scale_add_multi(sunindextype n, int count, const double *a, const double *x,
-                               N_Vector *Y, N_Vector *Z) {
+ALWAYS_INLINE void scale_add_multi(sunindextype n, int count, const double *a, const double *x,
+                                   N_Vector *Y, N_Vector *Z) {
     for (int k = 0; k < count; k++) {
         linear_sum(n, a[k], x, 1.0, small_vector_data(Y[k]), small_vector_data(Z[k]));
     }
 }
 
 /* Z[k] = c[k] X[k] */
-OPERATION void scale_vectors(sunindextype n, int count, const double *c, N_Vector *X, N_Vector *Z) {
+ALWAYS_INLINE void scale_vectors(sunindextype n, int count, const double *c, N_Vector *X,
+                                 N_Vector *Z) {
     for (int k = 0; k < count; k++) {
         scale(n, c[k], small_vector_data(X[k]), small_vector_data(Z[k]));
     }
 }
 
 /* Z[k] = a X[k] + b Y[k] */
-OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, double b, N_Vector *Y,
-                           N_Vector *Z) {
+ALWAYS_INLINE void sum_vectors(sunindextype n, int count, double a, N_Vector *X, double b,
+                               N_Vector *Y, N_Vector *Z) {
     for (int k = 0; k < count; k++) {
         linear_sum(n, a, small_vector_data(X[k]), b, small_vector_data(Y[k]),
                    small_vector_data(Z[k]));
@@ -232,12 +227,12 @@ OPERATION void sum_vectors(sunindextype n, int count, double a, N_Vector *X, dou
 
 /* ---- Tables of operations ------------------------------------------------------------------- */
 
-OPERATION sunindextype two(N_Vector x) {
+ALWAYS_INLINE sunindextype two(N_Vector x) {
     (void)x;
     return 2;
 }
 
-OPERATION sunindextype four(N_Vector x) {
+ALWAYS_INLINE sunindextype four(N_Vector x) {
     (void)x;
     return 4;
 }

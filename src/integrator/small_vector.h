@@ -10,7 +10,7 @@
 
 #include <sundials/sundials_nvector.h>
 
-/* What a linear combination was made of: see small_vector_note_terms. */
+/* The terms of a linear combination: see small_vector_note_terms. */
 enum { SMALL_VECTOR_MOST_TERMS = 16 };
 struct small_vector_terms {
     int count; /* 0: none, or more than there is room for */
@@ -30,8 +30,9 @@ static inline double *small_vector_data(N_Vector vector) {
  * terms NULL: no longer. */
 void small_vector_note_terms(N_Vector x, struct small_vector_terms *terms);
 
-/* x = sum of data[k] s^(count - 1 - k): the terms as the coefficients of a polynomial, that of the
- * highest power first. count > 0. */
-void small_vector_polynomial(const struct small_vector_terms *terms, double s, N_Vector x);
+/* x = sum of data[k] s^(count - 1 - k), length elements: the terms as the coefficients of a
+ * polynomial, that of the highest power first. count > 0. */
+void small_vector_polynomial(const struct small_vector_terms *terms, double s, size_t length,
+                             double x[]);
 
 #endif

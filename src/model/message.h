@@ -2,6 +2,7 @@
 #ifndef MESSAGE_H
 #define MESSAGE_H
 
+#include "platform.h"
 #include "status.h"
 
 /* text: finished, one line, valid during the call only. */
@@ -12,7 +13,7 @@ struct message_sink {
     void *context;
 };
 
-__attribute__((format(printf, 3, 4))) void
-message_write(const struct message_sink *sink, enum status status, const char *format, ...);
+PRINTF_FORMAT(3, 4)
+void message_write(const struct message_sink *sink, enum status status, const char *format, ...);
 
 #endif

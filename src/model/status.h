@@ -1,22 +1,24 @@
-/* What a call came to. One list holds every status, what a caller can do about it, and its text. */
+/* Result of a call. One list holds every status, what a caller can do about it, and its text. */
 #ifndef STATUS_H
 #define STATUS_H
 
 /* Severity of a status, in rising order. */
 enum severity {
     SEVERITY_NONE,
+    SEVERITY_NOTICE,  /* done, but the user should know something */
     SEVERITY_DISCARD, /* refused or only partly done, nothing is spoilt: the instance goes on */
     SEVERITY_ERROR,   /* the instance must be reset or restored before it goes on */
 };
 
 #define STATUS_LIST(X)                                                                             \
     X(STATUS_OK, SEVERITY_NONE, "ok")                                                              \
+    X(STATUS_COARSE_TOLERANCE, SEVERITY_NOTICE, "a tolerance is too coarse")                       \
     X(STATUS_NOT_FINITE, SEVERITY_DISCARD, "a value is not finite")                                \
     X(STATUS_OUT_OF_RANGE, SEVERITY_DISCARD, "a value is out of its range")                        \
     X(STATUS_TOO_MANY_STEPS, SEVERITY_DISCARD, "the integrator took all internal steps allowed")   \
     X(STATUS_NO_CONVERGENCE, SEVERITY_DISCARD, "the integrator cannot reach its tolerance")        \
     X(STATUS_INVALID_ARGUMENT, SEVERITY_ERROR, "an argument is not valid")                         \
-    X(STATUS_INVALID_PARAMETERS, SEVERITY_ERROR, "the parameters do not go together")              \
+    X(STATUS_INVALID_PARAMETERS, SEVERITY_ERROR, "the parameters are inconsistent")                \
     X(STATUS_INVALID_TIME, SEVERITY_ERROR, "the times of a step do not fit")                       \
     X(STATUS_OUT_OF_MEMORY, SEVERITY_ERROR, "out of memory")                                       \
     X(STATUS_INTERNAL, SEVERITY_ERROR, "the integrator refused a call")

@@ -52,7 +52,7 @@ def of_python(source: Path, build: Path, folder: Path) -> dict:
     (folder / "sitecustomize.py").write_text("import coverage\n\ncoverage.process_startup()\n")
     environment = os.environ | {"COVERAGE_PROCESS_START": str(settings), "PYTHONPATH": str(folder)}
     environment["RP_FMU"] = str(build / "RPManipulator.fmu")
-    tests = [source / "tests" / f"test_{name}.py" for name in PYTHON_TESTS]
+    tests = [source / "tests" / "fmu" / f"test_{name}.py" for name in PYTHON_TESTS]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
     run(*command, env=environment)
     coverage = [sys.executable, "-m", "coverage"]

@@ -5,7 +5,7 @@
 #include "bench.h"
 
 #include "measure.h"
-#include "turns.h"
+#include "race.h"
 
 #include <stdlib.h>
 #include <string.h>

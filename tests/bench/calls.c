@@ -2,7 +2,7 @@
 
 #include "fmu_run.h"
 #include "measure.h"
-#include "turns.h"
+#include "race.h"
 
 #include <malloc.h>
 #include <math.h>

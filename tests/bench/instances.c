@@ -4,7 +4,7 @@
 
 #include "fmu_run.h"
 #include "measure.h"
-#include "turns.h"
+#include "race.h"
 
 #include <math.h>
 #include <pthread.h>

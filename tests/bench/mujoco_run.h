@@ -1,4 +1,4 @@
-/* MuJoCo on the arm of tests/rp_manipulator.xml, through its C library. */
+/* MuJoCo on the arm of tests/rp_manipulator/rp_manipulator.xml, through its C library. */
 #ifndef BENCH_MUJOCO_RUN_H
 #define BENCH_MUJOCO_RUN_H
 

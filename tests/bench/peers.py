@@ -97,7 +97,9 @@ def run_dop853(work: Work, tolerance: float) -> Run:
 def run_mujoco(work: Work, tolerance: float) -> Run:
     """MuJoCo's RK4 by its Python bindings, a mj_step each communication step."""
     del tolerance
-    model = mujoco.MjModel.from_xml_path(str(FOLDER.parent / "rp_manipulator.xml"))
+    model = mujoco.MjModel.from_xml_path(
+        str(FOLDER.parent / "rp_manipulator" / "rp_manipulator.xml")
+    )
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     model.opt.timestep = work.step
     data = mujoco.MjData(model)

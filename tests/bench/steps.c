@@ -1,6 +1,6 @@
 #include "bench.h"
 
-#include "turns.h"
+#include "race.h"
 
 static const struct work {
     const char *name;
@@ -20,14 +20,14 @@ static const struct work {
     {"one step of 2 s, inputs constant", 2.0, 1, INPUTS_CONSTANT, 1e-8, 0.0, 0.0},
 };
 
-static void add_mujoco(struct turns *turns, int substeps) {
+static void add_mujoco(struct race *race, int substeps) {
     static const char *const names[] = {
         [MUJOCO_RK4] = "MuJoCo RK4", [MUJOCO_IMPLICITFAST] = "MuJoCo implicitfast"};
     for (enum mujoco_integrator i = MUJOCO_RK4; mujoco_available() && i <= MUJOCO_IMPLICITFAST;
          i++) {
-        turns_add(turns,
-                  (struct run){
-                      .name = names[i], .solver = MUJOCO, .integrator = i, .substeps = substeps});
+        race_add(race,
+                 (struct run){
+                     .name = names[i], .solver = MUJOCO, .integrator = i, .substeps = substeps});
     }
 }
 
@@ -35,15 +35,15 @@ static struct target at_most(double limit) {
     return (struct target){limit > 0.0 ? AT_MOST : NO_TARGET, limit};
 }
 
-/* erk against another run of the same turns */
-static void report_against(const struct turns *turns, struct report *report, const char *work,
+/* erk against another run of the same race */
+static void report_against(const struct race *race, struct report *report, const char *work,
                            const char *peer, struct target target) {
-    const int run = turns_find(turns, "erk");
-    const double ratio = turns_ratio(turns, run, turns_find(turns, peer));
+    const int run = race_find(race, "erk");
+    const double ratio = race_ratio(race, run, race_find(race, peer));
     char name[64];
     snprintf(name, sizeof name, "erk to %s", peer);
     report_row(report, "against", work, name);
-    report_number(report, "error", turns->error[run]);
+    report_number(report, "error", race->error[run]);
     printf("  %-28s %7.3f", name, ratio);
     report_judged(report, "ratio", ratio, target);
     printf("\n");
@@ -51,8 +51,8 @@ static void report_against(const struct turns *turns, struct report *report, con
 }
 
 /* The error of the plain loop bounds that of erk. */
-static void report_error(const struct turns *turns, struct report *report, const char *work) {
-    const double ratio = turns->error[turns_find(turns, "erk")] / turns->error[0];
+static void report_error(const struct race *race, struct report *report, const char *work) {
+    const double ratio = race->error[race_find(race, "erk")] / race->error[0];
     report_row(report, "against", work, "error of erk to that of the plain loop");
     printf("  error of erk to that of the plain loop %.1e", ratio);
     report_judged(report, "ratio", ratio, (struct target){AT_MOST, 1.0});
@@ -65,16 +65,16 @@ static void measure_free_motion(struct bench *bench) {
     static const double bound = 1e-8;
     static const char *const work = "one step of 2 s, free motion, error <= 1e-8";
     struct problem *problem = problem_create(2.0, 1, INPUTS_ZERO, 0.0);
-    struct turns turns = {0};
-    turns_add_usual(&turns, &bench->fmu, 1e-8);
-    add_mujoco(&turns, 0);
+    struct race race = {0};
+    race_add_usual(&race, &bench->fmu, 1e-8);
+    add_mujoco(&race, 0);
     // a method of first order needs millions of steps for this
-    turns.count -= mujoco_available() ? 1 : 0;
-    for (int run = 0; run < turns.count; run++) {
-        turns_tune(&turns.runs[run], &bench->fmu, problem, bound);
+    race.count -= mujoco_available() ? 1 : 0;
+    for (int run = 0; run < race.count; run++) {
+        race_tune(&race.runs[run], &bench->fmu, problem, bound);
     }
-    turns_take(&turns, &bench->fmu, problem, bench->repeats);
-    turns_report(&turns, &bench->report, "steps", work, problem, NULL);
+    race_run(&race, &bench->fmu, problem, bench->repeats);
+    race_report(&race, &bench->report, "steps", work, problem, NULL);
     problem_destroy(problem);
 }
 
@@ -83,20 +83,20 @@ void measure_steps(struct bench *bench) {
         const struct work *work = &table[i];
         const bool judged = work->tolerance == 1e-8 && work->inputs == INPUTS_CHANGING;
         struct problem *problem = problem_create(work->step, work->steps, work->inputs, 0.0);
-        struct turns turns = {0};
-        turns_add_usual(&turns, &bench->fmu, work->tolerance);
+        struct race race = {0};
+        race_add_usual(&race, &bench->fmu, work->tolerance);
         if (judged) {
-            add_mujoco(&turns, 1);
+            add_mujoco(&race, 1);
         }
-        turns_take(&turns, &bench->fmu, problem, bench->repeats);
+        race_run(&race, &bench->fmu, problem, bench->repeats);
         const struct target targets[MOST_RUNS] = {
             [CVODE_ADAMS] = at_most(work->adams), [ERK] = at_most(work->erk)};
-        turns_report(&turns, &bench->report, "steps", work->name, problem, targets);
+        race_report(&race, &bench->report, "steps", work->name, problem, targets);
         if (judged) {
-            report_error(&turns, &bench->report, work->name);
+            report_error(&race, &bench->report, work->name);
         }
         if (judged && mujoco_available()) {
-            report_against(&turns, &bench->report, work->name, "MuJoCo RK4",
+            report_against(&race, &bench->report, work->name, "MuJoCo RK4",
                            at_most(work->step == 1e-3 ? 0.2 : 0.0));
         }
         problem_destroy(problem);

@@ -1,6 +1,6 @@
 #include "bench.h"
 
-#include "turns.h"
+#include "race.h"
 
 #include <math.h>
 
@@ -9,10 +9,10 @@ static void sweep_tolerances(struct bench *bench, const char *name, const struct
     const int count = (int)lround(7.0 / decades);
     for (int i = 0; i <= count; i++) {
         const double tolerance = pow(10.0, -4.0 - i * decades);
-        struct turns turns = {0};
-        turns_add_usual(&turns, &bench->fmu, tolerance);
-        turns_take(&turns, &bench->fmu, problem, bench->repeats);
-        turns_report(&turns, &bench->report, "precision", name, problem, NULL);
+        struct race race = {0};
+        race_add_usual(&race, &bench->fmu, tolerance);
+        race_run(&race, &bench->fmu, problem, bench->repeats);
+        race_report(&race, &bench->report, "precision", name, problem, NULL);
     }
 }
 
@@ -26,12 +26,12 @@ static void sweep_mujoco(struct bench *bench, const char *name, const struct pro
         if (!mujoco_available() || substeps < 1) {
             continue;
         }
-        struct turns turns = {0};
-        turns_add(&turns, (struct run){"MuJoCo RK4", MUJOCO, 0, 0.0, MUJOCO_RK4, substeps});
-        turns_add(&turns, (struct run){"MuJoCo implicitfast", MUJOCO, 0, 0.0, MUJOCO_IMPLICITFAST,
-                                       substeps});
-        turns_take(&turns, &bench->fmu, problem, bench->repeats);
-        turns_report(&turns, &bench->report, "precision", name, problem, NULL);
+        struct race race = {0};
+        race_add(&race, (struct run){"MuJoCo RK4", MUJOCO, 0, 0.0, MUJOCO_RK4, substeps});
+        race_add(&race, (struct run){"MuJoCo implicitfast", MUJOCO, 0, 0.0, MUJOCO_IMPLICITFAST,
+                                     substeps});
+        race_run(&race, &bench->fmu, problem, bench->repeats);
+        race_report(&race, &bench->report, "precision", name, problem, NULL);
     }
 }
 
@@ -70,10 +70,10 @@ void measure_step_sizes(struct bench *bench) {
             char work[64];
             snprintf(work, sizeof work, "steps of %g ms, %s", 1e3 * sizes[i], kinds[kind].name);
             struct problem *problem = problem_create(sizes[i], steps, kinds[kind].inputs, 0.0);
-            struct turns turns = {0};
-            turns_add_usual(&turns, &bench->fmu, 1e-8);
-            turns_take(&turns, &bench->fmu, problem, bench->repeats);
-            turns_report(&turns, &bench->report, "step size", work, problem, NULL);
+            struct race race = {0};
+            race_add_usual(&race, &bench->fmu, 1e-8);
+            race_run(&race, &bench->fmu, problem, bench->repeats);
+            race_report(&race, &bench->report, "step size", work, problem, NULL);
             problem_destroy(problem);
         }
     }

@@ -15,9 +15,10 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from source_copy import ROOT, copy_sources, run, settings_of
+from tests.support.paths import ROOT
+from tests.support.source_copy import copy_sources, run, settings_of
 
 TIME_LIMIT = 120.0  # s, of a test that a mutant may have made endless
 
@@ -66,13 +67,11 @@ class Workshop:
 
     def failing(self, tests: tuple[str, ...]) -> str | None:
         """The first test that does not pass."""
-        unit = self.build / "fmu" / "RPManipulator"
-        loaded = [unit / "RPManipulator.so", unit / "modelDescription.xml"]
         for test in tests:
-            command = [self.build / "tests" / test, *(loaded if "fmi2" in test else [])]
+            program = self.build / "tests" / test
             try:
                 result = subprocess.run(
-                    command, capture_output=True, check=False, timeout=TIME_LIMIT
+                    program, capture_output=True, check=False, timeout=TIME_LIMIT
                 )
             except subprocess.TimeoutExpired:
                 return test

@@ -15,7 +15,7 @@ import numpy as np
 from cosim import trajectory_csv
 from cosim.coupling.master import Master
 from cosim.errors import UserError
-from cosim.fmu import Fmu
+from cosim.fmu_file import Fmu
 from cosim.model import Value
 from cosim.system import ssp
 from cosim.system.structure import Connection

@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim import project
 from cosim.errors import UserError
-from cosim.fmu import read_model
+from cosim.fmu_file import read_model
 from cosim.model import Value, Variable
 from models.closed_loop.references import equations
 from models.closed_loop.references.loop import COEFFICIENTS, INTEGRALS, SIGNALS, Loop

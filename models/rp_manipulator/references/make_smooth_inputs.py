@@ -18,7 +18,7 @@ from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 from cosim import convergence, project
 from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.fmu import read_model
+from cosim.fmu_file import read_model
 from cosim.output_files import whole
 from cosim.scenario import Scenario
 from cosim.signals import Sines

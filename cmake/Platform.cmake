@@ -1,0 +1,22 @@
+# What differs between platforms, in one place: names in an FMU, and flags that harden what is delivered.
+
+# folder of the binary in an FMI 2.0 archive, and how the file is called there
+set(FMI2_PLATFORM linux64)
+set(FMU_LIBRARY_SUFFIX .so)
+
+# No path in what is delivered: two builds in two folders are the same.
+set(reproducible_options
+  $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_BINARY_DIR}=build>
+  $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_SOURCE_DIR}=.>)
+
+# Protecting the stack costs a comparison in functions with arrays; sanitizers have checks of their own.
+set(hardening_options
+  -fstack-protector-strong
+  $<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
+  $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
+
+# Of the shared object: it exports what fmi2Functions.h marks and nothing of the libraries inside it,
+# names all it needs, and is read-only where it can be.
+set(FMU_LINK_OPTIONS
+  -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed
+  -Wl,-z,relro,-z,now,-z,noexecstack,-z,text)

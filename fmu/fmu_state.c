@@ -1,0 +1,138 @@
+#include "fmu_state.h"
+
+#include "serialization.h"
+
+/* A saved state carries the FMI state and the kind of its instance. */
+enum { TAG_KIND_SHIFT = 16, TAG_STATE_MASK = 0xffff };
+
+static unsigned tag_of(const struct component *component) {
+    return (unsigned)component->state | (unsigned)component->kind << TAG_KIND_SHIFT;
+}
+
+/* FMI states that a component can be in while its instance is in a phase. */
+static unsigned states_of(enum fmi_kind kind, enum phase phase) {
+    const bool steps = kind == KIND_CO_SIMULATION;
+    switch (phase) {
+    case PHASE_INSTANTIATED:
+        return STATE_INSTANTIATED | STATE_ERROR;
+    case PHASE_INITIALIZATION:
+        return STATE_INITIALIZATION | STATE_ERROR;
+    case PHASE_STEPPING:
+        return STATE_TERMINATED | STATE_ERROR |
+               (steps ? STATE_STEP_COMPLETE | STATE_STEP_FAILED : STATE_EVENT);
+    case PHASE_CONTINUOUS_TIME:
+        return steps ? 0 : STATE_CONTINUOUS_TIME | STATE_TERMINATED | STATE_ERROR;
+    case PHASE_COUNT:
+        break;
+    }
+    return 0;
+}
+
+/* The FMI state of a snapshot, if a component of this kind can be in it; otherwise 0. */
+static unsigned state_in(const struct component *component, unsigned tag, enum phase phase) {
+    const unsigned state = tag & TAG_STATE_MASK;
+    const bool is_one_bit = state != 0 && (state & (state - 1)) == 0;
+    const bool is_same_kind = tag >> TAG_KIND_SHIFT == (unsigned)component->kind;
+    return is_one_bit && is_same_kind ? state & states_of(component->kind, phase) : 0;
+}
+
+static enum component_status refuse_kind(struct component *component, unsigned call) {
+    return component_fail(
+        component, "%s: the saved state is refused: an instance for %s cannot be in it",
+        component->adapter->rules[call].name, component_kind_name(component->kind));
+}
+
+enum component_status fmu_state_save(struct component *component, unsigned call, void **fmu_state) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, fmu_state, fmu_state)) {
+        return COMPONENT_ERROR;
+    }
+    struct instance_snapshot *snapshot = *fmu_state;
+    const enum status status = instance_save(component->instance, tag_of(component), &snapshot);
+    *fmu_state = snapshot;
+    return component_result(component, status);
+}
+
+enum component_status fmu_state_restore(struct component *component, unsigned call,
+                                        void *fmu_state) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, fmu_state, fmu_state)) {
+        return COMPONENT_ERROR;
+    }
+    unsigned tag = 0;
+    enum phase phase = PHASE_COUNT;
+    enum status status = instance_snapshot_tag(component->instance, fmu_state, &tag, &phase);
+    if (status != STATUS_OK) {
+        return component_result(component, status);
+    }
+    const unsigned state = state_in(component, tag, phase);
+    if (state == 0) {
+        return refuse_kind(component, call);
+    }
+    status = instance_restore(component->instance, fmu_state);
+    if (status == STATUS_OK) {
+        component->state = (enum fmi_state)state;
+    }
+    return component_result(component, status);
+}
+
+enum component_status fmu_state_free(struct component *component, unsigned call, void **fmu_state) {
+    if (!component_enter(component, call)) {
+        return COMPONENT_ERROR;
+    }
+    if (fmu_state == NULL || *fmu_state == NULL) {
+        return COMPONENT_OK;
+    }
+    struct instance_snapshot *snapshot = *fmu_state;
+    const enum status status = instance_forget(component->instance, &snapshot);
+    *fmu_state = snapshot;
+    return component_result(component, status);
+}
+
+enum component_status fmu_state_size(struct component *component, unsigned call, void *fmu_state,
+                                     size_t *size) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, fmu_state, size)) {
+        return COMPONENT_ERROR;
+    }
+    unsigned tag = 0;
+    enum phase phase = PHASE_COUNT;
+    const enum status status = instance_snapshot_tag(component->instance, fmu_state, &tag, &phase);
+    if (status == STATUS_OK) {
+        *size = instance_serialized_size(component->instance);
+    }
+    return component_result(component, status);
+}
+
+enum component_status fmu_state_serialize(struct component *component, unsigned call,
+                                          void *fmu_state, unsigned char bytes[], size_t size) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, fmu_state, bytes)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component,
+                            instance_serialize(component->instance, fmu_state, bytes, size));
+}
+
+enum component_status fmu_state_deserialize(struct component *component, unsigned call,
+                                            const unsigned char bytes[], size_t size,
+                                            void **fmu_state) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, 1, bytes, fmu_state)) {
+        return COMPONENT_ERROR;
+    }
+    struct instance_snapshot *snapshot = NULL;
+    enum status status = instance_deserialize(component->instance, bytes, size, &snapshot);
+    if (status != STATUS_OK) {
+        return component_result(component, status);
+    }
+    unsigned tag = 0;
+    enum phase phase = PHASE_COUNT;
+    status = instance_snapshot_tag(component->instance, snapshot, &tag, &phase);
+    if (status != STATUS_OK || state_in(component, tag, phase) == 0) {
+        instance_forget(component->instance, &snapshot);
+        return refuse_kind(component, call);
+    }
+    *fmu_state = snapshot;
+    return COMPONENT_OK;
+}

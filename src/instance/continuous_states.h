@@ -1,0 +1,24 @@
+/* Integration from outside (Model Exchange): continuous time, and all states at once. */
+#ifndef INSTANCE_CONTINUOUS_STATES_H
+#define INSTANCE_CONTINUOUS_STATES_H
+
+#include "instance.h"
+
+/* While the time is continuous only continuous inputs may be set. */
+MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
+NONNULL void instance_enter_event_mode(struct instance *instance);
+
+MUST_CHECK NONNULL enum status instance_set_time(struct instance *instance, double time);
+
+/* count must be instance_state_count; the arrays may be NULL where it is 0. All or nothing. */
+NONNULL size_t instance_state_count(const struct instance *instance);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_set_states(struct instance *instance, const double x[], size_t count);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_states(struct instance *instance, double x[], size_t count);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_derivatives(struct instance *instance, double dx[], size_t count);
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_nominals(struct instance *instance, double nominals[], size_t count);
+
+#endif

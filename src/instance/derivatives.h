@@ -1,0 +1,26 @@
+/* Derivatives of an instance's values with respect to time and to other variables. */
+#ifndef INSTANCE_DERIVATIVES_H
+#define INSTANCE_DERIVATIVES_H
+
+#include "instance.h"
+
+/* Derivatives of inputs with respect to time, of orders 1 to 3, at the beginning of the next step:
+ * over it the inputs are Taylor polynomials. They apply to that step only. All or nothing. */
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_set_input_derivatives(struct instance *instance, const unsigned references[],
+                                   size_t count, const int orders[], const double values[]);
+
+/* Derivatives of Real outputs with respect to time, of orders 1 and 2, at the current time, inputs
+ * being the polynomials that apply there. All or nothing. */
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_output_derivatives(struct instance *instance, const unsigned references[],
+                                    size_t count, const int orders[], double values[]);
+
+/* Writes J v: J the derivatives of unknowns (Real variables of the model that are not parameters or
+ * inputs) with respect to knowns (inputs, states; before the first step parameters too). */
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_get_directional_derivative(struct instance *instance, const unsigned unknowns[],
+                                        size_t unknown_count, const unsigned knowns[],
+                                        size_t known_count, const double v[], double result[]);
+
+#endif

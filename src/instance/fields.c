@@ -1,0 +1,58 @@
+#include "fields.h"
+
+const struct variable *instance_refuse_reference(const struct instance *instance,
+                                                 unsigned reference, enum variable_type type) {
+    const struct variable *variable = variable_find(instance->description, reference);
+    if (variable == NULL) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "value reference %u is unknown: %s has no such variable", reference,
+                      instance->description->name);
+    } else {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "%s (value reference %u) is accessed as %s: it is of type %s", variable->name,
+                      reference, variable_type_name(type), variable_type_name(variable->type));
+    }
+    return NULL;
+}
+
+void instance_write_field(struct instance *instance, const struct variable *variable,
+                          double value) {
+    if (variable->type == VARIABLE_INT32) {
+        *(int *)instance_field(instance, variable) = (int)value;
+        return;
+    }
+    *(double *)instance_field(instance, variable) = value;
+    if (variable->causality == CAUSALITY_INPUT) {
+        const size_t i = instance_input_index(instance, variable);
+        instance->memory.pending[i].d[0] = value;
+        instance->memory.current[i] = instance->memory.pending[i];
+    }
+}
+
+void instance_set_clock(struct instance *instance, struct clock_time time) {
+    instance->state.time = time;
+    instance->state.own.time = time.s;
+    instance->outputs_are_valid = false;
+}
+
+enum status instance_update_outputs(struct instance *instance) {
+    if (instance->outputs_are_valid) {
+        return STATUS_OK;
+    }
+    const enum status status =
+        instance->model->outputs(instance->memory.values, instance->state.time.s);
+    instance->outputs_are_valid = status == STATUS_OK;
+    if (status != STATUS_OK) {
+        message_write(&instance->sink, status, "no outputs at t = %.17g: %s",
+                      instance->state.time.s, status_text(status));
+    }
+    return status;
+}
+
+enum status instance_not_finite(const struct instance *instance, const char *what) {
+    message_write(&instance->sink, STATUS_NOT_FINITE,
+                  "%s at t = %.17g is not finite: parameters, states and inputs are too extreme to "
+                  "compute it",
+                  what, instance->state.time.s);
+    return STATUS_NOT_FINITE;
+}

@@ -1,0 +1,47 @@
+/* Where the values of an instance lie, and when the calculated ones are up to date. */
+#ifndef INSTANCE_FIELDS_H
+#define INSTANCE_FIELDS_H
+
+#include "internals.h"
+
+/* Says in a message why there is no variable with this reference and type; NULL. */
+NONNULL const struct variable *instance_refuse_reference(const struct instance *instance,
+                                                         unsigned reference,
+                                                         enum variable_type type);
+
+/* The variable with this reference and type; NULL, with a message, if there is none. These three
+ * are inline: they run once or more for each value that is set or read. */
+static inline const struct variable *instance_find(const struct instance *instance,
+                                                   unsigned reference, enum variable_type type) {
+    const struct variable *variable = variable_find(instance->description, reference);
+    return variable != NULL && variable->type == type
+               ? variable
+               : instance_refuse_reference(instance, reference, type);
+}
+
+/* The place of a variable's value. */
+static inline void *instance_field(struct instance *instance, const struct variable *variable) {
+    char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
+                                                           : (char *)(void *)&instance->state.own;
+    return structure + variable->offset;
+}
+
+/* Index of an input variable among the inputs. */
+static inline size_t instance_input_index(const struct instance *instance,
+                                          const struct variable *variable) {
+    return (variable->offset - instance->model->inputs.offset) / sizeof(double);
+}
+
+/* Writes the value; an input is held at it from now on. */
+NONNULL void instance_write_field(struct instance *instance, const struct variable *variable,
+                                  double value);
+
+NONNULL void instance_set_clock(struct instance *instance, struct clock_time time);
+
+/* Brings the calculated values up to date; a message says why that fails. */
+MUST_CHECK NONNULL enum status instance_update_outputs(struct instance *instance);
+
+/* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
+NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);
+
+#endif

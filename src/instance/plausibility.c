@@ -1,0 +1,151 @@
+#include "plausibility.h"
+
+#include "settings.h"
+
+#include <limits.h>
+#include <math.h>
+
+/* A value by its name, and whether an instance can have it. */
+struct named_value {
+    const char *name;
+    double value;
+    bool is_possible;
+};
+
+static bool are_possible(const struct instance *instance, const struct named_value values[],
+                         size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        if (!values[i].is_possible) {
+            message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                          "the serialized state is refused: %s = %.17g is impossible",
+                          values[i].name, values[i].value);
+            return false;
+        }
+    }
+    return true;
+}
+
+#define COUNT(array) (sizeof(array) / sizeof(array)[0])
+
+static bool is_count(long value) {
+    return value >= 0 && value <= LONG_MAX / 2; // can be counted on from without overflow
+}
+
+static bool is_step(double value) {
+    return value >= 0.0 && isfinite(value);
+}
+
+/* Time, phase and what the integrator is asked for. */
+static bool has_possible_settings(const struct instance *instance,
+                                  const struct instance_state *state) {
+    const struct instance_values *own = &state->own;
+    const double tolerance = own->effective_relative_tolerance;
+    const int phase = (int)state->phase;
+    const struct named_value values[] = {
+        {"phase", phase, phase >= 0 && phase < PHASE_COUNT},
+        {"time", state->time.s, isfinite(state->time.s)},
+        {"the rest of time", state->time.rest, isfinite(state->time.rest)},
+        {"the variable time", own->time, isfinite(own->time)},
+        {"relative_tolerance", own->relative_tolerance, is_step(own->relative_tolerance)},
+        {"effective_relative_tolerance", tolerance,
+         tolerance >= INSTANCE_FINEST_TOLERANCE && tolerance <= INSTANCE_COARSEST_TOLERANCE},
+        {"max_step", own->max_step, is_step(own->max_step)},
+        {"max_internal_steps", own->max_internal_steps,
+         instance->integrator == NULL || own->max_internal_steps >= 1},
+        {"solver_method", own->solver_method,
+         own->solver_method > INTEGRATOR_NO_METHOD && own->solver_method < INTEGRATOR_METHODS},
+    };
+    return are_possible(instance, values, COUNT(values)) &&
+           (!state->experiment_defined ||
+            instance_check_experiment(instance, &state->experiment) == STATUS_OK);
+}
+
+static bool has_possible_statistics(const struct instance *instance,
+                                    const struct instance_state *state) {
+    const struct integrator_statistics *totals = &state->statistics;
+    const struct named_value values[] = {
+        {"solver_steps", (double)totals->steps, is_count(totals->steps)},
+        {"solver_rhs_evaluations", (double)totals->rhs_evaluations,
+         is_count(totals->rhs_evaluations)},
+        {"solver_failed_steps", (double)totals->failed_steps, is_count(totals->failed_steps)},
+        {"solver_restarts", (double)totals->restarts, is_count(totals->restarts)},
+        {"last_step", totals->last_step, isfinite(totals->last_step)},
+        {"solver_last_step", state->own.solver_last_step, isfinite(state->own.solver_last_step)},
+        {"the steps before the restart", (double)state->steps_before_restart,
+         state->steps_before_restart >= 0 && state->steps_before_restart <= totals->steps},
+    };
+    return are_possible(instance, values, COUNT(values));
+}
+
+/* What a replay of the integrator's history needs. */
+static bool has_possible_history(const struct instance *instance,
+                                 const struct instance_state *state) {
+    const long steps = state->statistics.steps - state->steps_before_restart;
+    const long most_steps = INSTANCE_LONGEST_HISTORY + (long)state->own.max_internal_steps;
+    const bool exists = state->has_history;
+    const struct named_value values[] = {
+        {"restart_time", state->restart_time.s, isfinite(state->restart_time.s)},
+        {"the rest of restart_time", state->restart_time.rest, isfinite(state->restart_time.rest)},
+        {"restart_step", state->restart_step, is_step(state->restart_step)},
+        {"next_step", state->next_step, is_step(state->next_step)},
+        {"the steps since the restart", (double)steps,
+         !exists || (steps > 0 && steps <= most_steps)},
+        {"first_time", state->first_time, !exists || state->first_time > 0.0},
+        {"latest_time", state->latest_time,
+         !exists || (state->latest_time >= state->first_time && isfinite(state->latest_time))},
+        {"span", state->span, !exists || state->span >= state->latest_time},
+    };
+    return are_possible(instance, values, COUNT(values));
+}
+
+static bool are_finite_inputs(const struct instance *instance, const char *name,
+                              const struct polynomial *inputs) {
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+            const struct named_value value = {name, inputs[i].d[k], isfinite(inputs[i].d[k])};
+            if (!are_possible(instance, &value, 1)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Parameters, inputs and states that could have been set. */
+static bool are_settable(const struct instance *instance, const char *values) {
+    const struct message_sink quiet = {0};
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        const void *field = values + variable->offset;
+        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
+            continue;
+        }
+        const double number =
+            variable->type == VARIABLE_FLOAT64 ? *(const double *)field : *(const int *)field;
+        const struct named_value value = {
+            variable->name, number, variable_check_value(variable, number, &quiet) == STATUS_OK};
+        if (!are_possible(instance, &value, 1)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+enum status instance_check_plausible(const struct instance *instance,
+                                     const struct instance_state *state, const char *block) {
+    // places in block as in the instance's own
+    const struct instance_memory *memory = &instance->memory;
+    const char *values = block + (memory->values - memory->block);
+    const char *held = block + (memory->held - memory->block);
+    const char *pending = block + ((const char *)memory->pending - memory->block);
+    const char *running = block + ((const char *)memory->running - memory->block);
+
+    // inputs at the current time are not checked: they may have overflowed on their way
+    const bool is_plausible =
+        has_possible_settings(instance, state) && has_possible_statistics(instance, state) &&
+        has_possible_history(instance, state) &&
+        are_finite_inputs(instance, "an input", (const void *)pending) &&
+        are_finite_inputs(instance, "an input since the restart", (const void *)running) &&
+        are_settable(instance, values) && (!state->has_history || are_settable(instance, held));
+    return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
+}

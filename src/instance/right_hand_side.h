@@ -1,0 +1,18 @@
+/* The initial value problem of an instance, as the integrator calls it: the model with the
+ * parameters held since the last restart, and the inputs as polynomials since then. */
+#ifndef INSTANCE_RIGHT_HAND_SIDE_H
+#define INSTANCE_RIGHT_HAND_SIDE_H
+
+#include "internals.h"
+
+/* The inputs of a restart change over time: a derivative of one of them is not 0. */
+bool instance_inputs_move(const struct polynomial inputs[], size_t count);
+
+/* After a restart: inputs that are held are evaluated once, not at every call. */
+NONNULL void instance_prepare_inputs(struct instance *instance);
+
+/* context: the instance. t: s since the restart. */
+ode_rhs instance_rhs;
+ode_jacobian instance_jacobian;
+
+#endif

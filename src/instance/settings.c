@@ -1,0 +1,105 @@
+#include "settings.h"
+
+#include <math.h>
+
+/* Absolute tolerance of a state, over relative tolerance times nominal value. */
+static const double absolute_fraction = 1e-2;
+
+enum status instance_check_experiment(const struct instance *instance,
+                                      const struct instance_experiment *experiment) {
+    const double start = experiment->start_time;
+    if (!isfinite(start)) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "start time %g is refused: a finite time is expected", start);
+        return STATUS_INVALID_ARGUMENT;
+    }
+    if (experiment->stop_time_defined &&
+        !(isfinite(experiment->stop_time) && experiment->stop_time >= start)) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "stop time %.17g is refused: a finite time, not before the start time %.17g, "
+                      "is expected",
+                      experiment->stop_time, start);
+        return STATUS_INVALID_ARGUMENT;
+    }
+    if (experiment->tolerance_defined &&
+        !(isfinite(experiment->tolerance) && experiment->tolerance > 0.0)) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "tolerance %g is refused: a finite value above 0 is expected",
+                      experiment->tolerance);
+        return STATUS_INVALID_ARGUMENT;
+    }
+    return STATUS_OK;
+}
+
+enum status instance_check_parameters(const struct instance *instance) {
+    char text[256]; // written where the parameters are refused
+    const enum status status =
+        instance->model->check_parameters(instance->memory.values, text, sizeof text);
+    if (status != STATUS_OK) {
+        message_write(&instance->sink, status, "%s", text);
+    }
+    return status;
+}
+
+/* The parameter wins over the experiment, which wins over the default. */
+void instance_update_tolerance(struct instance *instance) {
+    struct instance_state *state = &instance->state;
+    double tolerance = instance->description->default_tolerance;
+    if (state->own.relative_tolerance > 0.0) {
+        tolerance = state->own.relative_tolerance;
+    } else if (state->experiment.tolerance_defined) {
+        tolerance = fmin(state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE);
+    }
+    state->own.effective_relative_tolerance =
+        fmin(fmax(integrator_tolerance_fraction((enum integrator_method)state->own.solver_method) *
+                      tolerance,
+                  INSTANCE_FINEST_TOLERANCE),
+             INSTANCE_COARSEST_TOLERANCE);
+}
+
+void instance_report_tolerance(const struct instance *instance) {
+    const struct instance_state *state = &instance->state;
+    if (state->own.relative_tolerance == 0.0 && state->experiment.tolerance_defined &&
+        state->experiment.tolerance > INSTANCE_COARSEST_EXPERIMENT_TOLERANCE) {
+        message_write(&instance->sink, STATUS_COARSE_TOLERANCE,
+                      "the tolerance %g of the experiment is too coarse: %g is used instead. Set "
+                      "relative_tolerance for a coarser one",
+                      state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE);
+    }
+}
+
+static struct integrator_settings settings_of(const struct instance *instance) {
+    const struct instance_values *own = &instance->state.own;
+    return (struct integrator_settings){
+        .method = (enum integrator_method)own->solver_method,
+        .relative_tolerance = own->effective_relative_tolerance,
+        .max_step = own->max_step,
+    };
+}
+
+bool instance_is_configured_otherwise(const struct instance *instance) {
+    const struct integrator_settings wanted = settings_of(instance);
+    return instance->configured.method != wanted.method ||
+           instance->configured.relative_tolerance != wanted.relative_tolerance ||
+           instance->configured.max_step != wanted.max_step;
+}
+
+enum status instance_configure_integrator(struct instance *instance) {
+    const struct span states = instance->model->states;
+    const double tolerance = instance->state.own.effective_relative_tolerance;
+    double *absolute = doubles_of(instance->first_derivatives, states);
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        const size_t from_states = variable->offset - states.offset;
+        if (variable->owner == VARIABLE_OF_MODEL && from_states < states.size) {
+            absolute[from_states / sizeof(double)] =
+                absolute_fraction * variable->nominal * tolerance;
+        }
+    }
+    struct integrator_settings settings = settings_of(instance);
+    settings.absolute_tolerances = absolute;
+    const enum status status = integrator_configure(instance->integrator, &settings);
+    instance->configured = status == STATUS_OK ? settings : (struct integrator_settings){0};
+    instance->configured.absolute_tolerances = NULL;
+    return status;
+}

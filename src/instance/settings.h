@@ -1,0 +1,28 @@
+/* What an instance runs with: its experiment, its parameters, and what follows for the integrator.
+ */
+#ifndef INSTANCE_SETTINGS_H
+#define INSTANCE_SETTINGS_H
+
+#include "internals.h"
+
+/* STATUS_OK if the experiment can be run; otherwise a message says why not. */
+MUST_CHECK NONNULL enum status
+instance_check_experiment(const struct instance *instance,
+                          const struct instance_experiment *experiment);
+
+/* STATUS_OK if the parameters are consistent; otherwise a message says why not. */
+MUST_CHECK NONNULL enum status instance_check_parameters(const struct instance *instance);
+
+/* Computes the tolerance that the integrator runs at. */
+NONNULL void instance_update_tolerance(struct instance *instance);
+
+/* Says so in a message if the experiment's tolerance is too coarse to be used as it is. */
+NONNULL void instance_report_tolerance(const struct instance *instance);
+
+/* The values ask for another method, tolerance or limit than the integrator has. */
+NONNULL bool instance_is_configured_otherwise(const struct instance *instance);
+
+/* Gives the integrator the method, tolerances and limits that the values ask for. */
+MUST_CHECK NONNULL enum status instance_configure_integrator(struct instance *instance);
+
+#endif

@@ -1,0 +1,22 @@
+/* What a snapshot is made of, for the files that save and serialize it. */
+#ifndef INSTANCE_SNAPSHOT_CONTENTS_H
+#define INSTANCE_SNAPSHOT_CONTENTS_H
+
+#include "internals.h"
+#include "snapshot.h"
+
+#include <stddef.h>
+
+struct instance_snapshot {
+    struct instance_snapshot *newer;
+    struct instance_snapshot *older;
+    unsigned tag;
+    struct instance_state state;
+    max_align_t memory[]; /* copy of instance_memory.block */
+};
+
+/* STATUS_OK if the snapshot belongs to the instance; otherwise a message says so. */
+MUST_CHECK NONNULL enum status instance_check_own(const struct instance *instance,
+                                                  const struct instance_snapshot *snapshot);
+
+#endif

@@ -1,0 +1,49 @@
+/* What the methods of SUNDIALS share: its context, its vectors and its texts. */
+#ifndef SUNDIALS_H
+#define SUNDIALS_H
+
+#include "method.h"
+#include "small_vector.h"
+#include "sundials_compat.h"
+
+/* The first member of each method's memory, and the user data of its solver. */
+struct sundials {
+    struct problem *problem;
+    const struct method *method;
+    enum status (*status_of_flag)(const struct problem *problem, int flag);
+    struct sundials_texts texts;
+    SUNContext context;
+    N_Vector x;
+    N_Vector absolute_tolerances;
+    N_Vector work;
+};
+
+/* Bytes for the context and the method that needs most, the one with matrices. */
+size_t sundials_memory_size(size_t state_count);
+
+/* Allocates memory of size bytes that begins with a struct sundials, with the context and the
+ * vectors in it. NULL where memory is short. */
+MUST_CHECK NONNULL void *
+sundials_create(size_t size, struct problem *problem, const struct method *method,
+                enum status (*status_of_flag)(const struct problem *, int));
+
+/* Frees the memory itself too; the solver must be freed before. Half-built is allowed. */
+NONNULL void sundials_destroy(void *memory);
+
+/* The right-hand side as SUNDIALS calls it; user data: struct sundials. */
+int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data);
+
+/* Return value of a callback: 1, a smaller step is tried, where the evaluation failed. */
+static inline int sundials_callback_flag(enum status status) {
+    return status == STATUS_OK ? 0 : 1;
+}
+
+/* x may be the vector's own array. */
+NONNULL void sundials_set_state(struct sundials *sundials, const double x[]);
+NONNULL void sundials_get_state(const struct sundials *sundials, double x[]);
+
+/* Integrates x' = 0 with the method of memory: solvers allocate what they need at their first step.
+ */
+MUST_CHECK NONNULL enum status sundials_warm_up(void *memory);
+
+#endif

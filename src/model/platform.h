@@ -1,0 +1,42 @@
+/* What compilers and platforms call by different names: the only header that asks which one it is.
+ * Attributes stand in front of the return type. */
+#ifndef PLATFORM_H
+#define PLATFORM_H
+
+#if defined(__GNUC__)
+
+/* The caller must look at the returned status. */
+#define MUST_CHECK __attribute__((warn_unused_result))
+
+/* No pointer argument may be NULL; with numbers: not these, counted from 1. */
+#define NONNULL                __attribute__((nonnull))
+#define NONNULL_ARGUMENTS(...) __attribute__((nonnull(__VA_ARGS__)))
+
+/* Arguments from number `first` on belong to the printf format in argument number `format`. */
+#if defined(__MINGW32__)
+#define PRINTF_FORMAT(format_, first) __attribute__((format(gnu_printf, format_, first)))
+#else
+#define PRINTF_FORMAT(format_, first) __attribute__((format(printf, format_, first)))
+#endif
+
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+
+/* In front of a loop: no iteration depends on another. */
+#if defined(__clang__)
+#define INDEPENDENT_ITERATIONS _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define INDEPENDENT_ITERATIONS _Pragma("GCC ivdep")
+#endif
+
+#else
+
+#define MUST_CHECK
+#define NONNULL
+#define NONNULL_ARGUMENTS(...)
+#define PRINTF_FORMAT(format_, first)
+#define ALWAYS_INLINE static inline
+#define INDEPENDENT_ITERATIONS
+
+#endif
+
+#endif

@@ -1,0 +1,165 @@
+#include "race.h"
+
+#include "measure.h"
+#include "plain_loop.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void race_add(struct race *race, struct run run) {
+    require(race->count < MOST_RUNS, "too many runs");
+    race->runs[race->count++] = run;
+}
+
+static double run_once(const struct run *run, const struct fmu_functions *fmu,
+                       const struct problem *problem, double states[][4],
+                       struct fmu_counts *counts) {
+    switch (run->solver) {
+    case PLAIN_LOOP:
+        return plain_loop_run(problem, run->tolerance, states);
+    case FMU:
+        return fmu_run(fmu, problem, run->method, run->tolerance, states, counts);
+    case MUJOCO:
+        return mujoco_run(problem, run->integrator, run->substeps, states);
+    }
+    return 0.0;
+}
+
+void race_add_usual(struct race *race, const struct fmu_functions *fmu, double tolerance) {
+    struct problem *problem = problem_create(1e-3, 1, INPUTS_ZERO, 0.0);
+    struct fmu_counts counts;
+    double states[1][4];
+    fmu_run(fmu, problem, CVODE_ADAMS, tolerance, states, &counts);
+    problem_destroy(problem);
+    race_add(race, (struct run){.name = "plain loop",
+                                .solver = PLAIN_LOOP,
+                                .tolerance = counts.effective_tolerance});
+    static const char *const names[] = {
+        [CVODE_ADAMS] = "cvode_adams", [CVODE_BDF] = "cvode_bdf", [ERK] = "erk"};
+    for (enum method method = CVODE_ADAMS; method <= ERK; method++) {
+        race_add(race, (struct run){.name = names[method],
+                                    .solver = FMU,
+                                    .method = method,
+                                    .tolerance = tolerance});
+    }
+}
+
+/* s for a communication step, mean of so many runs that the reading of the clock does not count. */
+static double run_long_enough(struct race *race, int run, const struct fmu_functions *fmu,
+                              const struct problem *problem, double states[][4]) {
+    const double clock = clock_cost(processor_time);
+    double seconds = 0.0;
+    int passes = 0;
+    while (passes == 0 || (seconds < 2e-3 && passes < 200)) {
+        seconds += run_once(&race->runs[run], fmu, problem, states, &race->counts[run]) - clock;
+        passes++;
+    }
+    return seconds / passes / problem->steps;
+}
+
+void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
+              int repeats) {
+    double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
+    require(states != NULL && repeats <= MOST_REPEATS, "no memory");
+    race->repeats = repeats;
+    for (int repeat = 0; repeat < repeats; repeat++) {
+        for (int run = 0; run < race->count; run++) {
+            race->seconds[run][repeat] = run_long_enough(race, run, fmu, problem, states);
+            race->error[run] = problem_error(problem, states);
+        }
+    }
+    free(states);
+}
+
+int race_find(const struct race *race, const char *name) {
+    for (int run = 0; run < race->count; run++) {
+        if (strcmp(race->runs[run].name, name) == 0) {
+            return run;
+        }
+    }
+    return -1;
+}
+
+double race_us(const struct race *race, int run) {
+    double seconds[MOST_REPEATS];
+    memcpy(seconds, race->seconds[run], sizeof seconds);
+    return 1e6 * median(seconds, race->repeats);
+}
+
+double race_ratio(const struct race *race, int run, int peer) {
+    double ratios[MOST_REPEATS];
+    for (int repeat = 0; repeat < race->repeats; repeat++) {
+        ratios[repeat] = race->seconds[run][repeat] / race->seconds[peer][repeat];
+    }
+    return median(ratios, race->repeats);
+}
+
+void race_report(const struct race *race, struct report *report, const char *group,
+                 const char *work, const struct problem *problem, const struct target *targets) {
+    static const char *const ends[4] = {"end_q1", "end_q2", "end_dq1", "end_dq2"};
+    printf("\n%s\n", work);
+    for (int i = 0; i < race->count; i++) {
+        const struct run *run = &race->runs[i];
+        const double us = race_us(race, i);
+        report_row(report, group, work, run->name);
+        report_number(report, "step", problem->step);
+        report_number(report, "steps", problem->steps);
+        report_number(report, "us", us);
+        report_number(report, "error", race->error[i]);
+        for (int j = 0; j < 4; j++) { // of the reference, for other references to compare with
+            report_number(report, ends[j], problem->reference[problem->steps - 1][j]);
+        }
+        printf("  %-19s %9.2f us", run->name, us);
+        const double ratio = race_ratio(race, i, 0);
+        printf(" %7.3f  error %7.1e", ratio, race->error[i]);
+        if (run->solver == MUJOCO) {
+            report_number(report, "substeps", run->substeps);
+            printf("  timestep %g ms", 1e3 * problem->step / run->substeps);
+        } else {
+            report_number(report, "tolerance", run->tolerance);
+            printf("  tolerance %7.1e", run->tolerance);
+        }
+        if (run->solver == FMU) {
+            report_number(report, "effective_tolerance", race->counts[i].effective_tolerance);
+            report_number(report, "internal_steps", race->counts[i].internal_steps);
+            report_number(report, "evaluations", race->counts[i].evaluations);
+            printf(", runs at %7.1e, %6.1f steps, %6.1f evaluations",
+                   race->counts[i].effective_tolerance, race->counts[i].internal_steps,
+                   race->counts[i].evaluations);
+        }
+        report_judged(report, "ratio", ratio,
+                      targets == NULL ? (struct target){NO_TARGET, 0.0} : targets[i]);
+        printf("\n");
+        report_row_end(report);
+    }
+}
+
+void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
+               double bound) {
+    double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
+    struct fmu_counts counts;
+    require(states != NULL, "no memory");
+    if (run->solver == MUJOCO) {
+        run->substeps = 10;
+        run_once(run, fmu, problem, states, &counts);
+        while (problem_error(problem, states) > bound) {
+            run->substeps += run->substeps / 4 + 1;
+            require(run->substeps < 1000000, "no time step of MuJoCo meets the error asked for");
+            run_once(run, fmu, problem, states, &counts);
+        }
+    } else {
+        double best = 0.0;
+        for (int quarter = -48; quarter <= -12; quarter++) {
+            run->tolerance = pow(10.0, quarter / 4.0);
+            run_once(run, fmu, problem, states, &counts);
+            if (problem_error(problem, states) > bound) {
+                break;
+            }
+            best = run->tolerance;
+        }
+        require(best > 0.0, "no tolerance meets the error asked for");
+        run->tolerance = best;
+    }
+    free(states);
+}

@@ -1,0 +1,391 @@
+"""ClosedLoop.ssp is valid and says what it should; what is wrong in an SSP is refused by name."""
+
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from lxml import etree
+
+from cosim.__main__ import main
+from cosim.errors import UserError
+from cosim.system import ssp
+from cosim.system.ssp_reader import NAMESPACES
+from cosim.system.structure import Connector
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
+
+sys.path.insert(0, str(ROOT / "fmu"))
+import package  # noqa: E402
+
+SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"
+STRUCTURE = "SystemStructure.ssd"
+FMUS = {"trajectory": "RPTrajectory", "controller": "RPController", "arm": "RPManipulator"}
+REFERENCES = ["q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref"]
+MEASURED = ["q1", "q2", "dq1", "dq2"]
+EFFORTS = ["tau1", "f2"]
+
+# what each variant changes, of the components' defaults
+HEAVY = {"arm": {"m2": 1.2}}
+INTEGRAL = {"Ki1": 4000.0, "Ki2": 4000.0}
+VARIANTS: dict[str, dict[str, dict[str, float]]] = {
+    "nominal": {},
+    "heavy_payload": HEAVY,
+    "heavy_payload_integral": HEAVY | {"controller": INTEGRAL},
+    "horizontal_plane": {"arm": {"g": 0.0}, "controller": {"g": 0.0}},
+    "limited_effort": HEAVY | {"controller": INTEGRAL | {"tau1_max": 11.0}},
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def is_built() -> None:
+    if not SSP.is_file():
+        pytest.fail(f"{SSP}: no such file, ./run.sh builds it")
+
+
+def refused(path: Path) -> str:
+    """Text with which an SSP is refused: one line that names the archive."""
+    with pytest.raises(UserError) as caught, ssp.unpacked(path):
+        pass
+    text = str(caught.value)
+    assert "\n" not in text
+    assert text.startswith(f"{path}: ")
+    return text
+
+
+# ---- what is in it -------------------------------------------------------------------------------
+
+
+def test_files_are_valid_against_the_schemas() -> None:
+    kinds = {
+        ".ssd": "SystemStructureDescription.xsd",
+        ".ssv": "SystemStructureParameterValues.xsd",
+    }
+    found = []
+    with zipfile.ZipFile(SSP) as archive:
+        for name in archive.namelist():
+            if Path(name).suffix in kinds:
+                schema = etree.XMLSchema(etree.parse(SCHEMAS / kinds[Path(name).suffix]))
+                schema.assertValid(etree.fromstring(archive.read(name)).getroottree())
+                found.append(name)
+    assert len(found) == 1 + len(FMUS) * len(VARIANTS)
+
+
+def test_the_archive_depends_on_its_contents_alone(tmp_path: Path) -> None:
+    with zipfile.ZipFile(SSP) as archive:
+        archive.extractall(tmp_path / "files")
+        names = archive.namelist()
+    again = tmp_path / "again.ssp"
+    package.pack(again, {name: tmp_path / "files" / name for name in reversed(names)})
+    assert again.read_bytes() == SSP.read_bytes()
+
+
+def test_units_that_are_used_are_defined() -> None:
+    with zipfile.ZipFile(SSP) as archive:
+        for name in archive.namelist():
+            if name.endswith((".ssd", ".ssv")):
+                root = etree.fromstring(archive.read(name))
+                used = set(root.xpath("//@unit"))
+                defined = root.xpath("//ssc:Unit/@name", namespaces=NAMESPACES)
+                assert set(defined) == used, name
+                assert len(defined) == len(used)
+
+
+def test_units_are_those_of_the_fmus() -> None:
+    """Exponents of the SI base units, as the model descriptions define them."""
+    bases = ("kg", "m", "s", "rad")
+    with ssp.unpacked(SSP) as opened:
+        for component in FMUS:
+            description = fmpy.read_model_description(opened.fmu(component))
+            units = {u.name: u.baseUnit for u in description.unitDefinitions}
+            files = [opened.folder / STRUCTURE]
+            files += sorted((opened.folder / "resources").glob(f"{component}_*.ssv"))
+            for path in files:
+                for unit in etree.parse(path).iterfind(".//ssc:Unit", NAMESPACES):
+                    if unit.get("name") in units:
+                        wanted = [getattr(units[unit.get("name")], b) or 0 for b in bases]
+                        given = [int(unit[0].get(b, 0)) for b in bases]
+                        assert given == [int(x) for x in wanted], (path.name, unit.get("name"))
+
+
+def test_structure() -> None:
+    with ssp.unpacked(SSP) as opened:
+        system = opened.system
+        assert [(c.name, c.source) for c in system.components] == [
+            (name, f"resources/{fmu}.fmu") for name, fmu in FMUS.items()
+        ]
+        wanted = [("trajectory", name, "controller", name) for name in REFERENCES]
+        wanted += [("arm", name, "controller", name) for name in MEASURED]
+        wanted += [("controller", name, "arm", name) for name in EFFORTS]
+        found = [
+            (c.start_component, c.start_connector, c.end_component, c.end_connector)
+            for c in system.connections
+        ]
+        assert sorted(found) == sorted(wanted)
+        assert (system.start, system.stop, system.step, system.steps) == (0.0, 6.0, 1e-3, 6000)
+        assert system.component("arm").connectors["tau1"] == Connector(
+            "tau1", "input", "Real", "N.m"
+        )
+        for component, fmu in FMUS.items():
+            built = ROOT / "build" / f"{fmu}.fmu"
+            assert opened.fmu(component).read_bytes() == built.read_bytes()
+
+
+def test_variants() -> None:
+    with ssp.unpacked(SSP) as opened:
+        sets = opened.system.parameter_sets
+        starts = {
+            component: {
+                variable.name: variable.start
+                for variable in fmpy.read_model_description(opened.fmu(component)).modelVariables
+            }
+            for component in FMUS
+        }
+    assert list(sets) == list(VARIANTS)  # nominal first: libcosim takes the first
+    for variant, changes in VARIANTS.items():
+        for component in FMUS:
+            given = dict(sets[variant][component])
+            if "relative_tolerance" in starts[component]:
+                assert given.pop("relative_tolerance") == 1e-11
+            changed = {k: v for k, v in given.items() if v != float(starts[component][k])}
+            assert changed == changes.get(component, {}), (variant, component)
+
+
+def test_every_importer_gets_a_whole_variant() -> None:
+    """The first set, as libcosim reads it, is nominal; so is what is left where all sets apply in
+    turn, as the standard has it; and in any order the last one gives all values."""
+    with zipfile.ZipFile(SSP) as archive:
+        root = etree.fromstring(archive.read(STRUCTURE))
+        for component in FMUS:
+            path = f".//ssd:Component[@name='{component}']//ssd:ParameterBinding"
+            sources = [node.get("source") for node in root.iterfind(path, NAMESPACES)]
+            assert sources[0] == sources[-1] == f"resources/{component}_nominal.ssv"
+            names = [
+                etree.fromstring(archive.read(source)).xpath(
+                    "//ssv:Parameter/@name", namespaces=NAMESPACES
+                )
+                for source in sources
+            ]
+            assert all(x == names[0] for x in names)
+
+
+def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with ssp.unpacked(SSP) as opened:
+        folder = opened.folder
+        assert opened.fmu("arm").is_file()
+    assert not folder.exists()
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- what is refused -----------------------------------------------------------------------------
+
+TAU1 = '<ssd:Connector name="tau1" kind="input"><ssc:Real unit="N.m"/>'
+F2_CONNECTION = """      <ssd:Connection startElement="controller" startConnector="f2"
+          endElement="arm" endConnector="f2"/>"""
+NOMINAL_ARM = "resources/arm_nominal.ssv"
+TOLERANCE = '<ssv:Parameter name="relative_tolerance"><ssv:Real value="1e-11" unit="1"/>'
+
+
+def structure(old: str, new: str, count: int = 1) -> dict[str, Edit]:
+    return {STRUCTURE: replace(old, new, count)}
+
+
+def values(new: str) -> dict[str, Edit]:
+    """Another parameter in place of the arm's nominal one."""
+    return {NOMINAL_ARM: replace(TOLERANCE, new)}
+
+
+BAD: dict[str, tuple[dict[str, Edit], list[str]]] = {
+    "no FMU": (
+        {"resources/RPController.fmu": lambda _: None},
+        ["component 'controller'", "resources/RPController.fmu is missing"],
+    ),
+    "damaged FMU": (
+        {"resources/RPController.fmu": lambda content: content[: len(content) // 2]},
+        ["component 'controller'", "is no FMU"],
+    ),
+    "FMU of another version": (
+        {
+            "resources/RPController.fmu": edited_fmu(
+                {"modelDescription.xml": replace('fmiVersion="2.0"', 'fmiVersion="1.0"')}
+            )
+        },
+        ["component 'controller'", "resources/RPController.fmu"],
+    ),
+    "source outside": (
+        structure("resources/RPController.fmu", "../RPController.fmu"),
+        ["component 'controller'", "../RPController.fmu"],
+    ),
+    "connection from an unknown component": (
+        structure('startElement="controller"', 'startElement="contoller"'),
+        ["contoller.tau1 -> arm.tau1", "did you mean 'controller'?"],
+    ),
+    "connection to an unknown variable": (
+        structure('endElement="arm" endConnector="tau1"', 'endElement="arm" endConnector="tau3"'),
+        ["controller.tau1 -> arm.tau3", "'arm' has no connector 'tau3'", "did you mean 'tau1'?"],
+    ),
+    "connection against its direction": (
+        structure(
+            F2_CONNECTION,
+            '<ssd:Connection startElement="arm" startConnector="f2" endElement="controller" '
+            'endConnector="f2"/>',
+        ),
+        ["arm.f2 -> controller.f2", "'f2' is no output"],
+    ),
+    "connector that the FMU lacks": (
+        structure('name="dq2" kind="output"', 'name="ddq22" kind="output"'),
+        ["component 'arm'", "'ddq22'", "did you mean 'ddq2'?"],
+    ),
+    "connector of the wrong causality": (
+        structure(
+            '<ssd:Connector name="tau1" kind="input">', '<ssd:Connector name="tau1" kind="output">'
+        ),
+        ["component 'arm'", "'tau1' is an output, in its FMU an input"],
+    ),
+    "connector's unit": (
+        structure(TAU1, TAU1.replace("N.m", "N")),
+        ["component 'arm'", "'tau1' is in 'N', in its FMU 'N.m'"],
+    ),
+    "connector without a unit": (
+        structure(TAU1, TAU1.replace(' unit="N.m"', "")),
+        ["component 'arm'", "'tau1' is in no unit, in its FMU 'N.m'"],
+    ),
+    "units of a connection": (
+        structure('endElement="arm" endConnector="tau1"', 'endElement="arm" endConnector="f2"'),
+        ["controller.tau1 -> arm.f2", "units differ, 'N.m' and 'N'"],
+    ),
+    "connector's type": (
+        structure(TAU1, '<ssd:Connector name="tau1" kind="input"><ssc:Integer/>'),
+        ["component 'arm'", "'tau1' is of type Integer, in its FMU Real"],
+    ),
+    "connector without a type": (
+        structure(TAU1, '<ssd:Connector name="tau1" kind="input">'),
+        ["component 'arm'", "'tau1' has no type"],
+    ),
+    "input without a connection": (
+        structure(F2_CONNECTION, ""),
+        ["component 'arm'", "input 'f2' is not connected"],
+    ),
+    "two connections into one input": (
+        structure(F2_CONNECTION, F2_CONNECTION + F2_CONNECTION),
+        ["controller.f2 -> arm.f2", "the input has a connection already"],
+    ),
+    "transformation": (
+        structure(
+            F2_CONNECTION,
+            F2_CONNECTION[:-2] + '><ssc:LinearTransformation factor="2"/></ssd:Connection>',
+        ),
+        ["controller.f2 -> arm.f2", "transformation"],
+    ),
+    "connection to the system": (
+        structure('startElement="controller" startConnector="f2"', 'startConnector="f2"'),
+        [".f2 -> arm.f2", "the system's own connectors"],
+    ),
+    "component twice": (
+        structure('<ssd:Component name="trajectory"', '<ssd:Component name="arm"'),
+        ["component 'arm' is there twice"],
+    ),
+    "unknown parameter": (
+        values('<ssv:Parameter name="mm2"><ssv:Real value="1"/>'),
+        ["parameter set 'nominal'", "component 'arm'", "'mm2'", "did you mean"],
+    ),
+    "parameter's unit": (
+        values('<ssv:Parameter name="m1"><ssv:Real value="1" unit="m"/>'),
+        ["parameter set 'nominal'", "component 'arm'", "'m1' is in 'm', in its FMU 'kg'"],
+    ),
+    "parameter's type": (
+        values('<ssv:Parameter name="m1"><ssv:Integer value="1"/>'),
+        ["parameter set 'nominal'", "component 'arm'", "'m1' is of type Integer, in its FMU Real"],
+    ),
+    "parameter's range": (
+        values('<ssv:Parameter name="m1"><ssv:Real value="-1"/>'),
+        ["parameter set 'nominal'", "component 'arm'", "'m1' is -1.0, expected 0 to inf"],
+    ),
+    "parameter that is NaN": (
+        values('<ssv:Parameter name="m1"><ssv:Real value="NaN"/>'),
+        [NOMINAL_ARM, "component 'arm'", "'m1'", "expected a finite number"],
+    ),
+    "parameter that is none": (
+        values('<ssv:Parameter name="ddq1"><ssv:Real value="1"/>'),
+        ["parameter set 'nominal'", "component 'arm'", "'ddq1' is an output and cannot be set"],
+    ),
+    "parameter twice": (
+        values(f"{TOLERANCE}</ssv:Parameter>{TOLERANCE}"),
+        [NOMINAL_ARM, "component 'arm'", "'relative_tolerance' is there twice"],
+    ),
+    "parameter as an enumeration": (
+        {
+            "resources/controller_nominal.ssv": replace(
+                TOLERANCE, '<ssv:Parameter name="mode"><ssv:Enumeration value="pd"/>'
+            )
+        },
+        ["component 'controller'", "'mode'", "Integer"],
+    ),
+    "parameter set of another name": (
+        {NOMINAL_ARM: replace('name="nominal"', 'name="nominl"')},
+        ["has no parameter set 'nominl'"],
+    ),
+    "no parameter file": (
+        {NOMINAL_ARM: lambda _: None},
+        [f"{NOMINAL_ARM}: is missing in the SSP"],
+    ),
+    "no structure": ({STRUCTURE: lambda _: None}, [f"{STRUCTURE}: is missing in the SSP"]),
+    "structure cut off": (
+        {STRUCTURE: lambda content: content[:-200]},
+        [STRUCTURE, "not valid XML"],
+    ),
+    "parameters cut off": (
+        {NOMINAL_ARM: lambda content: content[:-20]},
+        [NOMINAL_ARM, "not valid XML"],
+    ),
+    "against the schema": (
+        {STRUCTURE: lambda content: content.replace(b"ssd:Elements>", b"ssd:Elemente>")},
+        [STRUCTURE, "line ", "Elemente"],
+    ),
+    "no step": (
+        structure('<osp:FixedStepAlgorithm baseStepSize="0.001"/>', ""),
+        [STRUCTURE, "baseStepSize"],
+    ),
+    "stop before start": (
+        structure('stopTime="6"', 'stopTime="-6"'),
+        [STRUCTURE, "stop -6.0 s"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_wrong_ssp_is_refused(case: str, tmp_path: Path) -> None:
+    edits, expected = BAD[case]
+    text = refused(edited(SSP, tmp_path / "wrong.ssp", edits))
+    for part in expected:
+        assert part in text
+
+
+def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "damaged.ssp"
+    path.write_bytes(SSP.read_bytes()[:-1000])
+    assert "damaged" in refused(path)
+    content = bytearray(SSP.read_bytes())
+    content[2000:2100] = bytes(100)
+    path.write_bytes(content)
+    assert "damaged" in refused(path)
+    path.write_text("no archive")
+    assert "not an SSP" in refused(path)
+    path.unlink()
+    assert "no such file" in refused(path)
+    path.mkdir()
+    assert "cannot be unpacked" in refused(path)
+
+
+def test_the_command_line_explains_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edits, _ = BAD["input without a connection"]
+    path = edited(SSP, tmp_path / "wrong.ssp", edits)
+    assert main(["system", "--ssp", str(path), "--report", str(tmp_path / "report")]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == f"error: {path}: component 'arm': input 'f2' is not connected\n"
+    assert not (tmp_path / "report").exists()

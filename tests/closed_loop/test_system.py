@@ -1,0 +1,404 @@
+"""The closed loop in Ecos and in libcosim is what the references say; failures leave nothing."""
+
+import functools
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+
+from cosim.__main__ import main
+from cosim.errors import UserError
+from cosim.system import comparison, ecos, ssp
+from models.closed_loop.study import EXPERIMENT
+from tests.importers.test_importers import folder_of
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, replace
+
+FMUS = ("RPTrajectory", "RPController", "RPManipulator")
+VARIANTS = (
+    *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
+    "limited_effort",
+)
+BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
+SCALE = 1e-3
+ROUNDING = 1e-9  # two engines with the same order
+STATES = ("q1", "q2", "dq1", "dq2")
+STRUCTURE = "SystemStructure.ssd"
+REPORT = ("{0}.png", "{0}.csv")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def is_built() -> None:
+    if not SSP.is_file():
+        pytest.fail(f"{SSP}: no such file, ./run.sh builds it")
+
+
+def read_csv(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a CSV file by name."""
+    if not path.is_file():
+        pytest.skip(f"{path}: no such file yet")
+    with path.open(encoding="utf-8") as file:
+        names = [name.strip('"') for name in file.readline().strip().split(",")]
+        return dict(zip(names, np.loadtxt(file, delimiter=",").T, strict=True))
+
+
+def reference(variant: str, name: str) -> dict[str, np.ndarray]:
+    return read_csv(ROOT / "models" / "closed_loop" / "references" / variant / name)
+
+
+def difference(values: np.ndarray, expected: np.ndarray) -> float:
+    assert values.shape == expected.shape
+    assert np.isfinite(values).all()
+    return float(np.abs(values - expected).max() / max(np.abs(expected).max(), SCALE))
+
+
+@functools.cache
+def run(variant: str) -> dict[str, np.ndarray]:
+    """The variant in Ecos: all recorded values by name."""
+    with ssp.unpacked(SSP) as opened:
+        result = ecos.run(opened, variant, comparison.recorded(opened))
+    return {"time": result.times} | dict(zip(result.names, result.values.T, strict=True))
+
+
+def rows_of(expected: dict[str, np.ndarray]) -> np.ndarray:
+    """Communication points that a reference has rows for."""
+    rows = np.rint(expected["time"] * 1000).astype(int)
+    assert np.allclose(expected["time"], rows / 1000, rtol=0, atol=1e-12)
+    assert (rows[0], rows[-1]) == (0, 6000)
+    assert len(rows) > 100
+    return rows
+
+
+# ---- Ecos ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_ecos_is_at_the_reference_of_its_order(variant: str) -> None:
+    expected = reference(variant, "ecos.csv")
+    result, rows = run(variant), rows_of(expected)
+    assert set(expected) == set(result)
+    worst = {name: difference(result[name][rows], expected[name]) for name in expected}
+    assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_motion_in_ecos_is_that_of_jacobi_stepping(variant: str) -> None:
+    expected = reference(variant, "sampled.csv")
+    result, rows = run(variant), rows_of(expected)
+    for name in STATES:
+        assert difference(result[f"arm.{name}"][rows], expected[f"arm.{name}"]) <= BOUND
+
+
+def test_the_bound_tells_one_order_from_another() -> None:
+    """A delay of one step more or less, or none at all, is far beyond it."""
+    other = reference("nominal", "monolithic.csv")
+    result, rows = run("nominal"), rows_of(other)
+    assert difference(result["arm.q1"][rows], other["arm.q1"]) > 100 * BOUND
+    sampled = reference("nominal", "sampled.csv")
+    effort = "controller.tau1"
+    assert difference(result[effort][rows], sampled[effort]) > 100 * BOUND
+
+
+def test_recorded_are_all_outputs_and_states() -> None:
+    with ssp.unpacked(SSP) as opened:
+        names = comparison.recorded(opened)
+    components = [name.partition(".")[0] for name in names]
+    assert names[:2] == ["trajectory.q1_ref", "trajectory.q2_ref"]
+    assert names[-2:] == ["controller.integral1", "controller.integral2"]
+    assert list(dict.fromkeys(components)) == ["trajectory", "controller", "arm"]
+    assert len(names) == len(set(names))
+    assert {f"arm.{name}" for name in (*STATES, "ddq1", "ee_x", "total_energy")} <= set(names)
+
+
+def test_variants_differ_as_they_should() -> None:
+    distance = {
+        variant: np.hypot(
+            run(variant)["arm.ee_x"] - run(variant)["trajectory.ee_x_ref"],
+            run(variant)["arm.ee_y"] - run(variant)["trajectory.ee_y_ref"],
+        )
+        for variant in VARIANTS
+    }
+    assert distance["nominal"].max() < 1e-3  # m
+    assert distance["heavy_payload"].max() > 10 * distance["nominal"].max()
+    # the constant part of the payload's error, at rest at the end
+    assert distance["heavy_payload"][-1] > 1e-3
+    assert distance["heavy_payload_integral"][-1] < 1e-5
+    torque = run("limited_effort")["controller.tau1"]
+    assert torque.max() == 11.0
+    assert 0.1 < np.mean(torque == 11.0) < 0.9
+    assert distance["limited_effort"][-1] < 1e-4
+
+
+# ---- libcosim ------------------------------------------------------------------------------------
+
+
+def first_variant(variant: str) -> Edit:
+    """Edit that leaves only the bindings of one variant: libcosim takes the first."""
+    others = "|".join(name for name in VARIANTS if name != variant)
+    binding = re.compile(rf'\s*<ssd:ParameterBinding source="resources/[a-z]+_({others})\.ssv"/>')
+
+    def edit(content: bytes) -> bytes:
+        text, count = binding.subn("", content.decode())
+        assert count == 3 * len(VARIANTS)  # nominal is bound twice
+        return text.encode()
+
+    return edit
+
+
+def libcosim(path: Path, names: list[str], steps: int, folder: Path) -> dict[str, np.ndarray]:
+    """Values by name, read after each step; no row of the start."""
+    python = folder_of("libcosimpy") / "bin" / "python"
+    driver = ROOT / "tests" / "importers" / "run_libcosimpy_system.py"
+    plan, result = folder / "names.json", folder / "rows.json"
+    plan.write_text(json.dumps(names), encoding="utf-8")
+    process = subprocess.run(
+        [python, driver, path, plan, str(steps), result],
+        check=False,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=120,
+        env=os.environ | {"TMPDIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
+    )
+    assert process.returncode == 0, process.stdout
+    rows = np.array(json.loads(result.read_text(encoding="utf-8")))
+    return dict(zip(names, rows.T, strict=True))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_libcosim_is_at_the_reference_of_its_order(variant: str, tmp_path: Path) -> None:
+    """libcosim reads before it sets inputs: all variables are those of the sampled system."""
+    path = SSP
+    if variant != "nominal":
+        path = edited(SSP, tmp_path / "one.ssp", {STRUCTURE: first_variant(variant)})
+    expected = reference(variant, "sampled.csv")
+    rows = rows_of(expected)
+    names = [name for name in expected if name != "time"]
+    result = libcosim(path, names, 6000, tmp_path)
+    worst = {name: difference(result[name][rows[1:] - 1], expected[name][1:]) for name in names}
+    assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
+
+
+def test_libcosim_differs_from_ecos_by_the_time_of_reading_alone(tmp_path: Path) -> None:
+    """Efforts without integral action show up one step later, and nothing else differs."""
+    result, steps = run("nominal"), 2000
+    names = [name for name in result if name != "time"]
+    other = libcosim(SSP, names, steps, tmp_path)
+    late = {f"controller.{name}" for name in ("tau1", "f2")}
+    late |= {name for name in names if name.startswith("controller.") and "error" in name}
+    direct = {"arm.ddq1", "arm.ddq2", "arm.actuator_power"}
+    for name in names:
+        if name in late:
+            assert difference(other[name], result[name][:steps]) <= ROUNDING, name
+        elif name not in direct:
+            assert difference(other[name], result[name][1 : steps + 1]) <= ROUNDING, name
+    for name in direct | late:
+        assert difference(other[name], result[name][1 : steps + 1]) > 1e4 * ROUNDING, name
+
+
+# ---- the FMUs ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FMUS)
+def test_fmpy_finds_nothing_in_the_fmus(name: str) -> None:
+    assert validate_fmu(str(ROOT / "build" / f"{name}.fmu")) == []
+
+
+# ---- the command ---------------------------------------------------------------------------------
+
+
+def test_the_command_checks_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "heavy_payload", "nominal", "--report", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    names = [line.split()[0] for line in out.splitlines() if " passed" in line]
+    assert names == ["heavy_payload", "nominal"]
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    for name in names:
+        for file in REPORT:
+            assert (tmp_path / file.format(name)).stat().st_size > 10_000
+        assert f'src="{name}.png"' in page
+    written, result = read_csv(tmp_path / "nominal.csv"), run("nominal")
+    assert list(written) == list(result)
+    for name in result:
+        np.testing.assert_array_equal(written[name], result[name])
+    assert len(list(tmp_path.iterdir())) == 5
+
+
+def test_the_variants_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "--list"]) == 0
+    assert capsys.readouterr().out.split() == list(VARIANTS)
+
+
+def test_an_unknown_variant_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "nominal", "heavy_playload"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "no variant 'heavy_playload', did you mean 'heavy_payload'?" in err
+    assert all(name in err for name in VARIANTS)
+
+
+def test_a_run_beyond_the_bound_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Another payload is not what the reference is of."""
+    path = edited(
+        SSP, tmp_path / "other.ssp", {"resources/arm_heavy_payload.ssv": replace("1.2", "1.2001")}
+    )
+    command = ["system", "heavy_payload", "--ssp", str(path), "--report", str(tmp_path / "report")]
+    assert main(command) == 1
+    assert "FAILED" in capsys.readouterr().out
+
+
+def fails(path: Path, variant: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """Error of a run that fails; neither results nor temporary files stay, not even older ones."""
+    report = folder / "report"
+    report.mkdir(exist_ok=True)
+    for file in ("index.html", *(name.format(variant) for name in REPORT)):
+        (report / file).write_text("of an earlier run", encoding="utf-8")
+    before = set(folder.iterdir())
+    assert main(["system", variant, "--ssp", str(path), "--report", str(report)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert list(report.iterdir()) == []
+    assert set(folder.iterdir()) == before
+    return err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('baseStepSize="0.001"', 'baseStepSize="0.002"', ["0.002 s", "references are for"]),
+        ('stopTime="6"', 'stopTime="3"', ["3.0 s", "references are for"]),
+        (
+            'source="resources/RPManipulator.fmu"',
+            'source="resources/None.fmu"',
+            ["arm", "None.fmu"],
+        ),
+    ],
+)
+def test_a_system_that_cannot_be_compared_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, words: list[str]
+) -> None:
+    path = edited(SSP, tmp_path / "other.ssp", {"SystemStructure.ssd": replace(old, new)})
+    text = fails(path, "nominal", tmp_path, capsys)
+    for word in words:
+        assert word in text
+
+
+def broken(component: str, fmu: str, reference: int, folder: Path) -> Path:
+    """SSP in which a variable of a component is NaN from the tenth step on."""
+    library = not_a_number(reference, 10, folder)
+    fmu_edit = edited_fmu({f"binaries/linux64/{fmu}.so": library})
+    return edited(SSP, folder / f"{component}.ssp", {f"resources/{fmu}.fmu": fmu_edit})
+
+
+@pytest.mark.parametrize(
+    ("component", "fmu", "variable", "reference"),
+    [
+        ("trajectory", "RPTrajectory", "dq2_ref", 43),
+        ("controller", "RPController", "tau1", 40),
+        ("arm", "RPManipulator", "q2", 11),
+    ],
+)
+def test_a_component_that_gives_nan_is_named(
+    component: str,
+    fmu: str,
+    variable: str,
+    reference: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    path = broken(component, fmu, reference, tmp_path)
+    err = fails(path, "nominal", tmp_path, capsys)
+    assert err == f"error: nominal: component '{component}': '{variable}' is nan at t = 0.01 s\n"
+
+
+def test_a_component_that_fails_in_initialization_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A path through the joint axis; Ecos itself would go on."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    edits = {"resources/trajectory_nominal.ssv": replace('value="0.1"', 'value="0.4"')}
+    path = edited(SSP, tmp_path / "unreachable.ssp", edits)
+    err = fails(path, "nominal", tmp_path, capsys)
+    assert "component 'trajectory' failed in initialization" in err
+    assert "0.1 m" in err  # the smallest reachable distance
+
+
+def test_a_component_that_fails_in_a_step_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    limited = '<ssv:Parameter name="max_internal_steps"><ssv:Integer value="1"/></ssv:Parameter>'
+    edits = {"resources/arm_nominal.ssv": replace("<ssv:Parameters>", f"<ssv:Parameters>{limited}")}
+    path = edited(SSP, tmp_path / "impatient.ssp", edits)
+    err = fails(path, "nominal", tmp_path, capsys)
+    assert "component 'arm' failed by t = 0.001 s" in err
+
+
+def test_ecos_that_crashes_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    library: Edit = lambda _: b"no shared object"  # noqa: E731
+    fmu_edit = edited_fmu({"binaries/linux64/RPController.so": library})
+    path = edited(SSP, tmp_path / "crash.ssp", {"resources/RPController.fmu": fmu_edit})
+    err = fails(path, "nominal", tmp_path, capsys)
+    assert "Ecos failed" in err
+
+
+def test_an_interrupted_run_leaves_nothing(tmp_path: Path) -> None:
+    report = tmp_path / "report"
+    command = [sys.executable, "-m", "cosim", "system", "--report", str(report)]
+    environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    with subprocess.Popen(
+        command,
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout.readline().startswith("variant")  # the runs begin
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (130, "interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_reference_is_refused(tmp_path: Path) -> None:
+    good = ROOT / "models" / "closed_loop" / "references" / "nominal" / "ecos.csv"
+    if not good.is_file():
+        pytest.skip(f"{good}: no such file yet")
+    lines = good.read_text(encoding="utf-8").splitlines(keepends=True)
+    system = tmp_path / "closed_loop"
+    path = system / "references" / "nominal" / "ecos.csv"
+    path.parent.mkdir(parents=True)
+    cases = {
+        "no such file": None,
+        "header": lines[1:],
+        "has no column": [
+            line.partition(",")[2] and line.rpartition(",")[0] + "\n" for line in lines
+        ],
+        "ends before": lines[:-1],
+        "cut off": [*lines[:-1], lines[-1][:-1]],
+        "finite numbers": [*lines[:5], lines[5].replace(",", ",nan,", 1).rpartition(",")[0] + "\n"],
+        "expected numbers": [*lines[:5], lines[5].replace(",", ",x", 1)],
+        "no communication point": [*lines[:3], lines[3].replace("0.04", "0.0405", 1), *lines[4:]],
+    }
+    with ssp.unpacked(SSP) as opened:
+        for message, content in cases.items():
+            if content is not None:
+                path.write_text("".join(content), encoding="utf-8")
+            with pytest.raises(UserError, match=message) as caught:
+                comparison.load_reference(opened, "nominal", system, EXPERIMENT)
+            assert "make_references.py nominal" in str(caught.value)

@@ -1,0 +1,437 @@
+"""The references of the closed loop: physics, closed forms, another integrator, made again."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+
+from cosim.errors import UserError
+from models.closed_loop.references import closed_loop, equations, make_references
+from models.closed_loop.references.closed_loop import COLUMNS, STATE, Columns, monolithic, sampled
+from tests.support.cosim_project import declared
+from tests.support.paths import ROOT
+from tests.support.rp_symbolic import PARAMETERS, STATES, TERMS, terms_of_the_motion
+
+FOLDER = ROOT / "models" / "closed_loop" / "references"
+VARIANTS = make_references.variants()
+FILES = ("monolithic.csv", "sampled.csv", "ecos.csv")
+BELIEVED = dict(
+    zip(sp.symbols(PARAMETERS), equations.symbols("controller", PARAMETERS), strict=True)
+) | dict(zip(sp.symbols(STATES), equations.symbols("controller", STATES), strict=True))
+
+
+def read(path: Path) -> tuple[list[str], np.ndarray]:
+    """Names and values, (names, rows), of a CSV file."""
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
+    return rows[0], np.array(rows[1:], dtype=float).T
+
+
+def largest(columns: Columns, other: Columns, names: tuple[str, ...]) -> float:
+    return float(max(np.max(np.abs(columns[name] - other[name])) for name in names))
+
+
+# -- equations --
+
+
+def test_controller_knows_the_dynamics_of_the_notes() -> None:
+    """D, C dq and g of equations (6) to (13), and what rp_symbolic derives, in every mode."""
+    m1, m2, i1, i2, l1, lc1, a, g = sp.symbols(PARAMETERS)
+    q1, q2, dq1, dq2 = sp.symbols(STATES)
+    length = l1 + q2
+    notes = {
+        "D11": m1 * lc1**2 + i1 + i2 + m2 * (length**2 + a**2),
+        "D12": -a * m2,
+        "D22": m2,
+        "coriolis1": 2 * m2 * length * dq1 * dq2,
+        "coriolis2": -m2 * length * dq1**2,
+        "gravity1": g * (m1 * lc1 * sp.cos(q1) + m2 * (length * sp.cos(q1) - a * sp.sin(q1))),
+        "gravity2": g * m2 * sp.sin(q1),
+    }
+    derived = terms_of_the_motion(equations.ARM.outputs)
+    assert all(sp.simplify(notes[name] - derived[name]) == 0 for name in TERMS)
+
+    Kp, Kd, reference, measured, integral, inertia = (
+        equations.symbols("controller", names)
+        for names in (
+            "Kp1 Kp2", "Kd1 Kd2", equations.REFERENCES, STATES, "integral1 integral2",
+            "inertia1 inertia2",
+        )
+    )  # fmt: skip
+    v = [
+        Kp[i] * (reference[i] - measured[i])
+        + Kd[i] * (reference[2 + i] - measured[2 + i])
+        + integral[i]
+        for i in (0, 1)
+    ]
+    c = {name: term.subs(BELIEVED) for name, term in notes.items()}
+    wanted = [reference[4] + v[0], reference[5] + v[1]]
+    laws = {
+        "pd": (inertia[0] * v[0], inertia[1] * v[1]),
+        "pd_gravity": (inertia[0] * v[0] + c["gravity1"], inertia[1] * v[1] + c["gravity2"]),
+        "computed_torque": (
+            c["D11"] * wanted[0] + c["D12"] * wanted[1] + c["coriolis1"] + c["gravity1"],
+            c["D12"] * wanted[0] + c["D22"] * wanted[1] + c["coriolis2"] + c["gravity2"],
+        ),
+    }
+    for mode, efforts in laws.items():
+        difference = equations.law(mode) - sp.Matrix(efforts)
+        assert difference.applyfunc(sp.simplify) == sp.zeros(2, 1), mode
+
+
+def test_columns_are_the_outputs_of_the_models() -> None:
+    outputs = [
+        f"{component}.{name}"
+        for component, folder in closed_loop.COMPONENTS.items()
+        for name in declared(folder).real_outputs
+    ]
+    assert list(COLUMNS) == [*outputs, "controller.integral1", "controller.integral2"]
+
+
+def blended(x: mpmath.mpf) -> mpmath.mpf:
+    x = min(max(x, mpmath.mpf(0)), mpmath.mpf(1))
+    return 10 * x**3 - 15 * x**4 + 6 * x**5
+
+
+def position(values: dict, t: mpmath.mpf) -> tuple[mpmath.mpf, mpmath.mpf]:
+    """The end effector on its path, with the phase as the integral of its blended rate."""
+    u = t - values["start_time"]
+    if values["motion"] == "line":
+        s = blended(u / values["duration"])
+        return tuple(
+            values[f"ee_{x}_from"] + (values[f"ee_{x}_to"] - values[f"ee_{x}_from"]) * s
+            for x in "xy"
+        )
+    ramp, moved = values["ramp_time"], values["turns"] / abs(values["frequency"])
+    corners = [mpmath.mpf(c) for c in (0, ramp, moved, moved + ramp)]
+    past = [c for c in corners if c < u]
+    phase = values["start_angle"] + 2 * mpmath.pi * values["frequency"] * mpmath.quad(
+        lambda s: blended(s / ramp) * blended((moved + ramp - s) / ramp), [*past, u]
+    ) * (u > 0)
+    return (
+        values["x_center"] + values["radius"] * mpmath.cos(phase),
+        values["y_center"] + values["radius"] * mpmath.sin(phase),
+    )
+
+
+AROUND = {"x_center": 0.05, "y_center": -0.02, "radius": 0.4, "frequency": -0.6, "start_angle": 2.0}
+CASES = {
+    "circle": {},
+    "circle_backward": {"branch": "backward", "x_center": -0.4, "turns": 1.5},
+    "circle_around": AROUND,
+    "line": {"motion": "line", "duration": 2.5},
+    "line_backward": {"motion": "line", "branch": "backward", "ee_x_from": -0.5, "a": -0.1},
+}
+
+
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
+def test_reference_follows_the_path(case: dict) -> None:
+    """The end effector's position from the joints, and the derivatives, as seen by mpmath."""
+    values = (
+        declared("rp_trajectory").start_values | {"motion": "circle", "branch": "forward"} | case
+    )
+    times = [0.2, 0.9, 1.4, 2.7] if values["motion"] == "circle" else [0.2, 0.9, 1.4]
+    column = monolithic({f"trajectory.{n}": v for n, v in case.items()}, times)
+    column = {n.removeprefix("trajectory."): v for n, v in column.items() if "trajectory" in n}
+    l1, a, sign = values["l1"], values["a"], 1 if values["branch"] == "forward" else -1
+
+    def joints(t: mpmath.mpf) -> tuple[mpmath.mpf, mpmath.mpf]:
+        x, y = position(values, t)
+        slide = sign * mpmath.sqrt(x**2 + y**2 - mpmath.mpf(a) ** 2)
+        return mpmath.atan2(y, x) - mpmath.atan2(a, slide), slide - l1
+
+    for i, time in enumerate(times):
+        t = mpmath.mpf(time)
+        with mpmath.workdps(30):
+            q1, q2 = joints(t)
+            turns = (column["q1_ref"][i] - float(q1)) / (2 * np.pi)
+            assert abs(turns - round(float(turns))) < 1e-15
+            assert abs(column["q2_ref"][i] - float(q2)) < 1e-15
+            for name, component in (("q1_ref", 0), ("q2_ref", 1)):
+                for order, prefix in ((1, "d"), (2, "dd")):
+                    exact = mpmath.diff(lambda s, c=component: joints(s)[c], t, order, h=1e-6)
+                    assert abs(column[prefix + name][i] - float(exact)) < 1e-8, (name, order, time)
+            for name, exact in zip(("ee_x_ref", "ee_y_ref"), position(values, t), strict=True):
+                assert abs(column[name][i] - float(exact)) < 1e-15
+
+
+def test_angle_is_continuous_and_principal_at_the_start() -> None:
+    """Four turns about the axis of joint 1, with no jump of the angle."""
+    circle = AROUND | {"turns": 4.0, "start_time": 0.0, "start_angle": 20.0}
+    times = np.arange(801) / 100
+    angle = monolithic({f"trajectory.{n}": v for n, v in circle.items()}, times)[
+        "trajectory.q1_ref"
+    ]
+    assert -np.pi < angle[0] <= np.pi
+    assert np.max(np.abs(np.diff(angle))) < 0.06
+    assert abs(angle[-1] - angle[0] + 8 * np.pi) < 1e-14
+
+
+# -- motion in continuous time --
+
+
+@pytest.mark.parametrize("variant", ["nominal", "heavy_payload_integral", "limited_effort"])
+def test_energy_changes_by_the_work_of_the_efforts(variant: str) -> None:
+    """E(t) - E(0) is the integral of tau1 dq1 + f2 dq2, by Gauss's quadrature."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    edges = np.linspace(0, 2, 101)
+    panels = (edges[:-1, None] + 0.01 * (nodes + 1)).ravel()
+    times = np.sort(np.concatenate((panels, edges)))
+    column = monolithic(VARIANTS[variant], times)
+    inside = np.isin(times, panels)
+    power = column["controller.tau1"] * column["arm.dq1"]
+    power += column["controller.f2"] * column["arm.dq2"]
+    assert np.array_equal(power, column["arm.actuator_power"])
+    work = 0.01 * np.sum(power[inside].reshape(-1, 12) * weights, axis=1)
+    energy = column["arm.total_energy"][~inside]
+    kinks = 1e-14 if variant != "limited_effort" else 1e-5  # a panel may hold a switch
+    assert np.max(np.abs(np.diff(energy) - work)) < kinks
+    if variant == "limited_effort":  # all panels but those with a switch
+        assert np.sum(np.abs(np.diff(energy) - work) > 1e-14) <= 8
+
+
+@pytest.mark.parametrize("variant", ["nominal", "horizontal_plane"])
+def test_matched_computed_torque_tracks_to_rounding(variant: str) -> None:
+    column = monolithic(VARIANTS[variant], np.arange(121) / 20)
+    for name in closed_loop.ERRORS:
+        assert np.max(np.abs(column[f"controller.{name}"])) < 1e-15
+
+
+def test_error_obeys_its_linear_equation() -> None:
+    """e'' + Kd e' + Kp e + w = 0, w' = Ki e: by eigenvalues, for a start off the trajectory."""
+    gains = {"1": (400.0, 40.0, 500.0), "2": (150.0, 18.0, 0.0)}
+    parameters = {"controller.tau1_max": 1e9, "controller.f2_max": 1e9}
+    for joint, values in gains.items():
+        for name, value in zip(("Kp", "Kd", "Ki"), values, strict=True):
+            parameters[f"controller.{name}{joint}"] = value
+    times = 1.0 + np.arange(101) / 50
+    on = monolithic({}, times)
+    off = np.array([0.1, -0.05, 0.3, 0.2, 4.0, -3.0])  # of the errors, and the integral parts
+    state = [float(on[f"trajectory.{n}"][0]) - o for n, o in zip(equations.REFERENCES, off[:4])]  # noqa: B905
+    column = monolithic(parameters, times, [*state, *off[4:]])
+    for i, (joint, (Kp, Kd, Ki)) in enumerate(gains.items()):
+        system = np.array([[0, 1, 0], [-Kp, -Kd, -1], [Ki, 0, 0]])
+        values, vectors = np.linalg.eig(system)
+        weight = np.linalg.solve(vectors, off[i::2])
+        exact = (vectors @ (weight[:, None] * np.exp(np.outer(values, times - 1.0)))).real
+        for name, row in zip((f"q{joint}_error", f"dq{joint}_error"), exact[:2], strict=True):
+            assert np.max(np.abs(column[f"controller.{name}"] - row)) < 1e-11
+        assert np.max(np.abs(column[f"controller.integral{joint}"] - exact[2])) < 1e-10
+
+
+def test_started_anywhere_the_motion_goes_on() -> None:
+    """In the middle of a saturated stretch, and of a segment, to any grid of times."""
+    parameters = VARIANTS["limited_effort"]
+    whole = monolithic(parameters, np.arange(251) / 50)
+    rows = slice(60, 251, 19)
+    state = [whole[name][60] for name in STATE]
+    part = monolithic(parameters, (np.arange(251) / 50)[rows], state)
+    for name in COLUMNS:
+        assert np.max(np.abs(part[name] - whole[name][rows])) < 1e-15, name
+
+
+def test_effort_saturates_and_the_arm_recovers() -> None:
+    column = monolithic(VARIANTS["limited_effort"], np.arange(601) / 100)
+    limit = VARIANTS["limited_effort"]["controller.tau1_max"]
+    assert 0.05 < np.mean(np.abs(column["controller.tau1"]) == limit) < 0.25
+    assert np.max(np.abs(column["controller.tau1"])) == limit
+    assert abs(column["controller.q1_error"][-1]) < 1e-5
+
+
+# -- another integrator --
+
+# both efforts saturate, both ways
+ROUGH = VARIANTS["limited_effort"] | {"controller.f2_max": 3.0, "controller.tau1_max": 9.0}
+OFF = np.array([0.06, -0.03, 0.4, 0.3, 2.0, -1.0])
+
+
+def accelerations(p: dict, q: np.ndarray, efforts: np.ndarray) -> np.ndarray:
+    inertia, bias = dynamics(p, "arm", q)
+    return np.linalg.solve(inertia, efforts - bias)
+
+
+def dynamics(p: dict, component: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """D and C dq + g, as in the notes."""
+    m1, m2, i1, i2, l1, lc1, a, g = (p[f"{component}.{name}"] for name in PARAMETERS)
+    length, s, c = l1 + q[1], np.sin(q[0]), np.cos(q[0])
+    first = m1 * lc1**2 + i1 + i2 + m2 * (length**2 + a**2)
+    gravity = g * np.array([m1 * lc1 * c + m2 * (length * c - a * s), m2 * s])
+    velocity = m2 * length * np.array([2 * q[2] * q[3], -(q[2] ** 2)])
+    return np.array([[first, -a * m2], [-a * m2, m2]]), velocity + gravity
+
+
+class Holding:
+    """The controller with the references of the hold at q = 0."""
+
+    def __init__(self) -> None:
+        self.p = {
+            f"{component}.{name}": start
+            for component, folder in (("controller", "rp_controller"), ("arm", "rp_manipulator"))
+            for name, start in declared(folder).start_values.items()
+        } | ROUGH
+        pair = lambda name: np.array([self.p[f"controller.{name}{i}"] for i in (1, 2)])  # noqa: E731
+        self.Kp, self.Kd, self.Ki = pair("Kp"), pair("Kd"), pair("Ki")
+        self.back = 1 / (pair("inertia") * self.p["controller.tracking_time"])
+        self.limit = np.array([self.p["controller.tau1_max"], self.p["controller.f2_max"]])
+
+    def law(self, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Efforts and rates of the integral parts."""
+        inertia, bias = dynamics(self.p, "controller", q)
+        unlimited = inertia @ (-self.Kp * q[:2] - self.Kd * q[2:] + w) + bias
+        efforts = np.clip(unlimited, -self.limit, self.limit)
+        return efforts, -self.Ki * q[:2] + self.back * (efforts - unlimited)
+
+
+def runge_kutta(f: Callable, y: np.ndarray, length: float, parts: int) -> np.ndarray:
+    h = length / parts
+    for _ in range(parts):
+        k1 = f(y)
+        k2 = f(y + h / 2 * k1)
+        k3 = f(y + h / 2 * k2)
+        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + f(y + h * k3))
+    return y
+
+
+def test_sampled_by_another_integrator() -> None:
+    controller, h, steps = Holding(), 1e-3, 200
+    y, w, known = OFF[:4], OFF[4:], OFF[:4]
+    effort = controller.law(known, w)[0]
+    rows = [(*y, *w, *effort)]
+    for _ in range(steps):
+        held, seen = effort, known
+        y = runge_kutta(
+            lambda s, u=held: np.concatenate((s[2:], accelerations(controller.p, s, u))), y, h, 2
+        )
+        w = runge_kutta(lambda s, q=seen: controller.law(q, s)[1], w, h, 40)
+        effort = controller.law(seen, w)[0]
+        known = y
+        rows.append((*y, *w, *effort))
+    times = np.arange(steps + 1) / 1000
+    column = sampled(ROUGH, times, OFF)
+    names = (*STATE, "controller.tau1", "controller.f2")
+    for name, row in zip(names, np.array(rows).T, strict=True):
+        # switches within a step are kinks, at which this integrator is of order 2
+        assert np.max(np.abs(column[name] - row)) < 1e-8 * (1 + np.max(np.abs(row))), name
+    for name, limit in (("tau1", 9.0), ("f2", 3.0)):
+        values = column[f"controller.{name}"]
+        assert np.any(values == limit) and np.any(values == -limit) and np.any(abs(values) < limit)
+
+
+def test_monolithic_by_another_integrator() -> None:
+    controller = Holding()
+
+    def rates(s: np.ndarray) -> np.ndarray:
+        efforts, integral = controller.law(s[:4], s[4:])
+        return np.concatenate((s[2:4], accelerations(controller.p, s, efforts), integral))
+
+    y, rows = OFF, [OFF]
+    for _ in range(20):
+        y = runge_kutta(rates, y, 1e-2, 100)
+        rows.append(y)
+    column = monolithic(ROUGH, np.arange(21) / 100, OFF)
+    for name, row in zip(STATE, np.array(rows).T, strict=True):
+        # the switches are kinks, at which this integrator is of order 2
+        assert np.max(np.abs(column[name] - row)) < 1e-7 * (1 + np.max(np.abs(row))), name
+
+
+# -- sampled system --
+
+
+@pytest.mark.parametrize("order", closed_loop.ORDERS)
+def test_sampled_tends_to_monolithic_with_slope_one(order: str) -> None:
+    parameters = VARIANTS["heavy_payload_integral"] | {"trajectory.start_time": 0.0}
+    errors = []
+    for per_second in (250, 500, 1000, 2000):
+        times = np.arange(per_second + 1) / per_second
+        exact = monolithic(parameters, times[:: per_second // 50])
+        stepped = sampled(parameters, times, order=order)
+        errors.append(
+            max(
+                np.max(np.abs(stepped[name][:: per_second // 50] - exact[name]))
+                for name in STATE[:4]
+            )
+        )
+    slopes = np.diff(-np.log2(np.array(errors, float)))
+    assert np.all(np.abs(slopes - 1) < 0.1), (errors, slopes)
+
+
+def test_rows_are_read_before_or_after_inputs_are_set() -> None:
+    """Both readings are of the same motion; what was known to the controller differs."""
+    times = np.arange(601) / 1000
+    parameters = VARIANTS["heavy_payload_integral"] | {"trajectory.start_time": 0.0}
+    before = sampled(parameters, times)
+    after = sampled(parameters, times, read="after")
+    same = [n for n in COLUMNS if n in STATE or n.startswith("trajectory.")]
+    assert largest(before, after, tuple(same)) == 0
+    for name in closed_loop.ERRORS:
+        known = after[f"controller.{name}"]
+        assert np.array_equal(before[f"controller.{name}"][1:], known[:-1])
+        coordinate = name.removesuffix("_error")
+        exact = after[f"trajectory.{coordinate}_ref"] - after[f"arm.{coordinate}"]
+        assert np.array_equal(known, exact)
+    for column, effort in ((before, slice(None, -1)), (after, slice(1, None))):
+        power = sum(
+            before[f"controller.{n}"][effort] * column[f"arm.{v}"][1:]
+            for n, v in (("tau1", "dq1"), ("f2", "dq2"))
+        )
+        assert np.max(np.abs(column["arm.actuator_power"][1:] - power)) < 1e-17
+
+
+@pytest.mark.parametrize(("order", "newest"), [("gauss_seidel", 0), ("gauss_seidel_arm_first", 1)])
+def test_gauss_seidel_gives_the_newest_outputs(order: str, newest: int) -> None:
+    """To the controller always the new reference; the new motion only where the arm steps first."""
+    times = np.arange(601) / 1000
+    parameters = VARIANTS["heavy_payload_integral"] | {"trajectory.start_time": 0.0}
+    column = sampled(parameters, times, order=order)
+    measured = slice(1, None) if newest else slice(None, -1)
+    for name in ("q1", "q2", "dq1", "dq2"):
+        error = column[f"trajectory.{name}_ref"][1:] - column[f"arm.{name}"][measured]
+        assert np.array_equal(column[f"controller.{name}_error"][1:], error)
+    efforts = slice(None, -1) if newest else slice(1, None)
+    power = sum(
+        column[f"controller.{n}"][efforts] * column[f"arm.{v}"][1:]
+        for n, v in (("tau1", "dq1"), ("f2", "dq2"))
+    )
+    assert np.max(np.abs(column["arm.actuator_power"][1:] - power)) < 1e-17
+
+
+# -- files --
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_made_again_is_the_same(variant: str) -> None:
+    made = make_references.make(VARIANTS[variant])
+    assert {path.name for path in (FOLDER / variant).iterdir()} == set(FILES) == set(made)
+    for file, (times, columns) in made.items():
+        path = FOLDER / variant / file
+        names, old = read(path)
+        assert names == ["time", *COLUMNS]
+        assert path.stat().st_size < 1_000_000 and path.read_text().startswith('"time","traj')
+        new = np.array([times, *(columns[name] for name in COLUMNS)], float)
+        assert old.shape == new.shape and np.array_equal(old[0], times)
+        scale = np.maximum(1, np.max(np.abs(old), axis=1, keepdims=True))
+        assert np.max(np.abs(new - old) / scale) < 1e-12, file
+
+
+def test_experiment_is_that_of_the_system() -> None:
+    text = (ROOT / "models" / "closed_loop" / "SystemStructure.ssd").read_text()
+    step = 1 / make_references.STEPS_PER_SECOND
+    assert f'startTime="0" stopTime="{make_references.STOP:g}"' in text
+    assert f'baseStepSize="{step:g}"' in text
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"arm.m9": 1.0}, "no parameter 'arm.m9'"),
+        ({"arm.m2": np.nan}, "arm.m2: nan is no finite number"),
+        ({"trajectory.motion": "spiral"}, "trajectory.motion: no 'spiral'"),
+    ],
+)
+def test_bad_parameters_are_refused(parameters: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message):
+        monolithic(parameters, [0.0, 1.0])

@@ -1,0 +1,494 @@
+"""Directional and output derivatives of the FMU against a sympy model that starts from positions.
+
+Every derivative must agree within 1e-11 of its exact value; where that is tiny or zero, within
+1e-14 of the largest in its row (rp_symbolic.Exact).
+"""
+
+import ctypes
+import itertools
+import random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Integer, fmi2Real, fmi2ValueReference
+
+from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, Unit, status_of
+from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values
+
+
+@pytest.fixture(scope="module")
+def model() -> Model:
+    return Model()
+
+
+# ---- Instances at random points ------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
+    return Unit(fmu, tmp_path_factory.mktemp("fmu"))
+
+
+def generic_point(seed: int) -> Values:
+    """Parameters, inputs and states, none of them zero; the slide on both sides of the axis."""
+    source = random.Random(seed)
+    parameters = dict(
+        m1=10 ** source.uniform(-1.0, 1.5),
+        m2=10 ** source.uniform(-2.0, 1.5),
+        I1z=10 ** source.uniform(-3.0, 1.0),
+        I2z=10 ** source.uniform(-3.0, 1.0),
+        l1=source.uniform(0.1, 2.0),
+        lc1=source.uniform(0.05, 1.5),
+        a=source.choice((-1, 1)) * source.uniform(0.05, 1.5),
+        g=source.uniform(1.0, 25.0),
+    )
+    moving = dict(
+        tau1=source.uniform(-30.0, 30.0),
+        f2=source.uniform(-30.0, 30.0),
+        q1=source.uniform(-3.0, 3.0),
+        q2=source.uniform(-3.0, 2.0),
+        dq1=source.uniform(-4.0, 4.0),
+        dq2=source.uniform(-3.0, 3.0),
+    )
+    return parameters | moving
+
+
+SEEDS = range(6)
+
+
+def some(point: Values, names: tuple[str, ...]) -> Values:
+    return {name: point[name] for name in names}
+
+
+@contextmanager
+def in_initialization_mode(unit: Unit, seed: int, kind: type = FMU2Slave) -> Iterator[Instance]:
+    with Instance(unit, kind) as instance:
+        instance.fmi.setupExperiment()
+        instance.set(**generic_point(seed))
+        instance.fmi.enterInitializationMode()
+        yield instance
+
+
+@contextmanager
+def between_steps(unit: Unit, seed: int) -> Iterator[Instance]:
+    with in_initialization_mode(unit, seed) as instance:
+        instance.fmi.exitInitializationMode()
+        instance.step(0.0, 0.01)
+        instance.set(**some(generic_point(seed + 1000), INPUTS))
+        yield instance
+
+
+@contextmanager
+def in_event_mode(unit: Unit, seed: int) -> Iterator[Instance]:
+    with in_initialization_mode(unit, seed, FMU2Model) as instance:
+        instance.fmi.exitInitializationMode()
+        instance.set(**some(generic_point(seed + 1000), INPUTS))
+        yield instance
+
+
+@contextmanager
+def in_continuous_time_mode(unit: Unit, seed: int) -> Iterator[Instance]:
+    with in_event_mode(unit, seed) as instance:
+        instance.fmi.newDiscreteStates()
+        instance.fmi.enterContinuousTimeMode()
+        point = generic_point(seed + 2000)
+        instance.fmi.setTime(0.25)
+        instance.fmi.setContinuousStates((ctypes.c_double * 4)(*(point[s] for s in STATES)), 4)
+        instance.set(**some(point, INPUTS))
+        yield instance
+
+
+MODES = {
+    "initialization": in_initialization_mode,
+    "steps": between_steps,
+    "event": in_event_mode,
+    "continuous time": in_continuous_time_mode,
+}
+each_mode = pytest.mark.parametrize("enter", MODES.values(), ids=MODES)
+each_seed = pytest.mark.parametrize("seed", SEEDS)
+
+
+def point_of(instance: Instance) -> Values:
+    return dict(zip(KNOWNS, instance.get(*KNOWNS), strict=True))
+
+
+def directional(instance: Instance, unknowns: tuple[str, ...], seed: Values) -> Values:
+    """Derivatives of `unknowns` in the direction of `seed`, in one call."""
+    references = instance.unit.references
+    result = instance.fmi.getDirectionalDerivative(
+        [references[name] for name in unknowns], [references[name] for name in seed], seed.values()
+    )
+    return dict(zip(unknowns, result, strict=True))
+
+
+# ---- Directional derivatives ---------------------------------------------------------------------
+
+
+def test_the_flags_say_what_is_offered(unit: Unit) -> None:
+    assert unit.description.coSimulation.providesDirectionalDerivative
+    assert unit.description.modelExchange.providesDirectionalDerivative
+    assert unit.description.coSimulation.maxOutputDerivativeOrder == 2
+    assert unit.description.coSimulation.canInterpolateInputs
+
+
+def test_the_symbolic_model_has_every_output_and_local_of_the_arm(unit: Unit, model: Model) -> None:
+    of_the_arm = [
+        variable.name
+        for variable in unit.description.modelVariables
+        if variable.causality in ("output", "local") and variable.variability == "continuous"
+    ]
+    assert set(model.expressions) == set(of_the_arm)
+    assert [name for name in of_the_arm if name in model.outputs] == list(model.outputs)
+
+
+@each_seed
+def test_the_symbolic_model_has_the_values_of_the_unit(unit: Unit, model: Model, seed: int) -> None:
+    with in_initialization_mode(unit, seed) as instance:
+        at = {sp.Symbol(name): mpmath.mpf(value) for name, value in point_of(instance).items()}
+        names = tuple(model.expressions)
+        expected = [float(model.expressions[name].evalf(40, subs=at)) for name in names]
+        scale = max(abs(value) for value in expected)
+        assert instance.get(*names) == pytest.approx(expected, rel=1e-11, abs=1e-14 * scale)
+
+
+@each_mode
+@each_seed
+def test_directional_derivatives_are_exact(
+    unit: Unit, model: Model, enter: Callable, seed: int
+) -> None:
+    """Every output, local and state derivative with respect to every input and state."""
+    unknowns, knowns = tuple(model.expressions), (*INPUTS, *STATES)
+    with enter(unit, seed) as instance:
+        exact = model.jacobian(point_of(instance), knowns)
+        for known in knowns:
+            for unknown, value in directional(instance, unknowns, {known: 1.0}).items():
+                exact[unknown, known].assert_is(value, (unknown, known))
+
+
+@pytest.mark.parametrize("kind", [FMU2Slave, FMU2Model])
+@each_seed
+def test_parameters_are_knowns_of_the_initialization(
+    unit: Unit, model: Model, kind: type, seed: int
+) -> None:
+    unknowns = tuple(model.expressions)
+    with in_initialization_mode(unit, seed, kind) as instance:
+        exact = model.jacobian(point_of(instance), KNOWNS)
+        for known in KNOWNS:
+            for unknown, value in directional(instance, unknowns, {known: 1.0}).items():
+                exact[unknown, known].assert_is(value, (unknown, known))
+
+
+@each_mode
+def test_a_call_with_many_knowns_gives_the_sums(unit: Unit, model: Model, enter: Callable) -> None:
+    source = random.Random(5)
+    for seed, count in itertools.product(SEEDS, (2, 3, 6)):
+        with enter(unit, seed) as instance:
+            exact = model.jacobian(point_of(instance), (*INPUTS, *STATES))
+            knowns = source.sample((*INPUTS, *STATES), count)
+            unknowns = tuple(source.sample(tuple(model.expressions), 9))
+            direction = {known: source.uniform(-2.0, 2.0) for known in knowns}
+            for unknown, value in directional(instance, unknowns, direction).items():
+                terms = [exact[unknown, known].value * v for known, v in direction.items()]
+                row = exact[unknown, knowns[0]].scale
+                Exact(mpmath.fsum(terms), row).assert_is(value, (unknown, direction))
+
+
+def test_asking_changes_nothing(unit: Unit, model: Model) -> None:
+    with between_steps(unit, 1) as instance, between_steps(unit, 1) as other:
+        directional(instance, tuple(model.expressions), dict.fromkeys(STATES, 1.0))
+        assert instance.everything() == other.everything()
+        instance.step(0.01, 0.01)
+        other.step(0.01, 0.01)
+        assert instance.everything() == other.everything()
+
+
+# ---- Structure -----------------------------------------------------------------------------------
+
+
+def structure(unknowns: list) -> dict[str, set[str]]:
+    """Names of the dependencies of each entry of a section of ModelStructure."""
+    return {
+        unknown.variable.name: {known.name for known in unknown.dependencies}
+        for unknown in unknowns
+    }
+
+
+@pytest.mark.parametrize(
+    ("section", "enter", "knowns"),
+    [
+        ("outputs", between_steps, (*INPUTS, *STATES)),
+        ("outputs", in_continuous_time_mode, (*INPUTS, *STATES)),
+        ("derivatives", between_steps, (*INPUTS, *STATES)),
+        ("derivatives", in_continuous_time_mode, (*INPUTS, *STATES)),
+        ("initialUnknowns", in_initialization_mode, KNOWNS),
+    ],
+)
+@each_seed
+def test_model_structure_is_the_pattern_of_the_derivatives(
+    unit: Unit, section: str, enter: Callable, knowns: tuple[str, ...], seed: int
+) -> None:
+    declared = structure(getattr(unit.description, section))
+    found = {name: set() for name in declared}
+    with enter(unit, seed) as instance:
+        for known in knowns:
+            for unknown, value in directional(instance, tuple(declared), {known: 1.0}).items():
+                if value != 0.0:
+                    found[unknown].add(known)
+    assert found == declared
+
+
+@pytest.mark.parametrize("enter", [between_steps, in_continuous_time_mode])
+def test_linearization(unit: Unit, model: Model, enter: Callable) -> None:
+    """A, B, C and D, put together from the model description as an importer does."""
+    description = unit.description
+    rates = tuple(unknown.variable.name for unknown in description.derivatives)
+    states = tuple(unknown.variable.derivative.name for unknown in description.derivatives)
+    outputs = tuple(unknown.variable.name for unknown in description.outputs)
+    inputs = tuple(v.name for v in description.modelVariables if v.causality == "input")
+    parts = {
+        "A": (rates, states),
+        "B": (rates, inputs),
+        "C": (outputs, states),
+        "D": (outputs, inputs),
+    }
+    with enter(unit, 11) as instance:
+        exact = model.jacobian(point_of(instance), (*INPUTS, *STATES))
+        matrices = {
+            part: np.transpose(
+                [list(directional(instance, rows, {column: 1.0}).values()) for column in columns]
+            )
+            for part, (rows, columns) in parts.items()
+        }
+    assert [matrices[part].shape for part in "ABCD"] == [(4, 4), (4, 2), (14, 4), (14, 2)]
+    assert matrices["A"][:2].tolist() == [[0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    for part, (rows, columns) in parts.items():
+        for (i, row), (j, column) in itertools.product(enumerate(rows), enumerate(columns)):
+            exact[row, column].assert_is(matrices[part][i, j], (part, row, column))
+
+
+# ---- Output derivatives --------------------------------------------------------------------------
+
+
+def output_derivatives(instance: Instance, names: tuple[str, ...]) -> dict[tuple[str, int], float]:
+    """Derivatives of orders 1 and 2, in one call."""
+    wanted = list(itertools.product(names, (1, 2)))
+    references = [instance.unit.references[name] for name, _ in wanted]
+    values = instance.fmi.getRealOutputDerivatives(references, [order for _, order in wanted])
+    return dict(zip(wanted, values, strict=True))
+
+
+def assert_output_derivatives(
+    instance: Instance, model: Model, inputs: Values, rates: list[list]
+) -> None:
+    """Compare with the motion of the state that the FMU reports, under the given inputs."""
+    exact = model.along_the_motion(point_of(instance) | inputs, rates)
+    for key, value in output_derivatives(instance, model.outputs).items():
+        exact[key].assert_is(value, key)
+
+
+NO_RATES = [[0.0, 0.0], [0.0, 0.0]]
+
+
+@each_seed
+def test_output_derivatives_with_held_inputs(unit: Unit, model: Model, seed: int) -> None:
+    with in_initialization_mode(unit, seed) as instance:
+        instance.fmi.exitInitializationMode()
+        assert_output_derivatives(instance, model, {}, NO_RATES)
+        t = 0.0
+        for i, h in enumerate((0.01, 0.003, 0.02)):
+            t = instance.step(t, h)
+            assert_output_derivatives(instance, model, {}, NO_RATES)
+            instance.set(**some(generic_point(seed + i), INPUTS))
+            assert_output_derivatives(instance, model, {}, NO_RATES)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@each_seed
+def test_output_derivatives_with_input_derivatives(
+    unit: Unit, model: Model, order: int, seed: int
+) -> None:
+    """At the end of a step they are those of the polynomials from its beginning."""
+    source = random.Random(seed)
+    with in_initialization_mode(unit, seed) as instance:
+        instance.fmi.exitInitializationMode()
+        t = 0.0
+        for h in (0.01, 0.004, 0.02):
+            start = {name: source.uniform(-20.0, 20.0) for name in INPUTS}
+            slopes = {
+                name: [source.uniform(-1.0, 1.0) * 50.0**k for k in range(1, order + 1)]
+                for name in INPUTS
+            }
+            instance.set(**start)
+            instance.set_input_derivatives(**slopes)
+            polynomials = {name: [start[name], *slopes[name], 0.0, 0.0] for name in INPUTS}
+            # before the step, at its beginning
+            rates = [[polynomials[name][k] for name in INPUTS] for k in (1, 2)]
+            assert_output_derivatives(instance, model, {}, rates)
+
+            t = instance.step(t, h)
+            at_end = {
+                name: [
+                    mpmath.fsum(
+                        mpmath.mpf(c) * mpmath.mpf(h) ** (n - k) / mpmath.factorial(n - k)
+                        for n, c in enumerate(polynomials[name])
+                        if n >= k
+                    )
+                    for k in (0, 1, 2)
+                ]
+                for name in INPUTS
+            }
+            inputs = {name: at_end[name][0] for name in INPUTS}
+            rates = [[at_end[name][k] for name in INPUTS] for k in (1, 2)]
+            assert_output_derivatives(instance, model, inputs, rates)
+
+
+@each_seed
+def test_input_derivatives_apply_to_one_step(unit: Unit, model: Model, seed: int) -> None:
+    with in_initialization_mode(unit, seed) as instance:
+        instance.fmi.exitInitializationMode()
+        instance.set_input_derivatives(tau1=(30.0, -400.0), f2=(-20.0, 0.0, 1e4))
+        t = instance.step(0.0, 0.01)
+        t = instance.step(t, 0.01)
+        assert_output_derivatives(instance, model, {}, NO_RATES)
+
+
+def test_derivatives_of_the_energy_are_the_power_and_its_rate(unit: Unit) -> None:
+    with in_initialization_mode(unit, 3) as instance:
+        instance.fmi.exitInitializationMode()
+        instance.set_input_derivatives(tau1=(30.0,), f2=(-20.0,))
+        instance.step(0.0, 0.01)
+        rates = output_derivatives(instance, ("total_energy", "actuator_power"))
+        power = instance.get("actuator_power")[0]
+        assert rates["total_energy", 1] == pytest.approx(power, rel=1e-12)
+        assert rates["total_energy", 2] == pytest.approx(rates["actuator_power", 1], rel=1e-12)
+
+
+# ---- Bad input -----------------------------------------------------------------------------------
+
+
+def assert_refused(instance: Instance, words: str, call: Callable, *arguments: object) -> None:
+    """fmi2Error, and one message of it that says what is wrong."""
+    assert status_of(call, *arguments) == ERROR
+    errors = [message.text for message in instance.messages if message.status == ERROR]
+    assert len(errors) == 1
+    assert words in errors[0]
+
+
+DQ1, DDQ1, TAU1, D11, M1, NOWHERE = 12, 14, 20, 50, 1, 99
+UNKNOWN_CASES = {
+    "no such unknown": ([DDQ1, NOWHERE], [TAU1], "99"),
+    "no such known": ([DDQ1], [NOWHERE], "99"),
+    "an input as unknown": ([TAU1], [TAU1], "tau1"),
+    "a parameter as unknown": ([M1], [TAU1], "m1"),
+    "the time as unknown": ([0], [TAU1], "time"),
+    "a counter as unknown": ([80], [TAU1], "solver_steps"),
+    "a solver variable as unknown": ([84], [TAU1], "effective_relative_tolerance"),
+    "an output as known": ([DDQ1], [30], "ee_x"),
+    "an acceleration as known": ([DDQ1], [DDQ1], "ddq1"),
+    "a local as known": ([DDQ1], [TAU1, D11], "D11"),
+    "a solver parameter as known": ([DDQ1], [82], "relative_tolerance"),
+}
+
+
+@pytest.mark.parametrize(("unknowns", "knowns", "words"), UNKNOWN_CASES.values(), ids=UNKNOWN_CASES)
+@each_mode
+def test_wrong_unknowns_and_knowns_are_refused(
+    unit: Unit, enter: Callable, unknowns: list[int], knowns: list[int], words: str
+) -> None:
+    with enter(unit, 0) as instance:
+        call = instance.fmi.getDirectionalDerivative
+        assert_refused(instance, words, call, unknowns, knowns, [1.0] * len(knowns))
+
+
+@pytest.mark.parametrize("enter", list(MODES.values())[1:], ids=list(MODES)[1:])
+def test_parameters_are_no_knowns_after_the_initialization(unit: Unit, enter: Callable) -> None:
+    with enter(unit, 0) as instance:
+        assert_refused(instance, "m1", instance.fmi.getDirectionalDerivative, [DDQ1], [M1], [1.0])
+
+
+@pytest.mark.parametrize("missing", range(4))
+@each_mode
+def test_missing_arrays_of_a_directional_derivative_are_refused(
+    unit: Unit, enter: Callable, missing: int
+) -> None:
+    references, value = (fmi2ValueReference * 1)(DDQ1), (fmi2Real * 1)(1.0)
+    knowns, result = (fmi2ValueReference * 1)(TAU1), (fmi2Real * 1)(7.0)
+    arrays = [references, knowns, value, result]
+    arrays[missing] = None
+    unknown, known, seed, out = arrays
+    with enter(unit, 0) as instance:
+        call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
+        assert status_of(call, component, None, 0, None, 0, None, None) == OK
+        assert_refused(instance, "NULL", call, component, unknown, 1, known, 1, seed, out)
+        assert result[0] == 7.0
+
+
+def test_a_refused_directional_derivative_writes_nothing(unit: Unit) -> None:
+    unknowns, result = (fmi2ValueReference * 2)(DDQ1, TAU1), (fmi2Real * 2)(7.0, 8.0)
+    knowns, seed = (fmi2ValueReference * 1)(TAU1), (fmi2Real * 1)(1.0)
+    with between_steps(unit, 0) as instance:
+        call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
+        assert_refused(instance, "tau1", call, component, unknowns, 2, knowns, 1, seed, result)
+        assert list(result) == [7.0, 8.0]
+
+
+OUTPUT_CASES = {
+    "order 0": ([DDQ1], [0], "order 0"),
+    "order 3": ([DDQ1, DQ1], [1, 3], "order 3"),
+    "a negative order": ([DDQ1], [-1], "order -1"),
+    "an input": ([TAU1], [1], "tau1"),
+    "a local": ([DDQ1, D11], [1, 1], "D11"),
+    "a parameter": ([M1], [1], "m1"),
+    "the time": ([0], [1], "time"),
+    "a counter": ([80], [1], "solver_steps"),
+    "no such reference": ([NOWHERE], [1], "99"),
+}
+
+
+@pytest.mark.parametrize(("references", "orders", "words"), OUTPUT_CASES.values(), ids=OUTPUT_CASES)
+def test_wrong_output_derivatives_are_refused(
+    unit: Unit, references: list[int], orders: list[int], words: str
+) -> None:
+    count = len(references)
+    result = (fmi2Real * count)(*range(7, 7 + count))
+    arrays = (fmi2ValueReference * count)(*references), count, (fmi2Integer * count)(*orders)
+    with between_steps(unit, 0) as instance:
+        call, component = instance.fmi.fmi2GetRealOutputDerivatives, instance.fmi.component
+        assert_refused(instance, words, call, component, *arrays, result)
+        assert list(result) == list(range(7, 7 + count))
+
+
+@pytest.mark.parametrize("missing", range(3))
+def test_missing_arrays_of_output_derivatives_are_refused(unit: Unit, missing: int) -> None:
+    arrays = [(fmi2ValueReference * 1)(DDQ1), (fmi2Integer * 1)(1), (fmi2Real * 1)(7.0)]
+    arrays[missing] = None
+    references, orders, result = arrays
+    with between_steps(unit, 0) as instance:
+        call, component = instance.fmi.fmi2GetRealOutputDerivatives, instance.fmi.component
+        assert status_of(call, component, None, 0, None, None) == OK
+        assert_refused(instance, "NULL", call, component, references, 1, orders, result)
+
+
+INPUT_CASES = {
+    "order 0": ([TAU1], [0], [1.0], "order 0"),
+    "order 4": ([TAU1], [4], [1.0], "order 4"),
+    "an output": ([TAU1, DDQ1], [1, 1], [1.0, 1.0], "ddq1"),
+    "a parameter": ([M1], [1], [1.0], "m1"),
+    "no such reference": ([NOWHERE], [1], [1.0], "99"),
+}
+
+
+@pytest.mark.parametrize(
+    ("references", "orders", "values", "words"), INPUT_CASES.values(), ids=INPUT_CASES
+)
+def test_wrong_input_derivatives_are_refused(
+    unit: Unit, references: list[int], orders: list[int], values: list[float], words: str
+) -> None:
+    with between_steps(unit, 0) as instance:
+        call = instance.fmi.setRealInputDerivatives
+        assert_refused(instance, words, call, references, orders, values)

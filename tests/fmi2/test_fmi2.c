@@ -1,0 +1,254 @@
+/* Instances of the FMU: a whole run, what Instantiate refuses, and that instances are independent.
+ * FMI 2.0, sections 2.1.5 and 2.1.6. Values are in test_fmi2_values.c, time in test_fmi2_time.c. */
+#define _POSIX_C_SOURCE 200809L
+#include "fmu_harness.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+/* ---- A whole run ---------------------------------------------------------------------------- */
+
+/* The inputs are held over a step: their work in it is tau1 dq1 + f2 dq2 of the displacements. */
+static void test_energy_is_the_work_of_the_inputs(void) {
+    const double h = 1e-3;
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_set(c, RP_MANIPULATOR_q1, 0.4);
+    fmu_initialize(c, 0.0, 0.0);
+
+    const double energy_at_start = fmu_get(c, RP_MANIPULATOR_total_energy);
+    double work = 0.0;
+    double largest = fabs(energy_at_start);
+    for (int i = 0; i < 1000; i++) {
+        const double tau1 = 8.0 * cos(5.0 * i * h);
+        const double f2 = 12.0 * sin(3.0 * i * h);
+        const double q1 = fmu_get(c, RP_MANIPULATOR_q1);
+        const double q2 = fmu_get(c, RP_MANIPULATOR_q2);
+        fmu_set(c, RP_MANIPULATOR_tau1, tau1);
+        fmu_set(c, RP_MANIPULATOR_f2, f2);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * h, h, fmi2True));
+        work += tau1 * (fmu_get(c, RP_MANIPULATOR_q1) - q1);
+        work += f2 * (fmu_get(c, RP_MANIPULATOR_q2) - q2);
+        largest = fmax(largest, fabs(fmu_get(c, RP_MANIPULATOR_kinetic_energy)));
+    }
+    TEST_ASSERT_TRUE(fabs(fmu_get(c, RP_MANIPULATOR_q1) - 0.4) > 0.1); // it has moved
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7 * largest, energy_at_start + work,
+                              fmu_get(c, RP_MANIPULATOR_total_energy));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Terminate(c));
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&messages), messages.texts);
+}
+
+/* ---- Instantiate ---------------------------------------------------------------------------- */
+
+static void test_instantiate_says_what_it_refuses(void) {
+    static const char guid[] = RP_MANIPULATOR_GUID;
+    static const struct {
+        const char *name;
+        fmi2Type type;
+        const char *guid;
+        const char *wrong, *expected; /* words of the message */
+    } cases[] = {
+        {NULL, fmi2CoSimulation, guid, "name", "not empty"},
+        {"", fmi2CoSimulation, guid, "name", "not empty"},
+        {"m", (fmi2Type)7, guid, "type", "7"},
+        {"m", (fmi2Type)-1, guid, "type", "-1"},
+        {"m", fmi2CoSimulation, NULL, "GUID", guid},
+        {"m", fmi2CoSimulation, "", "GUID", guid},
+        {"m", fmi2CoSimulation, "{another}", "{another}", guid},
+        {"m", fmi2CoSimulation, "{%s%n#}", "GUID", guid},
+        {"m", fmi2ModelExchange, "{another}", "{another}", guid},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        fmu_log_clear(&messages);
+        const fmi2CallbackFunctions callbacks = fmu_callbacks(&messages);
+        TEST_ASSERT_NULL(fmu.Instantiate(cases[i].name, cases[i].type, cases[i].guid, NULL,
+                                         &callbacks, fmi2False, fmi2False));
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_total(&messages));
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_count(&messages, "logStatusError"));
+        fmu_assert_logged(&messages, cases[i].wrong);
+        fmu_assert_logged(&messages, cases[i].expected);
+    }
+}
+
+static void test_instantiate_without_functions_gives_no_instance(void) {
+    TEST_ASSERT_NULL(fmu.Instantiate("m", fmi2CoSimulation, RP_MANIPULATOR_GUID, NULL, NULL,
+                                     fmi2False, fmi2True));
+    TEST_ASSERT_NULL(fmu.Instantiate(NULL, fmi2ModelExchange, NULL, NULL, NULL, 0, 0));
+}
+
+static void test_instantiate_without_logger_gives_no_crash(void) {
+    const fmi2CallbackFunctions none = {0};
+    TEST_ASSERT_NULL(fmu.Instantiate("", fmi2CoSimulation, RP_MANIPULATOR_GUID, "", &none, 0, 0));
+    TEST_ASSERT_NULL(fmu.Instantiate("m", fmi2CoSimulation, "wrong", "", &none, 0, 0));
+
+    const fmi2Component c =
+        fmu.Instantiate("m", fmi2CoSimulation, RP_MANIPULATOR_GUID, NULL, &none, 0, fmi2True);
+    TEST_ASSERT_NOT_NULL(c);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetDebugLogging(c, fmi2True, 0, NULL));
+    TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu_try_set(c, RP_MANIPULATOR_tau1, NAN));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu_try_set(c, RP_MANIPULATOR_ddq1, 1.0));
+    fmu_assert_reset_is_fresh(c, "without callbacks");
+    fmu.FreeInstance(c);
+}
+
+/* The memory functions are optional: canNotUseMemoryManagementFunctions is declared. */
+static void test_the_other_callbacks_may_be_null(void) {
+    fmi2CallbackFunctions callbacks = fmu_callbacks(&messages);
+    callbacks.allocateMemory = NULL;
+    callbacks.freeMemory = NULL;
+    callbacks.stepFinished = NULL;
+    const char *const locations[] = {NULL, "", "file:///nowhere/resources"};
+    for (size_t i = 0; i < FMU_COUNT(locations); i++) {
+        const fmi2Component c = fmu.Instantiate("m", fmi2CoSimulation, RP_MANIPULATOR_GUID,
+                                                locations[i], &callbacks, fmi2False, fmi2False);
+        TEST_ASSERT_NOT_NULL(c);
+        fmu_assert_reset_is_fresh(c, "without memory functions");
+        fmu.FreeInstance(c);
+    }
+}
+
+static char *copied(const char *text) {
+    const size_t size = strlen(text) + 1;
+    char *copy = malloc(size);
+    TEST_ASSERT_NOT_NULL(copy);
+    return memcpy(copy, text, size);
+}
+
+static void test_nothing_passed_to_instantiate_is_kept(void) {
+    char *name = copied("short-lived");
+    char *guid = copied(RP_MANIPULATOR_GUID);
+    fmi2CallbackFunctions *callbacks = malloc(sizeof *callbacks);
+    TEST_ASSERT_NOT_NULL(callbacks);
+    *callbacks = fmu_callbacks(&messages);
+    const fmi2Component c =
+        fmu.Instantiate(name, fmi2CoSimulation, guid, name, callbacks, fmi2False, fmi2False);
+    memset(name, 'x', strlen(name));
+    memset(guid, 'x', strlen(guid));
+    memset(callbacks, 0x55, sizeof *callbacks);
+    free(name);
+    free(guid);
+    free(callbacks);
+
+    TEST_ASSERT_NOT_NULL(c);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu_try_set(c, RP_MANIPULATOR_ddq1, 1.0));
+    TEST_ASSERT_EQUAL_STRING("short-lived", messages.instance_name);
+    fmu_assert_reset_is_fresh(c, "after the arguments of Instantiate are gone");
+    fmu.FreeInstance(c);
+}
+
+/* ---- Free and Reset ------------------------------------------------------------------------- */
+
+static void test_free_of_nothing_does_nothing(void) {
+    fmu.FreeInstance(NULL);
+
+    const fmi2Component c = fmu_initialized(&messages, 0.0);
+    fmi2FMUstate none = NULL;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.FreeFMUstate(c, NULL));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.FreeFMUstate(c, &none));
+    TEST_ASSERT_NULL(none);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.1, fmi2True));
+    TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
+}
+
+static void test_reset_brings_back_start_values_and_no_experiment(void) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_set(c, RP_MANIPULATOR_relative_tolerance, 1e-3);
+    fmu_set(c, RP_MANIPULATOR_q2, 0.7);
+    fmu_set(c, RP_MANIPULATOR_tau1, 7.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2True, 1e-4, 3.0, fmi2True, 4.0));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 3.0, 0.5, fmi2True));
+    fmu_assert_reset_is_fresh(c, "after a run with everything set");
+
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c)); // no experiment any more
+    fmu_assert_reset_is_fresh(c, "after an initialization without experiment");
+}
+
+static void test_reset_right_after_instantiate_and_twice(void) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    fmu_assert_reset_is_fresh(c, "after two resets");
+}
+
+/* Masters free badly: in any state, without Terminate. The leak check sees what stays behind. */
+static void test_free_works_in_the_middle_of_a_run(void) {
+    static struct fmu_run run;
+    const fmi2Component c = fmu_instantiate(&messages, true);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(c, 0, &run));
+    fmu_free(c);
+}
+
+/* ---- Many instances ------------------------------------------------------------------------- */
+
+enum { INSTANCES = 100, THREADS = 2 };
+
+static struct fmu_run alone[INSTANCES];
+
+static void run_alone(unsigned variants) {
+    for (unsigned i = 0; i < variants; i++) {
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(c, i, &alone[i]));
+        fmu_free(c);
+    }
+}
+
+static void test_interleaved_instances_do_not_disturb_each_other(void) {
+    static struct fmu_run together[INSTANCES];
+    fmi2Component c[INSTANCES];
+    run_alone(INSTANCES);
+    memset(together, 0, sizeof together);
+    for (unsigned i = 0; i < INSTANCES; i++) {
+        c[i] = fmu_instantiate(&messages, false);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2CoSimulation, c[i], i));
+    }
+    for (unsigned step = 0; step < FMU_RUN_STEPS; step++) {
+        for (unsigned i = 0; i < INSTANCES; i++) {
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2CoSimulation, c[i], step, &together[i]));
+        }
+    }
+    TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);
+    TEST_ASSERT_TRUE(memcmp(&alone[0], &alone[1], sizeof alone[0]) != 0);
+}
+
+struct thread_work {
+    unsigned variant;
+    unsigned differences;
+    struct fmu_log log;
+    struct fmu_run run;
+};
+
+static void *work_in_thread(void *work_pointer) {
+    struct thread_work *work = work_pointer;
+    const fmi2CallbackFunctions callbacks = fmu_callbacks(&work->log);
+    for (int i = 0; i < 50; i++) {
+        const fmi2Component c = fmu.Instantiate("thread", fmi2CoSimulation, RP_MANIPULATOR_GUID,
+                                                NULL, &callbacks, fmi2False, fmi2False);
+        const fmi2Status status = fmu_run(c, work->variant, &work->run);
+        const bool same = memcmp(&work->run, &alone[work->variant], sizeof work->run) == 0;
+        work->differences += status != fmi2OK || !same;
+        fmu.FreeInstance(c);
+    }
+    return NULL;
+}
+
+static void test_threads_do_not_disturb_each_other(void) {
+    static struct thread_work work[THREADS];
+    pthread_t threads[THREADS];
+    run_alone(THREADS);
+    for (unsigned i = 0; i < THREADS; i++) {
+        work[i].variant = i;
+        TEST_ASSERT_EQUAL_INT(0, pthread_create(&threads[i], NULL, work_in_thread, &work[i]));
+    }
+    for (unsigned i = 0; i < THREADS; i++) {
+        TEST_ASSERT_EQUAL_INT(0, pthread_join(threads[i], NULL));
+    }
+    for (unsigned i = 0; i < THREADS; i++) {
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, work[i].differences, work[i].log.texts);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&work[i].log), work[i].log.texts);
+    }
+}

@@ -1,0 +1,301 @@
+/* Serialized FMU states that are damaged, foreign or forged are refused, or at least do no harm.
+ * FMI 2.0, section 2.1.8; the form of a serialized state is told in src/instance/snapshot.h. */
+#define _POSIX_C_SOURCE 200809L
+#include "each_method.h"
+#include "fmu_snapshots.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+#include <unity.h>
+
+/* ---- Refused bytes -------------------------------------------------------------------------- */
+
+/* The bytes are refused, and the instance goes on as if they had not been given. */
+static void assert_refused(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes,
+                           const char *message) {
+    static struct fmu_values before;
+    static struct fmu_values after;
+    fmi2FMUstate made = NULL;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &before));
+    fmu_log_clear(&messages);
+    const fmi2Status status = fmu.DeSerializeFMUstate(c, bytes->data, bytes->size, &made);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, status, message);
+    TEST_ASSERT_NULL_MESSAGE(made, message);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], message);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &after));
+    fmu_assert_same_values(&before, &after, message);
+    fmu_assert_in_error(c);
+    fmu_restore(c, good);
+}
+
+/* Each case changes the bytes of a used instance; the next step is as if nothing had been. */
+static void check_refused(void (*check)(fmi2Component c, fmi2FMUstate good,
+                                        const struct fmu_bytes *bytes)) {
+    struct fmu_values expected;
+    struct fmu_values values;
+    fmu_used_step(fmu_used(FMU_CVODE_ADAMS, &messages), &expected);
+    const fmi2Component c = fmu_used(FMU_CVODE_ADAMS, &messages);
+    fmi2FMUstate good = fmu_save(c);
+    struct fmu_bytes bytes = fmu_serialize(c, good);
+    check(c, good, &bytes);
+    fmu_used_step(c, &values);
+    fmu_assert_same_values(&expected, &values, "after refused bytes");
+    fmu_bytes_free(&bytes);
+    fmu_assert_reset_is_fresh(c, "after refused bytes");
+}
+
+static void check_damaged(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes) {
+    static const fmi2Byte masks[] = {(fmi2Byte)0xff, 0x01, (fmi2Byte)0x80};
+    for (size_t i = 0; i < bytes->size; i++) {
+        for (size_t m = 0; m < FMU_COUNT(masks); m++) {
+            char text[64];
+            snprintf(text, sizeof text, "byte %zu flipped", i);
+            struct fmu_bytes damaged = fmu_bytes_copy(bytes, bytes->size);
+            damaged.data[i] = (fmi2Byte)(damaged.data[i] ^ masks[m]);
+            assert_refused(c, good, &damaged, text);
+            fmu_bytes_free(&damaged);
+        }
+    }
+}
+
+static void test_every_damaged_byte_is_noticed(void) {
+    check_refused(check_damaged);
+}
+
+static void check_truncated(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes) {
+    for (size_t size = 0; size < bytes->size; size++) {
+        char text[64];
+        snprintf(text, sizeof text, "truncated to %zu", size);
+        struct fmu_bytes truncated = fmu_bytes_copy(bytes, size);
+        assert_refused(c, good, &truncated, text);
+        fmu_bytes_free(&truncated);
+    }
+}
+
+static void test_every_truncation_is_noticed(void) {
+    check_refused(check_truncated);
+}
+
+static void check_trailing(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes) {
+    static const size_t more[] = {1, 7, 8, 4096};
+    for (size_t i = 0; i < FMU_COUNT(more); i++) {
+        struct fmu_bytes longer = fmu_bytes_copy(bytes, bytes->size + more[i]);
+        assert_refused(c, good, &longer, "trailing bytes");
+        fmu_bytes_free(&longer);
+    }
+}
+
+static void test_trailing_bytes_are_refused(void) {
+    check_refused(check_trailing);
+}
+
+/* ---- Valid checksums ------------------------------------------------------------------------ */
+
+enum { MAGIC_SIZE = 8, VERSION_AT = 8, GUID_AT = 20, CHECKSUM_SIZE = 8 };
+
+/* FNV-1a, as src/instance/snapshot.h tells it, over all but the checksum itself. */
+static void set_checksum(struct fmu_bytes *bytes) {
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < bytes->size - CHECKSUM_SIZE; i++) {
+        hash = (hash ^ (uint8_t)bytes->data[i]) * 0x100000001b3u;
+    }
+    for (size_t i = 0; i < CHECKSUM_SIZE; i++) {
+        bytes->data[bytes->size - CHECKSUM_SIZE + i] = (fmi2Byte)(hash >> (8 * i));
+    }
+}
+
+static void test_the_form_is_the_documented_one(void) {
+    static const char guid[] = RP_MANIPULATOR_GUID;
+    struct fmu_bytes bytes = fmu_save_bytes(fmu_used(FMU_CVODE_ADAMS, &messages));
+    const uint8_t *data = (const uint8_t *)bytes.data;
+    const size_t length = data[12] + 256u * data[13] + 65536u * data[14];
+    TEST_ASSERT_EQUAL_MEMORY("COSIMSTA", data, MAGIC_SIZE);
+    TEST_ASSERT_EQUAL_MEMORY("\1\0\0\0", data + VERSION_AT, 4);
+    TEST_ASSERT_EQUAL_UINT(bytes.size, length);
+    TEST_ASSERT_EQUAL_UINT(sizeof guid - 1, data[16]);
+    TEST_ASSERT_EQUAL_MEMORY(guid, data + GUID_AT, sizeof guid - 1);
+
+    struct fmu_bytes again = fmu_bytes_copy(&bytes, bytes.size);
+    set_checksum(&again);
+    fmu_assert_same_bytes(&bytes, &again, "checksum");
+    fmu_bytes_free(&again);
+    fmu_bytes_free(&bytes);
+}
+
+static void check_foreign(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes) {
+    static const struct {
+        size_t at;
+        fmi2Byte value;
+        const char *word; /* of the message */
+    } cases[] = {
+        {0, 'X', ""},
+        {VERSION_AT, 2, "version"},
+        {VERSION_AT + 3, 1, "version"},
+        {12, 0, ""}, // length
+        {15, 1, ""},
+        {16, 37, ""}, // length of the GUID
+        {19, (fmi2Byte)0xff, ""},
+        {GUID_AT + 1, 'x', "GUID"},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        char text[64];
+        snprintf(text, sizeof text, "byte %zu is %d", cases[i].at, cases[i].value);
+        struct fmu_bytes foreign = fmu_bytes_copy(bytes, bytes->size);
+        foreign.data[cases[i].at] = cases[i].value;
+        set_checksum(&foreign);
+        assert_refused(c, good, &foreign, text);
+        fmu_assert_logged(&messages, cases[i].word);
+        fmu_bytes_free(&foreign);
+    }
+}
+
+static void test_foreign_and_newer_states_are_refused(void) {
+    check_refused(check_foreign);
+}
+
+/* Everything that can be done with a restored state. */
+static void use_restored(fmi2Component c) {
+    static struct fmu_values values;
+    const fmi2ValueReference time_reference = RP_MANIPULATOR_time;
+    const fmi2ValueReference ddq2 = RP_MANIPULATOR_ddq2;
+    const fmi2ValueReference f2 = RP_MANIPULATOR_f2;
+    const fmi2Integer order = 2;
+    double time = 0.0;
+    double value = 1.0;
+    (void)fmu.GetReal(c, &time_reference, 1, &time);
+    for (int i = 0; i < 3; i++) {
+        (void)fmu.DoStep(c, time + i * 1e-3, 1e-3, fmi2True);
+    }
+    (void)fmu.GetRealOutputDerivatives(c, &ddq2, 1, &order, &value);
+    (void)fmu.GetDirectionalDerivative(c, &ddq2, 1, &f2, 1, &value, &value);
+    (void)fmu_get_all(c, &values);
+    for (size_t i = 0; i < fmu_variable_count; i++) {
+        TEST_ASSERT_TRUE(isfinite(values.reals[i]));
+    }
+}
+
+static void try_forged(const struct fmu_bytes *forged, const char *message) {
+    fmi2FMUstate made = NULL;
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    const fmi2Status status = fmu.DeSerializeFMUstate(c, forged->data, forged->size, &made);
+    TEST_ASSERT_TRUE_MESSAGE(status == fmi2OK || status == fmi2Error, message);
+    if (status == fmi2OK) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, made), message);
+        use_restored(c);
+    }
+    fmu_assert_reset_is_fresh(c, message);
+    fmu_free(c);
+}
+
+/* Replaces each field in turn by values of all kinds. */
+static void forge(fmi2Component c) {
+    static const uint64_t fields[] = {
+        0,
+        1,
+        3,
+        0x80000000u,         // 2^31
+        0xffffffffffffffffu, // -1 or NaN
+        0x7fffffffffffffffu, // the largest integer, or NaN
+        0x8000000000000000u, // the smallest integer, or -0.0
+        0x7ff0000000000000u, // infinity
+        0x7fe0000000000000u, // about 1e308
+        0xffe0000000000000u, // and its negative
+        0x7e37e43c8800759cu, // 1e300
+        0x01a56e1fc2f8f359u, // 1e-300
+        0xbff0000000000000u, // -1.0
+    };
+    struct fmu_bytes bytes = fmu_save_bytes(c);
+    const size_t fields_at = GUID_AT + strlen(RP_MANIPULATOR_GUID);
+    for (size_t at = fields_at; at + CHECKSUM_SIZE < bytes.size; at += 8) {
+        for (size_t i = 0; i < FMU_COUNT(fields); i++) {
+            char text[64];
+            snprintf(text, sizeof text, "field at %zu, value %zu", at, i);
+            struct fmu_bytes forged = fmu_bytes_copy(&bytes, bytes.size);
+            for (size_t k = 0; k < 8; k++) {
+                forged.data[at + k] = (fmi2Byte)(fields[i] >> (8 * k));
+            }
+            set_checksum(&forged);
+            try_forged(&forged, text);
+            fmu_bytes_free(&forged);
+        }
+    }
+    fmu_bytes_free(&bytes);
+}
+
+/* Whatever a state with a valid checksum holds: no crash, no hang, and no value that is not finite.
+ */
+EACH_METHOD static void test_forged_states_do_no_harm(void) {
+    alarm(100); // s: ends the program where one hangs
+    forge(fmu_used(method, &messages));
+
+    const fmi2Component held =
+        fmu_initialized_with(method, &messages, 0.0); // the integrator goes on
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(held, 0.0, 0.125, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(held, 0.125, 0.125, fmi2True));
+    forge(held);
+    alarm(0);
+}
+
+/* A value that no instance can have is refused by its name. The fields are found by their bits,
+ * which no other field has. */
+static void test_an_impossible_value_is_named(void) {
+    static const double marked = 0.12345678901234567;
+    static const double impossible = -0.5;
+    static const struct {
+        fmi2ValueReference reference;
+        const char *name;
+    } cases[] = {
+        {RP_MANIPULATOR_m2, "m2 = -0.5"},
+        {RP_MANIPULATOR_I1z, "I1z = -0.5"},
+        {RP_MANIPULATOR_relative_tolerance, "relative_tolerance = -0.5"},
+        {RP_MANIPULATOR_max_step, "max_step = -0.5"},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        fmu_set(c, cases[i].reference, marked);
+        fmu_initialize(c, 0.0, 0.0);
+        struct fmu_bytes bytes = fmu_save_bytes(c);
+        size_t replaced = 0;
+        for (size_t at = 0; at + sizeof marked <= bytes.size; at++) {
+            if (memcmp(bytes.data + at, &marked, sizeof marked) == 0) {
+                memcpy(bytes.data + at, &impossible, sizeof impossible);
+                replaced++;
+            }
+        }
+        TEST_ASSERT_GREATER_THAN_size_t(0, replaced);
+        set_checksum(&bytes);
+
+        fmi2FMUstate made = NULL;
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
+        TEST_ASSERT_NULL(made);
+        fmu_assert_logged(&messages, cases[i].name);
+        fmu_bytes_free(&bytes);
+        fmu_free(c);
+    }
+}
+
+/* Times of a history that contradict each other: by name too. */
+static void test_an_impossible_history_is_named(void) {
+    const fmi2Component c = fmu_initialized_with(FMU_CVODE_ADAMS, &messages, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.125, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.125, 0.0625, fmi2True));
+    struct fmu_bytes bytes = fmu_save_bytes(c);
+    const double first_time = 0.125; // s since the restart; the latest is 0.1875
+    const double late = 0.25;
+    size_t replaced = 0;
+    for (size_t at = 0; at + sizeof late <= bytes.size; at++) {
+        if (memcmp(bytes.data + at, &first_time, sizeof late) == 0) {
+            memcpy(bytes.data + at, &late, sizeof late);
+            replaced++;
+        }
+    }
+    TEST_ASSERT_EQUAL_size_t(1, replaced);
+    set_checksum(&bytes);
+    fmi2FMUstate made = NULL;
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
+    fmu_assert_logged(&messages, "latest_time = 0.1875");
+    fmu_bytes_free(&bytes);
+}

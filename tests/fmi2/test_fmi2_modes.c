@@ -1,0 +1,180 @@
+/* Model Exchange: what may be set in which mode, rollback, and instances of both kinds side by
+ * side. FMI 2.0, sections 2.1.8 and 3.2.3. */
+#include "fmu_model_exchange.h"
+#include "fmu_snapshots.h"
+#include "fmu_states.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+/* ---- What may be set ------------------------------------------------------------------------ */
+
+/* Letters of the modes in which the variable can be set: notes of the table of section 3.2.3. */
+static const struct {
+    fmi2ValueReference reference;
+    const char *modes;
+    const char *name;
+} settable[] = {
+    {RP_MANIPULATOR_tau1, "IMVN", "tau1"},
+    {RP_MANIPULATOR_f2, "IMVN", "f2"},
+    {RP_MANIPULATOR_m1, "IMV", "m1"}, // tunable
+    {RP_MANIPULATOR_g, "IMV", "g"},
+    {RP_MANIPULATOR_q1, "IM", "q1"}, // a start value
+    {RP_MANIPULATOR_dq2, "IM", "dq2"},
+    {RP_MANIPULATOR_relative_tolerance, "IM", "relative_tolerance"}, // fixed
+    {RP_MANIPULATOR_ddq1, "", "ddq1"},
+    {RP_MANIPULATOR_time, "", "time"},
+    {RP_MANIPULATOR_total_energy, "", "total_energy"},
+    {RP_MANIPULATOR_D11, "", "D11"},
+};
+
+static void test_what_may_be_set_in_which_mode(void) {
+    static const char modes[] = "IMVN";
+    for (size_t i = 0; i < FMU_COUNT(settable); i++) {
+        for (const char *mode = modes; *mode != '\0'; mode++) {
+            const fmi2Component c =
+                fmu_reach(fmi2ModelExchange, fmu_state_of(fmi2ModelExchange, *mode), &messages);
+            const bool allowed = strchr(settable[i].modes, *mode) != NULL;
+            const fmi2Status status = fmu_try_set(c, settable[i].reference, 0.5);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(allowed ? fmi2OK : fmi2Error, status, settable[i].name);
+            if (!allowed) {
+                fmu_assert_logged(&messages, settable[i].name);
+                fmu_assert_in_error(c);
+            } else if (*mode != 'I') {
+                TEST_ASSERT_EQUAL_DOUBLE(0.5, fmu_get(c, settable[i].reference));
+            }
+            fmu_free(c);
+        }
+    }
+}
+
+static void test_parameters_tuned_at_an_event_keep_the_states(void) {
+    double before[FMU_STATES];
+    double after[FMU_STATES];
+    double dx[FMU_STATES];
+    double dx_fresh[FMU_STATES];
+    static const fmi2ValueReference states[FMU_STATES] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
+                                                          RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
+    const fmi2Component c = fmu_me_initialized(&messages, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_step(c, 0.0, 0.25));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetContinuousStates(c, before, FMU_STATES));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
+    fmu_set(c, RP_MANIPULATOR_m2, 2.5);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterContinuousTimeMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetContinuousStates(c, after, FMU_STATES));
+    TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof before);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetDerivatives(c, dx, FMU_STATES));
+
+    const fmi2Component fresh = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    fmu_set(fresh, RP_MANIPULATOR_m2, 2.5);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(fresh, states, FMU_STATES, before));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_enter_continuous_time(fresh, 0.25));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetDerivatives(fresh, dx_fresh, FMU_STATES));
+    TEST_ASSERT_EQUAL_MEMORY(dx_fresh, dx, sizeof dx);
+}
+
+static void set_no_inertia(fmi2Component c) {
+    static const fmi2ValueReference references[] = {RP_MANIPULATOR_lc1, RP_MANIPULATOR_I1z,
+                                                    RP_MANIPULATOR_I2z};
+    static const double zeros[] = {0.0, 0.0, 0.0};
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(c, references, 3, zeros));
+}
+
+/* The sum of the inertias is checked where a mode ends in which it can be set. */
+static void test_parameters_without_inertia_are_refused(void) {
+    fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    set_no_inertia(c);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.ExitInitializationMode(c));
+    fmu_assert_logged(&messages, "lc1 = 0");
+    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an initialization without inertia");
+
+    fmu_log_clear(&messages);
+    c = fmu_me_initialized(&messages, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
+    set_no_inertia(c);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterContinuousTimeMode(c));
+    fmu_assert_logged(&messages, "lc1 = 0");
+    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an event without inertia");
+}
+
+/* ---- Rollback ------------------------------------------------------------------------------- */
+
+/* An integrator that refuses a step goes back to the states and the time of before. */
+static void test_rollback_is_exact(void) {
+    static struct fmu_run expected;
+    static struct fmu_run run;
+    const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
+
+    const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, c, 0));
+    memset(&run, 0, sizeof run);
+    fmi2FMUstate saved[FMU_RUN_STEPS];
+    for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
+        saved[i] = fmu_save(c);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, i, &run));
+        if (i % 4 == 3) { // go back, and repeat without saving
+            fmu_restore(c, saved[i - 2]);
+            for (unsigned again = i - 2; again <= i; again++) {
+                memset(&run.after[again], 0, sizeof run.after[again]);
+                TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, again, &run));
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &run, sizeof run);
+}
+
+static void test_another_instance_goes_on_from_the_bytes(void) {
+    static struct fmu_run expected;
+    static struct fmu_run run;
+    const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
+
+    memset(&run, 0, sizeof run);
+    fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, c, 0));
+    for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
+        struct fmu_bytes bytes = fmu_save_bytes(c);
+        fmu_free(c);
+        c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+        fmu_restore_bytes(c, &bytes);
+        fmu_bytes_free(&bytes);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, i, &run));
+    }
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &run, sizeof run);
+}
+
+/* ---- Both kinds ----------------------------------------------------------------------------- */
+
+static void test_both_kinds_side_by_side(void) {
+    static struct fmu_run alone[2];
+    static struct fmu_run together[2];
+    const fmi2Component own = fmu_instantiate(&messages, false);
+    const fmi2Component other = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(own, 2, &alone[0]));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, other, 2, &alone[1]));
+    fmu_free(own);
+    fmu_free(other);
+
+    memset(together, 0, sizeof together);
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    const fmi2Component m = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2CoSimulation, c, 2));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, m, 2));
+    for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2CoSimulation, c, i, &together[0]));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, m, i, &together[1]));
+    }
+    TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);
+}
+
+static void test_reset_keeps_the_kind(void) {
+    const fmi2Component c = fmu_me_initialized(&messages, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_enter_continuous_time(c, 0.0));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, 0.0, 0.1, fmi2True));
+    fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after a reset");
+}

@@ -1,0 +1,169 @@
+/* Derivatives of outputs with respect to time after a step with inputs that are polynomials.
+ * FMI 2.0, section 4.2.1. */
+#include "fmu_polynomials.h"
+
+#include <limits.h>
+#include <math.h>
+#include <unity.h>
+
+static void step(fmi2Component c, double time, double length) {
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, time, length, fmi2True));
+}
+
+static double output_derivative(fmi2Component c, fmi2ValueReference reference, fmi2Integer order) {
+    double value = NAN;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealOutputDerivatives(c, &reference, 1, &order, &value));
+    return value;
+}
+
+static void test_output_derivatives_of_the_slide(void) {
+    const double s = 0.5;
+    for (size_t i = 0; i < FMU_SLIDE_FORCES; i++) {
+        const struct fmu_polynomial *p = &fmu_slide_forces[i];
+        const fmi2Component c = fmu_slide(&messages, 0.0);
+        fmu_slide_begin(c);
+        fmu_set_polynomial(c, RP_MANIPULATOR_f2, p);
+        step(c, 0.0, s);
+        const double dq2 = fmu_get(c, RP_MANIPULATOR_dq2);
+        const double f = fmu_polynomial_integral(p, 0, s);
+        const double f_dot = fmu_polynomial_integral(p, -1, s);
+        const double f_dot_dot = fmu_polynomial_integral(p, -2, s);
+        const struct {
+            fmi2ValueReference reference;
+            double first, second;
+        } expected[] = {
+            {RP_MANIPULATOR_q1, 0.0, 0.0},
+            {RP_MANIPULATOR_q2, dq2, f / fmu_slide_mass},
+            {RP_MANIPULATOR_dq2, f / fmu_slide_mass, f_dot / fmu_slide_mass},
+            {RP_MANIPULATOR_ddq2, f_dot / fmu_slide_mass, f_dot_dot / fmu_slide_mass},
+            {RP_MANIPULATOR_kinetic_energy, f * dq2, f_dot * dq2 + f * f / fmu_slide_mass},
+            {RP_MANIPULATOR_potential_energy, 0.0, 0.0},
+            {RP_MANIPULATOR_actuator_power, f_dot * dq2 + f * f / fmu_slide_mass,
+             f_dot_dot * dq2 + 3.0 * f_dot * f / fmu_slide_mass},
+        };
+        for (size_t j = 0; j < FMU_COUNT(expected); j++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-10, expected[j].first,
+                                      output_derivative(c, expected[j].reference, 1));
+            TEST_ASSERT_DOUBLE_WITHIN(1e-10, expected[j].second,
+                                      output_derivative(c, expected[j].reference, 2));
+        }
+        fmu_free(c);
+    }
+}
+
+/* E' = power, and the derivatives of states are outputs themselves. */
+static void test_output_derivatives_agree_with_each_other(void) {
+    const fmi2Component c = fmu_swinging(&messages);
+    fmu_set_polynomial(c, RP_MANIPULATOR_tau1, &fmu_torque);
+    fmu_set_polynomial(c, RP_MANIPULATOR_f2, &fmu_force);
+    step(c, 0.0, 0.25);
+    static const fmi2ValueReference pairs[][2] = {
+        {RP_MANIPULATOR_q1, RP_MANIPULATOR_dq1},
+        {RP_MANIPULATOR_q2, RP_MANIPULATOR_dq2},
+        {RP_MANIPULATOR_dq1, RP_MANIPULATOR_ddq1},
+        {RP_MANIPULATOR_dq2, RP_MANIPULATOR_ddq2},
+        {RP_MANIPULATOR_ee_x, RP_MANIPULATOR_ee_vx},
+        {RP_MANIPULATOR_ee_y, RP_MANIPULATOR_ee_vy},
+        {RP_MANIPULATOR_total_energy, RP_MANIPULATOR_actuator_power}};
+    for (size_t i = 0; i < FMU_COUNT(pairs); i++) {
+        const double value = fmu_get(c, pairs[i][1]);
+        const double slope = output_derivative(c, pairs[i][1], 1);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-11 * (1.0 + fabs(value)), value,
+                                  output_derivative(c, pairs[i][0], 1));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-11 * (1.0 + fabs(slope)), slope,
+                                  output_derivative(c, pairs[i][0], 2));
+    }
+}
+
+/* Those of the next step, once the input is set; before the first step and after another one, and
+ * in either order of calls. What is not set again is 0. */
+static void test_output_derivatives_follow_what_is_set(void) {
+    const fmi2ValueReference f2 = RP_MANIPULATOR_f2;
+    const fmi2Integer first = 1;
+    const double value = 3.0;
+    const double slope = -7.0;
+    for (int variant = 0; variant < 4; variant++) {
+        const bool after_step = variant % 2 == 1;
+        const bool value_first = variant / 2 == 1;
+        const fmi2Component c = fmu_slide(&messages, 0.0);
+        fmu_slide_begin(c);
+        if (after_step) {
+            fmu_set_polynomial(c, f2, &fmu_slide_forces[FMU_SLIDE_FORCES - 1]);
+            step(c, 0.0, 0.5);
+        }
+        if (value_first) {
+            fmu_set(c, f2, value);
+        }
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetRealInputDerivatives(c, &f2, 1, &first, &slope));
+        if (!value_first) {
+            fmu_set(c, f2, value);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, value / fmu_slide_mass, fmu_get(c, RP_MANIPULATOR_ddq2));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, slope / fmu_slide_mass,
+                                  output_derivative(c, RP_MANIPULATOR_ddq2, 1));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, 0.0, output_derivative(c, RP_MANIPULATOR_ddq2, 2));
+        fmu_free(c);
+    }
+}
+
+static void test_output_derivatives_that_are_refused(void) {
+    static const struct {
+        fmi2ValueReference reference;
+        fmi2Integer order;
+        const char *word; /* of the message */
+    } cases[] = {
+        {RP_MANIPULATOR_q1, 0, "0"},
+        {RP_MANIPULATOR_q1, 3, "3"},
+        {RP_MANIPULATOR_q1, -1, "-1"},
+        {RP_MANIPULATOR_q1, INT_MIN, "order"},
+        {9999, 1, "9999"},
+        {RP_MANIPULATOR_f2, 1, "f2"},
+        {RP_MANIPULATOR_m1, 1, "m1"},
+        {RP_MANIPULATOR_solver_steps, 1, "solver_steps"},
+        {RP_MANIPULATOR_time, 1, "time"},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        const fmi2ValueReference references[] = {RP_MANIPULATOR_q2, cases[i].reference};
+        const fmi2Integer orders[] = {1, cases[i].order};
+        double values[] = {-12345.678, -12345.678};
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(
+            fmi2Error, fmu.GetRealOutputDerivatives(c, references, 2, orders, values),
+            cases[i].word);
+        TEST_ASSERT_EQUAL_DOUBLE(-12345.678, values[0]);
+        TEST_ASSERT_EQUAL_DOUBLE(-12345.678, values[1]);
+        TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2Error]);
+        fmu_assert_logged(&messages, cases[i].word);
+        fmu_assert_in_error(c);
+        fmu_assert_reset_is_fresh(c, cases[i].word);
+        fmu_free(c);
+    }
+}
+
+/* ---- Both kinds of derivatives -------------------------------------------------------------- */
+
+static fmi2Status derive(bool input, fmi2Component c, const fmi2ValueReference references[],
+                         size_t count, const fmi2Integer orders[], double values[]) {
+    return input ? fmu.SetRealInputDerivatives(c, references, count, orders, values)
+                 : fmu.GetRealOutputDerivatives(c, references, count, orders, values);
+}
+
+static void test_missing_arrays(void) {
+    const fmi2Integer order = 1;
+    double value = 1.0;
+    for (int i = 0; i < 6; i++) {
+        const bool input = i % 2 == 0;
+        const int missing = i / 2;
+        const fmi2ValueReference reference = input ? RP_MANIPULATOR_f2 : RP_MANIPULATOR_q1;
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, derive(input, c, NULL, 0, NULL, NULL));
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT(fmi2Error,
+                              derive(input, c, missing == 0 ? NULL : &reference, 1,
+                                     missing == 1 ? NULL : &order, missing == 2 ? NULL : &value));
+        fmu_assert_logged(&messages, "NULL");
+        fmu_assert_in_error(c);
+        fmu_free(c);
+    }
+}

@@ -1,0 +1,191 @@
+/* How results answer to what is set between steps, and what happens where they overflow. FMI 2.0,
+ * sections 2.1.7, 4.2.1 and 4.2.2. */
+#include "fmu_harness.h"
+
+#include <math.h>
+#include <unity.h>
+
+static const fmi2ValueReference state_references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
+                                                      RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
+
+static void get_states(fmi2Component c, double x[4]) {
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(c, state_references, 4, x));
+}
+
+/* D ddq + C dq + g = (tau1, f2), from what the FMU reports. */
+static void assert_equations_of_motion_hold(fmi2Component c, double tau1, double f2) {
+    const double ddq1 = fmu_get(c, RP_MANIPULATOR_ddq1);
+    const double ddq2 = fmu_get(c, RP_MANIPULATOR_ddq2);
+    const double D12 = fmu_get(c, RP_MANIPULATOR_D12);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (10.0 + fabs(tau1)), tau1,
+                              fmu_get(c, RP_MANIPULATOR_D11) * ddq1 + D12 * ddq2 +
+                                  fmu_get(c, RP_MANIPULATOR_coriolis1) +
+                                  fmu_get(c, RP_MANIPULATOR_gravity1));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (10.0 + fabs(f2)), f2,
+                              D12 * ddq1 + fmu_get(c, RP_MANIPULATOR_D22) * ddq2 +
+                                  fmu_get(c, RP_MANIPULATOR_coriolis2) +
+                                  fmu_get(c, RP_MANIPULATOR_gravity2));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13 * (10.0 + fabs(tau1) + fabs(f2)),
+                              tau1 * fmu_get(c, RP_MANIPULATOR_dq1) +
+                                  f2 * fmu_get(c, RP_MANIPULATOR_dq2),
+                              fmu_get(c, RP_MANIPULATOR_actuator_power));
+}
+
+static void test_get_after_set_answers_for_the_new_inputs(void) {
+    static const double inputs[][2] = {{0.0, 0.0}, {3.0, -4.0}, {-50.0, 70.0}};
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_set(c, RP_MANIPULATOR_dq1, 1.5);
+    fmu_initialize(c, 0.0, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.1, fmi2True));
+    double before[4];
+    get_states(c, before);
+    for (size_t i = 0; i < FMU_COUNT(inputs); i++) {
+        double after[4];
+        fmu_set(c, RP_MANIPULATOR_tau1, inputs[i][0]);
+        fmu_set(c, RP_MANIPULATOR_f2, inputs[i][1]);
+        assert_equations_of_motion_hold(c, inputs[i][0], inputs[i][1]);
+        get_states(c, after);
+        TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof before);
+    }
+}
+
+/* Reading in between, and inputs that are set and taken back, leave no trace. */
+static void test_only_the_inputs_at_the_step_count(void) {
+    double x[2][4];
+    for (int with_detour = 0; with_detour < 2; with_detour++) {
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        for (int step = 0; step < 10; step++) {
+            if (with_detour) {
+                fmu_set(c, RP_MANIPULATOR_tau1, 100.0);
+                (void)fmu_get(c, RP_MANIPULATOR_ddq1);
+            }
+            fmu_set(c, RP_MANIPULATOR_tau1, 2.0);
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, step / 8.0, 0.125, fmi2True));
+        }
+        get_states(c, x[with_detour]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+}
+
+static void test_tunable_parameters_keep_the_states(void) {
+    static const fmi2ValueReference references[] = {RP_MANIPULATOR_m1, RP_MANIPULATOR_l1,
+                                                    RP_MANIPULATOR_g};
+    static const double values[] = {4.0, 0.8, 3.7};
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_set(c, RP_MANIPULATOR_dq1, 1.0);
+    fmu_initialize(c, 0.0, 0.0);
+    for (int step = 0; step < 4; step++) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, step / 8.0, 0.125, fmi2True));
+    }
+    double before[4];
+    double after[4];
+    get_states(c, before);
+    const double energy = fmu_get(c, RP_MANIPULATOR_total_energy);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(c, references, 3, values));
+    get_states(c, after);
+    TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof before);
+    TEST_ASSERT_TRUE(energy != fmu_get(c, RP_MANIPULATOR_total_energy));
+    assert_equations_of_motion_hold(c, 0.0, 0.0);
+
+    // goes on like an instance that starts here with these parameters
+    const fmi2Component other = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(other, references, 3, values));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(other, state_references, 4, before));
+    fmu_initialize(other, 0.5, 0.0);
+    double expected[4];
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.5, 0.5, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(other, 0.5, 0.5, fmi2True));
+    get_states(c, after);
+    get_states(other, expected);
+    for (int i = 0; i < 4; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected[i], after[i]);
+    }
+}
+
+/* ---- Overflow ------------------------------------------------------------------------------- */
+
+/* Finite states whose accelerations and energies are not. */
+static const struct {
+    fmi2ValueReference reference;
+    double value;
+    fmi2ValueReference overflows;
+    const char *name;
+} extremes[] = {
+    {RP_MANIPULATOR_dq1, 1e200, RP_MANIPULATOR_ddq2, "ddq2"},
+    {RP_MANIPULATOR_dq1, -1e300, RP_MANIPULATOR_kinetic_energy, "kinetic_energy"},
+    {RP_MANIPULATOR_q2, 1e200, RP_MANIPULATOR_D11, "D11"},
+    {RP_MANIPULATOR_dq2, 1e160, RP_MANIPULATOR_total_energy, "total_energy"},
+};
+
+static void test_get_of_an_overflow_is_discarded(void) {
+    const double untouched = -12345.678;
+    for (size_t i = 0; i < FMU_COUNT(extremes); i++) {
+        const fmi2ValueReference references[] = {RP_MANIPULATOR_m1, extremes[i].overflows};
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        fmu_set(c, extremes[i].reference, extremes[i].value);
+        fmu_initialize(c, 0.0, 0.0);
+        fmu_log_clear(&messages);
+        double values[] = {untouched, untouched};
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Discard, fmu.GetReal(c, references, 2, values),
+                                      extremes[i].name);
+        TEST_ASSERT_EQUAL_DOUBLE(untouched, values[0]);
+        TEST_ASSERT_EQUAL_DOUBLE(untouched, values[1]);
+        fmu_assert_logged(&messages, extremes[i].name);
+        TEST_ASSERT_TRUE(extremes[i].value == fmu_get(c, extremes[i].reference));
+        fmu_assert_reset_is_fresh(c, extremes[i].name);
+        fmu_free(c);
+    }
+}
+
+static void test_a_step_into_overflow_is_discarded(void) {
+    for (size_t i = 0; i < FMU_COUNT(extremes); i++) {
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        fmu_set(c, RP_MANIPULATOR_dq1, 1e160); // already too fast for the first slope
+        fmu_set(c, extremes[i].reference, extremes[i].value);
+        fmu_initialize(c, 1.0, 0.0);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Discard, fmu.DoStep(c, 1.0, 0.1, fmi2True),
+                                      extremes[i].name);
+        TEST_ASSERT_GREATER_THAN_UINT(0, messages.count[fmi2Discard]);
+        TEST_ASSERT_EQUAL_UINT(0, messages.count[fmi2Error]);
+
+        double reached = NAN;
+        double x[4];
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
+        TEST_ASSERT_TRUE(reached >= 1.0 && reached < 1.1);
+        get_states(c, x);
+        for (int j = 0; j < 4; j++) {
+            TEST_ASSERT_TRUE(isfinite(x[j]));
+        }
+        fmu_assert_reset_is_fresh(c, extremes[i].name);
+        fmu_free(c);
+    }
+}
+
+static void assert_all_readable_or_discarded(fmi2Component c) {
+    for (size_t i = 0; i < fmu_variable_count; i++) {
+        double value = NAN;
+        if (fmu_variables[i].is_real) {
+            const fmi2Status status = fmu.GetReal(c, &fmu_variables[i].reference, 1, &value);
+            TEST_ASSERT_TRUE(isfinite(value) ? status == fmi2OK : status == fmi2Discard);
+        }
+    }
+}
+
+/* Whatever finite values are set: OK or Discard, never OK with a value that is not finite. */
+static void test_no_value_that_is_not_finite_comes_with_ok(void) {
+    static const double magnitudes[] = {1e-300, 1e20, 1e77, 1e100, 1e153, 1e154, 1e160, 1.7e308};
+    static const fmi2ValueReference references[] = {
+        RP_MANIPULATOR_q1, RP_MANIPULATOR_q2, RP_MANIPULATOR_dq1,  RP_MANIPULATOR_dq2,
+        RP_MANIPULATOR_g,  RP_MANIPULATOR_a,  RP_MANIPULATOR_tau1, RP_MANIPULATOR_I2z};
+    for (size_t i = 0; i < FMU_COUNT(magnitudes) * FMU_COUNT(references); i++) {
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        fmu_set(c, references[i % FMU_COUNT(references)], magnitudes[i / FMU_COUNT(references)]);
+        fmu_initialize(c, 0.0, 0.0);
+        assert_all_readable_or_discarded(c);
+        const fmi2Status status = fmu.DoStep(c, 0.0, 0.01, fmi2True);
+        TEST_ASSERT_TRUE(status == fmi2OK || status == fmi2Discard);
+        assert_all_readable_or_discarded(c);
+        fmu_assert_reset_is_fresh(c, "after an extreme run");
+        fmu_free(c);
+    }
+}

@@ -1,0 +1,341 @@
+/* Rollback to a saved state is exact to the bit and leaves no trace, wherever and however often it
+ * happens. FMI 2.0, section 2.1.8. */
+#define _POSIX_C_SOURCE 200809L
+#include "each_method.h"
+#include "fmu_sequences.h"
+#include "fmu_snapshots.h"
+
+#include <stdio.h>
+#include <time.h>
+#include <unity.h>
+
+static struct fmu_sequence sequence;
+static struct fmu_trace expected;
+
+/* The trace of a run that saves nothing. */
+static void run_plainly(unsigned seed) {
+    fmu_sequence_make(&sequence, seed);
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_sequence_run(c, &sequence, &expected);
+    fmu_free(c);
+}
+
+/* ---- Saving alone --------------------------------------------------------------------------- */
+
+static void run_saving_everywhere(unsigned seed) {
+    char text[64];
+    snprintf(text, sizeof text, "saved everywhere, seed %u", seed);
+    fmi2FMUstate reused = NULL;
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    for (size_t at = 0; at < expected.count; at++) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &reused));
+        (void)fmu_save(c); // FreeInstance frees it
+        struct fmu_bytes bytes = fmu_serialize(c, reused);
+        fmu_bytes_free(&bytes);
+        fmu_sequence_check(c, &sequence, at, &expected, text);
+    }
+    fmu_free(c);
+}
+
+static void test_saving_at_every_step_changes_nothing(void) {
+    for (unsigned seed = 0; seed < 200; seed++) {
+        run_plainly(seed);
+        run_saving_everywhere(seed);
+    }
+}
+
+/* ---- Going back ----------------------------------------------------------------------------- */
+
+struct saved {
+    size_t at; /* the operation that comes next */
+    fmi2FMUstate state;
+};
+
+enum { SAVED_CAPACITY = 4 };
+
+/* A run that goes back and forth in a sequence. */
+struct run {
+    fmi2Component component;
+    size_t at; /* the operation that comes next */
+    struct saved saved[SAVED_CAPACITY];
+    size_t saved_count;
+    struct fmu_random random;
+};
+
+static void save(struct run *run) {
+    size_t slot = run->saved_count;
+    if (slot == SAVED_CAPACITY) {
+        slot = fmu_random_below(&run->random, SAVED_CAPACITY); // reuses the memory of its handle
+    } else {
+        run->saved[slot].state = NULL;
+        run->saved_count++;
+    }
+    run->saved[slot].at = run->at;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(run->component, &run->saved[slot].state));
+}
+
+static void restore(struct run *run, const struct saved *saved) {
+    fmu_restore(run->component, saved->state);
+    run->at = saved->at;
+}
+
+static void replace_by_copy(struct run *run, struct saved *saved) {
+    struct fmu_bytes bytes = fmu_serialize(run->component, saved->state);
+    fmu_forget(run->component, &saved->state);
+    saved->state = fmu_deserialize(run->component, &bytes);
+    fmu_bytes_free(&bytes);
+}
+
+/* Goes on in another instance, which may have been used for something else. */
+static void move_to_other_instance(struct run *run) {
+    static struct fmu_run other_run;
+    struct fmu_bytes bytes = fmu_save_bytes(run->component);
+    fmu_free(run->component);
+    run->saved_count = 0;
+    run->component = fmu_instantiate(&messages, false);
+    if (fmu_random_below(&run->random, 2) == 0) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(run->component, 7, &other_run));
+    }
+    fmu_restore_bytes(run->component, &bytes);
+    fmu_bytes_free(&bytes);
+}
+
+/* Does something that is not in the sequence, which fails or not, and comes back. */
+static void make_detour(struct run *run) {
+    static struct fmu_run other_run;
+    fmi2FMUstate state = fmu_save(run->component);
+    double time = sequence.end;
+    for (size_t at = run->at; at < sequence.count; at++) {
+        if (sequence.operations[at].kind == FMU_STEP) {
+            time = sequence.operations[at].point;
+            break;
+        }
+    }
+    const unsigned length = fmu_random_below(&run->random, 6);
+    for (unsigned i = 0; i < length; i++) {
+        const struct fmu_operation operation = fmu_random_operation(&run->random, &time);
+        (void)fmu_apply(run->component, &operation);
+    }
+    switch (fmu_random_below(&run->random, 6)) {
+    case 0:
+        (void)fmu.Terminate(run->component);
+        break;
+    case 1:
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(run->component));
+        break;
+    case 2:
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(run->component));
+        (void)fmu_run(run->component, 3, &other_run);
+        break;
+    default:
+        break;
+    }
+    fmu_restore(run->component, state);
+    fmu_forget(run->component, &state);
+}
+
+static void do_something(struct run *run) {
+    struct saved *any =
+        run->saved_count > 0
+            ? &run->saved[fmu_random_below(&run->random, (unsigned)run->saved_count)]
+            : NULL;
+    switch (fmu_random_below(&run->random, 8)) {
+    case 0:
+    case 1:
+    case 2:
+        save(run);
+        break;
+    case 3:
+    case 4:
+        if (any != NULL) {
+            restore(run, any);
+        }
+        break;
+    case 5:
+        if (any != NULL) {
+            replace_by_copy(run, any);
+        }
+        break;
+    case 6:
+        move_to_other_instance(run);
+        break;
+    default:
+        make_detour(run);
+        break;
+    }
+}
+
+static void run_with_rollbacks(unsigned seed) {
+    char text[64];
+    snprintf(text, sizeof text, "with rollbacks, seed %u", seed);
+    struct run run = {
+        .component = fmu_instantiate(&messages, false),
+        .random = {.state = ~(uint64_t)seed},
+    };
+    int left = 24; // of what may be done: the run ends
+    while (run.at < expected.count) {
+        while (left > 0 && fmu_random_below(&run.random, 3) == 0) {
+            do_something(&run);
+            left--;
+        }
+        fmu_sequence_check(run.component, &sequence, run.at, &expected, text);
+        run.at++;
+    }
+    fmu_free(run.component);
+}
+
+static void test_rollback_is_exact_in_random_sequences(void) {
+    unsigned operations = 0;
+    unsigned failed = 0;
+    for (unsigned seed = 0; seed < 1000; seed++) {
+        run_plainly(seed);
+        run_with_rollbacks(seed);
+        operations += (unsigned)expected.count;
+        failed += expected.statuses[expected.count - 1] != fmi2OK;
+    }
+    // the sequences are what they are meant to be
+    TEST_ASSERT_GREATER_THAN_UINT(40000, operations);
+    TEST_ASSERT_GREATER_THAN_UINT(20, failed);
+    TEST_ASSERT_LESS_THAN_UINT(120, failed);
+}
+
+/* The integrator's counters too are those of the state, where a step takes no internal step at all:
+ * the first slope of the new input overflows. */
+EACH_METHOD static void test_rollback_is_exact_where_the_first_slope_fails(void) {
+    struct fmu_values outcomes[2];
+    for (int with_detour = 0; with_detour < 2; with_detour++) {
+        const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.125, fmi2True));
+        fmi2FMUstate state = fmu_save(c);
+        if (with_detour) {
+            fmu_set(c, RP_MANIPULATOR_f2, 30.0);
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.125, 3.0, fmi2True));
+            fmu_restore(c, state);
+        }
+        fmu_set(c, RP_MANIPULATOR_tau1, 1.7e308);
+        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, 0.125, 0.125, fmi2True));
+        (void)fmu_get_all(c, &outcomes[with_detour]); // accelerations are not finite
+        fmu_free(c);
+    }
+    fmu_assert_same_values(&outcomes[0], &outcomes[1], "after a first slope that is not finite");
+}
+
+/* ---- Long holds ----------------------------------------------------------------------------- */
+
+/* Thousands of internal steps, long enough for restarts that nothing set asks for. */
+static void assert_long(fmi2Component c) {
+    TEST_ASSERT_GREATER_THAN_INT(5000, fmu_get_integer(c, RP_MANIPULATOR_solver_steps));
+    TEST_ASSERT_GREATER_THAN_INT(3, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
+}
+
+enum { HELD_STEPS = 6000 };
+
+static const double held_step = 5e-3; // s
+
+static void step_held(fmi2Component c, unsigned step, struct fmu_values *values) {
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, step * held_step, held_step, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, values));
+}
+
+EACH_METHOD static void test_rollback_is_exact_where_nothing_is_set_for_long(void) {
+    static struct fmu_values run[HELD_STEPS];
+    const fmi2Component plain = fmu_lasting(method, &messages);
+    for (unsigned step = 0; step < HELD_STEPS; step++) {
+        step_held(plain, step, &run[step]);
+    }
+    assert_long(plain);
+
+    struct fmu_random random = {.state = 1};
+    const fmi2Component c = fmu_lasting(method, &messages);
+    fmi2FMUstate state = NULL;
+    unsigned saved_at = 0;
+    unsigned step = 0;
+    int left = 200; // times to go back
+    while (step < HELD_STEPS) {
+        char text[64];
+        struct fmu_values values;
+        snprintf(text, sizeof text, "held, step %u", step);
+        if (state == NULL || fmu_random_below(&random, 40) == 0) {
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &state));
+            saved_at = step;
+        }
+        step_held(c, step, &values);
+        fmu_assert_same_values(&run[step], &values, text);
+        step++;
+        if (left > 0 && fmu_random_below(&random, 30) == 0) {
+            fmu_restore(c, state);
+            step = saved_at;
+            left--;
+        }
+    }
+    TEST_ASSERT_LESS_THAN_INT(100, left); // it went back often
+}
+
+/* Single steps of thousands of internal steps each, repeated after a detour. */
+EACH_METHOD static void test_rollback_is_exact_over_steps_of_many_internal_steps(void) {
+    const double length = 20.0;
+    struct fmu_values first;
+    struct fmu_values again;
+    const fmi2Component c = fmu_lasting(method, &messages);
+    const fmi2Component saving = fmu_lasting(method, &messages);
+    for (int i = 0; i < 4; i++) {
+        fmi2FMUstate state = fmu_save(saving);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * length, length, fmi2True));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &first));
+        for (int repeat = 0; repeat < 2; repeat++) {
+            fmu_restore(saving, state);
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(saving, i * length, 1.0, fmi2True));
+            fmu_restore(saving, state);
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(saving, i * length, length, fmi2True));
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(saving, &again));
+            fmu_assert_same_values(&first, &again, "a step of 20 s");
+        }
+    }
+    assert_long(c);
+}
+
+/* ---- What it costs -------------------------------------------------------------------------- */
+
+static double seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* Figures, no assertion: times depend on the machine. */
+EACH_METHOD static void test_what_a_snapshot_costs_where_inputs_change_at_every_step(void) {
+    enum { STEPS = 5000 };
+    const double h = 1e-3;
+    double in_save = 0.0;
+    double in_restore = 0.0;
+    double in_first = 0.0;
+    double in_repeat = 0.0;
+    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
+    for (int i = 0; i < STEPS; i++) {
+        fmi2FMUstate state = NULL;
+        fmu_set(c, RP_MANIPULATOR_tau1, i % 7 - 3.0);
+        const double start = seconds();
+        (void)fmu.GetFMUstate(c, &state);
+        const double saved = seconds();
+        (void)fmu.DoStep(c, i * h, h, fmi2True);
+        const double stepped = seconds();
+        (void)fmu.SetFMUstate(c, state);
+        const double restored = seconds();
+        (void)fmu.DoStep(c, i * h, h, fmi2True);
+        const double repeated = seconds();
+        (void)fmu.FreeFMUstate(c, &state);
+        const double freed = seconds();
+        in_save += (saved - start) + (freed - repeated);
+        in_first += stepped - saved;
+        in_restore += restored - stepped;
+        in_repeat += repeated - restored;
+    }
+    char text[256];
+    snprintf(text, sizeof text,
+             "method %d: GetFMUstate and FreeFMUstate %.0f ns, SetFMUstate %.0f ns, step after it "
+             "%.0f ns, the "
+             "same step without %.0f ns",
+             method, 1e9 * in_save / STEPS, 1e9 * in_restore / STEPS, 1e9 * in_repeat / STEPS,
+             1e9 * in_first / STEPS);
+    TEST_MESSAGE(text);
+}

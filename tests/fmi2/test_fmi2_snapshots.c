@@ -1,0 +1,323 @@
+/* Handles of FMU states: what they hold in each state of an instance, whose they are, and who frees
+ * them. FMI 2.0, section 2.1.8. That rollback is exact: test_fmi2_rollback.c. */
+#include "each_method.h"
+#include "fmu_model_exchange.h"
+#include "fmu_snapshots.h"
+#include "fmu_states.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+static const fmi2Type types[] = {fmi2CoSimulation, fmi2ModelExchange};
+
+static void step(fmi2Component c, double time) {
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, time, 0.125, fmi2True));
+}
+
+/* ---- Every state ---------------------------------------------------------------------------- */
+
+static void get_all_where_allowed(fmi2Component c, const struct fmu_state *state,
+                                  struct fmu_values *values) {
+    memset(values, 0, sizeof *values);
+    if (state->letter != 'I') {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, values));
+    }
+}
+
+static void go_elsewhere(fmi2Type type, fmi2Component c, int where) {
+    static struct fmu_run run;
+    switch (where) {
+    case 0:
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+        break;
+    case 1:
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(c));
+        break;
+    default:
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(type, c, 5, &run));
+        break;
+    }
+}
+
+static void assert_restored(fmi2Component c, const struct fmu_state *state,
+                            const struct fmu_values *expected, const char *text) {
+    struct fmu_values values;
+    get_all_where_allowed(c, state, &values);
+    fmu_assert_same_values(expected, &values, text);
+    fmu_assert_in_state(c, state, 0.0, &messages, text);
+}
+
+static void check_state(fmi2Type type, const struct fmu_state *state) {
+    for (int where = 0; where < 3; where++) {
+        struct fmu_values expected;
+        const fmi2Component c = fmu_reach(type, state, &messages);
+        get_all_where_allowed(c, state, &expected);
+        fmi2FMUstate saved = fmu_save(c);
+        struct fmu_bytes bytes = fmu_serialize(c, saved);
+
+        go_elsewhere(type, c, where);
+        fmu_restore(c, saved);
+        assert_restored(c, state, &expected, state->name);
+
+        const fmi2Component other = fmu_instantiate_as(type, &messages, false);
+        go_elsewhere(type, other, where);
+        fmu_restore_bytes(other, &bytes);
+        assert_restored(other, state, &expected, state->name);
+        fmu_bytes_free(&bytes);
+        fmu_free(c);
+        fmu_free(other);
+    }
+}
+
+static void test_every_state_is_restored(void) {
+    for (size_t t = 0; t < FMU_COUNT(types); t++) {
+        for (size_t i = 0; i < FMU_STATES_PER_KIND; i++) {
+            check_state(types[t], &fmu_states_of(types[t])[i]);
+        }
+    }
+}
+
+/* What a failed step tells is part of the state. */
+static void test_the_time_of_a_failed_step_is_restored(void) {
+    double reached = -1.0;
+    double restored = -1.0;
+    const struct fmu_state *failed = fmu_state_of(fmi2CoSimulation, 'F');
+    const fmi2Component c = fmu_reach(fmi2CoSimulation, failed, &messages);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
+    fmi2FMUstate saved = fmu_save(c);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    fmu_restore(c, saved);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &restored));
+    TEST_ASSERT_EQUAL_DOUBLE(reached, restored);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, reached, 0.1, fmi2True));
+}
+
+/* A step that failed is repeated from before it in two halves: section 4.2.2. */
+EACH_METHOD static void test_a_failed_step_is_repeated_in_smaller_ones(void) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
+    fmu_set_integer(c, RP_MANIPULATOR_max_internal_steps, 60);
+    fmu_initialize(c, 0.0, 0.0);
+    fmi2FMUstate saved = fmu_save(c);
+    double length = 64.0;
+    while (fmu.DoStep(c, 0.0, length, fmi2True) != fmi2OK) {
+        fmu_restore(c, saved);
+        length /= 2.0;
+        TEST_ASSERT_TRUE(length > 1e-3);
+    }
+    TEST_ASSERT_TRUE(length < 64.0);
+    TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_time) == length);
+}
+
+/* ---- Handles -------------------------------------------------------------------------------- */
+
+EACH_METHOD static void test_get_into_a_handle_reuses_it(void) {
+    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
+    fmi2FMUstate state = fmu_save(c);
+    const fmi2FMUstate first = state;
+    step(c, 0.0);
+    const double q1 = fmu_get(c, RP_MANIPULATOR_q1);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &state));
+    TEST_ASSERT_EQUAL_PTR(first, state);
+    step(c, 0.125);
+    fmu_restore(c, state);
+    TEST_ASSERT_TRUE(q1 == fmu_get(c, RP_MANIPULATOR_q1));
+}
+
+EACH_METHOD static void test_a_restored_copy_stays_valid(void) {
+    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
+    struct fmu_values expected;
+    struct fmu_values values;
+    fmi2FMUstate saved = fmu_save(c);
+    struct fmu_bytes before = fmu_serialize(c, saved);
+    step(c, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &expected));
+    for (int i = 0; i < 3; i++) {
+        fmu_restore(c, saved);
+        step(c, 0.0);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &values));
+        fmu_assert_same_values(&expected, &values, "restored again");
+    }
+    struct fmu_bytes after = fmu_serialize(c, saved);
+    TEST_ASSERT_EQUAL_UINT(before.size, after.size);
+    TEST_ASSERT_EQUAL_MEMORY(before.data, after.data, before.size);
+    fmu_bytes_free(&before);
+    fmu_bytes_free(&after);
+}
+
+EACH_METHOD static void test_handles_survive_a_reset_and_an_error(void) {
+    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
+    step(c, 0.0);
+    fmi2FMUstate saved = fmu_save(c);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(c));
+    fmu_restore(c, saved);
+    step(c, 0.125);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(c));
+    fmu_forget(c, &saved); // allowed in the error state
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+}
+
+static void test_free_sets_null_and_takes_null(void) {
+    const fmi2Component c = fmu_initialized(&messages, 0.0);
+    fmi2FMUstate a = fmu_save(c);
+    fmi2FMUstate b = fmu_save(c);
+    TEST_ASSERT_TRUE(a != b);
+    fmu_forget(c, &a);
+    fmu_forget(c, &a); // it is NULL now
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.FreeFMUstate(c, NULL));
+    fmu_restore(c, b); // the other one is still there
+    fmu_forget(c, &b);
+    TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
+}
+
+/* Every function that takes a handle, by one signature. */
+static const enum fmu_function handle_functions[] = {
+    FMU_GetFMUstate,       FMU_SetFMUstate,  FMU_SerializedFMUstateSize,
+    FMU_SerializeFMUstate, FMU_FreeFMUstate,
+};
+
+static fmi2Status call_with(enum fmu_function function, fmi2Component c, fmi2FMUstate *state) {
+    fmi2Byte buffer[16384];
+    size_t size = sizeof buffer;
+    switch (function) {
+    case FMU_GetFMUstate:
+        return fmu.GetFMUstate(c, state);
+    case FMU_SetFMUstate:
+        return fmu.SetFMUstate(c, *state);
+    case FMU_SerializedFMUstateSize:
+        return fmu.SerializedFMUstateSize(c, *state, &size);
+    case FMU_SerializeFMUstate:
+        return fmu.SerializeFMUstate(c, *state, buffer, size);
+    default:
+        return fmu.FreeFMUstate(c, state);
+    }
+}
+
+/* The handle is refused, the instance otherwise as it was. */
+static void assert_handle_refused(enum fmu_function function, fmi2Component c, fmi2FMUstate state) {
+    struct fmu_values before;
+    struct fmu_values after;
+    const char *name = fmu_function_names[function];
+    fmi2FMUstate good = fmu_save(c);
+    fmi2FMUstate given = state;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &before));
+    fmu_log_clear(&messages);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call_with(function, c, &given), name);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], name);
+    TEST_ASSERT_EQUAL_PTR_MESSAGE(state, given, name);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &after));
+    fmu_assert_same_values(&before, &after, name);
+    fmu_assert_in_error(c);
+    fmu_restore(c, good);
+    fmu_forget(c, &good);
+}
+
+static void test_handles_of_others_are_refused(void) {
+    for (size_t i = 0; i < FMU_COUNT(handle_functions); i++) {
+        const fmi2Component owner = fmu_initialized(&messages, 0.0);
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        fmi2FMUstate foreign = fmu_save(owner);
+        assert_handle_refused(handle_functions[i], c, foreign);
+        step(c, 0.0);
+        step(owner, 0.0);
+        fmu_restore(owner, foreign);
+        step(owner, 0.0);
+        fmu_free(c);
+        fmu_free(owner);
+    }
+}
+
+static void test_what_is_no_handle_is_refused(void) {
+    for (size_t i = 0; i < FMU_COUNT(handle_functions); i++) {
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        fmi2FMUstate kept = fmu_save(c); // or the memory of the next would be used again
+        fmi2FMUstate saved = fmu_save(c);
+        const fmi2FMUstate freed = saved;
+        int nothing = 0;
+        assert_handle_refused(handle_functions[i], c, &nothing);
+        assert_handle_refused(handle_functions[i], c, c);
+        fmu_forget(c, &saved);
+        saved = freed;
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT(fmi2Error, call_with(handle_functions[i], c, &saved));
+        fmu_assert_in_error(c);
+        fmu_restore(c, kept);
+        step(c, 0.0);
+        fmu_free(c);
+    }
+}
+
+/* ---- Arguments ------------------------------------------------------------------------------ */
+
+static fmi2Status call_with_null(int which, fmi2Component c, fmi2FMUstate state) {
+    fmi2Byte buffer[16384];
+    size_t size = sizeof buffer;
+    fmi2FMUstate made = NULL;
+    switch (which) {
+    case 0:
+        return fmu.GetFMUstate(c, NULL);
+    case 1:
+        return fmu.SetFMUstate(c, NULL);
+    case 2:
+        return fmu.SerializedFMUstateSize(c, NULL, &size);
+    case 3:
+        return fmu.SerializedFMUstateSize(c, state, NULL);
+    case 4:
+        return fmu.SerializeFMUstate(c, NULL, buffer, size);
+    case 5:
+        return fmu.SerializeFMUstate(c, state, NULL, size);
+    case 6:
+        return fmu.DeSerializeFMUstate(c, NULL, size, &made);
+    case 7:
+        return fmu.DeSerializeFMUstate(c, NULL, 0, &made);
+    default: {
+        struct fmu_bytes bytes = {.data = buffer, .size = size};
+        (void)fmu.SerializedFMUstateSize(c, state, &bytes.size);
+        (void)fmu.SerializeFMUstate(c, state, bytes.data, bytes.size);
+        return fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, NULL);
+    }
+    }
+}
+
+static void test_null_arguments_are_errors(void) {
+    for (int which = 0; which < 9; which++) {
+        char text[32];
+        snprintf(text, sizeof text, "case %d", which);
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        fmi2FMUstate saved = fmu_save(c);
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call_with_null(which, c, saved), text);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], text);
+        fmu_assert_in_error(c);
+        fmu_restore(c, saved);
+        step(c, 0.0);
+        fmu_free(c);
+    }
+}
+
+/* ---- Memory --------------------------------------------------------------------------------- */
+
+/* Masters save at every step and never free; FreeInstance does, as the leak check sees. */
+EACH_METHOD static void test_thousands_that_are_never_freed_do_no_harm(void) {
+    enum { SNAPSHOTS = 20000 };
+    const double h = 1.0 / 1024.0;
+    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
+    const fmi2Component other = fmu_initialized_with(method, &messages, 0.0);
+    fmi2FMUstate oldest = fmu_save(c);
+    for (int i = 0; i < SNAPSHOTS; i++) {
+        fmi2FMUstate latest = fmu_save(c);
+        fmu_set(c, RP_MANIPULATOR_tau1, i % 3 - 1.0);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * h, h, fmi2True));
+        if (i % 16 == 0) {
+            fmu_restore(c, latest);
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * h, h, fmi2True));
+        }
+    }
+    fmu_restore(c, oldest);
+    step(c, 0.0);
+    step(other, 0.0);
+    TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_q1) == fmu_get(other, RP_MANIPULATOR_q1));
+}

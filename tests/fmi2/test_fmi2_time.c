@@ -1,0 +1,363 @@
+/* Time as masters keep it: experiments, steps and the status of a step. FMI 2.0, sections 2.1.6,
+ * 4.2.2 and 4.2.3. */
+#include "fmu_harness.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <unity.h>
+
+/* ---- Experiments ---------------------------------------------------------------------------- */
+
+static void test_experiments_that_are_refused(void) {
+    static const struct {
+        bool has_tolerance, has_stop;
+        double tolerance, start, stop;
+        const char *word; /* of the message */
+    } cases[] = {
+        {true, false, 0.0, 0.0, 0.0, "tolerance"},
+        {true, false, -1e-6, 0.0, 0.0, "tolerance"},
+        {true, false, NAN, 0.0, 0.0, "tolerance"},
+        {true, false, INFINITY, 0.0, 0.0, "tolerance"},
+        {false, false, 0.0, NAN, 0.0, "start time"},
+        {false, false, 0.0, INFINITY, 0.0, "start time"},
+        {false, false, 0.0, -INFINITY, 0.0, "start time"},
+        {false, true, 0.0, 1.0, 0.5, "stop time"},
+        {false, true, 0.0, 1.0, NAN, "stop time"},
+        {false, true, 0.0, 1.0, -INFINITY, "stop time"},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.SetupExperiment(c, cases[i].has_tolerance,
+                                                             cases[i].tolerance, cases[i].start,
+                                                             cases[i].has_stop, cases[i].stop));
+        fmu_assert_logged(&messages, cases[i].word);
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c));
+        fmu_assert_reset_is_fresh(c, cases[i].word);
+        fmu_free(c);
+    }
+}
+
+static void test_what_is_not_defined_is_not_looked_at(void) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, NAN, 1.0, fmi2False, -NAN));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, -1.0, 1.0, fmi2False, 0.5));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 1.0, 1.0, fmi2True));
+}
+
+static void test_initialization_needs_an_experiment(void) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c));
+    fmu_assert_logged(&messages, "experiment");
+    fmu_assert_in_error(c);
+    fmu_assert_reset_is_fresh(c, "without experiment");
+}
+
+static double effective_tolerance(double parameter, double experiment) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_set(c, RP_MANIPULATOR_relative_tolerance, parameter);
+    fmu_initialize(c, 0.0, experiment);
+    const double tolerance = fmu_get(c, RP_MANIPULATOR_effective_relative_tolerance);
+    fmu_free(c);
+    return tolerance;
+}
+
+/* An experiment's tolerance above 1e-4, as of a master that passes its own, is used as 1e-4. */
+static void test_a_coarse_tolerance_of_the_experiment_is_cut_and_reported(void) {
+    const double coarsest = effective_tolerance(0.0, 1e-4);
+    const double coarser_parameter = effective_tolerance(1e-3, 0.0);
+    TEST_ASSERT_EQUAL_UINT(0, fmu_log_count(&messages, "logStatusWarning"));
+    TEST_ASSERT_TRUE(coarser_parameter > coarsest);
+
+    const double tolerances[] = {1.01e-4, 1e-3, 0.1, 1e300};
+    for (size_t i = 0; i < FMU_COUNT(tolerances); i++) {
+        fmu_log_clear(&messages);
+        TEST_ASSERT_TRUE(effective_tolerance(0.0, tolerances[i]) == coarsest);
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_count(&messages, "logStatusWarning"));
+        TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2OK]);
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_total(&messages));
+        fmu_assert_logged(&messages, "0.0001");
+        fmu_assert_logged(&messages, "relative_tolerance");
+
+        // the parameter wins, without a word
+        fmu_log_clear(&messages);
+        TEST_ASSERT_TRUE(effective_tolerance(1e-3, tolerances[i]) == coarser_parameter);
+        TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
+    }
+}
+
+/* The integrator runs at a fraction of the tolerance asked for: the fraction is not tested. */
+static void test_the_tolerance_parameter_wins_over_the_experiment(void) {
+    const double by_default = effective_tolerance(0.0, 0.0);
+    const double fine = effective_tolerance(0.0, 1e-9);
+    const double coarse = effective_tolerance(0.0, 1e-4);
+    TEST_ASSERT_TRUE(0.0 < fine && fine < by_default && by_default < coarse);
+    TEST_ASSERT_TRUE(fine <= 1e-9 && coarse <= 1e-4);
+    TEST_ASSERT_TRUE(by_default == effective_tolerance(0.0, 1e-8));
+    TEST_ASSERT_TRUE(coarse == effective_tolerance(1e-4, 0.0));
+    TEST_ASSERT_TRUE(coarse == effective_tolerance(1e-4, 1e-9));
+    TEST_ASSERT_TRUE(fine == effective_tolerance(1e-9, 1e-4));
+}
+
+static int steps_at(double tolerance) {
+    const fmi2ValueReference reference = RP_MANIPULATOR_solver_steps;
+    fmi2Integer steps = 0;
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    fmu_initialize(c, 0.0, tolerance);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 2.0, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetInteger(c, &reference, 1, &steps));
+    fmu_free(c);
+    return steps;
+}
+
+static void test_a_finer_tolerance_takes_more_internal_steps(void) {
+    const int coarse = steps_at(1e-4);
+    TEST_ASSERT_GREATER_THAN_INT(0, coarse);
+    TEST_ASSERT_GREATER_THAN_INT(coarse, steps_at(1e-9));
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static void test_steps_that_are_refused(void) {
+    static const double start = 1.75;
+    static const struct {
+        double point, length;
+        const char *words[2]; /* of the message */
+    } cases[] = {
+        {start, 0.0, {"above 0", "1.75"}},   {start, -0.0, {"above 0", "1.75"}},
+        {start, -0.5, {"-0.5", "1.75"}},     {start, NAN, {"nan", "1.75"}},
+        {start, INFINITY, {"inf", "1.75"}},  {start, -INFINITY, {"inf", "1.75"}},
+        {NAN, 0.5, {"nan", "0.5"}},          {INFINITY, 0.5, {"inf", "0.5"}},
+        {DBL_MAX, DBL_MAX, {"refused", ""}}, {start, 1e-20, {"1e-20", "1.75"}},
+        {1.5, 0.25, {"1.5", "1.75"}},        // backwards
+        {1.8125, 0.625, {"1.8125", "1.75"}}, // a tenth of a step late
+        {1.6875, 0.625, {"1.6875", "1.75"}}, // and early
+        {0.0, 0.625, {"t = 0", "1.75"}},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_initialized(&messages, start);
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(
+            fmi2Error, fmu.DoStep(c, cases[i].point, cases[i].length, fmi2True), cases[i].words[0]);
+        fmu_assert_logged(&messages, cases[i].words[0]);
+        fmu_assert_logged(&messages, cases[i].words[1]);
+        TEST_ASSERT_EQUAL_DOUBLE(start, fmu_get(c, RP_MANIPULATOR_time));
+        fmu_assert_in_error(c);
+        fmu_assert_reset_is_fresh(c, messages.texts);
+        fmu_free(c);
+    }
+}
+
+/* A master's rounding: followed, and the step ends where the master says. */
+static void test_a_mismatch_of_rounding_is_followed(void) {
+    static const double mismatches[] = {1e-10, -1e-10, 3e-12, DBL_EPSILON};
+    for (size_t i = 0; i < FMU_COUNT(mismatches); i++) {
+        const fmi2Component c = fmu_initialized(&messages, 1.0);
+        const double point = 1.0 + mismatches[i];
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, point, 0.1, fmi2True));
+        TEST_ASSERT_TRUE(point + 0.1 == fmu_get(c, RP_MANIPULATOR_time));
+        fmu_free(c);
+    }
+}
+
+/* Within the slack of rounding, but it would end where the instance is. */
+static void test_a_step_that_ends_where_the_instance_is_is_refused(void) {
+    const double at = 1e6;
+    const double before = nextafter(at, 0.0);
+    static const struct {
+        int ulps;
+        fmi2Status status;
+    } cases[] = {{1, fmi2Error}, {2, fmi2OK}};
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_initialized(&messages, at);
+        const double h = cases[i].ulps * (at - before);
+        TEST_ASSERT_EQUAL_INT(cases[i].status, fmu.DoStep(c, before, h, fmi2True));
+        TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_time) >= at);
+        fmu_free(c);
+    }
+}
+
+static void test_masters_may_add_up_or_multiply(void) {
+    static const double lengths[] = {1e-3, 1.0 / 60.0, 0.1};
+    for (size_t i = 0; i < FMU_COUNT(lengths); i++) {
+        const double h = lengths[i];
+        const fmi2Component adding = fmu_initialized(&messages, 0.0);
+        const fmi2Component multiplying = fmu_initialized(&messages, 0.0);
+        double t = 0.0;
+        for (int step = 0; step < 5000; step++) {
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(adding, t, h, fmi2True));
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(multiplying, step * h, h, fmi2True));
+            t += h;
+        }
+        TEST_ASSERT_TRUE(t == fmu_get(adding, RP_MANIPULATOR_time));
+        TEST_ASSERT_TRUE(4999 * h + h == fmu_get(multiplying, RP_MANIPULATOR_time));
+        fmu_free(adding);
+        fmu_free(multiplying);
+    }
+}
+
+static fmi2Component initialized_until(double start, double stop) {
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, 0, start, fmi2True, stop));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
+    return c;
+}
+
+static void test_a_step_past_the_stop_time_is_refused(void) {
+    const fmi2Component c = initialized_until(1.0, 1.25);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 1.0, 0.125, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, 1.125, 0.1875, fmi2True));
+    fmu_assert_logged(&messages, "1.3125");
+    fmu_assert_logged(&messages, "1.25");
+    fmu_assert_in_error(c);
+    fmu_assert_reset_is_fresh(c, "after a step past the stop time");
+}
+
+static void test_the_stop_time_itself_is_reached_within_slack(void) {
+    static const double beyond[] = {0.0, 1e-10, -1e-10, DBL_EPSILON};
+    for (size_t i = 0; i < FMU_COUNT(beyond); i++) {
+        const fmi2Component c = initialized_until(1.0, 1.25);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 1.0, 0.25 + beyond[i], fmi2True));
+        TEST_ASSERT_TRUE(1.0 + (0.25 + beyond[i]) == fmu_get(c, RP_MANIPULATOR_time));
+        fmu_free(c);
+    }
+}
+
+static void test_the_start_time_does_not_matter(void) {
+    static const double starts[] = {0.0, -0.5, 1000.0, 1e6};
+    static const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
+                                                    RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
+    const double h = 1.0 / 128.0; // exact at each of the times
+    double expected[4];
+    for (size_t i = 0; i < FMU_COUNT(starts); i++) {
+        double x[4];
+        const fmi2Component c = fmu_initialized(&messages, starts[i]);
+        TEST_ASSERT_TRUE(starts[i] == fmu_get(c, RP_MANIPULATOR_time));
+        for (int step = 0; step < 128; step++) {
+            fmu_set(c, RP_MANIPULATOR_tau1, 3.0 * cos(0.1 * step));
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, starts[i] + step * h, h, fmi2True));
+        }
+        TEST_ASSERT_TRUE(starts[i] + 1.0 == fmu_get(c, RP_MANIPULATOR_time));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(c, references, 4, i == 0 ? expected : x));
+        for (size_t j = 0; i > 0 && j < 4; j++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, expected[j], x[j]);
+        }
+        fmu_free(c);
+    }
+}
+
+/* noSetFMUStatePriorToCurrentPoint is only a hint. */
+static void test_the_rollback_hint_changes_nothing(void) {
+    static const fmi2Boolean hints[] = {fmi2True, fmi2False, 7};
+    double q1[FMU_COUNT(hints)];
+    for (size_t i = 0; i < FMU_COUNT(hints); i++) {
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.5, hints[i]));
+        q1[i] = fmu_get(c, RP_MANIPULATOR_q1);
+        TEST_ASSERT_TRUE(q1[i] == q1[0]);
+    }
+}
+
+/* Neither a crash nor a hang: internal steps are limited. */
+static void test_an_endless_step_is_discarded(void) {
+    const fmi2Component c = fmu_initialized(&messages, 0.0);
+    const fmi2Status status = fmu.DoStep(c, 0.0, 1e300, fmi2True);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Discard, status, messages.texts);
+    double reached = NAN;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
+    TEST_ASSERT_TRUE(reached >= 0.0 && reached < 1e300);
+    TEST_ASSERT_TRUE(isfinite(fmu_get(c, RP_MANIPULATOR_q1)));
+    fmu_assert_reset_is_fresh(c, "after an endless step");
+}
+
+/* fmi2Discard of fmi2DoStep: section 4.2.2; fmi2LastSuccessfulTime: 4.2.3. */
+static void test_a_failed_step_tells_how_far_it_got(void) {
+    const fmi2ValueReference max_steps = RP_MANIPULATOR_max_internal_steps;
+    const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
+                                             RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
+    const double start = 2.0;
+    const double length = 10.0;
+    const fmi2Integer one = 1;
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(c, &max_steps, 1, &one));
+    fmu_initialize(c, start, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, start, length, fmi2True));
+    TEST_ASSERT_GREATER_THAN_UINT(0, messages.count[fmi2Discard]);
+
+    double reached = NAN;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
+    TEST_ASSERT_TRUE(reached >= start && reached < start + length);
+    TEST_ASSERT_EQUAL_DOUBLE(reached, fmu_get(c, RP_MANIPULATOR_time));
+
+    double x[4] = {NAN, NAN, NAN, NAN};
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(c, references, 4, x));
+    for (size_t i = 0; i < 4; i++) {
+        TEST_ASSERT_TRUE(isfinite(x[i]));
+    }
+    fmi2Boolean terminated = fmi2True;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
+    TEST_ASSERT_EQUAL_INT(fmi2False, terminated);
+}
+
+/* ---- Status --------------------------------------------------------------------------------- */
+
+static void test_status_tells_what_can_be_known(void) {
+    static const fmi2StatusKind kinds[] = {fmi2DoStepStatus, fmi2PendingStatus,
+                                           fmi2LastSuccessfulTime, fmi2Terminated,
+                                           (fmi2StatusKind)99};
+    const fmi2Component c = fmu_initialized(&messages, 2.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 2.0, 0.5, fmi2True));
+    for (size_t i = 0; i < FMU_COUNT(kinds); i++) {
+        const bool is_time = kinds[i] == fmi2LastSuccessfulTime;
+        const bool is_terminated = kinds[i] == fmi2Terminated;
+        fmi2Status status = fmi2Fatal;
+        fmi2Real real = -1.0;
+        fmi2Integer integer = -1;
+        fmi2Boolean boolean = -1;
+        fmi2String text = "untouched";
+        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.GetStatus(c, kinds[i], &status));
+        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.GetIntegerStatus(c, kinds[i], &integer));
+        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.GetStringStatus(c, kinds[i], &text));
+        TEST_ASSERT_EQUAL_INT(is_time ? fmi2OK : fmi2Discard,
+                              fmu.GetRealStatus(c, kinds[i], &real));
+        TEST_ASSERT_EQUAL_INT(is_terminated ? fmi2OK : fmi2Discard,
+                              fmu.GetBooleanStatus(c, kinds[i], &boolean));
+        TEST_ASSERT_EQUAL_INT(fmi2Fatal, status);
+        TEST_ASSERT_EQUAL_INT(-1, integer);
+        TEST_ASSERT_EQUAL_STRING("untouched", text);
+        TEST_ASSERT_EQUAL_DOUBLE(is_time ? 2.5 : -1.0, real);
+        TEST_ASSERT_EQUAL_INT(is_terminated ? fmi2False : -1, boolean);
+    }
+    TEST_ASSERT_EQUAL_INT(fmi2OK,
+                          fmu.DoStep(c, 2.5, 0.5, fmi2True)); // a Discard here is no failure
+}
+
+static fmi2Status status_into_nothing(int function, fmi2Component c) {
+    switch (function) {
+    case FMU_GetStatus:
+        return fmu.GetStatus(c, fmi2DoStepStatus, NULL);
+    case FMU_GetRealStatus:
+        return fmu.GetRealStatus(c, fmi2LastSuccessfulTime, NULL);
+    case FMU_GetIntegerStatus:
+        return fmu.GetIntegerStatus(c, fmi2DoStepStatus, NULL);
+    case FMU_GetBooleanStatus:
+        return fmu.GetBooleanStatus(c, fmi2Terminated, NULL);
+    default:
+        return fmu.GetStringStatus(c, fmi2PendingStatus, NULL);
+    }
+}
+
+static void test_status_into_nothing_is_an_error(void) {
+    for (int function = FMU_GetStatus; function <= FMU_GetStringStatus; function++) {
+        const fmi2Component c = fmu_initialized(&messages, 0.0);
+        fmu_log_clear(&messages);
+        TEST_ASSERT_EQUAL_INT(fmi2Error, status_into_nothing(function, c));
+        fmu_assert_logged(&messages, fmu_function_names[function]);
+        fmu_assert_in_error(c);
+        fmu_free(c);
+    }
+}

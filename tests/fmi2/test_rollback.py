@@ -1,0 +1,266 @@
+"""Rollback through fmpy: saved, serialized and restored states give the same results, bit for bit.
+
+Run as a program (fmu folder, file of a serialized state, file of a sequence), it is another
+process that restores a state and goes on from there.
+"""
+
+import json
+import random
+import subprocess
+import sys
+from ctypes import byref
+from pathlib import Path
+
+import pytest
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+
+from cosim import convergence
+from tests.fmi2.rollback_sequences import (
+    KINDS,
+    START,
+    WHIRL,
+    Move,
+    do,
+    other,
+    restore,
+    run,
+    sequence,
+    serialized,
+    times,
+)
+from tests.support.cosim_project import declared
+from tests.support.instances import ERROR, STATES, Instance, Unit, status_of
+from tests.support.paths import ROOT
+
+SEQUENCES = 100
+
+
+@pytest.fixture(scope="module")
+def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
+    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+
+
+# ---- Same bytes
+
+
+@pytest.mark.parametrize("number", range(SEQUENCES))
+def test_random_rollback(unit: Unit, number: int) -> None:
+    """Snapshots and jumps back at random, within an instance and from one to another."""
+    chance = random.Random(number)
+    kind = KINDS[number % len(KINDS)]
+    # now and then the integrator needs more steps than it keeps as its history
+    is_long = number % 20 == 0
+    moves = sequence(kind, 400 if is_long else chance.randint(5, 40), chance)
+    at = times(moves)
+    stop = {"stop": at[-1]} if chance.random() < 0.5 else {}
+    start = (WHIRL if is_long else START) | stop
+    expected = run(unit, moves, start)
+    instance = Instance(unit)
+    saved: list[tuple[int, object]] = []
+    packed: list[tuple[int, bytes]] = []
+    try:
+        instance.initialize(**start)
+        position, left = 0, 3 * len(moves) + 20
+        while position < len(moves):
+            left -= 1
+            action = chance.random() if left > 0 else 1.0
+            if action < 0.2:
+                saved.append((position, instance.fmi.getFMUstate()))
+            elif action < 0.3:
+                packed.append((position, serialized(instance)))
+            elif action < 0.4 and saved:
+                position, state = chance.choice(saved)
+                instance.fmi.setFMUstate(state)
+            elif action < 0.45 and packed:
+                position, content = chance.choice(packed)
+                if chance.random() < 0.5:
+                    instance.fmi.freeInstance()  # with all its snapshots
+                    saved.clear()
+                    instance = other(unit, chance)
+                restore(instance, content)
+            elif action < 0.5 and saved:
+                state = saved.pop(chance.randrange(len(saved)))[1]
+                instance.fmi.freeFMUstate(state)
+            else:
+                assert do(instance, at[position], moves[position]) == expected[position]
+                position += 1
+        assert not instance.messages
+        assert not is_long or instance.count("solver_restarts") > 2
+    finally:
+        instance.fmi.freeInstance()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_snapshots_leave_no_trace(unit: Unit, kind: str) -> None:
+    """A state saved at every step, from the initialization on: the same bytes as without."""
+    moves = sequence(kind, 300, random.Random(kind))
+    with Instance(unit) as instance:
+        instance.fmi.getFMUstate()
+        instance.initialize(**START)
+        for t, move, expected in zip(times(moves), moves, run(unit, moves), strict=False):
+            state = instance.fmi.getFMUstate()
+            serialized(instance)
+            assert do(instance, t, move) == expected
+            instance.fmi.freeFMUstate(state)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_rollback_at_every_step_leaves_no_trace(unit: Unit, kind: str) -> None:
+    """Each step is tried in another way, undone and made: the same bytes as without."""
+    chance = random.Random(kind)
+    moves, tried = sequence(kind, 300, chance), sequence("mixed", 300, chance)
+    with Instance(unit) as instance:
+        instance.initialize(**START)
+        state = instance.fmi.getFMUstate()
+        for t, move, trial, expected in zip(
+            times(moves), moves, tried, run(unit, moves), strict=False
+        ):
+            instance.fmi.fmi2GetFMUstate(instance.fmi.component, byref(state))  # same memory
+            do(instance, t, trial)
+            instance.fmi.setFMUstate(state)
+            assert do(instance, t, move) == expected
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_another_process_goes_on_the_same(unit: Unit, tmp_path: Path, kind: str) -> None:
+    moves = sequence(kind, 60, random.Random(kind))
+    at, cut = times(moves), 30
+    with Instance(unit) as instance:
+        instance.initialize(**START)
+        for t, move in zip(at, moves[:cut], strict=False):
+            do(instance, t, move)
+        (tmp_path / "state").write_bytes(serialized(instance))
+        rest = [do(instance, t, m).hex() for t, m in zip(at[cut:], moves[cut:], strict=False)]
+        final = [x.hex() for x in instance.get(*STATES)]
+    plan = [[t, m.length, m.values, m.derivatives] for t, m in zip(at, moves, strict=False)]
+    (tmp_path / "moves").write_text(json.dumps(plan[cut:]))
+    arguments = (unit.folder, tmp_path / "state", tmp_path / "moves")
+    command = [sys.executable, "-m", "tests.fmi2.test_rollback", *map(str, arguments)]
+    output = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    assert output.stdout.split() == [*rest, *final]
+
+
+def main(folder: str, state: str, moves: str) -> None:
+    """Restore and go on; print the bytes after each step and the final state as hexadecimals."""
+    with Instance(Unit(Path(folder), Path(folder))) as instance:
+        restore(instance, Path(state).read_bytes())
+        for t, *move in json.loads(Path(moves).read_text()):
+            print(do(instance, t, Move(*move)).hex())
+        print(*(x.hex() for x in instance.get(*STATES)))
+
+
+def test_states_of_the_initialization_are_restored(unit: Unit) -> None:
+    """Before, in and after initialization, and after the end."""
+    with Instance(unit) as instance:
+        states = [instance.fmi.getFMUstate()]
+        instance.fmi.setupExperiment(startTime=2.0, stopTime=3.0, tolerance=1e-6)
+        instance.set(q1=1.0)
+        states.append(instance.fmi.getFMUstate())
+        instance.fmi.enterInitializationMode()
+        states.append(instance.fmi.getFMUstate())
+        instance.fmi.exitInitializationMode()
+        instance.step(2.0, 1.0)
+        expected = instance.everything()
+        instance.fmi.terminate()
+        states.append(instance.fmi.getFMUstate())
+        instance.fmi.reset()
+
+        instance.fmi.setFMUstate(states[3])
+        assert instance.everything() == expected
+        assert status_of(instance.fmi.doStep, 3.0, 1.0) == ERROR
+        instance.fmi.setFMUstate(states[2])
+        instance.fmi.exitInitializationMode()
+        instance.step(2.0, 1.0)
+        assert instance.everything() == expected
+        instance.fmi.setFMUstate(states[1])
+        instance.fmi.enterInitializationMode()
+        instance.fmi.exitInitializationMode()
+        instance.step(2.0, 1.0)
+        assert instance.everything() == expected
+        instance.fmi.setFMUstate(states[0])
+        instance.initialize(2.0, 3.0, 1e-6, q1=1.0)
+        instance.step(2.0, 1.0)
+        assert instance.everything() == expected
+
+
+# ---- A master that needs it
+
+
+def test_master_with_step_doubling(unit: Unit) -> None:
+    """A step, undone, and two halves: their difference controls the step, errors go back."""
+    problem = convergence.load(
+        ROOT / "models/rp_manipulator/convergence/smooth_inputs.toml", declared("rp_manipulator")
+    )
+    stop, bound = problem.scenario.stop, 1e-5
+
+    def tell(instance: Instance, t: float) -> None:
+        values = {name: sines.derivative(t, 0).item() for name, sines in problem.inputs.items()}
+        instance.set(**values)
+        slopes = {name: [s.derivative(t, 1).item()] for name, s in problem.inputs.items()}
+        instance.set_input_derivatives(**slopes)
+
+    accepted: list[tuple[float, float]] = []
+    refused = 0
+    with Instance(unit) as instance:
+        instance.initialize(0.0, stop, 1e-10, **problem.scenario.initial)
+        begin = instance.fmi.getFMUstate()
+        t, h = 0.0, 0.5
+        while t < stop:
+            h = min(h, stop - t)
+            instance.fmi.fmi2GetFMUstate(instance.fmi.component, byref(begin))
+            tell(instance, t)
+            instance.step(t, h)
+            coarse = instance.get(*STATES)
+            instance.fmi.setFMUstate(begin)
+            tell(instance, t)
+            middle = instance.step(t, h / 2)
+            tell(instance, middle)
+            instance.step(middle, t + h - middle)
+            fine = instance.get(*STATES)
+            error = max(abs(a - b) for a, b in zip(coarse, fine, strict=True))
+            if error > bound:
+                instance.fmi.setFMUstate(begin)
+                refused += 1
+                h /= 2
+                continue
+            accepted += [(t, h / 2), (middle, t + h - middle)]
+            t += h
+            if error < bound / 10:
+                h *= 2
+        final, everything = dict(zip(STATES, fine, strict=True)), instance.everything()
+    assert refused > 5 and len({h for _, h in accepted}) > 3
+    assert problem.error(final) < 1e-2  # inputs are linear in a step
+
+    with Instance(unit) as instance:  # the same steps, none of them undone
+        instance.initialize(0.0, stop, 1e-10, **problem.scenario.initial)
+        for t, h in accepted:
+            tell(instance, t)
+            instance.step(t, h)
+        assert instance.everything() == everything
+
+
+def test_a_failed_step_can_be_undone(unit: Unit) -> None:
+    """A step that the integrator cannot finish is fmi2Discard; the state before it is as good."""
+    with Instance(unit) as instance:
+        instance.fmi.setInteger([unit.references["max_internal_steps"]], [50])
+        instance.initialize(**START)
+        instance.step(0.0, 0.01)
+        state, own = instance.fmi.getFMUstate(), instance.everything()
+        with pytest.raises(FMICallException) as caught:
+            instance.step(0.01, 100.0)
+        assert caught.value.status == 2
+        assert 0.01 <= instance.fmi.getRealStatus(fmi2.fmi2LastSuccessfulTime) < 100
+        instance.fmi.setFMUstate(state)
+        assert instance.everything() == own
+        instance.step(0.01, 0.01)
+        after = instance.everything()
+    with Instance(unit) as instance:
+        instance.fmi.setInteger([unit.references["max_internal_steps"]], [50])
+        instance.initialize(**START)
+        instance.step(instance.step(0.0, 0.01), 0.01)
+        assert instance.everything() == after
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,465 @@
+"""Start times, long runs, masters that are a little off, and what changes between steps."""
+
+import math
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from ctypes import c_double
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import heyoka as hy
+import numpy as np
+import pytest
+from fmpy import fmi2
+
+from tests.support.cosim_project import declared, load
+from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, Unit, status_of
+from tests.support.paths import ROOT
+
+START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
+# In the horizontal plane a constant force draws link 2 in, the spin drives it out: bounded for
+# ever, not chaotic, with two quantities that are conserved.
+WHIRL = {"g": 0.0, "q2": 0.1, "dq1": 4.0, "f2": -5.0}
+
+
+@pytest.fixture(scope="module")
+def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
+    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+
+
+@pytest.fixture(scope="module")
+def maker() -> Iterator[ModuleType]:
+    """make_smooth_inputs.py: the independent equations."""
+    folder = str(ROOT / "models" / "rp_manipulator" / "references")
+    sys.path.insert(0, folder)
+    import make_smooth_inputs
+
+    yield make_smooth_inputs
+    sys.path.remove(folder)
+
+
+def reference(maker: ModuleType, values: dict[str, float]) -> hy.taylor_adaptive:
+    """The motion from `values`, the inputs being heyoka's parameters; in long double."""
+    case = SimpleNamespace(start_values=declared("rp_manipulator").start_values | values)
+    inputs = {name: hy.par[i] for i, name in enumerate(INPUTS)}
+    motion = maker.integrator(case, inputs, pars=len(INPUTS))
+    motion.pars[:] = [np.longdouble(values.get(name, 0.0)) for name in INPUTS]
+    return motion
+
+
+def reals(instance: Instance, without: Sequence[str] = ("time",)) -> list[float]:
+    """Values of all Real variables but those."""
+    left_out = {instance.unit.references[name] for name in without}
+    return instance.fmi.getReal([r for r in instance.unit.reals if r not in left_out])
+
+
+# ---- Start times -------------------------------------------------------------------------------
+
+
+def master(
+    unit: Unit, start: float, h: float, count: int, without: Sequence[str] = ("time",)
+) -> np.ndarray:
+    """Values after every step of a run whose inputs rest, jump and move in turn."""
+    rows = []
+    with Instance(unit) as instance:
+        instance.initialize(start, start + count * h, 1e-8, **START)
+        for i in range(count):
+            elapsed = i * h
+            if i % 3:
+                instance.set(tau1=math.sin(3 * elapsed), f2=-9 + math.cos(2 * elapsed))
+            if i % 3 == 2:
+                instance.set_input_derivatives(
+                    tau1=[3 * math.cos(3 * elapsed)], f2=[-2 * math.sin(2 * elapsed), 0.1, -0.2]
+                )
+            instance.step(start + elapsed, h)
+            rows.append(reals(instance, without))
+        assert instance.get("time") == [start + count * h]
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
+def test_start_time_does_not_matter_where_points_are_exact(unit: Unit, start: float) -> None:
+    """Steps of 1/128 s are exact at all these times: the results are equal bit for bit."""
+    expected = master(unit, 0.0, 1 / 128, 384)
+    assert np.array_equal(master(unit, start, 1 / 128, 384), expected)
+
+
+@pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
+def test_start_time_matters_by_the_rounding_of_points_alone(unit: Unit, start: float) -> None:
+    """Steps of 1 ms are rounded, at 1e6 s by up to 6e-11 s: inputs change that much off."""
+    without = ("time", "solver_last_step")
+    expected = master(unit, 0.0, 1e-3, 3000, without)
+    found = master(unit, start, 1e-3, 3000, without)
+    scale = np.maximum(np.max(np.abs(expected), axis=0), 1e-3)
+    rounding = np.spacing(abs(start) + 3.0) / 2
+    assert np.max(np.abs(found - expected) / scale) < 1e-12 + 30 * rounding
+
+
+# ---- Ten minutes -------------------------------------------------------------------------------
+
+
+def conserved(instance: Instance) -> tuple[float, float]:
+    """Of the whirl: energy without the work of f2 (J), angular momentum about z0 (kg m2/s)."""
+    q2, dq1, dq2, energy, f2, D11, D12 = instance.get(
+        "q2", "dq1", "dq2", "total_energy", "f2", "D11", "D12"
+    )
+    return energy - f2 * q2, D11 * dq1 + D12 * dq2
+
+
+def whirl(
+    unit: Unit, times: list[float], lengths: list[float], stop: float | None
+) -> tuple[list[float], float]:
+    """Final states, and the largest relative change of what is conserved at every 1000th step."""
+    change = 0.0
+    with Instance(unit) as instance:
+        instance.initialize(times[0], stop, 1e-10, **WHIRL)
+        component, step = instance.fmi.component, instance.fmi.fmi2DoStep
+        first = conserved(instance)
+        for i, (t, h) in enumerate(zip(times, lengths, strict=False)):
+            step(component, t, h, fmi2.fmi2True)
+            if i % 1000 == 0 or i == len(lengths) - 1:
+                now = conserved(instance)
+                change = max(
+                    change, *(abs(a - b) / abs(b) for a, b in zip(now, first, strict=True))
+                )
+        assert not instance.messages
+        return instance.get(*STATES), change
+
+
+@pytest.mark.parametrize("accumulated", [False, True])
+def test_ten_minutes_in_steps_of_a_sixtieth(
+    unit: Unit, maker: ModuleType, accumulated: bool
+) -> None:
+    """Points i / 60 s, and points that a master adds up: 36 000 steps are followed."""
+    h, count = 1 / 60, 36_000
+    times = [i / 60 for i in range(count + 1)]
+    if accumulated:
+        for i in range(count):
+            times[i + 1] = times[i] + h
+    motion = reference(maker, WHIRL)
+    motion.propagate_until(np.longdouble(times[-1]))
+    states, change = whirl(unit, times, [h] * count, 600.0)
+    assert change < 1e-8
+    assert np.max(np.abs(np.array(states) - motion.state.astype(float))) < 1e-5
+
+
+def control(t: float, states: list[float]) -> tuple[float, float]:
+    """A sampled controller that swings the arm and holds link 2: tau1 (N.m), f2 (N)."""
+    q1, q2, dq1, dq2 = states
+    tau1 = 4.0 * math.cos(q1) - 20.0 * (q1 - 0.8 * math.sin(0.7 * t)) - 4.0 * dq1
+    f2 = 9.81 * math.sin(q1) - 30.0 * (q2 - 0.2 * math.sin(1.1 * t)) - 8.0 * dq2
+    return tau1, f2
+
+
+def test_ten_minutes_under_control(unit: Unit, maker: ModuleType) -> None:
+    """Both inputs change at each of 36 000 steps of 1/60 s: the controller is in the master."""
+    h, count = 1 / 60, 36_000
+    motion = reference(maker, START)
+    expected = np.empty((count, len(STATES)))
+    for i in range(count):
+        motion.pars[:] = control(i / 60, motion.state.astype(float).tolist())
+        motion.time = np.longdouble(0)
+        motion.propagate_until(np.longdouble((i + 1) / 60) - np.longdouble(i / 60))
+        expected[i] = motion.state
+    found = np.empty_like(expected)
+    with Instance(unit) as instance:
+        instance.initialize(stop=600.0, tolerance=1e-8, **START)
+        fmi, component = instance.fmi, instance.fmi.component
+        inputs = (fmi2.fmi2ValueReference * 2)(*(unit.references[name] for name in INPUTS))
+        states = (fmi2.fmi2ValueReference * 4)(*(unit.references[name] for name in STATES))
+        u, x = (c_double * 2)(), (c_double * 4)(*START.values())
+        for i in range(count):
+            u[:] = control(i / 60, list(x))
+            fmi.fmi2SetReal(component, inputs, 2, u)
+            fmi.fmi2DoStep(component, i / 60, h, fmi2.fmi2True)
+            fmi.fmi2GetReal(component, states, 4, x)
+            found[i] = x
+        assert instance.count("solver_restarts") == count
+    assert np.max(np.abs(expected)) < 5 and np.ptp(expected[-3000:, 0]) > 0.5  # still moving
+    assert np.max(np.abs(found - expected)) < 1e-8
+
+
+def test_stop_time_is_reached_by_600_000_steps(unit: Unit) -> None:
+    """The master adds up 1 ms and ends 7e-9 s off; one more step goes past the stop time."""
+    times, t, h = [], 0.0, 1e-3
+    for _ in range(600_000):
+        times.append(t)
+        t += h
+    assert 1e-9 < abs(t - 600.0) < 1e-7
+    with Instance(unit) as instance:
+        instance.initialize(0.0, 600.0, 1e-10, **WHIRL)
+        first = conserved(instance)
+        component, step = instance.fmi.component, instance.fmi.fmi2DoStep
+        for point in times:
+            step(component, point, h, fmi2.fmi2True)
+        assert instance.get("time")[0] == pytest.approx(600.0, abs=1e-7)
+        assert conserved(instance) == pytest.approx(first, rel=1e-8)
+        assert not instance.messages
+        assert status_of(instance.fmi.doStep, t, h) == ERROR
+        assert "600" in instance.messages[-1].text
+
+
+# ---- Masters that are off ----------------------------------------------------------------------
+
+
+def at_one_second(unit: Unit) -> Instance:
+    """An instance at t = 1 s, after steps of 10 ms."""
+    instance = Instance(unit).initialize(tolerance=1e-10, **START)
+    instance.set(tau1=1.0, f2=-7.0)
+    for i in range(100):
+        instance.step(i / 100, 0.01)
+    return instance
+
+
+@pytest.mark.parametrize("off", [1e-10, -1e-10])
+def test_master_that_is_off_by_rounding_is_followed(unit: Unit, off: float) -> None:
+    """The step ends where the master says, and covers the time from where the instance is."""
+    with at_one_second(unit) as instance, at_one_second(unit) as exact:
+        instance.step(1.0 + off, 0.01)
+        assert instance.get("time") == [1.0 + off + 0.01]
+        exact.step(1.0, 1.0 + off + 0.01 - 1.0)
+        assert reals(instance) == pytest.approx(reals(exact), rel=1e-13, abs=1e-13)
+        instance.step(1.01, 0.01)  # and back
+        exact.step(exact.get("time")[0], 1.02 - exact.get("time")[0])
+        assert reals(instance) == pytest.approx(reals(exact), rel=1e-13, abs=1e-13)
+        assert not instance.messages
+
+
+@pytest.mark.parametrize("off", [1e-3, -1e-3])
+def test_master_that_is_off_by_a_tenth_of_a_step_is_refused(unit: Unit, off: float) -> None:
+    with at_one_second(unit) as instance:
+        before = instance.everything()
+        assert status_of(instance.fmi.doStep, 1.0 + off, 0.01) == ERROR
+        text = instance.messages[-1].text
+        named = {float(number) for number in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?", text)}
+        assert {1.0, 1.0 + off} <= named
+        assert instance.everything() == before
+        instance.fmi.reset()
+        instance.initialize(**START)
+        instance.step(0.0, 0.01)
+
+
+# ---- Tunable parameters ------------------------------------------------------------------------
+
+
+CHANGES = [
+    {"m2": 1.6},
+    {"g": 1.62, "a": -0.3},
+    {"m1": 1.0, "I1z": 0.3, "I2z": 0.2, "l1": 0.7, "lc1": 0.4, "m2": 0.6},
+]
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("moving", [False, True])
+def test_new_parameters_are_those_of_a_new_instance(
+    unit: Unit, change: dict[str, float], moving: bool
+) -> None:
+    """A change between steps: as if a new instance started there, bit for bit."""
+
+    def go_on(instance: Instance) -> Iterator[list[float]]:
+        yield reals(instance, ("time", "solver_last_step"))  # the new one has made no step yet
+        for i in range(64, 192):
+            if i % 20 == 0:
+                instance.set(tau1=i / 100)
+            if moving:
+                instance.set_input_derivatives(tau1=[1.0, -2.0], f2=[0.5])
+            instance.step(i / 64, 1 / 64)
+            yield reals(instance)
+
+    inputs = {"tau1": 0.8, "f2": -7.0}
+    with Instance(unit) as instance, Instance(unit) as fresh:
+        instance.initialize(tolerance=1e-9, **START)
+        instance.set(**inputs)
+        for i in range(64):
+            instance.step(i / 64, 1 / 64)
+        states = dict(zip(STATES, instance.get(*STATES), strict=True))
+        before = instance.get("ddq1")
+        instance.set(**change)
+        assert instance.get("ddq1") != before
+        fresh.initialize(1.0, tolerance=1e-9, **states, **inputs, **change)
+        for found, expected in zip(go_on(instance), go_on(fresh), strict=True):
+            assert found == expected
+
+
+def test_new_parameters_at_a_time_that_is_rounded(unit: Unit) -> None:
+    """The new instance knows the time as a double, the old one what rounding left over as well.
+
+    Its first step is shorter or longer by that, so that the integrator may take other internal
+    steps: equal to what the integration is accurate to.
+    """
+    step, tolerance = 1 / 60, 1e-9
+    with Instance(unit) as instance, Instance(unit) as fresh:
+        instance.initialize(tolerance=tolerance, **START)
+        for i in range(60):
+            instance.step(i * step, step)
+        states = dict(zip(STATES, instance.get(*STATES), strict=True))
+        instance.set(m2=1.6)
+        fresh.initialize(60 * step, tolerance=tolerance, m2=1.6, **states)
+        for i in range(60, 120):
+            for one in (instance, fresh):
+                one.step(i * step, step)
+            assert instance.get(*STATES) == pytest.approx(fresh.get(*STATES), rel=tolerance)
+
+
+def test_parameters_set_to_what_they_are_change_nothing(unit: Unit) -> None:
+    with Instance(unit) as instance, Instance(unit) as other:
+        for one in (instance, other):
+            one.initialize(**START)
+            one.step(0.0, 0.5)
+        instance.set(m2=2.0)
+        instance.set(m2=1.0, tau1=0.0)
+        for one in (instance, other):
+            one.step(0.5, 0.5)
+        assert instance.everything() == other.everything()
+
+
+# ---- Logging -----------------------------------------------------------------------------------
+
+
+def debug_run(unit: Unit, prepare: Callable[[Instance], object], **options: object) -> Instance:
+    """The scenario hanging_swing, from SetupExperiment to Terminate; the instance is freed."""
+    scenario = load("hanging_swing")
+    with Instance(unit, **options) as instance:
+        prepare(instance)
+        values = scenario.parameters | scenario.initial
+        instance.initialize(scenario.start, scenario.stop, scenario.tolerance, **values)
+        for i, (t, end) in enumerate(pairwise(scenario.times.tolist())):
+            instance.set(**{name: v[i].item() for name, v in scenario.inputs.items()})
+            instance.step(t, end - t)
+            instance.get(*STATES)
+        instance.count("solver_steps")
+        instance.fmi.terminate()
+    return instance
+
+
+@pytest.mark.parametrize("how", ["instantiate", "all", "logAll"])
+def test_debug_run_shows_every_call(unit: Unit, how: str) -> None:
+    calls: list[str] = []
+
+    def prepare(instance: Instance) -> None:
+        if how != "instantiate":
+            instance.fmi.setDebugLogging(True, [] if how == "all" else [how])
+            instance.messages.clear()
+            calls.clear()
+
+    instance = debug_run(unit, prepare, logging_on=how == "instantiate", calls=calls.append)
+    made = [re.match(r"fmi2\w+", call).group() for call in calls]
+    assert made[-1] == "fmi2FreeInstance"
+    assert (made[0] == "fmi2Instantiate") == (how == "instantiate")
+    assert made.count("fmi2DoStep") == 1000
+    told = [m.text for m in instance.messages if m.category == "logAll"]
+    assert [text[: len(name)] for text, name in zip(told, made, strict=True)] == made
+    assert {m.status for m in instance.messages} == {OK}
+
+
+@pytest.mark.parametrize("how", ["default", "off again"])
+def test_nothing_is_logged_when_off(unit: Unit, how: str) -> None:
+    def prepare(instance: Instance) -> None:
+        if how == "off again":
+            instance.fmi.setDebugLogging(False, [])
+            instance.messages.clear()
+
+    assert debug_run(unit, prepare, logging_on=how == "off again").messages == []
+
+
+def test_categories_are_those_declared(unit: Unit) -> None:
+    declared = [category.name for category in unit.description.logCategories]
+    assert "logAll" in declared
+    with Instance(unit) as instance:
+        for category in declared:
+            instance.fmi.setDebugLogging(True, [category])
+        assert status_of(instance.fmi.setDebugLogging, True, ["logNothing"]) == ERROR
+
+
+# ---- Solver insight ----------------------------------------------------------------------------
+
+
+COUNTERS = ("solver_steps", "solver_rhs_evaluations", "solver_restarts", "solver_failed_steps")
+
+
+def counters(instance: Instance) -> dict[str, int]:
+    return {name: instance.count(name) for name in (*COUNTERS, "solver_last_order")}
+
+
+def test_solver_variables_are_declared(unit: Unit) -> None:
+    declared = {v.name: v for v in unit.description.modelVariables if v.name.startswith("solver_")}
+    assert [v.valueReference for v in declared.values()] == [80, 81, 85, 86, 87, 88, 90]
+    for name in (*COUNTERS, "solver_last_step", "solver_last_order"):
+        assert declared[name].causality == "local" and declared[name].variability == "discrete"
+
+
+def test_before_the_first_step_nothing_is_counted(unit: Unit) -> None:
+    with Instance(unit) as instance:
+        for _ in range(2):
+            instance.initialize(**START)
+            assert set(counters(instance).values()) == {0}
+            assert instance.get("solver_last_step") == [0.0]
+            instance.step(0.0, 0.1)
+            assert min(counters(instance)[name] for name in COUNTERS[:3]) > 0
+            instance.fmi.reset()
+
+
+def test_restarts_are_those_that_changes_ask_for(unit: Unit) -> None:
+    """One at the start, one for each change of an input or a parameter, one for each polynomial."""
+    with Instance(unit) as instance:
+        instance.initialize(**START, tau1=0.5)
+        t, expected = 0.0, 1
+        for i in range(60):
+            if i % 10 == 5:
+                instance.set(tau1=float(i))
+                expected += 1
+            if i % 10 == 7:
+                instance.set(tau1=99.0, f2=3.0)
+                instance.set(tau1=float(i - 2), f2=0.0)  # back again: no change
+            if i == 38:
+                instance.set(m1=2.5)
+                expected += 1
+            if i == 51:
+                instance.set_input_derivatives(f2=[1.0])
+                expected += 1  # with the polynomial
+            if i == 52:
+                expected += 1  # and without, from its last value
+            t = instance.step(t, 0.01)
+            assert instance.count("solver_restarts") == expected
+
+
+def test_numbers_of_the_solver_are_plausible(unit: Unit) -> None:
+    with Instance(unit) as instance:
+        instance.initialize(tolerance=1e-10, **WHIRL)
+        before, t = counters(instance), 0.0
+        highest = 0
+        for _ in range(2000):
+            t = instance.step(t, 0.01)
+            now = counters(instance)
+            assert all(now[name] >= before[name] for name in COUNTERS)
+            assert 1 <= now["solver_last_order"] <= 12  # Adams
+            assert 0 < instance.get("solver_last_step")[0] < 1
+            highest = max(highest, now["solver_last_order"])
+            before = now
+        assert highest > 4
+        assert t / now["solver_steps"] > 1e-3  # the mean step
+        assert now["solver_rhs_evaluations"] > now["solver_steps"]
+        assert 0 < now["solver_failed_steps"] < now["solver_steps"] / 10
+        # nothing changed: only the history's length asks for restarts
+        assert 1 <= now["solver_restarts"] <= 1 + now["solver_steps"] / 500
+
+
+def test_steps_follow_the_tolerance(unit: Unit) -> None:
+    steps = []
+    for tolerance in (1e-4, 1e-7, 1e-10):
+        with Instance(unit) as instance:
+            instance.initialize(tolerance=tolerance, **WHIRL)
+            instance.step(0.0, 10.0)
+            steps.append(instance.count("solver_steps"))
+    assert steps[0] < steps[1] < steps[2]
+
+
+def test_model_exchange_counts_nothing(unit: Unit) -> None:
+    with Instance(unit, fmi2.FMU2Model) as model:
+        model.initialize(**START)
+        model.fmi.newDiscreteStates()
+        model.fmi.enterContinuousTimeMode()
+        model.fmi.getDerivatives((c_double * 4)(), 4)
+        assert set(counters(model).values()) == {0}

@@ -1,0 +1,16 @@
+/* What every test of the built FMU begins and ends with: link fmu_fixture. */
+#include "fmu_harness.h"
+
+#include <unity.h>
+
+void suiteSetUp(void) {
+    fmu_load();
+}
+
+void setUp(void) {
+    fmu_log_clear(&messages);
+}
+
+void tearDown(void) {
+    fmu_tear_down(&messages);
+}

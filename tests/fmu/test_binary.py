@@ -1,0 +1,109 @@
+"""The shared object in each FMU: what it needs, how it is protected; two builds are the same."""
+
+import os
+import re
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import ROOT
+from tests.support.source_copy import copy_sources, run, settings_of
+
+FMUS = ("RPManipulator", "RPTrajectory", "RPController")
+
+
+@pytest.fixture(scope="module", params=FMUS)
+def binary(
+    request: pytest.FixtureRequest, fmu: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """The shared object of each FMU, taken out of its archive."""
+    with zipfile.ZipFile(fmu.with_name(f"{request.param}.fmu")) as archive:
+        name = f"binaries/linux64/{request.param}.so"
+        return Path(archive.extract(name, tmp_path_factory.mktemp("fmu")))
+
+
+def readelf(*arguments: object) -> str:
+    """What readelf says, in lines of any width."""
+    command = ["readelf", "--wide", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_it_needs_libc_and_libm_alone(binary: Path) -> None:
+    needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", readelf("--dynamic", binary)))
+    assert needed <= {"libc.so.6", "libm.so.6"}
+
+
+def test_it_names_no_folder_to_load_from(binary: Path) -> None:
+    assert not re.search(r"\((RPATH|RUNPATH)\)", readelf("--dynamic", binary))
+
+
+def test_it_needs_the_glibc_that_the_readme_states(binary: Path) -> None:
+    stated = re.search(
+        r"The binary needs glibc (\d+)\.(\d+)\s+or later", (ROOT / "README.md").read_text()
+    )
+    versions = re.findall(r"GLIBC_(\d+)\.(\d+)", readelf("--version-info", binary))
+    newest = max((int(major), int(minor)) for major, minor in versions)
+    assert newest == tuple(map(int, stated.groups()))
+    assert newest <= (2, 29)
+
+
+def test_relocations_are_read_only_when_it_is_loaded(binary: Path) -> None:
+    assert re.search(r"^ *GNU_RELRO ", readelf("--segments", binary), re.MULTILINE)
+    dynamic = readelf("--dynamic", binary)
+    assert "BIND_NOW" in dynamic and re.search(r"FLAGS_1\).*NOW", dynamic)
+
+
+def test_no_memory_is_writable_and_executable(binary: Path) -> None:
+    segments = re.findall(
+        r"^ *(LOAD|GNU_STACK)(?: +0x\w+){5} ([RWE ]{3}) ",
+        readelf("--segments", binary),
+        re.MULTILINE,
+    )
+    assert {name for name, _ in segments} == {"LOAD", "GNU_STACK"}
+    assert not [segment for segment in segments if {"W", "E"} <= set(segment[1])]
+
+
+def test_code_is_not_relocated(binary: Path) -> None:
+    assert "TEXTREL" not in readelf("--dynamic", binary)
+
+
+def test_the_stack_is_protected(binary: Path) -> None:
+    """By gcc for every function with an array, and where glibc knows the size of a buffer."""
+    symbols = readelf("--dyn-syms", binary)
+    assert "__stack_chk_fail" in symbols
+    assert "__vsnprintf_chk" in symbols
+
+
+def test_it_names_no_path_of_the_machine_that_built_it(binary: Path, fmu: Path) -> None:
+    content = binary.read_bytes()
+    for path in (ROOT, fmu.parent):
+        assert os.fsencode(path) not in content
+
+
+# ---- Two builds ---------------------------------------------------------------------------------
+
+
+def build(sources: Path, folder: Path, settings: list[str]) -> Path:
+    """Build the FMUs and the system of sources, without tests."""
+    run("cmake", "-S", sources, "-B", folder, "-DBUILD_TESTING=OFF", *settings)
+    run("cmake", "--build", folder, "--parallel", "2")
+    return folder
+
+
+def test_two_builds_in_two_folders_give_the_same_bytes(fmu: Path, tmp_path: Path) -> None:
+    """Copies in folders of names of other lengths, at another time and under another umask."""
+    first = copy_sources(tmp_path / "a")
+    second = copy_sources(tmp_path / "a folder with a longer name" / "b")
+    settings = settings_of(fmu.parent)
+    for path in second.rglob("*"):
+        os.utime(path, (1_000_000_000, 1_000_000_000))
+    before = os.umask(0o077)
+    try:
+        built = build(second, tmp_path / "elsewhere", settings)
+    finally:
+        os.umask(before)
+    expected = build(first, first / "build", settings)
+    for name in [f"{name}.fmu" for name in FMUS] + ["ClosedLoop.ssp"]:
+        assert (built / name).read_bytes() == (expected / name).read_bytes(), name

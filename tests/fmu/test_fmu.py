@@ -1,0 +1,124 @@
+"""The built FMU as its importers see it: archive, binary, model description, a run by fmpy."""
+
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.util import create_plotly_figure
+from fmpy.validation import validate_fmu
+
+from tests.support.paths import ROOT
+
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+
+
+@pytest.fixture(scope="module")
+def binary(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shared object, taken out of the archive."""
+    folder = tmp_path_factory.mktemp("fmu")
+    with zipfile.ZipFile(fmu) as archive:
+        return Path(archive.extract("binaries/linux64/RPManipulator.so", folder))
+
+
+def output_of(*command: object) -> str:
+    """Output of a command that must succeed."""
+    arguments = [str(argument) for argument in command]
+    return subprocess.run(arguments, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
+    with zipfile.ZipFile(fmu) as archive:
+        assert archive.testzip() is None
+        entries = {info.filename: info for info in archive.infolist()}
+        page = archive.read("documentation/index.html").decode()
+        picture = archive.read("model.png")
+    assert set(entries) == {
+        "binaries/linux64/RPManipulator.so",
+        "documentation/index.html",
+        "documentation/model.svg",
+        "documentation/licenses/license.txt",
+        "documentation/licenses/sundials.txt",
+        "model.png",
+        "modelDescription.xml",
+    }
+    for info in entries.values():
+        assert info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+        assert info.date_time == (1980, 1, 1, 0, 0, 0)
+    assert picture.startswith(b"\x89PNG")
+    assert "effective_relative_tolerance" in page and "<math" in page
+
+
+def test_the_binary_exports_the_functions_of_the_standard_and_nothing_else(binary: Path) -> None:
+    symbols = output_of("nm", "-D", "--defined-only", binary).split("\n")
+    exported = {line.split()[-1] for line in symbols if line}
+    header = (HEADERS / "fmi2Functions.h").read_text()
+    standard = set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
+    assert len(standard) == 44
+    assert exported == standard
+
+
+def test_fmpy_finds_no_problem(fmu: Path) -> None:
+    assert validate_fmu(str(fmu)) == []
+    command = Path(sys.executable).parent / "fmpy"
+    assert "No problems found." in output_of(command, "validate", fmu)
+
+
+def test_the_model_description_follows_the_schema(fmu: Path) -> None:
+    fmpy.read_model_description(str(fmu), validate=True)
+
+
+def test_fmpy_simulates_it_by_default(fmu: Path, tmp_path: Path) -> None:
+    result = tmp_path / "result.csv"
+    command = Path(sys.executable).parent / "fmpy"
+    output_of(command, "simulate", fmu, "--output-file", result)
+    rows = np.genfromtxt(result, delimiter=",", names=True)
+    assert rows["time"][0] == 0.0
+    assert rows["time"][-1] == 2.0
+    # free motion conserves the energy that the arm has at rest
+    energy = rows["total_energy"]
+    scale = np.max(np.abs(rows["kinetic_energy"]) + np.abs(rows["potential_energy"]))
+    assert np.max(np.abs(energy - energy[0])) <= 1e-6 * scale
+    assert np.ptp(rows["q1"]) > 1.0
+
+
+def test_inputs_of_a_user_drive_it(fmu: Path) -> None:
+    """At rest in the horizontal plane, a constant force on link 2 alone is uniform acceleration."""
+    signals = np.array([(0.0, 3.0), (1.0, 3.0)], dtype=[("time", float), ("f2", float)])
+    result = fmpy.simulate_fmu(
+        str(fmu), stop_time=1.0, step_size=0.01, start_values={"g": 0.0, "a": 0.0, "m2": 1.5},
+        input=signals, output=["q1", "q2", "dq2"],
+    )  # fmt: skip
+    np.testing.assert_allclose(result["q2"], 0.5 * 2.0 * result["time"] ** 2, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result["dq2"], 2.0 * result["time"], rtol=0, atol=1e-9)
+    assert np.all(result["q1"] == 0.0)
+
+
+def test_the_sample_of_the_readme_runs(fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = []
+    monkeypatch.setattr(fmpy, "plot_result", shown.append)
+    monkeypatch.chdir(ROOT)
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert len(blocks) == 1
+    exec(blocks[0].replace("build/RPManipulator.fmu", str(fmu)), {})
+    assert shown[0]["time"][-1] == 2.0
+
+
+def test_fmpy_can_plot(fmu: Path) -> None:
+    """`fmpy simulate --show-plot` draws with plotly, which fmpy does not bring by itself."""
+    result = fmpy.simulate_fmu(str(fmu), stop_time=0.1)
+    figure = create_plotly_figure(result)
+    assert len(figure.data) >= 14
+
+
+def test_the_page_names_the_fraction_of_the_tolerance_that_is_used(fmu: Path) -> None:
+    page = (ROOT / "models" / "rp_manipulator" / "README.md").read_text()
+    fraction = 1.0 / float(re.search(r"integrates at 1/(\d+) of", page).group(1))
+    result = fmpy.simulate_fmu(
+        str(fmu), stop_time=0.01, relative_tolerance=1e-6, output=["effective_relative_tolerance"]
+    )
+    assert result["effective_relative_tolerance"][0] == pytest.approx(1e-6 * fraction, rel=1e-14)

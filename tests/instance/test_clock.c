@@ -1,0 +1,53 @@
+#include "clock.h"
+
+#include <math.h>
+#include <unity.h>
+
+static void test_no_time_is_lost_where_doubles_are_coarse(void) {
+    // at 1e6 s doubles are 1.2e-10 s apart: each of these steps would be rounded by up to half of
+    // it
+    const struct clock_time start = {.s = 1e6};
+    struct clock_time time = start;
+    for (int i = 0; i < 1024 * 1024; i++) {
+        time = clock_add(time, 0x1p-40);
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(1.0 / (1 << 20), clock_difference(time, start));
+}
+
+static void test_accumulated_steps_meet_their_exact_sum(void) {
+    struct clock_time time = {0};
+    double rounded = 0.0;
+    for (int i = 0; i < 600000; i++) {
+        time = clock_add(time, 1e-3);
+        rounded += 1e-3;
+    }
+    // 600000 times the double nearest to 1e-3, in extended precision
+    const long double exact = 600000.0L * (long double)1e-3;
+    TEST_ASSERT_TRUE(fabsl((long double)time.s + time.rest - exact) < 1e-25L * 600000.0L + 1e-17L);
+    TEST_ASSERT_TRUE(fabs(rounded - 600.0) > 1e-9);
+}
+
+static void test_time_is_the_rounded_sum(void) {
+    const struct clock_time time = clock_add((struct clock_time){.s = 0.1, .rest = 1e-18}, 0.2);
+    TEST_ASSERT_EQUAL_DOUBLE(0.1 + 0.2, time.s);
+    TEST_ASSERT_TRUE(fabs(time.rest) <= 0.5 * 0x1p-53);
+}
+
+static void test_difference_has_the_sign_of_later_minus_earlier(void) {
+    const struct clock_time earlier = {.s = -0.5};
+    const struct clock_time later = {.s = 0.25, .rest = 1e-20};
+    TEST_ASSERT_EQUAL_DOUBLE(0.75, clock_difference(later, earlier));
+    TEST_ASSERT_EQUAL_DOUBLE(-0.75, clock_difference(earlier, later));
+}
+
+static void test_slack_is_small_against_time_and_step(void) {
+    TEST_ASSERT_EQUAL_DOUBLE(1e-9 * 2.0, clock_slack(2.0, 0.1));
+    TEST_ASSERT_EQUAL_DOUBLE(1e-9 * 2.0, clock_slack(-2.0, 0.1));
+    TEST_ASSERT_EQUAL_DOUBLE(1e-9 * 0.1, clock_slack(0.0, 0.1));
+    TEST_ASSERT_EQUAL_DOUBLE(1e-3 / 100.0, clock_slack(1e6, 1e-3));
+}
+
+static void test_slack_covers_the_rounding_of_a_communication_point(void) {
+    const double spacing = nextafter(1e6, INFINITY) - 1e6;
+    TEST_ASSERT_TRUE(clock_slack(1e6, 2.0 * spacing) >= spacing);
+}

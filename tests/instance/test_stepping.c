@@ -1,0 +1,343 @@
+/* From one communication point to the next, with each method, against the solution in closed form.
+ */
+#include "instance.h"
+
+#include "allocations.h"
+#include "derivatives.h"
+#include "each_method.h"
+#include "last_text.h"
+#include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+#include <unity.h>
+
+static struct instance *instance;
+
+/* The oscillator, with a note of how far the integrator has gone. */
+static double latest; /* s: latest time that the right-hand side was evaluated at */
+
+static enum status watched_rhs(const void *values, double t, const double x[], const double u[],
+                               double dx[]) {
+    latest = fmax(latest, t);
+    return oscillator_model.right_hand_side(values, t, x, u, dx);
+}
+
+static struct instance *create(void) {
+    static struct model model;
+    static struct model_description model_description;
+    const unsigned reference = OSCILLATOR_SOLVER_METHOD;
+    struct instance *created = NULL;
+    model = oscillator_model;
+    model.right_hand_side = watched_rhs;
+    model_description = oscillator_description;
+    model_description.model = &model;
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &created));
+    ASSERT_OK(instance_set_integer(created, &reference, 1, &method));
+    return created;
+}
+
+void setUp(void) {
+    memset(last_text, 0, sizeof last_text);
+    latest = -INFINITY;
+    instance = create();
+}
+
+void tearDown(void) {
+    instance_destroy(instance);
+}
+
+/* Back to what setUp gives. */
+static void begin_anew(void) {
+    tearDown();
+    setUp();
+}
+
+static double get(struct instance *from, unsigned reference) {
+    double value = NAN;
+    ASSERT_OK(instance_get_real(from, &reference, 1, &value));
+    return value;
+}
+
+static int get_integer(unsigned reference) {
+    int value = -1;
+    ASSERT_OK(instance_get_integer(instance, &reference, 1, &value));
+    return value;
+}
+
+static enum status set(struct instance *to, unsigned reference, double value) {
+    return instance_set_real(to, &reference, 1, &value);
+}
+
+static void initialize_until(struct instance *started, double start, double stop) {
+    const struct instance_experiment experiment = {
+        .start_time = start, .stop_time_defined = isfinite(stop), .stop_time = stop};
+    ASSERT_OK(instance_setup_experiment(started, &experiment));
+    ASSERT_OK(instance_enter_initialization(started));
+    ASSERT_OK(instance_exit_initialization(started));
+}
+
+static void initialize(struct instance *started, double start) {
+    initialize_until(started, start, INFINITY);
+}
+
+static void get_states(struct instance *from, double states[2]) {
+    states[0] = get(from, OSCILLATOR_X);
+    states[1] = get(from, OSCILLATOR_V);
+}
+
+/* An experiment whose input changes at every third step. */
+static void run(struct instance *stepped, int steps, double states[2]) {
+    for (int i = 0; i < steps; i++) {
+        ASSERT_OK(set(stepped, OSCILLATOR_U, sin((i / 3) * 0.1)));
+        ASSERT_OK(instance_do_step(stepped, i * 0.01, 0.01));
+    }
+    get_states(stepped, states);
+}
+
+/* ---- Solutions ----------------------------------------------------------------------------------
+ */
+
+EACH_METHOD static void test_held_inputs_give_the_exact_piecewise_solution(void) {
+    double exact[2] = {1.0, 0.0};
+    initialize(instance, 0.0);
+    for (int i = 0; i < 300; i++) {
+        const double u = cos(0.3 * i);
+        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        ASSERT_OK(instance_do_step(instance, 0.02 * i, 0.02));
+        oscillator_solution(2.0, u, 0.02, exact, exact);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(instance, OSCILLATOR_V));
+    }
+    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(instance, OSCILLATOR_TIME));
+}
+
+EACH_METHOD static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
+    double exact[2] = {1.0, 0.0};
+    initialize(instance, 0.0);
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    oscillator_solution(2.0, 0.0, 0.5, exact, exact);
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 3.0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+    ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
+    oscillator_solution(3.0, 0.0, 0.5, exact, exact);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+}
+
+EACH_METHOD static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
+    const unsigned reference = OSCILLATOR_MAX_STEPS;
+    const int limit = 20;
+    double exact[2] = {1.0, 0.0};
+    ASSERT_OK(instance_set_integer(instance, &reference, 1, &limit));
+    initialize(instance, 5.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 5.0, 100.0));
+    const double t = instance_time(instance);
+    TEST_ASSERT_TRUE(t > 5.0 && t < 105.0);
+    TEST_ASSERT_EQUAL_DOUBLE(t, get(instance, OSCILLATOR_TIME));
+    oscillator_solution(2.0, 0.0, t - 5.0, exact, exact);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_INT(20, get_integer(OSCILLATOR_STEPS));
+}
+
+EACH_METHOD static void test_setting_the_same_values_again_changes_nothing(void) {
+    struct instance *untouched = create();
+    initialize(instance, 0.0);
+    initialize(untouched, 0.0);
+    for (int i = 0; i < 100; i++) {
+        ASSERT_OK(set(instance, OSCILLATOR_U, 5.0)); // set and taken back before the step
+        ASSERT_OK(set(instance, OSCILLATOR_U, 0.0));
+        ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 2.0));
+        (void)get(instance, OSCILLATOR_ENERGY);
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+        ASSERT_OK(instance_do_step(untouched, 0.01 * i, 0.01));
+        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_X), get(instance, OSCILLATOR_X));
+        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_V), get(instance, OSCILLATOR_V));
+    }
+    instance_destroy(untouched);
+}
+
+EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
+    initialize(instance, 0.0);
+    for (int i = 0; i < 50; i++) {
+        ASSERT_OK(set(instance, OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0));
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+    }
+    const int alternating = get_integer(OSCILLATOR_STEPS);
+    begin_anew();
+    initialize(instance, 0.0);
+    for (int i = 0; i < 50; i++) {
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+    }
+    TEST_ASSERT_EQUAL_INT(get_integer(OSCILLATOR_STEPS), alternating);
+}
+
+EACH_CVODE_METHOD static void test_a_restart_happens_only_where_something_changed(void) {
+    double states[2];
+    initialize(instance, 0.0);
+    for (int i = 0; i < 100; i++) {
+        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
+    }
+    const int held = get_integer(OSCILLATOR_STEPS);
+
+    begin_anew();
+    initialize(instance, 0.0);
+    run(instance, 100, states);
+    TEST_ASSERT_TRUE(get_integer(OSCILLATOR_STEPS) > 3 * held);
+    TEST_ASSERT_TRUE(get_integer(OSCILLATOR_EVALUATIONS) > get_integer(OSCILLATOR_STEPS));
+}
+
+EACH_METHOD static void test_steps_allocate_nothing(void) {
+    double states[2];
+    initialize(instance, 0.0);
+    const long before = allocation_count();
+    run(instance, 100, states);
+    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+}
+
+/* ---- Beyond communication points ------------------------------------------------------------ */
+
+static void step_held(int steps, double h) {
+    for (int i = 0; i < steps; i++) {
+        ASSERT_OK(instance_do_step(instance, i * h, h));
+    }
+}
+
+EACH_CVODE_METHOD static void test_internal_steps_pass_points_where_nothing_changes(void) {
+    const double h = 1.0 / 1024.0;
+    initialize(instance, 0.0);
+    step_held(1024, h);
+    TEST_ASSERT_TRUE(latest > 1.0 + h);
+    TEST_ASSERT_LESS_THAN_INT(512, get_integer(OSCILLATOR_STEPS));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(instance, OSCILLATOR_X));
+}
+
+EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
+    static const double stops[] = {0.5, 0.7, 1.0};
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
+        const double h = stops[i] / 100.0;
+        begin_anew();
+        initialize_until(instance, 0.0, stops[i]);
+        step_held(100, h);
+        TEST_ASSERT_TRUE(latest <= stops[i] * (1.0 + 1e-12));
+        TEST_ASSERT_TRUE(latest >= stops[i] * (1.0 - 1e-12));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(instance, OSCILLATOR_X));
+    }
+}
+
+/* In the step with a derivative and in one right after steps that went beyond. */
+EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(void) {
+    const unsigned input = OSCILLATOR_U;
+    const int order = 1;
+    const double slope = 0.5;
+    const double h = 1.0 / 1024.0;
+    initialize(instance, 0.0);
+    step_held(1024, h);
+    for (int i = 1024; i < 1100; i++) {
+        latest = -INFINITY;
+        ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
+        ASSERT_OK(instance_do_step(instance, i * h, h));
+        TEST_ASSERT_TRUE(latest <= (i + 1) * h * (1.0 + 1e-12));
+    }
+}
+
+/* What lies beyond is dropped: the solution with the new input begins in the state at the point. */
+EACH_METHOD static void test_a_new_input_acts_from_the_point_on(void) {
+    const double h = 1.0 / 1024.0;
+    const double length = 0.25;
+    double exact[2];
+    double states[2];
+    initialize(instance, 0.0);
+    step_held(1024, h);
+    for (int i = 0; i < 40; i++) {
+        const double u = i % 2 == 0 ? 3.0 : -3.0;
+        get_states(instance, states);
+        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        ASSERT_OK(instance_do_step(instance, 1.0 + i * length, length));
+        oscillator_solution(2.0, u, length, states, exact);
+        get_states(instance, states);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[0], states[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, exact[1], states[1]);
+    }
+}
+
+/* With another parameter there is no first step from before either: bit for bit a new instance that
+ * starts in the state at the point, the times being exact. */
+EACH_METHOD static void test_a_new_parameter_makes_a_new_instance(void) {
+    const double h = 1.0 / 1024.0;
+    double states[2];
+    double expected[2];
+    initialize_until(instance, 0.0, 4.0);
+    step_held(1024, h);
+    get_states(instance, states);
+    struct instance *fresh = create();
+    ASSERT_OK(set(fresh, OSCILLATOR_X, states[0]));
+    ASSERT_OK(set(fresh, OSCILLATOR_V, states[1]));
+    ASSERT_OK(set(fresh, OSCILLATOR_OMEGA, 3.0));
+    ASSERT_OK(set(fresh, OSCILLATOR_U, 1.5));
+    initialize_until(fresh, 1.0, 4.0);
+    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 3.0));
+    ASSERT_OK(set(instance, OSCILLATOR_U, 1.5));
+    for (int i = 1024; i < 2048; i++) {
+        ASSERT_OK(instance_do_step(instance, i * h, h));
+        ASSERT_OK(instance_do_step(fresh, i * h, h));
+        get_states(instance, states);
+        get_states(fresh, expected);
+        TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
+    }
+    instance_destroy(fresh);
+}
+
+/* ---- Jumps of the input --------------------------------------------------------------------- */
+
+/* Linear congruential generator of Knuth, MMIX: from -1 to 1. */
+static double random_sign(uint64_t *state) {
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) * 0x1p-52 - 1.0;
+}
+
+/* Error of 1000 steps of 1/128 s, relative to the largest values of the solution. The input jumps
+ * by up to this fraction of itself, at every so many communication points. */
+static double error_with_jumps(double tolerance, double jump, int every) {
+    const double h = 1.0 / 128.0;
+    uint64_t random = 1;
+    double exact[2] = {1.0, 0.0};
+    double states[2];
+    double u = 1.0;
+    double error = 0.0;
+    double scale = 0.0;
+    begin_anew();
+    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, tolerance));
+    initialize(instance, 0.0);
+    for (int i = 0; i < 1000; i++) {
+        if (i % every == 0) {
+            u = 1.0 + jump * random_sign(&random);
+        }
+        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        ASSERT_OK(instance_do_step(instance, i * h, h));
+        oscillator_solution(2.0, u, h, exact, exact);
+        get_states(instance, states);
+        for (int k = 0; k < 2; k++) {
+            error = fmax(error, fabs(states[k] - exact[k]));
+            scale = fmax(scale, fabs(exact[k]));
+        }
+    }
+    return error / scale;
+}
+
+/* No size of jump is so small that going on costs accuracy, or so large that a restart does. */
+EACH_METHOD static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
+    static const double tolerances[] = {1e-4, 1e-6, 1e-8, 1e-10};
+    static const int intervals[] = {1, 25};
+    for (int i = 0; i < 8; i++) {
+        const double tolerance = tolerances[i / 2];
+        const double smallest = error_with_jumps(tolerance, 1e-12, intervals[i % 2]);
+        for (int exponent = -12; exponent <= 3; exponent++) {
+            const double error = error_with_jumps(tolerance, pow(10.0, exponent), intervals[i % 2]);
+            TEST_ASSERT_TRUE(error <= 3.0 * tolerance);
+            TEST_ASSERT_TRUE(error <= 2.0 * smallest);
+        }
+    }
+}

@@ -1,0 +1,393 @@
+#include "integrator.h"
+
+#include "allocations.h"
+#include "each_method.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+/* x' = v, v' = -x, until failing_from, from where on the right-hand side gives NaN. */
+struct circle {
+    double latest; /* s: latest time asked for */
+    double failing_from;
+    long evaluations;
+};
+
+static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
+    struct circle *of = context;
+    of->latest = fmax(of->latest, t);
+    of->evaluations++;
+    dx[0] = x[1];
+    dx[1] = t >= of->failing_from ? NAN : -x[0];
+    return STATUS_OK;
+}
+
+static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
+    (void)t;
+    (void)x;
+    (void)context;
+    static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
+    memcpy(J, columns, sizeof columns);
+    return STATUS_OK;
+}
+
+static enum status always_failing(double t, const double x[], double dx[], void *context) {
+    (void)t;
+    (void)context;
+    memcpy(dx, x, 2 * sizeof(double));
+    return STATUS_OUT_OF_RANGE;
+}
+
+static struct circle circle;
+static struct integrator *integrator;
+static long step_limit;
+static int message_count;
+static enum status message_status;
+
+static void count_message(void *context, enum status status, const char *text) {
+    TEST_ASSERT_EQUAL_PTR(&circle, context);
+    TEST_ASSERT_TRUE(strlen(text) > 0);
+    message_status = status;
+    message_count++;
+}
+
+static const double start[2] = {1.0, 0.0};
+
+static void create(ode_rhs *rhs) {
+    const struct ode ode = {
+        .state_count = 2, .rhs = rhs, .jacobian = circle_jacobian, .context = &circle};
+    const struct message_sink sink = {.write = count_message, .context = &circle};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
+}
+
+static void configure(double tolerance) {
+    const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
+    const struct integrator_settings settings = {
+        .method = method, .relative_tolerance = tolerance, .absolute_tolerances = absolute};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+}
+
+static void restart(double span) {
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, span, 0.0));
+}
+
+static void advance(double t, double x[2]) {
+    double reached;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, step_limit, &reached, x));
+    TEST_ASSERT_EQUAL_DOUBLE(t, reached);
+}
+
+void setUp(void) {
+    circle = (struct circle){.failing_from = INFINITY};
+    message_count = 0;
+    step_limit = 100000;
+    create(circle_rhs);
+    configure(1e-10);
+}
+
+void tearDown(void) {
+    integrator_destroy(integrator);
+}
+
+EACH_METHOD static void test_the_state_is_that_of_the_time_asked_for(void) {
+    double x[2];
+    restart(INFINITY);
+    for (int i = 1; i <= 1000; i++) {
+        const double t = 0.01 * i;
+        advance(t, x);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(t), x[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, -sin(t), x[1]);
+    }
+    TEST_ASSERT_EQUAL_INT(0, message_count);
+}
+
+EACH_METHOD static void test_the_error_follows_the_tolerance(void) {
+    double coarse = INFINITY;
+    for (int digits = 4; digits <= 12; digits += 2) {
+        double x[2];
+        configure(pow(10.0, -digits));
+        restart(INFINITY);
+        advance(10.0, x);
+        const double error = hypot(x[0] - cos(10.0), x[1] + sin(10.0));
+        // the circle neither grows nor damps errors: at worst all steps' local errors add up
+        struct integrator_statistics statistics;
+        integrator_get_statistics(integrator, &statistics);
+        TEST_ASSERT_TRUE(error < sqrt(2.0) * (double)statistics.steps * pow(10.0, -digits));
+        TEST_ASSERT_TRUE(error < coarse);
+        coarse = error;
+    }
+}
+
+EACH_CVODE_METHOD static void test_asking_for_more_points_costs_no_steps(void) {
+    double x[2];
+    struct integrator_statistics few;
+    struct integrator_statistics many;
+    restart(INFINITY);
+    advance(0.1, x);
+    advance(10.0, x);
+    integrator_get_statistics(integrator, &few);
+
+    configure(1e-10);
+    restart(INFINITY);
+    for (int i = 1; i <= 100; i++) {
+        advance(0.1 * i, x);
+    }
+    integrator_get_statistics(integrator, &many);
+    TEST_ASSERT_TRUE(labs(many.steps - few.steps) <= 1);
+}
+
+/* To the bit: where else there was a stop does not matter. */
+EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
+    enum { POINTS = 300 };
+    const double first_step = 1e-6; // otherwise it depends on the first point
+    double many[POINTS][2];
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, INFINITY, first_step));
+    for (int i = 0; i < POINTS; i++) {
+        advance(0.01 * (i + 1), many[i]);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        double alone[2];
+        TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                              integrator_restart(integrator, start, INFINITY, first_step));
+        advance(0.01 * (i + 1), alone);
+        TEST_ASSERT_EQUAL_MEMORY(alone, many[i], sizeof alone);
+    }
+}
+
+EACH_METHOD static void test_a_restart_begins_at_time_zero_from_its_state(void) {
+    double first[2];
+    double again[2];
+    restart(INFINITY);
+    advance(3.0, first);
+    restart(INFINITY);
+    advance(3.0, again);
+    TEST_ASSERT_EQUAL_MEMORY(first, again, sizeof first);
+}
+
+EACH_METHOD static void test_nothing_is_evaluated_beyond_the_span(void) {
+    double x[2];
+    restart(1.0);
+    for (int i = 1; i <= 100; i++) {
+        advance(0.01 * i, x);
+    }
+    TEST_ASSERT_TRUE(circle.latest <= 1.0 + 1e-12);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(1.0), x[0]);
+
+    // a later restart without a span is not bound by the former one
+    restart(INFINITY);
+    advance(2.0, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
+}
+
+/* What a snapshot relies on: where the stops were in between does not matter. */
+EACH_CVODE_METHOD static void test_a_run_can_be_repeated_with_two_stops(void) {
+    double x[2];
+    double repeated[2];
+    struct integrator_statistics first;
+    struct integrator_statistics second;
+    restart(7.0);
+    for (int i = 1; i <= 60; i++) {
+        advance(0.1 * i, x);
+    }
+    integrator_get_statistics(integrator, &first);
+
+    restart(7.0);
+    advance(0.1, repeated);
+    advance(0.1 * 60, repeated);
+    TEST_ASSERT_EQUAL_MEMORY(x, repeated, sizeof x);
+    integrator_set_statistics(integrator, &first);
+
+    // and go on alike
+    for (int i = 61; i <= 70; i++) {
+        advance(fmin(0.1 * i, 7.0), repeated);
+    }
+    integrator_get_statistics(integrator, &second);
+    configure(1e-10);
+    restart(7.0);
+    for (int i = 1; i <= 70; i++) {
+        advance(fmin(0.1 * i, 7.0), x);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x, repeated, sizeof x);
+    struct integrator_statistics whole;
+    integrator_get_statistics(integrator, &whole);
+    TEST_ASSERT_EQUAL_MEMORY(&whole, &second, sizeof whole);
+}
+
+EACH_METHOD static void test_statistics_add_up_over_restarts(void) {
+    double x[2];
+    struct integrator_statistics once;
+    struct integrator_statistics thrice;
+    restart(INFINITY);
+    advance(1.0, x);
+    integrator_get_statistics(integrator, &once);
+    TEST_ASSERT_TRUE(once.steps > 0);
+    TEST_ASSERT_EQUAL_INT(circle.evaluations, once.rhs_evaluations);
+
+    for (int i = 0; i < 2; i++) {
+        restart(INFINITY);
+        advance(1.0, x);
+    }
+    integrator_get_statistics(integrator, &thrice);
+    TEST_ASSERT_EQUAL_INT(3 * once.steps, thrice.steps);
+    TEST_ASSERT_EQUAL_INT(circle.evaluations, thrice.rhs_evaluations);
+
+    configure(1e-10);
+    integrator_get_statistics(integrator, &once);
+    TEST_ASSERT_EQUAL_INT(0, once.steps);
+}
+
+EACH_METHOD static void test_too_many_steps_leave_a_valid_state(void) {
+    double x[2];
+    double reached;
+    configure(1e-10);
+    step_limit = 20;
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
+                          integrator_advance(integrator, 10.0, step_limit, &reached, x));
+    TEST_ASSERT_TRUE(reached > 0.0 && reached < 10.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(reached), x[0]);
+    TEST_ASSERT_TRUE(message_count > 0);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, message_status);
+}
+
+EACH_METHOD static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(void) {
+    double x[2];
+    double reached;
+    circle.failing_from = 1.0;
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
+                          integrator_advance(integrator, 2.0, step_limit, &reached, x));
+    TEST_ASSERT_TRUE(reached > 0.5 && reached <= 1.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(reached), x[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, -sin(reached), x[1]);
+}
+
+EACH_METHOD static void test_a_right_hand_side_that_fails_at_once_leaves_the_state(void) {
+    double x[2];
+    double reached;
+    circle.failing_from = 0.0;
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
+                          integrator_advance(integrator, 2.0, step_limit, &reached, x));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
+    TEST_ASSERT_EQUAL_MEMORY(start, x, sizeof start);
+
+    integrator_destroy(integrator);
+    create(always_failing);
+    configure(1e-10);
+    restart(INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
+                          integrator_advance(integrator, 2.0, step_limit, &reached, x));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, reached);
+}
+
+EACH_METHOD static void test_a_restart_after_a_failure_works(void) {
+    double x[2];
+    double reached;
+    circle.failing_from = 1.0;
+    restart(INFINITY);
+    TEST_ASSERT_TRUE(integrator_advance(integrator, 2.0, step_limit, &reached, x) != STATUS_OK);
+    circle.failing_from = INFINITY;
+    restart(INFINITY);
+    advance(2.0, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
+}
+
+EACH_METHOD static void test_nothing_is_allocated_after_creation(void) {
+    double x[2];
+    const long before = allocation_count();
+    configure(1e-8);
+    for (int i = 0; i < 100; i++) {
+        restart(i % 2 == 0 ? INFINITY : 2.0);
+        advance(1.0, x);
+        advance(2.0, x);
+    }
+    TEST_ASSERT_EQUAL_INT(before, allocation_count());
+    TEST_ASSERT_TRUE(before > 0);
+}
+
+/* The limit of a new integrator, and of one that had another. */
+EACH_METHOD static void test_no_step_is_longer_than_the_limit(void) {
+    static const double limits[] = {1e-4, 0.0, 0.01};
+    double x[2];
+    const double absolute[2] = {1e-6, 1e-6};
+    struct integrator_settings settings = {
+        .method = method, .relative_tolerance = 1e-4, .absolute_tolerances = absolute};
+    struct integrator_statistics statistics;
+    integrator_destroy(integrator);
+    create(circle_rhs);
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
+        const double limit = settings.max_step = limits[i];
+        const double length = limit > 0.0 ? 100.0 * limit : 1.0;
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+        restart(INFINITY);
+        advance(length, x);
+        integrator_get_statistics(integrator, &statistics);
+        if (limit > 0.0) {
+            TEST_ASSERT_TRUE(statistics.last_step <= limit * (1.0 + 1e-9));
+            TEST_ASSERT_GREATER_OR_EQUAL_INT(100, statistics.steps);
+        } else {
+            TEST_ASSERT_TRUE(statistics.last_step > 0.01);
+        }
+    }
+}
+
+/* Whatever state the one before ended with. */
+EACH_METHOD static void test_another_method_may_take_over(void) {
+    static const double not_finite[2] = {NAN, INFINITY};
+    const double absolute[2] = {1e-12, 1e-12};
+    double x[2];
+    double expected[2];
+    restart(INFINITY);
+    advance(1.0, expected);
+    for (enum integrator_method other = INTEGRATOR_CVODE_ADAMS; other < INTEGRATOR_METHODS;
+         other++) {
+        const struct integrator_settings settings = {
+            .method = other, .relative_tolerance = 1e-10, .absolute_tolerances = absolute};
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, not_finite, INFINITY, 0.0));
+    }
+    configure(1e-10);
+    restart(INFINITY);
+    advance(1.0, x);
+    TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
+}
+
+EACH_METHOD static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
+    static const double limits[] = {1e-3, 1e-9, 5e-324, 1e300};
+    const double absolute[2] = {1e-16, 1e-16};
+    struct integrator_settings settings = {
+        .method = method, .relative_tolerance = 1e-14, .absolute_tolerances = absolute};
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
+        settings.max_step = limits[i];
+        integrator_destroy(integrator);
+        create(circle_rhs);
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    }
+}
+
+EACH_METHOD static void test_a_vanishing_step_ends_in_the_same_way_each_time(void) {
+    static const double lengths[] = {5e-324, 1e-300, 1e-200};
+    for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
+        enum status statuses[2];
+        long evaluations[2];
+        for (int k = 0; k < 2; k++) {
+            struct integrator_statistics statistics;
+            double x[2];
+            double reached;
+            configure(1e-8);
+            restart(INFINITY);
+            statuses[k] = integrator_advance(integrator, lengths[i], step_limit, &reached, x);
+            integrator_get_statistics(integrator, &statistics);
+            evaluations[k] = statistics.rhs_evaluations;
+        }
+        TEST_ASSERT_EQUAL_INT(statuses[0], statuses[1]);
+        TEST_ASSERT_EQUAL_INT(evaluations[0], evaluations[1]);
+    }
+}
+
+EACH_METHOD static void test_destroying_nothing_is_allowed(void) {
+    integrator_destroy(NULL);
+}

@@ -1,0 +1,292 @@
+"""Commands that the system or the user stops: one line says so, nothing half-written is left."""
+
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cosim.__main__ import main
+from tests.support.cosim_project import without_progress
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP
+
+SCENARIO = "constant_effort_single_step"
+RUN = ("run", SCENARIO, "--tolerance", "1e-8")
+SYSTEM = ("system", "nominal")
+LONG = ("run", "constant_effort")
+FMU_SOURCES = ROOT / "fmu"
+
+
+class Place:
+    """Folders of a command: where it is run, its report, its temporary files."""
+
+    def __init__(self, folder: Path, fmu: Path) -> None:
+        self.here = folder / "a folder, ü"
+        self.report = self.here / "report"
+        self.temporary = folder / "temporary"
+        self.here.mkdir()
+        self.temporary.mkdir()
+        self.fmu = fmu
+
+    def popen(
+        self, arguments: tuple[str, ...], largest: int | None = None, **options
+    ) -> subprocess.Popen:
+        """Start a command, which may write files of at most `largest` bytes."""
+        given = ("--fmu", str(self.fmu)) if arguments[0] == "run" else ("--ssp", str(SSP))
+
+        def limit() -> None:
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            if largest is not None:
+                resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+        return subprocess.Popen(
+            [sys.executable, "-P", "-m", "cosim", *arguments, *given, "--report", "report"],
+            cwd=self.here,
+            env={
+                **os.environ,
+                "PYTHONPATH": str(ROOT),
+                "TMPDIR": str(self.temporary),
+                **options.pop("env", {}),
+            },
+            text=True,
+            preexec_fn=limit,
+            **{key: value for key, value in streams.items() if key != "env"},
+        )
+
+    def call(self, arguments: tuple[str, ...], **options) -> tuple[int, str, str]:
+        with self.popen(arguments, **options) as process:
+            out, err = process.communicate(timeout=100)
+        return process.returncode, out, without_progress(err or "")
+
+    def written(self) -> list[str]:
+        """Names in the report's folder."""
+        return sorted(x.name for x in self.report.iterdir()) if self.report.exists() else []
+
+    def assert_clean(self) -> None:
+        """No temporary file is left, under whatever name."""
+        assert [x.name for x in self.temporary.iterdir() if x.name.startswith("cosim-")] == []
+        assert [name for name in self.written() if name.startswith(".")] == []
+
+
+@pytest.fixture
+def place(tmp_path: Path, fmu: Path) -> Place:
+    return Place(tmp_path, fmu)
+
+
+def assert_one_line(err: str, *parts: str) -> None:
+    assert err.startswith("error: ") and err.count("\n") == 1
+    for part in parts:
+        assert part in err
+
+
+# ---- no room on the disk -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("arguments", "largest"), [(RUN, 0), (RUN, 30_000), (SYSTEM, 1_000_000)])
+def test_no_room_for_files(place: Place, arguments: tuple[str, ...], largest: int) -> None:
+    """Where the copy of the FMU, or the values of a run, find no room."""
+    code, _, err = place.call(arguments, largest=largest)
+    assert code == 2
+    # matplotlib has a line of its own where it cannot keep its list of fonts
+    assert_one_line(re.sub("^Could not save font_manager.*\n", "", err))
+    assert place.written() == []
+    place.assert_clean()
+
+
+@pytest.mark.parametrize("arguments", [RUN, SYSTEM], ids=["run", "system"])
+def test_no_room_for_the_report(place: Place, arguments: tuple[str, ...]) -> None:
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place.here],
+        capture_output=True,
+        check=False,
+    )
+    if mounted.returncode:
+        pytest.skip("only root can make a small disk")
+    try:
+        code, _, err = place.call(arguments)
+        assert code == 2
+        assert_one_line(err, "report: the report cannot be written: No space left on device")
+        assert place.written() == []
+        place.assert_clean()
+    finally:
+        subprocess.run(["umount", place.here], check=True)
+
+
+@pytest.mark.parametrize("program", ["generate", "package", "document"])
+def test_what_builds_an_fmu_leaves_nothing_broken(tmp_path: Path, program: str) -> None:
+    """An older file stays as it was, and no other appears."""
+    model = ROOT / "models" / "rp_manipulator"
+    description = ROOT / "build" / "fmu" / "RPManipulator" / "modelDescription.xml"
+    output = tmp_path / "out"
+    output.mkdir()
+    file, arguments = {
+        "generate": ("modelDescription.xml", [model / "variables.toml", "--output", output]),
+        "package": ("a.fmu", [output / "a.fmu", f"model={model}"]),
+        "document": (
+            "index.html",
+            ["--readme", model / "README.md", "--model-description", description]
+            + ["--output", output],
+        ),
+    }[program]
+    (output / file).write_bytes(b"\xff older")
+
+    def limit() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
+
+    done = subprocess.run(
+        [sys.executable, "-B", FMU_SOURCES / f"{program}.py", *arguments],
+        preexec_fn=limit,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"{program}.py: ") and done.stderr.count("\n") == 1
+    assert [x.name for x in output.iterdir()] == [file]
+    assert (output / file).read_bytes() == b"\xff older"
+
+
+# ---- no reader of the output -------------------------------------------------------------------
+
+
+def test_the_reader_leaves(place: Place) -> None:
+    with place.popen(SYSTEM) as process:
+        process.stdout.readline()
+        process.stdout.close()
+        err = process.stderr.read()
+    assert process.returncode == 1 and err == ""
+    place.assert_clean()
+
+
+def test_no_room_for_the_output(place: Place) -> None:
+    with Path("/dev/full").open("w") as full:
+        code, _, err = place.call(RUN, stdout=full)
+    assert code == 2
+    assert_one_line(err, "output or temporary files: No space left on device")
+    place.assert_clean()
+
+
+def test_no_room_for_errors(place: Place) -> None:
+    with Path("/dev/full").open("w") as full:
+        code, out, _ = place.call(("run", "unknown"), stderr=full)
+    assert code == 2 and out == ""
+
+
+def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "cosim", tmp_path / "cosim")
+    model = tmp_path / "models" / "m"
+    (model / "scenarios").mkdir(parents=True)
+    text = (
+        'title = "A"\ndescription = "B"\ntolerance = 1e-6\n[time]\nstart = 0\nstop = 1\nstep = 1\n'
+    )
+    (model / "scenarios" / "ü.toml").write_text(text)
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim", "list"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"\\xfc  A\n", b"")
+
+
+def test_a_message_is_one_line_whatever_it_quotes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "a\nb\x1b[31m"]) == 2
+    assert_one_line(capsys.readouterr().err, r"a\nb\x1b[31m")
+
+
+# ---- the user stops it -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("stop", "code", "told"),
+    [(signal.SIGINT, 130, "interrupted\n"), (signal.SIGTERM, 143, "")],
+    ids=["Ctrl-C", "SIGTERM"],
+)
+@pytest.mark.parametrize("arguments", [LONG, ("system",)], ids=["run", "system"])
+def test_stopped_in_the_middle(
+    place: Place,
+    arguments: tuple[str, ...],
+    stop: signal.Signals,
+    code: int,
+    told: str,
+) -> None:
+    with place.popen(arguments) as process:
+        process.stdout.readline()  # the head of the table: an FMU is unpacked
+        time.sleep(0.3)
+        process.send_signal(stop)
+        out, err = process.communicate(timeout=20)
+    if "report: " not in out:  # else it had ended before
+        assert (process.returncode, without_progress(err)) == (code, told)
+    place.assert_clean()
+
+
+@pytest.mark.parametrize(
+    ("stop", "code", "told"),
+    [("SIGINT", 130, "interrupted\n"), ("SIGTERM", 143, "")],
+    ids=["Ctrl-C", "SIGTERM"],
+)
+def test_a_library_may_hide_that_it_was_stopped(stop: str, code: int, told: str) -> None:
+    program = f"""
+import os, signal, sys
+from cosim import __main__ as cli
+
+def main():
+    try:
+        os.kill(os.getpid(), signal.{stop})
+        signal.pause()
+    except BaseException:
+        raise ValueError("Invalid affine transformation matrix")
+
+cli.main = main
+sys.exit(cli._as_program())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (code, told)
+
+
+# ---- surroundings ------------------------------------------------------------------------------
+
+
+def test_without_a_home_and_with_the_plainest_locale(place: Place) -> None:
+    environment = {"LC_ALL": "C", "LANG": "C", "HOME": "/nonexistent"}
+    code, out, err = place.call(RUN, env=environment)
+    assert (code, err) == (0, "")
+    assert "report: report/index.html\n" in out  # relative to the current folder
+    place.assert_clean()
+
+
+def test_the_scripts_take_no_modules_from_elsewhere(tmp_path: Path) -> None:
+    """Neither of the current folder nor of PYTHONPATH."""
+    for name in ("numpy", "tomllib", "argparse"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('the wrong module')")
+    text = (ROOT / "run.sh").read_text()
+    assert "unset PYTHONPATH PYTHONHOME" in text
+    commands = re.findall(r'exec "\$python" (.*) -m cosim', text)
+    assert len(commands) == 3 and set(commands) == {"-P"}
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "cosim", "list"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")

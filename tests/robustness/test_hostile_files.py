@@ -1,0 +1,331 @@
+"""Files that are no files, are cut or are endless: one line that says so, nothing left behind."""
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cosim import input_files, reference
+from cosim import scenario as scenarios
+from cosim.errors import UserError
+from cosim.fmu_file import Fmu
+from cosim.system import ssp
+from models.closed_loop.coupling.loop import opened as opened_loop
+from tests.support.cosim_project import declared
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP, Edit, edited, replace
+
+MODEL = "rp_manipulator"
+SCENARIO = "constant_effort_single_step"
+STRUCTURE = "SystemStructure.ssd"
+DESCRIPTION = "modelDescription.xml"
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    """A copy of the model's folder with one scenario."""
+    folder = tmp_path / "models" / MODEL
+    part = f"scenarios/{SCENARIO}.toml"
+    (folder / part).parent.mkdir(parents=True)
+    shutil.copy(ROOT / "models" / MODEL / part, folder / part)
+    source = ROOT / "models" / MODEL / "references" / SCENARIO
+    shutil.copytree(source, folder / "references" / SCENARIO)
+    return folder
+
+
+def scenario_file(model: Path) -> Path:
+    return model / "scenarios" / f"{SCENARIO}.toml"
+
+
+def reference_file(model: Path) -> Path:
+    return model / "references" / SCENARIO / "RPManipulator_ref.csv"
+
+
+def read(model: Path) -> None:
+    reference.load(scenarios.load(scenario_file(model), declared(MODEL)), declared(MODEL))
+
+
+def refused(action: Callable[[], object], *parts: str) -> None:
+    with pytest.raises(UserError) as caught:
+        action()
+    for part in parts:
+        assert part in str(caught.value)
+
+
+def open_fmu(path: Path) -> None:
+    with Fmu(path):
+        pass
+
+
+def open_ssp(path: Path) -> None:
+    with ssp.unpacked(path):
+        pass
+
+
+# ---- what is no file ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", [scenario_file, reference_file])
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (os.mkfifo, "a device or a pipe"),
+        (lambda path: path.symlink_to("/dev/zero"), "a device or a pipe"),
+        (lambda path: path.symlink_to(path.name), "Too many levels"),
+        (lambda path: path.mkdir(), "Is a directory"),
+    ],
+    ids=["pipe", "device", "loop", "folder"],
+)
+def test_what_is_no_file_is_refused_at_once(
+    model: Path,
+    file: Callable[[Path], Path],
+    make: Callable[[Path], object],
+    message: str,
+) -> None:
+    path = file(model)
+    path.unlink()
+    make(path)
+    refused(lambda: read(model), path.name, message)
+
+
+@pytest.mark.parametrize("action", [open_fmu, open_ssp], ids=["FMU", "SSP"])
+def test_a_pipe_is_no_archive(tmp_path: Path, action: Callable[[Path], None]) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    refused(lambda: action(tmp_path / "pipe"), "pipe: cannot be read", "expected a file")
+
+
+def test_files_of_other_editors_are_read(model: Path) -> None:
+    for path in (scenario_file(model), reference_file(model)):
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    read(model)
+
+
+def test_files_that_are_too_large(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(input_files, "LARGEST_TOML", 10_000_000)
+    with scenario_file(model).open("r+b") as file:
+        file.truncate(10_000_001)
+    refused(lambda: read(model), f"{SCENARIO}.toml: is larger than 10 MB")
+
+
+# ---- scenarios -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("start = 0.0", f"start = 0x{'f' * 5000}", "[time] start: expected a finite number"),
+        ("start = 0.0", f"start = [0x{'f' * 5000}]", "[time] start: expected a number"),
+        ("start = 0.0", f"start{'.x' * 50_000} = 0.0", "a key of more than 32 parts"),
+        ("[time]", f"x = {'[' * 100_000}\n[time]", "not valid TOML"),
+    ],
+    ids=["number", "number in a list", "key", "nesting"],
+)
+def test_values_beyond_all_measure(model: Path, old: str, new: str, message: str) -> None:
+    path = scenario_file(model)
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    refused(lambda: read(model), f"{SCENARIO}.toml", message)
+
+
+def test_a_pattern_of_too_many_steps(model: Path) -> None:
+    path = scenario_file(model)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    long = f"step = [{', '.join(['0.01'] * 1001)}]"
+    lines = [long if line.startswith("step =") else line for line in lines]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    refused(lambda: read(model), "[time] step: has 1001 lengths, expected at most 1000")
+
+
+# ---- references --------------------------------------------------------------------------------
+
+
+def test_a_reference_cut_anywhere_is_refused(model: Path) -> None:
+    path = reference_file(model)
+    scenario = scenarios.load(scenario_file(model), declared(MODEL))
+    content = path.read_bytes()
+    for length in range(len(content)):
+        path.write_bytes(content[:length])
+        refused(lambda: reference.load(scenario, declared(MODEL)), str(path), "make_references.py")
+    path.write_bytes(content)
+    reference.load(scenario, declared(MODEL))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"\n\n", "expected a header"),
+        (b'"' + b"a" * 200_000 + b"\n", "line 1: not a header"),
+        (b'"time"\n' + b'"1\n' * 3, "line 2: expected numbers"),
+    ],
+)
+def test_a_reference_of_another_format(model: Path, content: bytes, message: str) -> None:
+    reference_file(model).write_bytes(content)
+    refused(lambda: read(model), message)
+
+
+def test_columns_exchanged(model: Path) -> None:
+    path = reference_file(model)
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    path.write_text("".join(",".join([row[1], row[0], *row[2:]]) + "\n" for row in rows))
+    refused(lambda: read(model), "line 1: expected a header whose first column is 'time'")
+
+
+# ---- archives ----------------------------------------------------------------------------------
+
+
+def bomb(path: Path, name: str, size: int) -> bytes:
+    """An archive of one file of zeros."""
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+        archive.open(name, "w") as file,
+    ):
+        for _ in range(size // 1_000_000):
+            file.write(bytes(1_000_000))
+    return path.read_bytes()
+
+
+def test_archives_that_grow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    content = bomb(tmp_path / "large.fmu", DESCRIPTION, 65_000_000)
+    refused(lambda: open_fmu(tmp_path / "large.fmu"), "modelDescription.xml has 65 MB")
+    nested: dict[str, Edit] = {"resources/RPManipulator.fmu": lambda _: content}
+    path = edited(SSP, tmp_path / "nested.ssp", nested)
+    refused(lambda: open_ssp(path), "component 'arm'", "modelDescription.xml has 65 MB")
+    monkeypatch.setattr("cosim.archives.LARGEST_CONTENT", 64_000_000)
+    bomb(tmp_path / "large.ssp", "data", 65_000_000)
+    refused(lambda: open_ssp(tmp_path / "large.ssp"), "has 65 MB inside, expected at most 64 MB")
+
+
+def test_an_archive_of_too_many_files(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "many.ssp", "w") as archive:
+        for i in range(10_001):
+            archive.writestr(str(i), b"")
+    refused(lambda: open_ssp(tmp_path / "many.ssp"), "has 10001 files inside")
+
+
+@pytest.mark.parametrize("name", ["../../x", "/x", "resources/../../x"])
+def test_an_archive_that_leads_out_of_its_folder(tmp_path: Path, fmu: Path, name: str) -> None:
+    for source, action in ((SSP, open_ssp), (fmu, open_fmu)):
+        path = tmp_path / source.name
+        shutil.copy(source, path)
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr(name, b"x")
+        refused(lambda path=path, action=action: action(path), "outside of its folder")
+
+
+@pytest.mark.parametrize(
+    "doctype",
+    [
+        '<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/hostname">]>',
+        "<!DOCTYPE a []>",
+    ],
+)
+def test_entities_are_refused(tmp_path: Path, doctype: str) -> None:
+    edits = {STRUCTURE: replace("?>", f"?>{doctype}")}
+    refused(lambda: open_ssp(edited(SSP, tmp_path / "a.ssp", edits)), "DOCTYPE, leave it out")
+
+
+def test_entities_that_grow_are_refused(tmp_path: Path, fmu: Path) -> None:
+    levels = "".join(f'<!ENTITY {chr(98 + i)} "{f"&{chr(97 + i)};" * 50}">' for i in range(8))
+    doctype = f'?><!DOCTYPE a [<!ENTITY a "aaaaaaaaaaaaaaaaaaaa">{levels}]>'
+
+    def change(content: bytes) -> bytes:
+        text = content.decode().replace("?>", doctype, 1)
+        return text.replace(' description="', ' description="&i;', 1).encode()
+
+    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
+    refused(lambda: open_fmu(path), "wrong modelDescription.xml", "entity")
+
+
+def test_a_variant_is_no_path(tmp_path: Path) -> None:
+    """Its name becomes that of files which are written and removed."""
+    rename = replace('name="nominal"', 'name="../../x"')
+    edits = {
+        f"resources/{component}_nominal.ssv": rename
+        for component in ("arm", "controller", "trajectory")
+    }
+    path = edited(SSP, tmp_path / "a.ssp", edits)
+    refused(lambda: open_ssp(path), "name '../../x' of the set is no plain name")
+
+
+def test_a_source_of_an_impossible_name(tmp_path: Path) -> None:
+    edit = replace("resources/RPManipulator.fmu", f"resources/{'9' * 400}.fmu")
+    path = edited(SSP, tmp_path / "a.ssp", {STRUCTURE: edit})
+    refused(lambda: open_ssp(path), "is missing in the SSP")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"controller"', '"steering"', "has no component 'controller', which the study needs"),
+        ('stopTime="6"', 'stopTime="5"', "stops at 5.0 s; the references are for 6.0 s"),
+        ('baseStepSize="0.001"', 'baseStepSize="1e-9"', "more than 10000000 steps"),
+    ],
+)
+def test_a_system_that_the_study_does_not_know(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = edited(SSP, tmp_path / "a.ssp", {STRUCTURE: replace(old, new, -1)})
+
+    def study() -> None:
+        with opened_loop(path):
+            pass
+
+    refused(study, f"{path}: ", message)
+
+
+def without_variables(content: bytes) -> bytes:
+    """A model description with no variable but the time."""
+    text = content.decode()
+    for section, rest in (
+        (
+            "ModelVariables",
+            '<ScalarVariable name="time" valueReference="0" causality="independent" '
+            'variability="continuous"><Real/></ScalarVariable>',
+        ),
+        ("ModelStructure", ""),
+    ):
+        begin, end = text.index(f"<{section}>"), text.index(f"</{section}>")
+        text = text[:begin] + f"<{section}>{rest}" + text[end:]
+    return text.encode()
+
+
+def without_an_output(content: bytes) -> bytes:
+    """A model description in which the total energy is no output any more."""
+    before, name, after = content.decode().partition('name="total_energy"')
+    return (before + name + after.replace('causality="output"', 'causality="local"', 1)).encode()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (without_variables, f"{SCENARIO}.toml: [parameters]: the model has no variable"),
+        (without_an_output, "_ref.csv, line 1: 'total_energy' is not an output of the model"),
+    ],
+)
+def test_an_fmu_without_what_is_compared(
+    fmu: Path, tmp_path: Path, model: Path, change: Edit, message: str
+) -> None:
+    """It must not pass because there is nothing to compare."""
+    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
+    command = [sys.executable, "-m", "cosim", "run", SCENARIO, "--fmu", str(path)]
+    shutil.copytree(ROOT / "cosim", tmp_path / "cosim")
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert message in done.stderr and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [('start="2.0" min="0.0"', 'start="two" min="0.0"'), ('value="2"', 'value="second"')],
+)
+def test_a_model_description_with_wrong_numbers(
+    fmu: Path, tmp_path: Path, old: str, new: str
+) -> None:
+    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: replace(old, new)})
+    refused(lambda: open_fmu(path), "a.fmu: wrong modelDescription.xml: ", new.split('"')[1])

@@ -1,0 +1,402 @@
+"""RPController against a sympy model of its laws, whose arm comes from positions (rp_symbolic).
+
+Values must agree within 1e-12 and derivatives within 1e-10 of the exact ones, relative to the sum
+of the absolute values of the terms that they are made of.
+"""
+
+import functools
+import itertools
+import random
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+import sympy as sp
+from fmpy.validation import validate_fmu
+
+from cosim import reference
+from cosim.comparison import Runs
+from cosim.fmu_file import Fmu
+from tests.support.cosim_project import declared, load, names_of
+from tests.support.instances import DISCARD, ERROR, OK, Instance, Unit, status_of
+from tests.support.paths import ROOT
+from tests.support.rp_symbolic import PARAMETERS as ARM
+from tests.support.rp_symbolic import TERMS, Model
+
+FOLDER = ROOT / "models" / "rp_controller"
+SCENARIOS = names_of(FOLDER.name)
+
+MODES = {"pd": 1, "pd_gravity": 2, "computed_torque": 3}
+LAW = ("Kp1", "Kp2", "Kd1", "Kd2", "Ki1", "Ki2", "inertia1", "inertia2", "tracking_time")
+LIMITS = ("tau1_max", "f2_max")
+PARAMETERS = (*ARM, *LAW, *LIMITS)
+REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
+INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
+STATES = ("integral1", "integral2")
+KNOWNS = (*PARAMETERS, *INPUTS, *STATES)
+EFFORTS = ("tau1", "f2")
+ERRORS = ("q1_error", "q2_error", "dq1_error", "dq2_error")
+RATES = ("dintegral1", "dintegral2")
+UNLIMITED = ("tau1_unlimited", "f2_unlimited")
+UNKNOWNS = (*EFFORTS, *ERRORS, *RATES, *UNLIMITED)
+INPUT_RATES = tuple(tuple(f"{name}_{order}" for name in INPUTS) for order in ("rate", "bend"))
+FREE = (0, 0)
+SIDES = ((0, 0), (1, 0), (0, -1), (-1, 1))  # per joint: free, at the upper or lower limit
+CASES = list(itertools.product(MODES, SIDES))
+
+Values = dict[str, float]
+
+# ---- The laws in sympy ---------------------------------------------------------------------------
+
+
+@functools.cache
+def terms_of_the_arm() -> dict[str, sp.Expr]:
+    expressions = Model().expressions
+    return {name: expressions[name] for name in TERMS}
+
+
+@functools.cache
+def law(mode: str, sides: tuple[int, int]) -> dict[str, sp.Expr]:
+    """Every unknown, with each joint free or at the limit on the side that is given."""
+    s = {name: sp.Symbol(name) for name in KNOWNS}
+    arm = terms_of_the_arm()
+    e = [s[f"q{i}_ref"] - s[f"q{i}"] for i in (1, 2)]
+    de = [s[f"dq{i}_ref"] - s[f"dq{i}"] for i in (1, 2)]
+    v = [s[f"Kp{i}"] * e[i - 1] + s[f"Kd{i}"] * de[i - 1] + s[f"integral{i}"] for i in (1, 2)]
+    inertia = [s["inertia1"], s["inertia2"]]
+    gravity = sp.Matrix([arm["gravity1"], arm["gravity2"]])
+    if mode == "computed_torque":
+        mass = sp.Matrix([[arm["D11"], arm["D12"]], [arm["D12"], arm["D22"]]])
+        asked = sp.Matrix([s["ddq1_ref"] + v[0], s["ddq2_ref"] + v[1]])
+        unlimited = mass * asked + sp.Matrix([arm["coriolis1"], arm["coriolis2"]]) + gravity
+    else:
+        unlimited = sp.Matrix([inertia[0] * v[0], inertia[1] * v[1]])
+        if mode == "pd_gravity":
+            unlimited += gravity
+    limit = [s[name] for name in LIMITS]
+    effort = [sides[i] * limit[i] if sides[i] else unlimited[i] for i in (0, 1)]
+    rates = [
+        s[f"Ki{i + 1}"] * e[i] + (effort[i] - unlimited[i]) / (inertia[i] * s["tracking_time"])
+        for i in (0, 1)
+    ]
+    return dict(zip(UNKNOWNS, (*effort, *e, *de, *rates, *unlimited), strict=True))
+
+
+def compiled(names: tuple[str, ...], rows: list[list[sp.Expr]]) -> Callable[..., list]:
+    return sp.lambdify(sp.symbols(names), rows, "mpmath", cse=True)
+
+
+@functools.cache
+def terms_of_values(mode: str, sides: tuple[int, int]) -> Callable[..., list]:
+    return compiled(
+        KNOWNS, [list(sp.expand(x).as_ordered_terms()) for x in law(mode, sides).values()]
+    )
+
+
+@functools.cache
+def jacobian(mode: str, sides: tuple[int, int]) -> Callable[..., list]:
+    expressions = law(mode, sides).values()
+    return compiled(KNOWNS, [[x.diff(sp.Symbol(k)) for k in KNOWNS] for x in expressions])
+
+
+@functools.cache
+def along_time(mode: str, sides: tuple[int, int]) -> Callable[..., list]:
+    """Terms of the derivatives of orders 1 and 2 of each output, one per moving variable."""
+    expressions = law(mode, sides)
+    rates = {
+        **dict(zip(STATES, (expressions[name] for name in RATES), strict=True)),
+        **dict(zip(INPUTS, sp.symbols(INPUT_RATES[0]), strict=True)),
+        **dict(zip(INPUT_RATES[0], sp.symbols(INPUT_RATES[1]), strict=True)),
+    }
+    rows = []
+    for name in (*EFFORTS, *ERRORS):
+        once = [expressions[name].diff(sp.Symbol(x)) * rate for x, rate in rates.items()]
+        total = sp.Add(*once)
+        rows += [once, [total.diff(sp.Symbol(x)) * rate for x, rate in rates.items()]]
+    return compiled((*KNOWNS, *INPUT_RATES[0], *INPUT_RATES[1]), rows)
+
+
+def numbers(values: Values, names: tuple[str, ...]) -> list[mpmath.mpf]:
+    return [mpmath.mpf(values[name]) for name in names]
+
+
+def assert_close(actual: float, terms: list, bound: float, what: object) -> None:
+    exact = mpmath.fsum(terms)
+    scale = mpmath.fsum(abs(term) for term in terms)
+    assert abs(mpmath.mpf(actual) - exact) <= bound * scale, (what, actual, exact, scale)
+
+
+# ---- Instances at random points ------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def path(fmu: Path) -> Path:
+    return fmu.with_name("RPController.fmu")
+
+
+@pytest.fixture(scope="module")
+def unit(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
+    return Unit(path, tmp_path_factory.mktemp("controller"))
+
+
+def random_point(source: random.Random) -> Values:
+    """Parameters, inputs and states, none of them zero; the limits are still to be chosen."""
+
+    def either(low: float, high: float) -> float:
+        return source.choice((-1, 1)) * source.uniform(low, high)
+
+    return dict(
+        m1=10 ** source.uniform(-1.0, 1.5),
+        m2=10 ** source.uniform(-2.0, 1.5),
+        I1z=10 ** source.uniform(-3.0, 1.0),
+        I2z=10 ** source.uniform(-3.0, 1.0),
+        l1=source.uniform(0.1, 2.0),
+        lc1=source.uniform(0.05, 1.5),
+        a=either(0.05, 1.5),
+        g=source.uniform(1.0, 25.0),
+        **{name: 10 ** source.uniform(0.0, 3.0) for name in LAW[:6]},
+        **{name: 10 ** source.uniform(-1.0, 1.0) for name in LAW[6:8]},
+        tracking_time=10 ** source.uniform(-2.0, 1.0),
+        **dict.fromkeys(LIMITS, 1.0),
+        **{name: either(0.1, 3.0) for name in (*INPUTS, *STATES)},
+    )
+
+
+def generic_point(mode: str, sides: tuple[int, int], seed: int) -> Values:
+    """Draw a point at which each joint is free or at a limit as `sides` says."""
+    source = random.Random(f"{mode} {sides} {seed}")
+    while True:
+        point = random_point(source)
+        rows = terms_of_values(mode, FREE)(*numbers(point, KNOWNS))
+        asked = [float(mpmath.fsum(rows[UNKNOWNS.index(name)])) for name in UNLIMITED]
+        if all(side * u >= 0.0 for side, u in zip(sides, asked, strict=True)):
+            break
+    for name, side, u in zip(LIMITS, sides, asked, strict=True):
+        point[name] = abs(u) * (source.uniform(0.2, 0.9) if side else source.uniform(1.5, 5.0))
+    return point
+
+
+@contextmanager
+def in_initialization_mode(unit: Unit, mode: str, point: Values) -> Iterator[Instance]:
+    with Instance(unit) as instance:
+        instance.fmi.setupExperiment()
+        instance.set(**point)
+        instance.fmi.setInteger([unit.references["mode"]], [MODES[mode]])
+        instance.fmi.enterInitializationMode()
+        yield instance
+
+
+# ---- Values and derivatives ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("mode", "sides"), CASES)
+def test_values_are_those_of_the_law(unit: Unit, mode: str, sides: tuple[int, int]) -> None:
+    for seed in range(5):
+        point = generic_point(mode, sides, seed)
+        with in_initialization_mode(unit, mode, point) as instance:
+            rows = terms_of_values(mode, sides)(*numbers(point, KNOWNS))
+            for name, actual, row in zip(UNKNOWNS, instance.get(*UNKNOWNS), rows, strict=True):
+                assert_close(actual, row, 1e-12, (name, seed))
+
+
+@pytest.mark.parametrize(("mode", "sides"), CASES)
+def test_directional_derivatives(unit: Unit, mode: str, sides: tuple[int, int]) -> None:
+    for seed in range(3):
+        point = generic_point(mode, sides, seed)
+        rows = jacobian(mode, sides)(*numbers(point, KNOWNS))
+        with in_initialization_mode(unit, mode, point) as instance:
+            unknowns = [unit.references[name] for name in UNKNOWNS]
+            for k, known in enumerate(KNOWNS):
+                column = instance.fmi.getDirectionalDerivative(
+                    unknowns, [unit.references[known]], [1.0]
+                )
+                for name, actual, row in zip(UNKNOWNS, column, rows, strict=True):
+                    scale = max(abs(entry) for entry in row)
+                    bound = max(1e-10 * abs(row[k]), 1e-13 * scale)
+                    assert abs(actual - row[k]) <= bound, (name, known, actual, row[k])
+
+
+@pytest.mark.parametrize(("mode", "sides"), CASES)
+def test_output_derivatives(unit: Unit, mode: str, sides: tuple[int, int]) -> None:
+    outputs = (*EFFORTS, *ERRORS)
+    references = [unit.references[name] for name in outputs]
+    for seed in range(3):
+        point = generic_point(mode, sides, seed)
+        source = random.Random(seed)
+        rates = {name: (source.uniform(-3, 3), source.uniform(-9, 9)) for name in INPUTS}
+        moving = [mpmath.mpf(rates[name][order]) for order in (0, 1) for name in INPUTS]
+        rows = iter(along_time(mode, sides)(*numbers(point, KNOWNS), *moving))
+        with in_initialization_mode(unit, mode, point) as instance:
+            instance.fmi.exitInitializationMode()
+            instance.set_input_derivatives(**rates)
+            for name, reference in zip(outputs, references, strict=True):
+                for order in (1, 2):
+                    actual = instance.fmi.getRealOutputDerivatives([reference], [order])[0]
+                    assert_close(actual, next(rows), 1e-10, (name, order, seed))
+
+
+def test_dependencies_are_those_of_the_laws(unit: Unit) -> None:
+    depends: dict[str, set[str]] = {name: set() for name in UNKNOWNS}
+    for mode, sides in CASES:
+        rows = jacobian(mode, sides)(*numbers(generic_point(mode, sides, 0), KNOWNS))
+        for name, row in zip(UNKNOWNS, rows, strict=True):
+            depends[name] |= {k for k, entry in zip(KNOWNS, row, strict=True) if entry != 0}
+    # of the mode depends what differs between two modes
+    for name in UNKNOWNS:
+        if len({law(mode, FREE)[name] for mode in MODES}) > 1 or name in RATES:
+            depends[name].add("mode")
+
+    structure = unit.description
+    listed = {u.variable.name: u for u in (*structure.outputs, *structure.derivatives)}
+    assert set(listed) == {*EFFORTS, *ERRORS, *RATES}
+    for name, unknown in listed.items():
+        expected = depends[name] - {*PARAMETERS, "mode"}
+        assert {v.name for v in unknown.dependencies} == expected, name
+    initial = {u.variable.name: u for u in structure.initialUnknowns}
+    for name in listed:
+        assert {v.name for v in initial[name].dependencies} == depends[name], name
+
+
+# ---- With the arm --------------------------------------------------------------------------------
+
+
+def test_gravity_compensation_holds_the_arm_in_place(fmu: Path, unit: Unit, tmp_path: Path) -> None:
+    arm_unit = Unit(fmu, tmp_path)
+    measured = ("q1", "q2", "dq1", "dq2")
+    with Instance(arm_unit) as arm, Instance(unit) as controller:
+        controller.fmi.setInteger([unit.references["mode"]], [MODES["pd_gravity"]])
+        controller.initialize(q1=0.7, q2=0.2, q1_ref=0.7, q2_ref=0.2, Ki1=50.0, Ki2=50.0)
+        arm.initialize(q1=0.7, q2=0.2, **dict(zip(EFFORTS, controller.get(*EFFORTS), strict=True)))
+        for i in range(500):
+            arm.step(0.002 * i, 0.002)
+            controller.set(**dict(zip(measured, arm.get(*measured), strict=True)))
+            controller.step(0.002 * i, 0.002)
+            arm.set(**dict(zip(EFFORTS, controller.get(*EFFORTS), strict=True)))
+        assert arm.get(*measured) == pytest.approx([0.7, 0.2, 0.0, 0.0], abs=1e-12)
+
+
+# ---- As a unit -----------------------------------------------------------------------------------
+
+
+def test_parameters_that_leave_no_inertia_are_refused(unit: Unit) -> None:
+    with Instance(unit) as instance:
+        instance.fmi.setupExperiment()
+        instance.set(m1=0.0, I1z=0.0, I2z=0.0)
+        instance.fmi.enterInitializationMode()
+        assert status_of(instance.fmi.exitInitializationMode) == ERROR
+        assert "m1 lc1^2 + I1z + I2z = 0 is refused" in instance.messages[-1].text
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("Kp1", -1.0), ("Ki2", -1e-9), ("inertia1", 0.0), ("tracking_time", 0.0), ("f2_max", -1.0)],
+)
+def test_values_out_of_range_are_refused(unit: Unit, name: str, value: float) -> None:
+    with Instance(unit) as instance:
+        assert status_of(lambda: instance.set(**{name: value})) == DISCARD
+        assert name in instance.messages[-1].text
+
+
+def test_unknown_modes_are_refused(unit: Unit) -> None:
+    with Instance(unit) as instance:
+        for mode in (0, 4):
+            status = status_of(instance.fmi.setInteger, [unit.references["mode"]], [mode])
+            assert status == DISCARD and "mode" in instance.messages[-1].text
+
+
+def test_mode_changes_between_steps(unit: Unit) -> None:
+    point = generic_point("pd", FREE, 1) | dict.fromkeys(LIMITS, 1e9) | {"Ki1": 0.0, "Ki2": 0.0}
+    with in_initialization_mode(unit, "pd", point) as instance:
+        instance.fmi.exitInitializationMode()
+        for i, (mode, number) in enumerate(MODES.items()):
+            instance.fmi.setInteger([unit.references["mode"]], [number])
+            rows = terms_of_values(mode, FREE)(*numbers(point, KNOWNS))
+            for name, actual in zip(EFFORTS, instance.get(*EFFORTS), strict=True):
+                assert_close(actual, rows[UNKNOWNS.index(name)], 1e-12, (mode, name))
+            instance.step(0.1 * i, 0.1)
+
+
+def test_rollback_in_saturation_is_exact(unit: Unit) -> None:
+    # only what acts on the integral parts, so that the limit is met, held and left again
+    values = dict(
+        q1_ref=0.3, q2_ref=-0.2, Kp1=20.0, Ki1=900.0, Ki2=900.0, tau1_max=12.0, f2_max=9.0
+    )
+
+    def run(instance: Instance, first: int, last: int) -> list[bytes]:
+        seen = []
+        for i in range(first, last):
+            if i % 7 == 0:
+                instance.set(q1=0.5 if i > 40 else 0.05 * (i % 2))
+            instance.step(0.01 * i, 0.01)
+            seen.append(instance.everything())
+        return seen
+
+    with Instance(unit) as instance:
+        instance.initialize(tolerance=1e-11, **values)
+        run(instance, 0, 30)
+        assert instance.get("tau1") == [12.0]
+        state = instance.fmi.getFMUState()
+        once = run(instance, 30, 80)
+        assert instance.get("tau1") < [12.0]
+        instance.fmi.setFMUState(state)
+        assert run(instance, 30, 80) == once
+        assert status_of(instance.fmi.freeFMUState, state) == OK
+
+
+def test_fmpy_finds_nothing_wrong(path: Path) -> None:
+    assert validate_fmu(str(path)) == []
+
+
+def test_references_and_units_of_the_arm_are_the_arms(
+    fmu: Path, unit: Unit, tmp_path: Path
+) -> None:
+    arm = {v.name: v for v in Unit(fmu, tmp_path).description.modelVariables}
+    own = {v.name: v for v in unit.description.modelVariables}
+    for name in ARM:
+        for key in ("valueReference", "unit", "start", "min"):
+            assert getattr(own[name], key) == getattr(arm[name], key), (name, key)
+    for name in (*EFFORTS, "q1", "q2", "dq1", "dq2"):
+        assert own[name].unit == arm[name].unit, name
+
+
+# ---- References ----------------------------------------------------------------------------------
+
+
+def test_references_are_those_of_the_script(tmp_path: Path) -> None:
+    script = FOLDER / "references" / "make_references.py"
+    subprocess.run([sys.executable, script, "--output", tmp_path], check=True, cwd=tmp_path)
+    for name in SCENARIOS:
+        for made in (tmp_path / name).iterdir():
+            stored = FOLDER / "references" / name / made.name
+            assert stored.read_bytes() == made.read_bytes(), stored
+
+
+@pytest.mark.parametrize(
+    ("name", "effort", "limit"),
+    [("limited_integral", "tau1", 14), ("limited_integral", "f2", 9), ("pd_gravity", "f2", 12)],
+)
+def test_scenarios_meet_limits_and_leave_them(name: str, effort: str, limit: float) -> None:
+    scenario = load(f"controller_{name}")
+    column = reference.load(scenario, declared(FOLDER.name)).column(effort)
+    assert {max(-1, min(1, int(u / limit))) for u in column} == {-1, 0, 1}
+    assert abs(column).max() == limit
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_scenarios_meet_their_references(path: Path, name: str) -> None:
+    with Fmu(path) as opened:
+        runs = Runs({"rp_controller": opened})
+        scenario = load(name)
+        errors = [runs.run(scenario, tolerance).error for tolerance in (1e-5, 1e-8, 1e-11)]
+    assert all(np.array(errors) <= [1e-6, 1e-8, 1e-10]), errors
+
+
+def test_page_tells_every_variable() -> None:
+    page = (FOLDER / "README.md").read_text(encoding="utf-8")
+    for name in (*PARAMETERS, *INPUTS, *STATES, *UNKNOWNS, "mode", *MODES):
+        assert f"`{name}`" in page, name

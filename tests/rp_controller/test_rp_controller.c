@@ -1,0 +1,317 @@
+/* The controller: its law with the arm that it drives, and its integral part through the instance
+ * and the integrator. test_controller.py compares values and derivatives with sympy. */
+#include "derivatives.h"
+#include "instance.h"
+#include "last_text.h"
+#include "model_description.h"
+#include "rp_controller_model.h"
+#include "rp_controller_propagation.h"
+#include "rp_test_support.h"
+#include "stepping.h"
+#include "value_references.h"
+#include "values.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static struct instance *instance;
+static struct rp_test_random random_source;
+
+void setUp(void) {
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    random_source.state = 4;
+}
+
+void tearDown(void) {
+    instance_destroy(instance);
+}
+
+/* ---- The law and the arm -------------------------------------------------------------------- */
+
+static double positive(double high) {
+    return fabs(rp_test_uniform(&random_source, 0.01, high));
+}
+
+static void random_values(struct rp_controller_values *v) {
+    struct rp_controller_parameters *p = &v->parameters;
+    *v = (struct rp_controller_values){0};
+    rp_test_random_parameters(&random_source, &p->arm);
+    p->tracking_time = positive(1.0);
+    for (int i = 0; i < 2; i++) {
+        p->Kp[i] = positive(400.0);
+        p->Kd[i] = positive(40.0);
+        p->Ki[i] = positive(4000.0);
+        p->inertia[i] = positive(5.0);
+        p->limit[i] = positive(400.0);
+        v->integral[i] = rp_test_uniform(&random_source, -20.0, 20.0);
+    }
+    double *inputs = v->inputs.q_ref;
+    for (size_t i = 0; i < sizeof v->inputs / sizeof(double); i++) {
+        inputs[i] = rp_test_uniform(&random_source, -2.0, 2.0);
+    }
+}
+
+/* With the arm's own parameters computed torque leaves ddq = ddq_ref + Kd de + Kp e + w, whatever
+ * the motion: linear and decoupled. */
+static void test_computed_torque_makes_the_error_dynamics_linear(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_controller_values v;
+        random_values(&v);
+        v.parameters.mode = RP_CONTROLLER_COMPUTED_TORQUE;
+        const struct rp_controller_inputs *in = &v.inputs;
+        double efforts[2];
+        double ddq[2];
+        double asked[2];
+        struct rp_test_state state = {.q = {in->q[0], in->q[1]}, .dq = {in->dq[0], in->dq[1]}};
+        for (int i = 0; i < 2; i++) {
+            asked[i] = in->ddq_ref[i] + v.parameters.Kd[i] * (in->dq_ref[i] - in->dq[i]) +
+                       v.parameters.Kp[i] * (in->q_ref[i] - in->q[i]) + v.integral[i];
+            state.ddq[i] = asked[i];
+        }
+        rp_controller_unlimited(&v.parameters, in, v.integral, efforts);
+        rp_forward_dynamics(&v.parameters.arm, in->q, in->dq, efforts, ddq);
+
+        double force[2];
+        double scale[2];
+        rp_test_force_scale(&v.parameters.arm, &state, force);
+        rp_test_acceleration_scale(&v.parameters.arm, in->q, force, scale);
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(asked[i], ddq[i], 16 * DBL_EPSILON * scale[i]);
+        }
+    }
+}
+
+/* At rest on the target the efforts are what holds the arm: g(q) and nothing else. */
+static void test_gravity_compensation_holds_the_arm(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_controller_values v;
+        random_values(&v);
+        v.parameters.mode = RP_CONTROLLER_PD_GRAVITY;
+        memcpy(v.inputs.q, v.inputs.q_ref, sizeof v.inputs.q);
+        memset(v.inputs.dq, 0, sizeof v.inputs.dq);
+        memset(v.inputs.dq_ref, 0, sizeof v.inputs.dq_ref);
+        memset(v.integral, 0, sizeof v.integral);
+
+        double efforts[2];
+        double gravity[2];
+        double ddq[2];
+        rp_controller_unlimited(&v.parameters, &v.inputs, v.integral, efforts);
+        rp_gravity_forces(&v.parameters.arm, v.inputs.q, gravity);
+        TEST_ASSERT_TRUE(efforts[0] == gravity[0] && efforts[1] == gravity[1]);
+
+        const struct rp_test_state state = {.q = {v.inputs.q[0], v.inputs.q[1]}};
+        double force[2];
+        double scale[2];
+        rp_test_force_scale(&v.parameters.arm, &state, force);
+        rp_test_acceleration_scale(&v.parameters.arm, v.inputs.q, force, scale);
+        rp_forward_dynamics(&v.parameters.arm, v.inputs.q, v.inputs.dq, efforts, ddq);
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(0.0, ddq[i], 16 * DBL_EPSILON * scale[i]);
+        }
+    }
+}
+
+/* PD modes: a joint's effort is its inertia times what computed torque asks of a free mass. */
+static void test_pd_is_computed_torque_of_two_free_masses(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_controller_values v;
+        random_values(&v);
+        memset(v.inputs.ddq_ref, 0, sizeof v.inputs.ddq_ref);
+        v.parameters.arm = (struct rp_parameters){
+            .m2 = v.parameters.inertia[1], .I1z = v.parameters.inertia[0], .l1 = -v.inputs.q[1]};
+        double pd[2];
+        double computed[2];
+        v.parameters.mode = RP_CONTROLLER_PD;
+        rp_controller_unlimited(&v.parameters, &v.inputs, v.integral, pd);
+        v.parameters.mode = RP_CONTROLLER_COMPUTED_TORQUE;
+        rp_controller_unlimited(&v.parameters, &v.inputs, v.integral, computed);
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(computed[i], pd[i], 4 * DBL_EPSILON * fabs(computed[i]));
+        }
+    }
+}
+
+static void test_efforts_stay_within_their_limits(void) {
+    const struct rp_controller_parameters p = {.limit = {3.0, 0.0}};
+    const double cases[][4] = {
+        {3.5, 1e-300, 3.0, 0.0},     {-3.5, -1e-300, -3.0, -0.0},  {3.0, 0.0, 3.0, 0.0},
+        {2.75, INFINITY, 2.75, 0.0}, {-INFINITY, -4.0, -3.0, 0.0}, {-2.75, 0.0, -2.75, 0.0},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        double effort[2];
+        rp_controller_limited(&p, cases[k], effort);
+        TEST_ASSERT_TRUE(effort[0] == cases[k][2] && effort[1] == cases[k][3]);
+    }
+    double effort[2];
+    rp_controller_limited(&p, (const double[2]){NAN, NAN}, effort);
+    TEST_ASSERT_TRUE(isnan(effort[0]) && isnan(effort[1]));
+}
+
+static void test_calculated_fields_are_written_and_not_read(void) {
+    const size_t known = offsetof(struct rp_controller_values, dintegral);
+    const size_t calculated = sizeof(struct rp_controller_values) - known;
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_controller_values values, first, second;
+        random_values(&values);
+        random_values(&first);
+        random_values(&second);
+        values.parameters.mode = 1 + n % 3;
+        struct rp_controller_values clean_first = first, clean_second = second, alone = first;
+        rp_controller_propagate(&values, &clean_first, &clean_second);
+
+        const struct rp_controller_values *poisoned[] = {&values, &first, &second, &alone};
+        for (int k = 0; k < 4; k++) {
+            memset((char *)poisoned[k] + known, 0xff, calculated); // NaN
+        }
+        rp_controller_propagate(&values, &first, &second);
+        rp_controller_propagate(&values, &alone, NULL);
+        TEST_ASSERT_EQUAL_MEMORY(&clean_first, &first, sizeof first);
+        TEST_ASSERT_EQUAL_MEMORY(&clean_second, &second, sizeof second);
+        TEST_ASSERT_EQUAL_MEMORY(&clean_first, &alone, sizeof alone);
+    }
+}
+
+/* ---- The integral part ---------------------------------------------------------------------- */
+
+static double get(unsigned reference) {
+    double value = NAN;
+    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
+    return value;
+}
+
+static void set(unsigned reference, double value) {
+    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
+}
+
+/* PD of joint 1, by itself: u = M (Kp e + Kd de + w). */
+static const double M = 0.75, Kp = 50.0, Kd = 8.0, Ki = 240.0, Tt = 0.125, limit = 30.0;
+static const double e = 0.25, de = -0.5;
+
+static void start(double gain, double tracking_time, double w) {
+    const unsigned mode = RP_CONTROLLER_mode;
+    const int pd = RP_CONTROLLER_PD;
+    ASSERT_OK(instance_set_integer(instance, &mode, 1, &pd));
+    set(RP_CONTROLLER_inertia1, M);
+    set(RP_CONTROLLER_Kp1, Kp);
+    set(RP_CONTROLLER_Kd1, Kd);
+    set(RP_CONTROLLER_Ki1, gain);
+    set(RP_CONTROLLER_tracking_time, tracking_time);
+    set(RP_CONTROLLER_tau1_max, limit);
+    set(RP_CONTROLLER_integral1, w);
+    set(RP_CONTROLLER_q1_ref, e);
+    set(RP_CONTROLLER_dq1, -de);
+    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+}
+
+static void step_to(double t) {
+    ASSERT_OK(instance_do_step(instance, instance_time(instance), t - instance_time(instance)));
+}
+
+/* Below the limit w' = Ki e: a ramp. At w = edge the effort meets the limit; from there on
+ * w' = Ki e - (w - edge) / Tt, which ends at edge + Ki e Tt. */
+static double edge_of(double error) {
+    return limit / M - Kp * error - Kd * de;
+}
+
+static double into_the_limit(double w, double t) {
+    const double edge = edge_of(e);
+    const double hit = (edge - w) / (Ki * e);
+    return t < hit ? w + Ki * e * t : edge + Ki * e * Tt * -expm1(-(t - hit) / Tt);
+}
+
+static double out_of_the_limit(double w, double t) {
+    const double edge = edge_of(-e);
+    const double rest = edge - Ki * e * Tt;
+    const double left = Tt * log((w - rest) / (edge - rest));
+    return t < left ? rest + (w - rest) * exp(-t / Tt) : edge - Ki * e * (t - left);
+}
+
+static void test_integral_ramps_up_and_meets_the_limit(void) {
+    start(Ki, Tt, 2.0);
+    for (int i = 1; i <= 100; i++) {
+        step_to(0.0137 * i);
+        const double w = get(RP_CONTROLLER_integral1);
+        ASSERT_CLOSE(into_the_limit(2.0, instance_time(instance)), w, 1e-9);
+        const double unlimited = M * (Kp * e + Kd * de + w);
+        ASSERT_CLOSE(unlimited, get(RP_CONTROLLER_tau1_unlimited), 1e-13);
+        TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == fmin(get(RP_CONTROLLER_tau1_unlimited), limit));
+    }
+}
+
+static void test_integral_decays_out_of_the_limit_and_ramps_down(void) {
+    start(Ki, Tt, 150.0);
+    set(RP_CONTROLLER_q1_ref, -e);
+    for (int i = 1; i <= 100; i++) {
+        step_to(0.0137 * i);
+        ASSERT_CLOSE(out_of_the_limit(150.0, instance_time(instance)), get(RP_CONTROLLER_integral1),
+                     1e-9);
+    }
+    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
+}
+
+/* At the end the rate is zero, Ki e = excess / (M Tt). */
+static void test_unlimited_effort_exceeds_the_limit_by_what_is_predicted(void) {
+    start(Ki, Tt, 0.0);
+    step_to(40.0 * Tt);
+    ASSERT_CLOSE(limit + Ki * e * M * Tt, get(RP_CONTROLLER_tau1_unlimited), 1e-9);
+    ASSERT_CLOSE(0.0, get(RP_CONTROLLER_dintegral1), 1e-9);
+    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == limit);
+}
+
+/* After 5 s at the limit the error changes its sign. With back-calculation the effort leaves the
+ * limit at once, because Ki Tt < 2 Kp. Without (a tracking time beyond all others) the integral has
+ * grown to Ki e 5 s and must first come down again by the same law. */
+static void test_effort_leaves_the_limit_without_delay(void) {
+    start(Ki, Tt, 0.0);
+    step_to(5.0);
+    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == limit);
+    set(RP_CONTROLLER_q1_ref, -e);
+    ASSERT_CLOSE(limit + M * (Ki * Tt - 2.0 * Kp) * e, get(RP_CONTROLLER_tau1), 1e-9);
+    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
+
+    instance_reset(instance);
+    start(Ki, 1e12, 0.0);
+    step_to(5.0);
+    set(RP_CONTROLLER_q1_ref, -e);
+    const double delay = (Ki * e * 5.0 - edge_of(-e)) / (Ki * e);
+    TEST_ASSERT_TRUE(delay > 3.0);
+    step_to(5.0 + 0.999 * delay);
+    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) == limit);
+    step_to(5.0 + 1.001 * delay);
+    TEST_ASSERT_TRUE(get(RP_CONTROLLER_tau1) < limit);
+}
+
+static void test_integral_rests_without_gain(void) {
+    const double held[] = {0.1, 1234.5}; // below the limit and beyond it
+    for (int k = 0; k < 2; k++) {
+        instance_reset(instance);
+        set(RP_CONTROLLER_Ki2, 100.0); // the other joint moves
+        set(RP_CONTROLLER_q2_ref, 1.0);
+        start(0.0, Tt, held[k]);
+        for (int i = 1; i <= 20; i++) {
+            step_to(0.05 * i);
+            TEST_ASSERT_TRUE(get(RP_CONTROLLER_integral1) == held[k]);
+            TEST_ASSERT_TRUE(get(RP_CONTROLLER_dintegral1) == 0.0);
+        }
+        TEST_ASSERT_TRUE(fabs(get(RP_CONTROLLER_integral2)) > 1.0);
+    }
+}
+
+/* The error runs as e + r t + b t^2 / 2 over the step, by derivatives of two inputs. */
+static void test_integral_follows_extrapolated_inputs(void) {
+    const double r = 0.5, b = -3.0, h = 0.25;
+    start(Ki, Tt, 1.0);
+    set(RP_CONTROLLER_tau1_max, 1e6);
+    const unsigned references[] = {RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1_ref, RP_CONTROLLER_q1};
+    const int orders[] = {1, 2, 1};
+    const double derivatives[] = {r - 1.0, b, -1.0};
+    ASSERT_OK(instance_set_input_derivatives(instance, references, 3, orders, derivatives));
+    step_to(h);
+    ASSERT_CLOSE(1.0 + Ki * (e * h + r * h * h / 2.0 + b * h * h * h / 6.0),
+                 get(RP_CONTROLLER_integral1), 1e-10);
+}

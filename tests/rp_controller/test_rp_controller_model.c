@@ -1,0 +1,119 @@
+/* The controller as the instance sees it: the derivatives of its fields along curves, its
+ * integrator's view, what is refused. */
+#include "rp_controller_model.h"
+#include "rp_test_support.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+/* All that a curve moves, from arm to limit and from the inputs to the integral part, then the
+ * calculated fields. */
+enum {
+    MOVED_PARAMETERS = offsetof(struct rp_controller_parameters, mode) / sizeof(double),
+    INPUTS = offsetof(struct rp_controller_values, inputs) / sizeof(double),
+    CALCULATED = offsetof(struct rp_controller_values, dintegral) / sizeof(double),
+    DOUBLES = sizeof(struct rp_controller_values) / sizeof(double),
+};
+
+union point {
+    struct rp_controller_values v;
+    double all[DOUBLES];
+};
+
+static union point at, first, second;
+static struct rp_test_random random_source;
+static char text[512];
+
+void setUp(void) {
+    random_source.state = 7;
+    text[0] = '\0';
+}
+/* Gains of the integral part at joint 2 alone; limits that are far or exceeded everywhere. */
+static void next_point(int mode, bool is_limited) {
+    memset(&at, 0, sizeof at);
+    memset(&first, 0, sizeof first);
+    memset(&second, 0, sizeof second);
+    for (int i = 0; i < CALCULATED; i++) {
+        if (i >= MOVED_PARAMETERS && i < INPUTS) {
+            continue;
+        }
+        at.all[i] = rp_test_uniform(&random_source, 0.5, 2.0);
+        first.all[i] = rp_test_uniform(&random_source, -0.5, 0.5);
+        second.all[i] = rp_test_uniform(&random_source, -0.5, 0.5);
+    }
+    struct rp_controller_parameters *p = &at.v.parameters;
+    p->mode = mode;
+    p->Ki[0] = first.v.parameters.Ki[0] = second.v.parameters.Ki[0] = 0.0;
+    for (int i = 0; i < 2; i++) {
+        p->limit[i] = is_limited ? 0.0625 : 1e3;
+    }
+    // efforts of both signs
+    const double side = rp_test_uniform(&random_source, -1.0, 1.0) < 0.0 ? -64.0 : 64.0;
+    at.v.integral[0] += side;
+    at.v.integral[1] -= side;
+}
+
+static void calculate(double t, union point *moved) {
+    *moved = at;
+    for (int i = 0; i < CALCULATED; i++) {
+        if (i < MOVED_PARAMETERS || i >= INPUTS) {
+            moved->all[i] += t * first.all[i] + 0.5 * t * t * second.all[i];
+        }
+    }
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.outputs(&moved->v, t));
+}
+
+static double field_at(const void *field, double t) {
+    union point moved;
+    calculate(t, &moved);
+    return moved.all[*(const int *)field];
+}
+
+static void test_derivatives_along_curves_are_those_of_the_fields(void) {
+    const double h = 1.0 / 256;
+    for (int n = 0; n < 60; n++) {
+        next_point(RP_CONTROLLER_PD + n % 3, n % 2 == 1);
+        TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                              rp_controller_model.propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
+        for (int field = CALCULATED; field < DOUBLES; field++) {
+            const double scale = 1e3 + fabs(field_at(&field, 0.0));
+            ASSERT_CLOSE(rp_test_derivative(field_at, &field, 0.0, h), first.all[field],
+                         1e-11 * scale);
+            ASSERT_CLOSE(rp_test_second_derivative(field_at, &field, 0.0, h), second.all[field],
+                         1e-9 * scale);
+        }
+    }
+}
+
+static void test_what_is_integrated_are_the_rates_that_are_output(void) {
+    for (int n = 0; n < 12; n++) {
+        next_point(RP_CONTROLLER_PD + n % 3, n % 2 == 1);
+        const struct rp_controller_inputs inputs = at.v.inputs;
+        double u[sizeof inputs / sizeof(double)];
+        double dx[2];
+        memcpy(u, &inputs, sizeof inputs);
+        memset(&at.v.inputs, 0, sizeof at.v.inputs); // they are arguments
+        TEST_ASSERT_EQUAL_INT(
+            STATUS_OK, rp_controller_model.right_hand_side(&at.v, 0.0, at.v.integral, u, dx));
+        at.v.inputs = inputs;
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.outputs(&at.v, 0.0));
+        TEST_ASSERT_EQUAL_MEMORY(at.v.dintegral, dx, sizeof dx);
+        TEST_ASSERT_TRUE(dx[0] == 0.0 && dx[1] != 0.0);
+    }
+}
+
+static void test_an_arm_without_inertia_is_refused(void) {
+    next_point(RP_CONTROLLER_PD, false);
+    struct rp_parameters *arm = &at.v.parameters.arm;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("", text);
+    arm->m1 = 2.0;
+    arm->lc1 = arm->I1z = arm->I2z = 0.0;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
+                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("the inertia m1 lc1^2 + I1z + I2z = 0 is refused: it must be above 0 "
+                             "(m1 = 2, lc1 = 0, I1z = 0, I2z = 0)",
+                             text);
+}

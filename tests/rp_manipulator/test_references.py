@@ -1,0 +1,199 @@
+"""The reference trajectories: made again they come out the same, and they conserve energy."""
+
+import csv
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from cosim.scenario import Scenario
+from tests.support.cosim_project import declared, load, names_of
+from tests.support.paths import ROOT
+
+MODEL = ROOT / "models" / "rp_manipulator"
+SCRIPT = MODEL / "references" / "make_references.py"
+FILES = ("RPManipulator_ref.csv", "RPManipulator_in.csv", "RPManipulator_ref.opt")
+SCENARIOS = {name: load(name) for name in names_of(MODEL.name)}
+each_scenario = pytest.mark.parametrize("run", SCENARIOS.values(), ids=SCENARIOS.keys())
+
+
+@pytest.fixture(scope="session")
+def maker() -> ModuleType:
+    """make_references.py as a module."""
+    spec = importlib.util.spec_from_file_location("make_references", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="session")
+def reference(maker: ModuleType):
+    return maker.Reference()
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All references, made again in another folder by another process."""
+    folder = tmp_path_factory.mktemp("references")
+    subprocess.run([sys.executable, SCRIPT, "--output", folder], check=True, cwd=folder)
+    return folder
+
+
+def read(path: Path) -> tuple[list[str], np.ndarray]:
+    """Names and values, (rows, names), of a CSV file."""
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
+    return rows[0], np.array(rows[1:], dtype=float)
+
+
+def columns(run: Scenario) -> dict[str, np.ndarray]:
+    names, values = read(run.reference_folder / FILES[0])
+    return dict(zip(names, values.T, strict=True))
+
+
+@each_scenario
+def test_made_again_is_the_same(run: Scenario, made: Path) -> None:
+    for file in FILES:
+        old, new = run.reference_folder / file, made / run.name / file
+        if old.read_bytes() == new.read_bytes():
+            continue  # always so on one kind of machine
+        assert file.endswith(".csv"), "the options differ"
+        (old_names, old_values), (new_names, new_values) = read(old), read(new)
+        assert old_names == new_names and old_values.shape == new_values.shape
+        error = np.max(np.abs(new_values - old_values), axis=0)
+        assert np.all(error <= 1e-14 * np.max(np.abs(old_values), axis=0)), file
+
+
+def test_nothing_is_left_over(made: Path) -> None:
+    folders = [MODEL / "references" / name for name in SCENARIOS]
+    assert sorted(p for p in (MODEL / "references").iterdir() if (p / FILES[0]).exists()) == folders
+    for folder in (*folders, *made.iterdir()):
+        assert {path.name for path in folder.iterdir()} == set(FILES)
+
+
+def test_made_by_itself_or_after_another_gives_identical_bytes(
+    maker: ModuleType, made: Path, tmp_path: Path
+) -> None:
+    reference = maker.Reference()
+    for name in ("sixtieth", "early_start", "sixtieth"):
+        reference.write(SCENARIOS[name], tmp_path / name)
+        for file in FILES:
+            assert (tmp_path / name / file).read_bytes() == (made / name / file).read_bytes()
+
+
+def test_unknown_scenario_is_refused() -> None:
+    command = [sys.executable, SCRIPT, "none"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: no scenario 'none' of this model (known: coasting, ")
+
+
+@each_scenario
+def test_files_have_the_cross_check_format(run: Scenario) -> None:
+    real = [v for v in declared(MODEL.name).variables.values() if v.type == "Real"]
+    kind = {
+        FILES[0]: [v.name for v in real if v.causality == "output"],
+        FILES[1]: [v.name for v in real if v.causality == "input"],
+    }
+    times = {FILES[0]: run.times[run.reference_rows], FILES[1]: run.times}
+    for file, names in kind.items():
+        path = run.reference_folder / file
+        header = path.read_text().split("\n", 1)[0]
+        assert header == ",".join(f'"{name}"' for name in ("time", *names))
+        assert path.stat().st_size < 1_000_000
+        values = read(path)[1]
+        assert np.array_equal(values[:, 0], times[file])
+        assert np.all(np.isfinite(values))
+    options = dict(csv.reader((run.reference_folder / FILES[2]).read_text().splitlines()))
+    assert {key: float(value) for key, value in options.items()} == {
+        "StartTime": run.start,
+        "StopTime": run.stop,
+        "StepSize": run.steps[0] if len(run.steps) == 1 else 0.0,
+        "RelTol": run.tolerance,
+    }
+
+
+@each_scenario
+def test_first_row_is_the_start(run: Scenario) -> None:
+    first = {name: column[0] for name, column in columns(run).items()}
+    force = {name: run.inputs[name][0] if name in run.inputs else 0.0 for name in ("tau1", "f2")}
+    for name in ("q1", "q2", "dq1", "dq2"):
+        assert first[name] == run.initial.get(name, 0.0)
+    power = force["tau1"] * first["dq1"] + force["f2"] * first["dq2"]
+    assert first["actuator_power"] == pytest.approx(power, rel=1e-15)
+
+
+@each_scenario
+def test_rows_have_the_inputs_of_the_step_that_ends_there(run: Scenario) -> None:
+    column = columns(run)
+    held = np.maximum(run.reference_rows - 1, 0)
+    zero = np.zeros(len(run.times))
+    power = run.inputs.get("tau1", zero)[held] * column["dq1"]
+    power += run.inputs.get("f2", zero)[held] * column["dq2"]
+    assert column["actuator_power"] == pytest.approx(power, abs=1e-14 * (1 + np.abs(power).max()))
+
+
+@each_scenario
+def test_energy_changes_by_the_work_of_the_efforts(run: Scenario, reference) -> None:
+    """Over a step with held inputs the work is tau1 (change of q1) + f2 (change of q2), exactly."""
+    values = dict(zip(reference.outputs, reference.simulate(run).T, strict=True))
+    moved = np.diff(np.stack([values["q1"], values["q2"]], axis=1), axis=0)
+    work = np.cumsum(np.sum(reference.inputs(run)[:-1] * moved, axis=1))
+    gained = values["total_energy"][1:] - values["total_energy"][0]
+    scale = np.max(np.abs(values["kinetic_energy"]) + np.abs(values["potential_energy"]))
+    assert np.max(np.abs(gained - work)) < 1e-17 * scale
+
+
+@pytest.mark.parametrize("name", ["free_fall", "coasting", "constant_effort"])
+def test_energy_in_the_files_with_constant_efforts(name: str) -> None:
+    run, column = SCENARIOS[name], columns(SCENARIOS[name])
+    gained = column["total_energy"] - column["total_energy"][0]
+    for effort, coordinate in (("tau1", "q1"), ("f2", "q2")):
+        if effort in run.inputs:
+            gained -= run.inputs[effort][0] * (column[coordinate] - column[coordinate][0])
+    scale = np.max(np.abs(column["kinetic_energy"]) + np.abs(column["potential_energy"]))
+    assert np.max(np.abs(gained)) < 1e-15 * scale
+
+
+@each_scenario
+def test_outputs_in_the_files_belong_together(run: Scenario) -> None:
+    """Single columns against formulas written here: no column is mixed up with another."""
+    p = run.start_values
+    c = columns(run)
+    x = (p["l1"] + c["q2"]) * np.cos(c["q1"]) - p["a"] * np.sin(c["q1"])
+    y = (p["l1"] + c["q2"]) * np.sin(c["q1"]) + p["a"] * np.cos(c["q1"])
+    vx = c["dq2"] * np.cos(c["q1"]) - c["dq1"] * y
+    vy = c["dq2"] * np.sin(c["q1"]) + c["dq1"] * x
+    inertia = p["m1"] * p["lc1"] ** 2 + p["I1z"] + p["I2z"]
+    kinetic = (inertia * c["dq1"] ** 2 + p["m2"] * (vx**2 + vy**2)) / 2
+    potential = p["g"] * (p["m1"] * p["lc1"] * np.sin(c["q1"]) + p["m2"] * y)
+    expected = {
+        "ee_x": x, "ee_y": y, "ee_vx": vx, "ee_vy": vy, "kinetic_energy": kinetic,
+        "potential_energy": potential, "total_energy": kinetic + potential,
+    }  # fmt: skip
+    for name, column in expected.items():
+        scale = np.max(np.abs(kinetic) + np.abs(potential)) if "energy" in name else 1 + abs(column)
+        assert np.all(np.abs(c[name] - column) <= 1e-14 * scale), name
+
+
+def test_equations_agree_with_the_notes(maker: ModuleType) -> None:
+    """Equations (14) and (15) hold for the accelerations that follow from the positions."""
+    equations = maker.derive()
+    ddq1, ddq2 = equations.accelerations
+    m1, m2, i1, i2, l1, lc1, a, g = sp.symbols(maker.PARAMETERS)
+    q1, q2, dq1, dq2 = sp.symbols(maker.STATES)
+    tau1, f2 = sp.symbols(maker.INPUTS)
+    s, c = sp.sin(q1), sp.cos(q1)
+    d11 = m2 * a**2 + m2 * l1**2 + 2 * m2 * l1 * q2 + m1 * lc1**2 + m2 * q2**2 + i1 + i2
+    c211 = c121 = l1 * m2 + m2 * q2
+    gravity1 = m1 * g * lc1 * c + m2 * g * (l1 * c - a * s + q2 * c)
+    first = d11 * ddq1 - a * m2 * ddq2 + (c211 + c121) * dq1 * dq2 + gravity1 - tau1
+    second = -a * m2 * ddq1 + m2 * ddq2 - c211 * dq1**2 + m2 * g * s - f2
+    assert sp.simplify(first) == 0
+    assert sp.simplify(second) == 0

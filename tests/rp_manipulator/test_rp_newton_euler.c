@@ -1,0 +1,239 @@
+/* Newton-Euler recursion against the closed forms of the notes, with (18) corrected, against
+ * accelerations differentiated from positions, and against the Euler-Lagrange dynamics. */
+#include "rp_manipulator.h"
+#include "rp_test_support.h"
+#include "unity.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define EPS DBL_EPSILON
+
+static struct rp_test_random random_source;
+static struct rp_parameters p;
+static struct rp_test_state s;
+
+/* Short names of the notes for the sample, set by next_sample. */
+static double s1, c1, q2, L, dq1, dq2, ddq1, ddq2;
+
+void setUp(void) {
+    random_source.state = 13;
+}
+static void next_sample(void) {
+    rp_test_random_parameters(&random_source, &p);
+    rp_test_random_state(&random_source, &s);
+    s1 = sin(s.q[0]);
+    c1 = cos(s.q[0]);
+    q2 = s.q[1];
+    L = p.l1 + q2;
+    dq1 = s.dq[0];
+    dq2 = s.dq[1];
+    ddq1 = s.ddq[0];
+    ddq2 = s.ddq[1];
+}
+
+/* Bound of the terms of the accelerations of both links, and of the forces on them. */
+static double acceleration_scale(void) {
+    double length = p.l1 + p.lc1 + fabs(q2) + fabs(p.a);
+    return length * (fabs(ddq1) + dq1 * dq1) + 2.0 * fabs(dq1 * dq2) + fabs(ddq2);
+}
+
+static double force_scale(void) {
+    return (p.m1 + p.m2) * (acceleration_scale() + fabs(p.g));
+}
+
+/* The terms of (26) are longer than those of (14): lc1 enters twice, with both signs. */
+static double moment_scale(void) {
+    double arms = fabs(q2) + 2.0 * p.lc1 + p.l1 + fabs(p.a);
+    return arms * force_scale() + (p.I1z + p.I2z) * fabs(ddq1);
+}
+
+#define ASSERT_VECTOR(x, y, z, v, bound) vector_close(x, y, z, v, bound, __LINE__)
+static void vector_close(double x, double y, double z, const double v[3], double bound, int line) {
+    rp_test_close(x, v[0], bound, line);
+    rp_test_close(y, v[1], bound, line);
+    rp_test_close(z, v[2], bound, line);
+}
+
+/* ---- Forward recursion ---------------------------------------------------------------------- */
+
+static void test_link_motion_is_16_to_18(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_link_motion motion;
+        next_sample();
+        memset(&motion, 0xff, sizeof motion);
+        rp_newton_euler_forward(&p, s.q, s.dq, s.ddq, &motion);
+        double bound = 8 * EPS * acceleration_scale();
+        ASSERT_VECTOR(0.0, dq1, 0.0, motion.omega, 0.0);
+        ASSERT_VECTOR(0.0, ddq1, 0.0, motion.domega, 0.0);
+        ASSERT_VECTOR(p.lc1 * ddq1, 0.0, -p.lc1 * dq1 * dq1, motion.ac1, bound);
+        ASSERT_VECTOR(p.l1 * ddq1 - p.a * dq1 * dq1, 0.0, -p.a * ddq1 - p.l1 * dq1 * dq1,
+                      motion.ae1, bound);
+        ASSERT_VECTOR(L * ddq1 - p.a * dq1 * dq1 + 2.0 * dq1 * dq2, 0.0,
+                      -p.a * ddq1 - L * dq1 * dq1 + ddq2, motion.ac2, bound);
+    }
+}
+
+/* A point of the arm in frame 0 along q + dq t + ddq t^2 / 2: `along` (and q2 where it slides) on
+ * z1, `across` on x1, from the joint axis. */
+struct tracked_point {
+    double along;
+    double across;
+    bool slides;
+    int axis;
+};
+
+static double tracked_coordinate(const void *context, double t) {
+    const struct tracked_point *point = context;
+    double angle = s.q[0] + t * (s.dq[0] + 0.5 * t * s.ddq[0]);
+    double slide = s.q[1] + t * (s.dq[1] + 0.5 * t * s.ddq[1]);
+    double along = point->along + (point->slides ? slide : 0.0);
+    return point->axis == 0 ? along * cos(angle) - point->across * sin(angle)
+                            : along * sin(angle) + point->across * cos(angle);
+}
+
+static void check_acceleration(struct tracked_point point, const double acceleration[3]) {
+    /* Over the stencil q1 = u + u^2 / 2 with |u| <= w t at most, whose sine has a tenth derivative
+     * below 9496 * 1.125^10 w^10: with w h <= 1/32 truncation is below 40 epsilons by h^2.
+     * Positions err by 4 epsilons, times 6.4. */
+    double w = fmax(1.0, fmax(fabs(dq1), sqrt(fabs(ddq1))));
+    double h = rp_test_power_of_two(1.0 / w) / 32;
+    double length = fabs(point.along) + fabs(point.across);
+    if (point.slides) {
+        length += fabs(q2) + fabs(dq2) / w + fabs(ddq2) / (w * w);
+    }
+    double bound = 66 * EPS * length / (h * h);
+    point.axis = 0;
+    double x = rp_test_second_derivative(tracked_coordinate, &point, 0.0, h);
+    point.axis = 1;
+    double y = rp_test_second_derivative(tracked_coordinate, &point, 0.0, h);
+    /* x1 = (-s1, c1), y1 = z0, z1 = (c1, s1) */
+    ASSERT_VECTOR(-s1 * x + c1 * y, 0.0, c1 * x + s1 * y, acceleration, 1.5 * bound);
+}
+
+/* Nothing of the notes but the positions goes in: the Coriolis term has the factor 2. */
+static void test_link_accelerations_are_second_derivatives_of_positions(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_link_motion motion;
+        next_sample();
+        rp_newton_euler_forward(&p, s.q, s.dq, s.ddq, &motion);
+        check_acceleration((struct tracked_point){.along = p.lc1}, motion.ac1);
+        check_acceleration((struct tracked_point){.along = p.l1, .across = p.a}, motion.ae1);
+        check_acceleration((struct tracked_point){.along = p.l1, .across = p.a, .slides = true},
+                           motion.ac2);
+    }
+}
+
+/* ---- Backward recursion --------------------------------------------------------------------- */
+
+/* (24) and (25) with `coriolis` times q1' q2': 2 is right, the notes print 1. */
+static void forces_on_link_2(double coriolis, double *f2x, double *f2z) {
+    *f2x = p.m2 * (L * ddq1 - p.a * dq1 * dq1 + coriolis * dq1 * dq2 + p.g * c1);
+    *f2z = p.m2 * (-p.a * ddq1 - L * dq1 * dq1 + ddq2 + p.g * s1);
+}
+
+/* (20), (22) and (23) from them, as printed. */
+static void loads_as_printed(double coriolis, struct rp_joint_loads *loads) {
+    double f2x, f2z;
+    forces_on_link_2(coriolis, &f2x, &f2z);
+    double f1x = f2x + p.m1 * (p.lc1 * ddq1 + p.g * c1);
+    double f1z = f2z + p.m1 * (-p.lc1 * dq1 * dq1 + p.g * s1);
+    double tau2 =
+        p.m2 * (q2 * L * ddq1 - q2 * p.a * dq1 * dq1 + coriolis * q2 * dq1 * dq2 + q2 * p.g * c1) +
+        p.I2z * ddq1;
+    double tau1 = tau2 + p.lc1 * f1x - (p.lc1 - p.l1) * f2x - p.a * f2z + p.I1z * ddq1;
+    *loads = (struct rp_joint_loads){.f1 = {f1x, 0.0, f1z},
+                                     .tau1 = {0.0, tau1, 0.0},
+                                     .f2 = {f2x, 0.0, f2z},
+                                     .tau2 = {0.0, tau2, 0.0}};
+}
+
+static void test_joint_loads_are_19_to_25(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_joint_loads loads, expected;
+        next_sample();
+        memset(&loads, 0xff, sizeof loads);
+        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
+        loads_as_printed(2.0, &expected);
+        double force = 16 * EPS * force_scale(), moment = 16 * EPS * moment_scale();
+        ASSERT_VECTOR(expected.f1[0], 0.0, expected.f1[2], loads.f1, force);
+        ASSERT_VECTOR(expected.f2[0], 0.0, expected.f2[2], loads.f2, force);
+        ASSERT_VECTOR(0.0, expected.tau1[1], 0.0, loads.tau1, moment);
+        ASSERT_VECTOR(0.0, expected.tau2[1], 0.0, loads.tau2, moment);
+    }
+}
+
+static void test_torque_is_the_moment_of_both_links_about_the_joint_axis(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_joint_loads loads;
+        double f2x, f2z;
+        next_sample();
+        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
+        forces_on_link_2(2.0, &f2x, &f2z);
+        double moment = p.lc1 * p.m1 * (p.lc1 * ddq1 + p.g * c1) + L * f2x - p.a * f2z;
+        moment += (p.I1z + p.I2z) * ddq1;
+        ASSERT_CLOSE(moment, loads.tau1[1], 16 * EPS * moment_scale());
+    }
+}
+
+static void test_plane_motion_loads_nothing_out_of_the_plane(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_joint_loads loads;
+        next_sample();
+        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
+        TEST_ASSERT_TRUE(loads.f1[1] == 0.0 && loads.f2[1] == 0.0);
+        TEST_ASSERT_TRUE(loads.tau1[0] == 0.0 && loads.tau1[2] == 0.0);
+        TEST_ASSERT_TRUE(loads.tau2[0] == 0.0 && loads.tau2[2] == 0.0);
+    }
+}
+
+static void test_both_recursions_together_are_one_after_the_other(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_link_motion motion;
+        struct rp_joint_loads together, apart;
+        next_sample();
+        rp_newton_euler(&p, s.q, s.dq, s.ddq, &together);
+        rp_newton_euler_forward(&p, s.q, s.dq, s.ddq, &motion);
+        rp_newton_euler_backward(&p, s.q, &motion, &apart);
+        TEST_ASSERT_EQUAL_MEMORY(&apart, &together, sizeof apart);
+    }
+}
+
+/* ---- Newton-Euler against Euler-Lagrange ---------------------------------------------------- */
+
+static void test_newton_euler_gives_the_generalized_forces_of_euler_lagrange(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_joint_loads loads;
+        double tau[2], scale[2];
+        next_sample();
+        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
+        rp_inverse_dynamics(&p, s.q, s.dq, s.ddq, tau);
+        s.tau[0] = s.tau[1] = 0.0;
+        rp_test_force_scale(&p, &s, scale);
+        ASSERT_CLOSE(tau[0], loads.tau1[1],
+                     fmin(16 * EPS * (moment_scale() + scale[0]), 1e-12 * scale[0]));
+        ASSERT_CLOSE(tau[1], loads.f2[2], 16 * EPS * scale[1]);
+    }
+}
+
+/* (18) as printed has half of the Coriolis acceleration. The missing half turns up in (26), which
+ * is then short of (14) by m2 (l1 + q2) q1' q2'; (27) does not contain it. */
+static void test_recursion_as_printed_is_short_of_14(void) {
+    double largest = 0.0;
+    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
+        struct rp_joint_loads printed;
+        double tau[2], scale[2];
+        next_sample();
+        loads_as_printed(1.0, &printed);
+        rp_inverse_dynamics(&p, s.q, s.dq, s.ddq, tau);
+        s.tau[0] = s.tau[1] = 0.0;
+        rp_test_force_scale(&p, &s, scale);
+        double missing = p.m2 * L * dq1 * dq2;
+        double bound = 16 * EPS * (moment_scale() + scale[0]);
+        ASSERT_CLOSE(-missing, printed.tau1[1] - tau[0], bound);
+        ASSERT_CLOSE(tau[1], printed.f2[2], 16 * EPS * scale[1]);
+        largest = fmax(largest, fabs(missing) / bound);
+    }
+    TEST_ASSERT_TRUE(largest > 1e9); /* far above the rounding */
+}

@@ -1,0 +1,429 @@
+/* The reference motions: geometry, continuity, what is refused, and a model without states. */
+#include "continuous_states.h"
+#include "last_text.h"
+#include "model_description.h"
+#include "rp_manipulator.h"
+#include "rp_trajectory_example.h"
+#include "rp_trajectory_model.h"
+#include "serialization.h"
+#include "snapshot.h"
+#include "stepping.h"
+#include "values.h"
+
+#include <math.h>
+#include <unity.h>
+
+#define COUNT(array) (sizeof(array) / sizeof((array)[0]))
+
+static const double pi = 3.14159265358979323846;
+static const struct rp_trajectory_parameters at_rest;
+
+static struct rp_trajectory_parameters p;
+
+void setUp(void) {
+    p = rp_trajectory_example;
+    last_text[0] = '\0';
+}
+/* The circle that contains the axis of joint 1. */
+static void set_around(void) {
+    p.center[0] = 0.05;
+    p.center[1] = -0.1;
+    p.radius = 0.45;
+    p.start_angle = 2.0;
+    p.frequency = -0.8;
+    p.turns = 4.75;
+}
+
+static struct rp_trajectory_point at(double t) {
+    const struct rp_trajectory_curve curve = {&p, &at_rest, &at_rest, {t, 1.0, 0.0}};
+    struct rp_trajectory_point point;
+    rp_trajectory_evaluate(&curve, &point);
+    return point;
+}
+
+static double end_time(void) {
+    return p.motion == RP_TRAJECTORY_CIRCLE
+               ? p.start_time + p.turns / fabs(p.frequency) + p.ramp_time
+               : p.start_time + p.duration;
+}
+
+/* Each motion and branch, the circle beside and around the axis. */
+enum { KINDS = 7 };
+
+static void set_kind(int kind) {
+    static const int motions[KINDS] = {
+        RP_TRAJECTORY_POINT_TO_POINT, RP_TRAJECTORY_LINE,   RP_TRAJECTORY_LINE,
+        RP_TRAJECTORY_CIRCLE,         RP_TRAJECTORY_CIRCLE, RP_TRAJECTORY_CIRCLE,
+        RP_TRAJECTORY_CIRCLE,
+    };
+    p = rp_trajectory_example;
+    if (kind >= 5) {
+        set_around();
+    }
+    p.motion = motions[kind];
+    p.branch = kind % 2 == 0 ? RP_TRAJECTORY_BACKWARD : RP_TRAJECTORY_FORWARD;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
+}
+
+/* ---- Geometry ------------------------------------------------------------------------------- */
+
+static void assert_on_path(const struct rp_trajectory_point *point) {
+    const double x = point->ee[0].position.value;
+    const double y = point->ee[1].position.value;
+    if (p.motion == RP_TRAJECTORY_CIRCLE) {
+        const double dx = x - p.center[0];
+        const double dy = y - p.center[1];
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, p.radius, sqrt(dx * dx + dy * dy));
+    } else if (p.motion == RP_TRAJECTORY_LINE) {
+        const double area = (x - p.ee_from[0]) * (p.ee_to[1] - p.ee_from[1]) -
+                            (y - p.ee_from[1]) * (p.ee_to[0] - p.ee_from[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.0, area);
+    }
+}
+
+static void test_forward_kinematics_of_the_joints_gives_the_path(void) {
+    for (int kind = 0; kind < KINDS; kind++) {
+        set_kind(kind);
+        const struct rp_parameters arm = {.l1 = p.l1, .a = p.a, .m2 = 1.0};
+        for (int i = 0; i <= 400; i++) {
+            const struct rp_trajectory_point point = at(0.3 + i * end_time() / 390.0);
+            const double q[2] = {point.q[0].position.value, point.q[1].position.value};
+            const double dq[2] = {point.q[0].velocity.value, point.q[1].velocity.value};
+            double position[2];
+            double velocity[2];
+            rp_end_effector_position(&arm, q, position);
+            rp_end_effector_velocity(&arm, q, dq, velocity);
+            for (int j = 0; j < 2; j++) {
+                TEST_ASSERT_DOUBLE_WITHIN(1e-14, position[j], point.ee[j].position.value);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13, velocity[j], point.ee[j].velocity.value);
+            }
+            assert_on_path(&point);
+            const double L = p.l1 + q[1];
+            if (p.motion != RP_TRAJECTORY_POINT_TO_POINT) {
+                TEST_ASSERT_TRUE(p.branch == RP_TRAJECTORY_BACKWARD ? L < 0.0 : L > 0.0);
+            }
+        }
+    }
+}
+
+static void test_the_start_is_the_principal_solution(void) {
+    for (int kind = 1; kind < KINDS; kind++) {
+        for (int i = 0; i < 24; i++) {
+            set_kind(kind);
+            const double turn = i * pi / 12.0;
+            const double c = cos(turn);
+            const double s = sin(turn);
+            double *const points[] = {p.ee_from, p.ee_to, p.center};
+            for (size_t j = 0; j < COUNT(points); j++) {
+                const double x = points[j][0];
+                points[j][0] = c * x - s * points[j][1];
+                points[j][1] = s * x + c * points[j][1];
+            }
+            const struct rp_trajectory_point point = at(p.start_time);
+            const struct rp_parameters arm = {.l1 = p.l1, .a = p.a};
+            const double ee[2] = {point.ee[0].position.value, point.ee[1].position.value};
+            double q[2];
+            TEST_ASSERT_TRUE(rp_inverse_kinematics(
+                &arm, ee,
+                p.branch == RP_TRAJECTORY_FORWARD ? RP_BRANCH_FORWARD : RP_BRANCH_BACKWARD, q));
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14, q[0], point.q[0].position.value);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14, q[1], point.q[1].position.value);
+        }
+    }
+}
+
+static void test_ends_are_reached_exactly(void) {
+    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
+    for (int i = 0; i < 2; i++) {
+        TEST_ASSERT_TRUE(at(p.start_time).q[i].position.value == p.q_from[i]);
+        TEST_ASSERT_TRUE(at(end_time()).q[i].position.value == p.q_to[i]);
+    }
+    p.motion = RP_TRAJECTORY_LINE;
+    for (int i = 0; i < 2; i++) {
+        TEST_ASSERT_TRUE(at(p.start_time).ee[i].position.value == p.ee_from[i]);
+        TEST_ASSERT_TRUE(at(end_time()).ee[i].position.value == p.ee_to[i]);
+    }
+    p.motion = RP_TRAJECTORY_CIRCLE;
+    p.turns = 2.25;
+    TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.center[0], at(end_time()).ee[0].position.value);
+    TEST_ASSERT_DOUBLE_WITHIN(2e-16, p.center[1] + p.radius, at(end_time()).ee[1].position.value);
+}
+
+/* A coordinate that does not change rests exactly, also one that is no short binary number. */
+static void test_a_line_along_an_axis_keeps_the_other_coordinate(void) {
+    p.motion = RP_TRAJECTORY_LINE;
+    p.ee_to[1] = p.ee_from[1];
+    for (int i = 0; i < 100; i++) {
+        const struct motion y = at(i * 0.02).ee[1];
+        TEST_ASSERT_TRUE(y.position.value == p.ee_from[1]);
+        TEST_ASSERT_TRUE(y.velocity.value == 0.0 && y.acceleration.value == 0.0);
+    }
+}
+
+/* ---- Time ----------------------------------------------------------------------------------- */
+
+static size_t boundaries(double times[4]) {
+    times[0] = p.start_time;
+    times[1] = end_time();
+    if (p.motion != RP_TRAJECTORY_CIRCLE) {
+        times[2] = p.start_time + 0.5 * p.duration; // where the nearer end changes
+        return 3;
+    }
+    times[2] = p.start_time + p.ramp_time;
+    times[3] = end_time() - p.ramp_time;
+    return 4;
+}
+
+static void test_joints_are_twice_continuously_differentiable(void) {
+    const double h = 1e-9;
+    for (int kind = 0; kind < KINDS; kind++) {
+        set_kind(kind);
+        double times[4];
+        const size_t count = boundaries(times);
+        for (size_t k = 0; k < count; k++) {
+            const struct rp_trajectory_point before = at(times[k] - h);
+            const struct rp_trajectory_point after = at(times[k] + h);
+            for (int i = 0; i < 2; i++) {
+                const struct motion b = before.q[i];
+                const struct motion a = after.q[i];
+                TEST_ASSERT_DOUBLE_WITHIN(1e-7, b.position.value, a.position.value);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-6, b.velocity.value, a.velocity.value);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-5, b.acceleration.value, a.acceleration.value);
+            }
+        }
+    }
+}
+
+/* At the boundary itself the later formula holds: the third derivative jumps there. */
+static void test_the_later_segment_holds_at_a_boundary(void) {
+    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
+    const double jerk = 60.0 * (p.q_to[0] - p.q_from[0]) / pow(p.duration, 3.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, jerk, at(p.start_time).q[0].acceleration.first);
+    TEST_ASSERT_TRUE(at(nextafter(p.start_time, 0.0)).q[0].acceleration.first == 0.0);
+    TEST_ASSERT_TRUE(at(end_time()).q[0].acceleration.first == 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, jerk, at(nextafter(end_time(), 0.0)).q[0].acceleration.first);
+}
+
+/* Between ramp and full speed only the fourth derivative jumps: the second one of the acceleration.
+ */
+static void test_the_later_segment_holds_where_a_ramp_ends_or_begins(void) {
+    const double times[] = {p.start_time + p.ramp_time, end_time() - p.ramp_time};
+    for (int k = 0; k < 2; k++) {
+        const double at_boundary = at(times[k]).ee[0].acceleration.second;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, at(times[k] + 1e-9).ee[0].acceleration.second, at_boundary);
+        const double before = at(times[k] - 1e-9).ee[0].acceleration.second;
+        TEST_ASSERT_TRUE(fabs(before - at_boundary) > 1e-3);
+    }
+}
+
+static void test_derivatives_along_time_are_the_rates(void) {
+    for (int kind = 0; kind < KINDS; kind++) {
+        set_kind(kind);
+        for (int i = 0; i <= 200; i++) {
+            const struct rp_trajectory_point point = at(0.4 + i * end_time() / 190.0);
+            const struct motion all[] = {point.q[0], point.q[1], point.ee[0], point.ee[1]};
+            for (size_t j = 0; j < COUNT(all); j++) {
+                const struct motion m = all[j];
+                const double scale = 1.0 + fabs(m.acceleration.value);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale, m.velocity.value, m.position.first);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.velocity.first);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.position.second);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (scale + fabs(m.velocity.second)),
+                                          m.velocity.second, m.acceleration.first);
+            }
+        }
+    }
+}
+
+static void test_it_rests_before_and_after(void) {
+    for (int kind = 0; kind < KINDS; kind++) {
+        set_kind(kind);
+        const double times[][2] = {{p.start_time - 1e-12, -1e6}, {end_time() + 1e-12, 1e6}};
+        for (size_t k = 0; k < COUNT(times); k++) {
+            const struct rp_trajectory_point near = at(times[k][0]);
+            const struct rp_trajectory_point far = at(times[k][1]);
+            for (int i = 0; i < 2; i++) {
+                TEST_ASSERT_TRUE(near.q[i].position.value == far.q[i].position.value);
+                TEST_ASSERT_TRUE(near.ee[i].position.value == far.ee[i].position.value);
+                const struct motion q = near.q[i];
+                TEST_ASSERT_TRUE(q.velocity.value == 0.0 && q.acceleration.value == 0.0);
+                TEST_ASSERT_TRUE(q.position.first == 0.0 && q.position.second == 0.0);
+                TEST_ASSERT_TRUE(q.acceleration.first == 0.0 && q.acceleration.second == 0.0);
+            }
+        }
+    }
+}
+
+static double largest_jump_of_q1(int count) {
+    double largest = 0.0;
+    double last = at(p.start_time).q[0].position.value;
+    for (int i = 1; i <= count; i++) {
+        const double t = p.start_time + (end_time() - p.start_time) * i / count;
+        const double q1 = at(t).q[0].position.value;
+        largest = fmax(largest, fabs(q1 - last));
+        last = q1;
+    }
+    return largest;
+}
+
+static void test_q1_goes_on_without_a_jump(void) {
+    for (int kind = 1; kind < KINDS; kind++) {
+        set_kind(kind);
+        TEST_ASSERT_TRUE(largest_jump_of_q1(4000) < 0.02);
+    }
+    set_around();
+    p.motion = RP_TRAJECTORY_CIRCLE;
+    p.turns = 5.0;
+    const double turned = at(end_time()).q[0].position.value - at(p.start_time).q[0].position.value;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, -10.0 * pi, turned);
+}
+
+static void test_q1_follows_a_line_over_the_negative_axis(void) {
+    p.motion = RP_TRAJECTORY_LINE;
+    p.a = 0.0;
+    p.ee_from[0] = p.ee_to[0] = -0.4;
+    p.ee_from[1] = 0.4;
+    p.ee_to[1] = -0.4;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.75 * pi, at(0.0).q[0].position.value);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1.25 * pi, at(9.0).q[0].position.value);
+}
+
+/* ---- What is refused ------------------------------------------------------------------------ */
+
+static void test_distance_of_a_line(void) {
+    double nearest[2];
+    p.motion = RP_TRAJECTORY_LINE;
+    p.ee_from[0] = -1.0;
+    p.ee_to[0] = 2.0;
+    p.ee_from[1] = p.ee_to[1] = 0.25;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.25, rp_trajectory_distance(&p, nearest));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.0, nearest[0]);
+    p.ee_to[0] = -0.3; // ends before the foot of the perpendicular
+    p.ee_to[1] = 0.4;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, rp_trajectory_distance(&p, nearest));
+    TEST_ASSERT_TRUE(nearest[0] == -0.3 && nearest[1] == 0.4);
+    p.ee_from[0] = p.ee_to[0]; // a line of no length
+    p.ee_from[1] = p.ee_to[1];
+    TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, rp_trajectory_distance(&p, nearest));
+}
+
+/* Against the nearest of many points of the swept arc. */
+static void test_distance_of_an_arc(void) {
+    for (int i = 0; i < 12 * 6 * 2; i++) {
+        set_kind(i % 2 == 0 ? 3 : 5);
+        p.start_angle = -7.0 + i % 24;
+        p.turns = 0.05 + 0.2 * (i % 6);
+        p.frequency = i % 4 < 2 ? 0.01 : -0.01;
+        double expected = INFINITY;
+        const int count = 20000;
+        for (int k = 0; k <= count; k++) {
+            const double swept = 2.0 * pi * p.turns * k / count;
+            const double angle = p.start_angle + (p.frequency < 0.0 ? -swept : swept);
+            const double x = p.center[0] + p.radius * cos(angle);
+            const double y = p.center[1] + p.radius * sin(angle);
+            expected = fmin(expected, sqrt(x * x + y * y));
+        }
+        double nearest[2];
+        const double distance = rp_trajectory_distance(&p, nearest);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, expected, distance);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, distance,
+                                  sqrt(nearest[0] * nearest[0] + nearest[1] * nearest[1]));
+    }
+}
+
+static void test_an_arc_may_leave_out_what_is_out_of_reach(void) {
+    p.center[0] = 0.3;
+    p.center[1] = 0.0;
+    p.radius = 0.35; // nearest 0.05 at the angle pi
+    p.turns = 0.5;
+    p.frequency = 0.25;
+    p.start_angle = -pi / 2.0;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
+    p.frequency = -0.25;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_OUT_OF_REACH, rp_trajectory_check(&p));
+    p.frequency = 0.25;
+    p.turns = 0.76; // just beyond the angle pi
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_OUT_OF_REACH, rp_trajectory_check(&p));
+    p.a = -0.04;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
+}
+
+static void test_what_belongs_to_another_motion_is_not_checked(void) {
+    p.frequency = 0.0;
+    p.ramp_time = 1e9;
+    p.motion = RP_TRAJECTORY_LINE;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
+    p.ee_from[0] = p.ee_from[1] = 0.0;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_OUT_OF_REACH, rp_trajectory_check(&p));
+    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
+    TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
+}
+
+/* ---- A model without states and inputs ------------------------------------------------------- */
+
+static const unsigned outputs[] = {40, 41, 42, 43, 44, 45, 46, 47, 48, 49};
+
+static struct instance *initialized(void) {
+    const struct instance_experiment experiment = {.start_time = 0.0};
+    struct instance *instance;
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+    return instance;
+}
+
+static void test_steps_follow_the_motion(void) {
+    struct instance *instance = initialized();
+    for (int i = 0; i < 60; i++) {
+        double values[COUNT(outputs)];
+        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.1));
+        ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), values));
+        const struct rp_trajectory_point point = at(instance_time(instance));
+        TEST_ASSERT_TRUE(values[0] == point.q[0].position.value);
+        TEST_ASSERT_TRUE(values[5] == point.q[1].acceleration.value);
+        TEST_ASSERT_TRUE(values[8] == point.ee[0].velocity.value);
+    }
+    instance_destroy(instance);
+}
+
+static void test_snapshots_and_their_bytes_go_back(void) {
+    struct instance *instance = initialized();
+    struct instance *other = initialized();
+    struct instance_snapshot *snapshot = NULL;
+    struct instance_snapshot *read = NULL;
+    unsigned char bytes[1024];
+    double expected[COUNT(outputs)];
+    double values[COUNT(outputs)];
+    ASSERT_OK(instance_do_step(instance, 0.0, 1.1));
+    ASSERT_OK(instance_save(instance, 7, &snapshot));
+    ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), expected));
+    TEST_ASSERT_LESS_OR_EQUAL_UINT64(sizeof bytes, instance_serialized_size(instance));
+    ASSERT_OK(instance_serialize(instance, snapshot, bytes, sizeof bytes));
+
+    ASSERT_OK(instance_do_step(instance, 1.1, 1.0));
+    ASSERT_OK(instance_restore(instance, snapshot));
+    ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), values));
+    TEST_ASSERT_EQUAL_MEMORY(expected, values, sizeof values);
+
+    ASSERT_OK(instance_deserialize(other, bytes, instance_serialized_size(other), &read));
+    ASSERT_OK(instance_restore(other, read));
+    TEST_ASSERT_TRUE(instance_time(other) == 1.1);
+    ASSERT_OK(instance_get_real(other, outputs, COUNT(outputs), values));
+    TEST_ASSERT_EQUAL_MEMORY(expected, values, sizeof values);
+    ASSERT_OK(instance_do_step(other, 1.1, 0.5));
+    instance_destroy(instance);
+    instance_destroy(other);
+}
+
+static void test_arrays_of_no_states(void) {
+    struct instance *instance = initialized();
+    TEST_ASSERT_EQUAL_UINT64(0, instance_state_count(instance));
+    ASSERT_OK(instance_set_states(instance, NULL, 0));
+    ASSERT_OK(instance_get_states(instance, NULL, 0));
+    ASSERT_OK(instance_get_derivatives(instance, NULL, 0));
+    ASSERT_OK(instance_get_nominals(instance, NULL, 0));
+    double x = 0.0;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_get_states(instance, &x, 1));
+    instance_destroy(instance);
+}

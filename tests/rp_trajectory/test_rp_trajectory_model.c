@@ -1,0 +1,189 @@
+/* The reference motions as the instance sees them: fields, their derivatives, what is refused. */
+#include "rp_trajectory_example.h"
+#include "rp_trajectory_model.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static const double pi = 3.14159265358979323846;
+
+static struct rp_trajectory_values v;
+static char text[512];
+
+void setUp(void) {
+    v = (struct rp_trajectory_values){.parameters = rp_trajectory_example};
+    v.parameters.start_angle = 0.25;
+    text[0] = '\0';
+}
+/* Calculated fields in the order of the structure. */
+enum { DQ = 2, DDQ = 4, VELOCITY = 8, FIELDS = 10 };
+
+static const double *fields_of(const struct rp_trajectory_values *values) {
+    return values->q;
+}
+
+static void fields_at(double t, double fields[FIELDS]) {
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.outputs(&v, t));
+    memcpy(fields, fields_of(&v), FIELDS * sizeof(double));
+}
+
+static const int motions[] = {RP_TRAJECTORY_POINT_TO_POINT, RP_TRAJECTORY_LINE,
+                              RP_TRAJECTORY_CIRCLE};
+
+/* ---- Derivatives ---------------------------------------------------------------------------- */
+
+static void test_rates_along_time_are_the_fields(void) {
+    struct rp_trajectory_values first;
+    struct rp_trajectory_values second;
+    for (size_t motion = 0; motion < 3; motion++) {
+        v.parameters.motion = motions[motion];
+        double fields[FIELDS];
+        fields_at(1.1, fields);
+        memset(&first, 0, sizeof first);
+        memset(&second, 0, sizeof second);
+        TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                              rp_trajectory_model.propagate(&v, 1.1, 1.0, &first, &second));
+        for (int i = 0; i < 2; i++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, fields[DQ + i], first.q[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, fields[DDQ + i], first.dq[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, fields[VELOCITY + i], first.ee_position[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, fields[DDQ + i], second.q[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-10, first.ddq[i], second.dq[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, first.ee_velocity[i], second.ee_position[i]);
+        }
+    }
+}
+
+/* The Real parameters, from l1 on. */
+enum {
+    FIRST_REAL = offsetof(struct rp_trajectory_parameters, l1),
+    REALS = (sizeof(struct rp_trajectory_parameters) - FIRST_REAL) / sizeof(double)
+};
+
+static double *reals_of(struct rp_trajectory_values *values) {
+    return (double *)(void *)((char *)&values->parameters + FIRST_REAL);
+}
+
+/* Central differences of the fields by each parameter in turn. */
+static void test_rates_along_parameters_are_those_of_the_fields(void) {
+    const double step = 1e-5;
+    struct rp_trajectory_values first;
+    double *direction = reals_of(&first);
+    double *parameters = reals_of(&v);
+    for (size_t motion = 0; motion < 3; motion++) {
+        v.parameters.motion = motions[motion];
+        for (size_t i = 0; i < REALS; i++) {
+            double before[FIELDS];
+            double after[FIELDS];
+            const double value = parameters[i];
+            memset(&first, 0, sizeof first);
+            direction[i] = 1.0;
+            TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                                  rp_trajectory_model.propagate(&v, 1.1, 0.0, &first, NULL));
+            parameters[i] = value - step;
+            fields_at(1.1, before);
+            parameters[i] = value + step;
+            fields_at(1.1, after);
+            parameters[i] = value;
+            for (int k = 0; k < FIELDS; k++) {
+                const double difference = (after[k] - before[k]) / (2.0 * step);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-6 * (1.0 + fabs(difference)), difference,
+                                          fields_of(&first)[k]);
+            }
+        }
+    }
+}
+
+static void test_there_is_no_state(void) {
+    TEST_ASSERT_EQUAL_UINT64(0, rp_trajectory_model.states.size);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                          rp_trajectory_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
+}
+
+/* ---- What is refused ------------------------------------------------------------------------ */
+
+static void assert_refused(const char *expected) {
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
+                          rp_trajectory_model.check_parameters(&v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING(expected, text);
+}
+
+static void assert_accepted(void) {
+    text[0] = '\0';
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.check_parameters(&v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING("", text);
+}
+
+static void test_start_values_are_accepted(void) {
+    for (size_t motion = 0; motion < 3; motion++) {
+        v.parameters.motion = motions[motion];
+        assert_accepted();
+    }
+}
+
+static void test_a_circle_needs_a_frequency(void) {
+    v.parameters.frequency = 0.0;
+    assert_refused("frequency = 0 is refused: a circle needs one above or below 0");
+}
+
+static void test_a_circle_needs_time_for_its_ramps(void) {
+    v.parameters.turns = 0.25;
+    v.parameters.frequency = -0.5;
+    v.parameters.ramp_time = 0.75;
+    assert_refused("turns / |frequency| = 0.5 s is refused: it must be at least ramp_time = 0.75 s "
+                   "(turns = 0.25, frequency = -0.5 Hz)");
+    v.parameters.turns = 0.375; // just enough
+    assert_accepted();
+}
+
+static void test_a_path_at_the_smallest_distance_is_refused(void) {
+    v.parameters.motion = RP_TRAJECTORY_LINE;
+    v.parameters.ee_from[0] = 0.5;
+    v.parameters.ee_from[1] = v.parameters.ee_to[1] = 0.125;
+    v.parameters.ee_to[0] = -0.5;
+    v.parameters.a = -0.125;
+    assert_refused(
+        "the path to (0, 0.125) m is refused: there it is 0.125 m from the axis of "
+        "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.125 m");
+    v.parameters.a = -0.1249;
+    assert_accepted();
+}
+
+/* The text gives the nearest point of the path and its distance. */
+static void test_a_path_stays_beyond_the_smallest_distance(void) {
+    v.parameters.motion = RP_TRAJECTORY_LINE;
+    v.parameters.ee_from[0] = 0.5;
+    v.parameters.ee_from[1] = v.parameters.ee_to[1] = -0.0625;
+    v.parameters.ee_to[0] = -0.5;
+    assert_refused("the path to (0, -0.0625) m is refused: there it is 0.0625 m from the axis of "
+                   "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.1 m");
+}
+
+static void test_a_circle_about_the_axis_is_everywhere_as_near(void) {
+    v.parameters.center[0] = v.parameters.center[1] = 0.0;
+    v.parameters.start_angle = 0.0;
+    v.parameters.radius = 0.0625;
+    assert_refused("the path to (0.0625, 0) m is refused: there it is 0.0625 m from the axis of "
+                   "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.1 m");
+    v.parameters.radius = 0.125;
+    assert_accepted();
+}
+
+/* A quarter of a circle that does not come to the axis, with either of its ends next to it. */
+static void test_the_nearest_point_of_an_arc_may_be_an_end(void) {
+    v.parameters.center[0] = 0.25;
+    v.parameters.center[1] = 0.0;
+    v.parameters.radius = 0.25;
+    v.parameters.ramp_time = 0.25;
+    v.parameters.turns = 0.25;
+    for (int direction = -1; direction <= 1; direction += 2) {
+        // from the top to the right, and back
+        v.parameters.frequency = 0.5 * direction;
+        v.parameters.start_angle = direction < 0 ? 0.5 * pi : 0.0;
+        v.parameters.a = 0.5;
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
+                              rp_trajectory_model.check_parameters(&v, text, sizeof text));
+        TEST_ASSERT_NOT_NULL(strstr(text, "(0.25, 0.25) m is refused: there it is 0.353553 m"));
+    }
+}

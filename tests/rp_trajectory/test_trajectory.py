@@ -1,0 +1,389 @@
+"""RPTrajectory.fmu: exact motions and derivatives, what it refuses, a unit without states."""
+
+import ctypes
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+import fmpy
+import mpmath as mp
+import numpy as np
+import pytest
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from fmpy.validation import validate_fmu
+
+from tests.support.cosim_project import declared, load, names_of
+from tests.support.instances import ERROR, Instance, Unit
+from tests.support.paths import ROOT
+
+MODEL = ROOT / "models" / "rp_trajectory"
+SCRIPT = MODEL / "references" / "make_references.py"
+DECLARED = declared(MODEL.name).variables
+START = {name: v.start for name, v in DECLARED.items() if v.causality == "parameter"}
+OUTPUTS = [name for name, v in DECLARED.items() if v.causality == "output"]
+SCENARIOS = names_of(MODEL.name)
+ENUMERATIONS = {name: list(v.items) for name, v in DECLARED.items() if v.type == "Enumeration"}
+
+AROUND = {"x_center": 0.05, "y_center": -0.1, "radius": 0.45, "start_angle": 2.0}
+AROUND |= {"frequency": -0.8, "turns": 2.75, "ramp_time": 0.7}
+LINE = {"ee_x_from": -0.4, "ee_y_from": 0.25, "ee_x_to": -0.15, "ee_y_to": -0.35, "duration": 1.6}
+MOTIONS = {
+    "point_to_point": {"motion": "point_to_point", "q1_from": -0.3, "duration": 1.7, "a": -0.2},
+    "line": {"motion": "line", "a": 0.08, **LINE},
+    "line_backward": {"motion": "line", "branch": "backward", "a": -0.12, "l1": 0.4, **LINE},
+    "beside": {"frequency": -0.5},
+    "beside_backward": {"branch": "backward", "start_angle": 3.0, "turns": 1.3},
+    "around": {**AROUND},
+    "around_backward": {"branch": "backward", "a": 0.2, **AROUND},
+    "arc": {"x_center": 0.3, "y_center": 0.0, "radius": 0.35, "start_angle": -1.6, "turns": 0.5}
+    | {"frequency": 0.4},
+}
+each_motion = pytest.mark.parametrize("motion", MOTIONS)
+
+
+@pytest.fixture(scope="module")
+def path() -> Path:
+    """The FMU, built beside that of the manipulator."""
+    build = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
+    return build / "RPTrajectory.fmu"
+
+
+@pytest.fixture(scope="module")
+def unit(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
+    return Unit(path, tmp_path_factory.mktemp("unit"))
+
+
+@pytest.fixture(scope="module")
+def maker() -> ModuleType:
+    """make_references.py as a module: the same motions, from sympy and mpmath."""
+    spec = importlib.util.spec_from_file_location("make_trajectory_references", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(autouse=True)
+def digits() -> Iterator[None]:
+    with mp.workdps(40):
+        yield
+
+
+def numbered(parameters: dict[str, object]) -> dict[str, float]:
+    """Parameters with the numbers of items in place of their names."""
+    return {
+        name: ENUMERATIONS[name].index(value) + 1 if name in ENUMERATIONS else value
+        for name, value in parameters.items()
+    }
+
+
+def give(instance: Instance, parameters: dict[str, object]) -> None:
+    """Set parameters, items by their names."""
+    for name, value in numbered(parameters).items():
+        if name in ENUMERATIONS:
+            instance.fmi.setInteger([instance.unit.references[name]], [value])
+        else:
+            instance.set(**{name: value})
+
+
+@contextmanager
+def running(
+    unit: Unit, parameters: dict[str, object], start: float = 0.0, kind: type = fmi2.FMU2Slave
+) -> Iterator[Instance]:
+    """An instance with `parameters`, initialized at `start` (s)."""
+    with Instance(unit, kind) as instance:
+        give(instance, parameters)
+        yield instance.initialize(start=start)
+
+
+def boundaries(parameters: dict[str, object]) -> list[float]:
+    """Times (s) at which segments meet."""
+    value = {name: v.get("start") for name, v in DECLARED.items()} | numbered(parameters)
+    t0 = value["start_time"]
+    if value["motion"] != ENUMERATIONS["motion"].index("circle") + 1:
+        return [t0, t0 + value["duration"]]
+    full, ramp = value["turns"] / abs(value["frequency"]), value["ramp_time"]
+    return [t0, t0 + ramp, t0 + full, t0 + full + ramp]
+
+
+def random_times(parameters: dict[str, object], count: int = 4) -> np.ndarray:
+    """Times within each segment and the holds before and after, rising, (n,) in s."""
+    ends = boundaries(parameters)
+    limits = [ends[0] - 0.3, *ends, ends[-1] + 0.3]
+    random = np.random.default_rng(5)
+    return np.concatenate(
+        [np.sort(random.uniform(a, b, count)) for a, b in zip(limits, limits[1:], strict=False)]
+    )
+
+
+def derivatives(instance: Instance, order: int) -> list[float]:
+    references = [instance.unit.references[name] for name in OUTPUTS]
+    refs = (ctypes.c_uint32 * len(references))(*references)
+    orders = (ctypes.c_int * len(references))(*[order] * len(references))
+    values = (ctypes.c_double * len(references))()
+    instance.fmi.fmi2GetRealOutputDerivatives(
+        instance.fmi.component, refs, len(references), orders, values
+    )
+    return list(values)
+
+
+def assert_close(got: np.ndarray, expected: np.ndarray, bound: float) -> None:
+    """Each column within `bound` of its largest expected value."""
+    scale = np.maximum(np.max(np.abs(expected), axis=0), 1e-3)
+    assert np.max(np.abs(got - expected) / scale) < bound
+
+
+# ---- exact motions -----------------------------------------------------------------------------
+
+
+@each_motion
+def test_outputs_and_their_derivatives(unit: Unit, maker: ModuleType, motion: str) -> None:
+    """At random times of each segment, against derivatives of the same motion in 40 digits."""
+    parameters = MOTIONS[motion]
+    times = random_times(parameters)
+    exact = maker.Motion(START | numbered(parameters))
+    assert list(maker.OUTPUTS) == OUTPUTS
+    got, expected = {0: [], 1: [], 2: []}, {0: [], 1: [], 2: []}
+    with running(unit, parameters, start=times[0] - 0.01) as instance:
+        t = times[0] - 0.01
+        for target in times:
+            instance.step(t, target - t)
+            t = target
+            now = float(t)
+            got[0].append(instance.get(*OUTPUTS))
+            expected[0].append([float(x) for x in follow(exact, now)])
+            # differences in 40 digits: their errors are below 1e-15
+            h = mp.mpf("1e-10")
+            before, at, after = (exact.outputs(mp.mpf(now) + k * h) for k in (-1, 0, 1))
+            expected[1].append(
+                [float((c - a) / (2 * h)) for a, c in zip(before, after, strict=True)]
+            )
+            expected[2].append(
+                [float((a - 2 * b + c) / h**2) for a, b, c in zip(before, at, after, strict=True)]
+            )
+            for order in (1, 2):
+                got[order].append(derivatives(instance, order))
+    for order, bound in ((0, 1e-13), (1, 1e-10), (2, 1e-10)):
+        assert_close(np.array(got[order]), np.array(expected[order]), bound)
+
+
+@each_motion
+def test_derivatives_by_parameters(unit: Unit, maker: ModuleType, motion: str) -> None:
+    """Directional derivatives in initialization mode, against differences in 40 digits."""
+    parameters = START | numbered(MOTIONS[motion])
+    names = [name for name in START if DECLARED[name].type == "Real"]
+    times, h = random_times(MOTIONS[motion], 1), mp.mpf("1e-12")
+    expected = np.empty((len(times), len(names), len(OUTPUTS)))
+    for k, name in enumerate(names):
+        value = mp.mpf(parameters[name])
+        sides = (maker.Motion(parameters | {name: value + side * h}) for side in (-1, 1))
+        rows = [[follow(moved, t) for t in times] for moved in sides]
+        difference = (np.array(rows[1]) - np.array(rows[0])) / (2 * h)
+        expected[:, k] = difference.astype(float)
+    outputs = [unit.references[output] for output in OUTPUTS]
+    for i, t in enumerate(times):
+        with Instance(unit) as instance:
+            give(instance, MOTIONS[motion])
+            instance.fmi.setupExperiment(startTime=t)
+            instance.fmi.enterInitializationMode()
+            got = [
+                instance.fmi.getDirectionalDerivative(outputs, [unit.references[name]], [1.0])
+                for name in names
+            ]
+        assert_close(np.array(got).T, expected[i].T, 1e-11)
+
+
+def follow(exact: object, t: float) -> list[mp.mpf]:
+    """Outputs at `t` (s), the angle brought there in steps of less than half a turn."""
+    if exact.q1 is None:
+        exact.now = exact.value["start_time"]
+        exact.outputs(exact.now)  # q1 is principal at the start
+    for between in np.arange(float(exact.now), float(t), 0.2):
+        exact.outputs(float(between))
+    exact.now = t
+    return exact.outputs(float(t))
+
+
+@pytest.mark.parametrize("start", [-1e4, 1e5])
+def test_the_motion_does_not_depend_on_when_it_starts(unit: Unit, start: float) -> None:
+    elapsed = np.arange(1, 48) / 8  # exact at both times
+    with (
+        running(unit, {"start_time": 0.5}) as first,
+        running(unit, {"start_time": start + 0.5}, start=start) as second,
+    ):
+        for t in elapsed:
+            first.step(t - 0.125, 0.125)
+            second.step(start + t - 0.125, 0.125)
+            assert first.get(*OUTPUTS) == second.get(*OUTPUTS)
+
+
+# ---- what is refused ---------------------------------------------------------------------------
+
+REFUSED = {
+    "no_frequency": ({"frequency": 0.0}, "frequency = 0 is refused"),
+    "short": (
+        {"turns": 0.25, "frequency": -0.5, "ramp_time": 0.75},
+        "turns / |frequency| = 0.5 s is refused: it must be at least ramp_time = 0.75 s",
+    ),
+    "circle_too_near": (
+        {"x_center": 0.15, "y_center": 0.0},
+        "there it is 0.05 m from the axis of joint 1, and it must stay beyond the smallest "
+        "reachable distance |a| = 0.1 m",
+    ),
+    "circle_around_too_near": (
+        {"x_center": 0.0, "y_center": 0.25, "radius": 0.3, "branch": "backward"},
+        "the path to (0, -0.05) m is refused: there it is 0.05 m from the axis",
+    ),
+    "line_too_near": (
+        {"motion": "line", "ee_x_from": 0.5, "ee_y_from": -0.0625, "ee_x_to": -0.5}
+        | {"ee_y_to": -0.0625, "a": -0.08},
+        "(0, -0.0625) m is refused: there it is 0.0625 m from the axis of joint 1, and it must "
+        "stay beyond the smallest reachable distance |a| = 0.08 m",
+    ),
+    "singular": (
+        {"motion": "line", "ee_x_from": 0.5, "ee_y_from": 0.125, "ee_x_to": -0.5}
+        | {"ee_y_to": 0.125, "a": 0.125},
+        "there it is 0.125 m",
+    ),
+    "at_the_axis": (
+        {"motion": "line", "ee_x_from": 0.0, "ee_y_from": 0.0, "a": 0.0},
+        "there it is 0 m",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_parameters_that_do_not_go_together(unit: Unit, case: str) -> None:
+    parameters, words = REFUSED[case]
+    with Instance(unit, logging_on=True) as instance:
+        give(instance, parameters)
+        instance.fmi.setupExperiment()
+        instance.fmi.enterInitializationMode()
+        with pytest.raises(FMICallException) as caught:
+            instance.fmi.exitInitializationMode()
+        assert caught.value.status == ERROR
+        assert any(words in message.text for message in instance.messages), instance.messages
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"radius": -0.1}, "radius"),
+        ({"turns": -1.0}, "turns"),
+        ({"ramp_time": 0.0}, "ramp_time"),
+        ({"duration": 0.0}, "duration"),
+    ],
+)
+def test_values_out_of_range(unit: Unit, parameters: dict[str, float], words: str) -> None:
+    with Instance(unit, logging_on=True) as instance:
+        with pytest.raises(FMICallException):
+            instance.set(**parameters)
+        assert any(words in message.text for message in instance.messages)
+
+
+@pytest.mark.parametrize("name", ENUMERATIONS)
+@pytest.mark.parametrize("beyond", [False, True])
+def test_numbers_that_are_no_items(unit: Unit, name: str, beyond: bool) -> None:
+    value = len(ENUMERATIONS[name]) + 1 if beyond else 0
+    with Instance(unit, logging_on=True) as instance:
+        with pytest.raises(FMICallException):
+            instance.fmi.setInteger([unit.references[name]], [value])
+        assert any(name in message.text for message in instance.messages)
+
+
+def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(unit: Unit) -> None:
+    near = {"x_center": 0.3, "y_center": 0.0, "radius": 0.35, "start_angle": -1.5, "turns": 0.45}
+    with running(unit, near | {"frequency": 0.4}) as instance:
+        instance.step(0.0, 1.0)
+    with pytest.raises(FMICallException), running(unit, near | {"frequency": -0.4}):
+        pass
+
+
+# ---- a unit without states and inputs ----------------------------------------------------------
+
+
+def test_fmpy_finds_no_problem(path: Path) -> None:
+    assert validate_fmu(str(path)) == []
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpy_simulates_it(path: Path, maker: ModuleType, kind: str) -> None:
+    result = fmpy.simulate_fmu(
+        str(path),
+        fmi_type=kind,
+        stop_time=6.0,
+        output_interval=0.125,
+        start_values={"motion": "2", "branch": "1", "duration": 2.0},
+    )
+    line = numbered({"motion": "line", "branch": "forward", "duration": 2.0})
+    exact = maker.Motion(START | line)
+    assert len(result) == 49
+    expected = np.array([[float(x) for x in exact.outputs(t)] for t in result["time"]])
+    got = np.array([result[name] for name in OUTPUTS]).T
+    assert_close(got, expected, 1e-13)
+
+
+def test_states_are_saved_and_restored(unit: Unit) -> None:
+    with running(unit, MOTIONS["around"]) as instance, running(unit, {}) as other:
+        fmi = instance.fmi
+        instance.step(0.0, 1.3)
+        state = fmi.getFMUstate()
+        expected = instance.get(*OUTPUTS), derivatives(instance, 1), derivatives(instance, 2)
+        content = fmi.serializeFMUstate(state)
+        instance.step(1.3, 1.0)
+        assert instance.get(*OUTPUTS) != expected[0]
+        fmi.setFMUstate(state)
+        assert (instance.get(*OUTPUTS), *(derivatives(instance, k) for k in (1, 2))) == expected
+        fmi.freeFMUstate(state)
+
+        other.fmi.setFMUstate(other.fmi.deSerializeFMUstate(content))
+        assert (other.get(*OUTPUTS), *(derivatives(other, k) for k in (1, 2))) == expected
+        other.step(1.3, 0.5)
+
+
+def test_model_exchange_without_states(unit: Unit) -> None:
+    assert unit.description.numberOfContinuousStates == 0
+    with running(unit, {}, kind=fmi2.FMU2Model) as model:
+        model.fmi.newDiscreteStates()
+        model.fmi.enterContinuousTimeMode()
+        nothing = (ctypes.c_double * 0)()
+        model.fmi.getContinuousStates(nothing, 0)
+        model.fmi.setContinuousStates(nothing, 0)
+        model.fmi.getDerivatives(nothing, 0)
+        assert model.fmi.completedIntegratorStep() == (0, 0)
+        values = {}
+        for t in (1.25, 3.0, 1.25):
+            model.fmi.setTime(t)
+            values.setdefault(t, []).append(model.get(*OUTPUTS))
+        assert values[1.25][0] == values[1.25][1] != values[3.0][0]
+
+
+def test_only_the_start_is_settable(unit: Unit) -> None:
+    with running(unit, {}) as instance, pytest.raises(FMICallException):
+        instance.set(radius=0.05)
+
+
+# ---- references --------------------------------------------------------------------------------
+
+
+def test_references_made_again_are_the_same(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, SCRIPT, "--output", tmp_path], check=True, cwd=tmp_path)
+    kept = [folder.name for folder in (MODEL / "references").iterdir() if folder.is_dir()]
+    assert sorted(set(kept) - {"__pycache__"}) == sorted(SCENARIOS)
+    for name in SCENARIOS:
+        for file in ("RPTrajectory_ref.csv", "RPTrajectory_in.csv", "RPTrajectory_ref.opt"):
+            made = (tmp_path / name / file).read_bytes()
+            assert made == (MODEL / "references" / name / file).read_bytes(), (name, file)
+
+
+def test_every_motion_and_branch_has_a_scenario() -> None:
+    found = [load(name).start_values for name in SCENARIOS]
+    for name, items in ENUMERATIONS.items():
+        given = {values[name] for values in found}
+        assert given == set(range(1, len(items) + 1)), name

@@ -1,0 +1,96 @@
+"""A copy of the project with few scenarios, and changed files, for the tests of the Python side."""
+
+import functools
+import os
+import re
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cosim import __main__ as cli
+from cosim import project
+from cosim import scenario as scenarios
+from cosim.fmu_file import read_model
+from cosim.model import Model
+from cosim.scenario import Scenario
+from tests.support.paths import ROOT
+
+BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
+FMUS = {
+    "rp_manipulator": BUILD / "RPManipulator.fmu",
+    "rp_controller": BUILD / "RPController.fmu",
+    "rp_trajectory": BUILD / "RPTrajectory.fmu",
+}
+FILES = project.scenario_files()
+NAMES = list(FILES)
+SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion
+
+
+def names_of(model: str) -> list[str]:
+    """Scenarios of one model, by its folder."""
+    return [name for name, path in FILES.items() if project.model_folder(path).name == model]
+
+
+@functools.cache
+def declared(model: str) -> Model:
+    """What the built FMU of a model declares, by the model's folder."""
+    return read_model(FMUS[model])
+
+
+def load(name: str, root: Path = ROOT) -> Scenario:
+    """A scenario of the project, or of a copy of it."""
+    path = root / FILES[name].relative_to(ROOT)
+    return scenarios.load(path, declared(project.model_folder(path).name))
+
+
+def copy_project(folder: Path) -> None:
+    """A project with two scenarios."""
+    model = folder / "models" / "rp_manipulator"
+    (model / "scenarios").mkdir(parents=True)
+    (model / "references").mkdir()
+    shutil.copy(ROOT / "models/rp_manipulator/references/scales.toml", model / "references")
+    for name in (SHORT, LONG):
+        original = load(name)
+        shutil.copy(original.path, model / "scenarios")
+        shutil.copytree(original.reference_folder, model / "references" / name)
+
+
+def reference_file(project: Path, name: str) -> Path:
+    return project / f"models/rp_manipulator/references/{name}/RPManipulator_ref.csv"
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def repacked(source: Path, target: Path, change: Callable[[str], str], drop: str = "-") -> Path:
+    """Copy of an FMU with a changed modelDescription.xml and without files under `drop`."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = change(content.decode()).encode()
+            if not name.startswith(drop):
+                new.writestr(name, content)
+    return target
+
+
+def without_progress(error: str) -> str:
+    """Without the lines on progress, which a busy machine makes more of."""
+    return re.sub(r"(?m)^.*: \d+ %, \d+ s\n", "", error)
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error without progress."""
+    code = cli.main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return code, out, without_progress(err)
+
+
+def assert_one_line(error: str) -> None:
+    assert error.startswith("error: ") and error.count("\n") == 1 and "Traceback" not in error

@@ -1,0 +1,32 @@
+"""Copies of the sources, built apart from them with the settings of a build that is there."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+from tests.support.paths import ROOT
+
+SETTINGS = (
+    "CMAKE_C_COMPILER:", "FMI_HEADERS_DIR:", "_Python3_EXECUTABLE:", "SUNDIALS_DIR:",
+    "SUNDIALS_LICENSE:", "UNITY_DIR:",
+)  # fmt: skip
+
+
+def copy_sources(to: Path) -> Path:
+    """What a build needs: no build folder, no references."""
+    ignored = shutil.ignore_patterns("build", ".git", "__pycache__", "references")
+    return shutil.copytree(ROOT, to, ignore=ignored)
+
+
+def settings_of(build: Path) -> list[str]:
+    """Options for CMake: compiler, Python and the places of libraries as in the folder build."""
+    lines = (build / "CMakeCache.txt").read_text().splitlines()
+    return [f"-D{line.removeprefix('_')}" for line in lines if line.startswith(SETTINGS)]
+
+
+def run(*command: object) -> None:
+    """Run a command that must succeed; its output is told if it does not."""
+    arguments = [str(argument) for argument in command]
+    result = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        raise RuntimeError(f"{' '.join(arguments)}\n{result.stdout}{result.stderr}")

@@ -1,0 +1,58 @@
+"""Copies of SSPs and FMUs with something in them changed."""
+
+import io
+import subprocess
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import fmpy
+
+from tests.support.paths import ROOT
+
+SSP = ROOT / "build" / "ClosedLoop.ssp"
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+Edit = Callable[[bytes], bytes | None]  # None: the file is left out
+
+
+def edited(source: Path, target: Path, edits: dict[str, Edit]) -> Path:
+    """Copy an archive with some of its files changed; return `target`."""
+    target.write_bytes(_edited(source.read_bytes(), edits))
+    return target
+
+
+def replace(old: str, new: str, count: int = 1) -> Edit:
+    """Edit that replaces text, which has to be there."""
+
+    def edit(content: bytes) -> bytes:
+        assert old.encode() in content
+        return content.replace(old.encode(), new.encode(), count)
+
+    return edit
+
+
+def edited_fmu(edits: dict[str, Edit]) -> Edit:
+    """Edit of an FMU that lies in an SSP."""
+    return lambda content: _edited(content, edits)
+
+
+def _edited(archive: bytes, edits: dict[str, Edit]) -> bytes:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(archive)) as old, zipfile.ZipFile(buffer, "w") as new:
+        assert set(edits) <= set(old.namelist())
+        for name in old.namelist():
+            content: bytes | None = old.read(name)
+            if name in edits:
+                content = edits[name](content)
+            if content is not None:
+                new.writestr(name, content)
+    return buffer.getvalue()
+
+
+def not_a_number(reference: int, steps: int, folder: Path) -> Edit:
+    """Edit that puts tests/support/not_a_number.c in the place of an FMU's shared object."""
+    library = folder / f"not_a_number_{reference}_{steps}.so"
+    command = ["gcc", "-std=c17", "-shared", "-fPIC", f"-DBROKEN={reference}", f"-DSTEPS={steps}"]
+    command += ["-I", str(HEADERS), "-o", str(library)]
+    subprocess.run([*command, str(Path(__file__).with_name("not_a_number.c"))], check=True)
+    return lambda _: library.read_bytes()
