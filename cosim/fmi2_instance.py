@@ -48,7 +48,7 @@ class Fmi2Instance:
         self._callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
         self._callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         self._callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
-        self.slave = self._load()
+        self.fmi = self._load()
 
     def _load(self) -> fmi2.FMU2Slave:
         try:
@@ -64,9 +64,9 @@ class Fmi2Instance:
 
     def __enter__(self) -> "Fmi2Instance":
         try:
-            self.slave.instantiate(callbacks=self._callbacks, loggingOn=False)
+            self.fmi.instantiate(callbacks=self._callbacks, loggingOn=False)
         except Exception as error:  # fmpy raises a bare exception for NULL
-            self.slave.freeLibrary()
+            self.fmi.freeLibrary()
             said = self._last_message()
             raise UserError(f"{self.fmu.path}: fmi2Instantiate failed{said}") from error
         return self
@@ -76,13 +76,13 @@ class Fmi2Instance:
             return  # nothing may be called any more, not even fmi2FreeInstance
         try:
             if self._initialized and self._status < fmi2.fmi2Error:
-                self.slave.terminate()
+                self.fmi.terminate()
         except FMICallException as error:
             if kind is None:
                 raise self.failure(error, "at the end") from error
         finally:
             if self._status != fmi2.fmi2Fatal:
-                self.slave.freeInstance()
+                self.fmi.freeInstance()
 
     # ---- Messages --------------------------------------------------------------------------------
 
@@ -116,17 +116,17 @@ class Fmi2Instance:
     def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> None:
         """Give start and stop time (s) and the relative tolerance of the experiment."""
         with self.explained("in initialization"):
-            self.slave.setupExperiment(tolerance=tolerance, startTime=start, stopTime=stop)
+            self.fmi.setupExperiment(tolerance=tolerance, startTime=start, stopTime=stop)
 
     def enter_initialization(self) -> None:
         """Into initialization mode; parameters and start values are set before."""
         with self.explained("in initialization"):
-            self.slave.enterInitializationMode()
+            self.fmi.enterInitializationMode()
 
     def exit_initialization(self) -> None:
         """To the first communication point; inputs are set before."""
         with self.explained("in initialization"):
-            self.slave.exitInitializationMode()
+            self.fmi.exitInitializationMode()
         self._initialized = True
 
     # ---- Values ----------------------------------------------------------------------------------
@@ -135,10 +135,10 @@ class Fmi2Instance:
         """Set one variable."""
         variable = self.fmu.model.variables[name]
         function = {
-            "Real": self.slave.setReal,
-            "Boolean": self.slave.setBoolean,
-            "String": self.slave.setString,
-        }.get(variable.type, self.slave.setInteger)
+            "Real": self.fmi.setReal,
+            "Boolean": self.fmi.setBoolean,
+            "String": self.fmi.setString,
+        }.get(variable.type, self.fmi.setInteger)
         try:
             function([variable.reference], [value])
         except FMICallException as error:
@@ -150,7 +150,7 @@ class Fmi2Instance:
         if variable is None or variable.type != "Integer":
             return None
         with self.explained(f"({name})"):
-            return self.slave.getInteger([variable.reference])[0]
+            return self.fmi.getInteger([variable.reference])[0]
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> "Reals":
         """The Real variables `names`, to get or set at once, many times.
@@ -177,7 +177,7 @@ class Fmi2Instance:
         FMICallException
         """
         final = fmi2.fmi2False if goes_back else fmi2.fmi2True
-        self.slave.fmi2DoStep(self.slave.component, start, length, final)
+        self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
 
     def saved_state(self) -> "SavedState":
         """A place for a state to go back to, still empty."""
@@ -198,7 +198,7 @@ class Reals:
         self, instance: Fmi2Instance, names: Sequence[str], memory: Array | None = None
     ) -> None:
         self.names = list(names)
-        self._slave = instance.slave
+        self._fmi = instance.fmi
         self._count = len(self.names)
         variables = instance.fmu.model.variables
         references = [variables[name].reference for name in self.names]
@@ -209,14 +209,14 @@ class Reals:
     def get(self) -> None:
         """Values from the instance; FMICallException if that fails."""
         if self._count:
-            slave = self._slave
-            slave.fmi2GetReal(slave.component, self._references, self._count, self._values)
+            fmi = self._fmi
+            fmi.fmi2GetReal(fmi.component, self._references, self._count, self._values)
 
     def set(self) -> None:
         """Values to the instance; FMICallException if that fails."""
         if self._count:
-            slave = self._slave
-            slave.fmi2SetReal(slave.component, self._references, self._count, self._values)
+            fmi = self._fmi
+            fmi.fmi2SetReal(fmi.component, self._references, self._count, self._values)
 
 
 class Derivatives(Reals):
@@ -229,17 +229,17 @@ class Derivatives(Reals):
     def get(self) -> None:
         """Derivatives of outputs from the instance; FMICallException if that fails."""
         if self._count:
-            slave = self._slave
-            slave.fmi2GetRealOutputDerivatives(
-                slave.component, self._references, self._count, self._orders, self._values
+            fmi = self._fmi
+            fmi.fmi2GetRealOutputDerivatives(
+                fmi.component, self._references, self._count, self._orders, self._values
             )
 
     def set(self) -> None:
         """Derivatives of inputs to the instance; FMICallException if that fails."""
         if self._count:
-            slave = self._slave
-            slave.fmi2SetRealInputDerivatives(
-                slave.component, self._references, self._count, self._orders, self._values
+            fmi = self._fmi
+            fmi.fmi2SetRealInputDerivatives(
+                fmi.component, self._references, self._count, self._orders, self._values
             )
 
 
@@ -247,18 +247,18 @@ class SavedState:
     """The state of an instance at some time; its functions raise FMICallException if they fail."""
 
     def __init__(self, instance: Fmi2Instance) -> None:
-        self._slave = instance.slave
+        self._fmi = instance.fmi
         self._state = fmi2.fmi2FMUstate()
 
     def take(self) -> None:
         """Keep the present state, in place of the one kept before."""
-        self._slave.fmi2GetFMUstate(self._slave.component, byref(self._state))
+        self._fmi.fmi2GetFMUstate(self._fmi.component, byref(self._state))
 
     def restore(self) -> None:
         """Bring the instance back to the state kept, as often as wanted."""
-        self._slave.fmi2SetFMUstate(self._slave.component, self._state)
+        self._fmi.fmi2SetFMUstate(self._fmi.component, self._state)
 
     def free(self) -> None:
         """Free the state, if one is kept."""
         if self._state.value is not None:
-            self._slave.fmi2FreeFMUstate(self._slave.component, byref(self._state))
+            self._fmi.fmi2FreeFMUstate(self._fmi.component, byref(self._state))

@@ -58,7 +58,7 @@ class Fmu:
         self._unpacked.cleanup()
 
     def instance(self, name: str) -> Fmi2Instance:
-        """A new instance, to be entered as a context; `name` is in its messages."""
+        """A new instance, of the class for the FMU's version of FMI; `name` is in its messages."""
         return Fmi2Instance(self, name)
 
 

@@ -145,16 +145,21 @@ class Master:
         also: Sequence[tuple[str, str]],
     ) -> None:
         """Lay out the system's values, and find the source of each input among them."""
+        # what is read, by component
         outputs = {}
         for name, instance in instances.items():
             further = [variable for component, variable in also if component == name]
             outputs[name] = list(dict.fromkeys([*instance.fmu.model.real_outputs, *further]))
+
+        # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
         place = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
         self.values = np.frombuffer(memory)[: len(keys)]
         self.slopes = np.zeros(len(keys))
+
+        # the components with their sources
         self.components: dict[str, ConnectedInstance] = {}
         first = 0
         for name, instance in instances.items():
@@ -247,9 +252,8 @@ class Master:
     def advance(self, end: float) -> None:
         """One step to the time `end`, s."""
         length = end - self.time
-        groups = (
-            [self.components.values()] if self.jacobi else [[p] for p in self.components.values()]
-        )
+        components = list(self.components.values())
+        groups = [components] if self.jacobi else [[component] for component in components]
         for group in groups:
             for component in group:
                 try:

@@ -1,6 +1,6 @@
-"""What the folder of a system knows of it: its measures, its picture, the study of its coupling.
+"""What only the folder of a system knows: its measures, its picture, the study of its coupling.
 
-A system's folder has a module study.py with the names of `Study`; `load` gives it.
+The folder has a module study.py with the names of `Study`; `load` gives it.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,11 +20,11 @@ from cosim.system.ssp import Ssp
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure of a run, for the tables."""
+    """A number that a run is measured by, for the tables."""
 
     name: str
     unit: str
-    meaning: str  # what follows "NAME:" in an explanation, without a full stop
+    meaning: str  # explains it on the page, after its name and a colon
     value: Callable[[Outcome], float]
 
 

@@ -168,10 +168,10 @@ def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatc
         master.initialize(0.0, None, PARAMETERS)
         freed = []
         for component in master.components.values():
-            slave = component.instance.slave
-            free = slave.fmi2FreeFMUstate
+            fmi = component.instance.fmi
+            free = fmi.fmi2FreeFMUstate
             monkeypatch.setattr(
-                slave,
+                fmi,
                 "fmi2FreeFMUstate",
                 lambda *arguments, free=free: (freed.append(arguments), free(*arguments)),
             )
