@@ -1,10 +1,14 @@
 #!/usr/bin/env bash
-# Sets up, builds the FMUs, simulates scenarios with fmpy and checks them against their
-# references. ./run.sh: all scenarios; ./run.sh NAME ...: these; ./run.sh --list: their names;
-# ./run.sh --help: more. ./run.sh system [VARIANT ...]: the closed loop, build/ClosedLoop.ssp, in
-# Ecos; ./run.sh system --list: its variants. ./run.sh coupling: what the coupling of them costs.
+# Sets up, builds the FMUs, simulates scenarios with fmpy and compares them with their references.
+#
+#   ./run.sh                       all scenarios
+#   ./run.sh NAME ...              these scenarios
+#   ./run.sh --list                names of the scenarios, without building
+#   ./run.sh system [VARIANT ...]  the closed loop in Ecos; --list: names of its variants
+#   ./run.sh coupling              what the coupling of the closed loop costs
+#   ./run.sh --help                all options; also after system and coupling
 set -euo pipefail
-unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
+unset PYTHONPATH PYTHONHOME  # may lead to other modules than those tested here
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
 "$root/setup.sh"

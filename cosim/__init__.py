@@ -1,1 +1,1 @@
-"""Runs co-simulation units through fmpy and checks them against reference trajectories."""
+"""Drives FMUs through fmpy: compares them with references, plots, couples, runs systems."""

@@ -1,4 +1,4 @@
-"""Errors whose text is meant for the user."""
+"""Errors whose text is meant for the user, and what such texts are made of."""
 
 import difflib
 from collections.abc import Iterable
@@ -15,3 +15,13 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message that proposes the closest of `known`, or nothing."""
     close = difflib.get_close_matches(name, list(known), n=1)
     return f", did you mean {close[0]!r}?" if close else ""
+
+
+def reason(error: Exception) -> str:
+    """What the system says about a file, without number and name."""
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def one_line(text: object) -> str:
+    """`text` with each run of white space replaced by a single space."""
+    return " ".join(str(text).split())

@@ -1,25 +1,26 @@
 """Reference trajectories, the error of a run against them, and the bounds on it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from cosim import variables
+from cosim import project, trajectory_csv
 from cosim.errors import UserError
-from cosim.files import read_csv
+from cosim.input_files import is_file, read_toml
+from cosim.model import Model
 from cosim.scenario import Scenario
 from cosim.simulation import Result
 
 SMALLEST_SCALE = 1e-3  # in the variable's unit; below it an error counts as absolute
-# Kinetic and potential energy cancel in the total, and the zero of the potential is arbitrary:
-# errors of these two are measured against what is exchanged, not against what is left.
-EXCHANGED = ("kinetic_energy", "potential_energy")
-SCALED_BY_EXCHANGE = ("potential_energy", "total_energy")
 
 ERROR_PER_TOLERANCE = 1000.0
 # largest error allowed at a tolerance, and at every tighter one
 BOUNDS = {1e-8: 1e-6, 1e-11: 1e-8}
+
+# name -> names whose absolute values are summed up to the scale of its error
+Summed = Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,7 @@ class Reference:
     times: np.ndarray  # (rows,) s
     names: tuple[str, ...]
     values: np.ndarray  # (rows, len(names)) in the variables' units
+    summed: Summed = field(default_factory=dict)
 
     def column(self, name: str) -> np.ndarray:
         """Values of one variable, (rows,)."""
@@ -37,19 +39,24 @@ class Reference:
             raise UserError(f"{self.path}, line 1: has no column {name!r}")
         return self.values[:, self.names.index(name)]
 
+    @property
+    def columns(self) -> dict[str, np.ndarray]:
+        """Values of all variables, (rows,) each."""
+        return dict(zip(self.names, self.values.T, strict=True))
 
-def model_name(scenario: Scenario) -> str:
-    """Name of the FMU that a scenario's model is built into, and of its reference files."""
-    path = scenario.model_folder / variables.FILE_NAME
-    model = variables.read_toml(path).get("model")
-    name = model.get("name") if isinstance(model, dict) else None
-    if not isinstance(name, str) or not name.isidentifier():
-        raise UserError(f"{path}: [model] needs a name, an identifier of C")
-    return name
+    def scale(self, name: str) -> float:
+        """What an error of a variable is divided by, in its unit."""
+        return scale(self.columns, name, self.summed)
 
 
-def load(scenario: Scenario) -> Reference:
+def load(scenario: Scenario, model: Model) -> Reference:
     """Read and check the reference of `scenario`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    model : Model
+        What the scenario was checked against.
 
     Raises
     ------
@@ -57,29 +64,55 @@ def load(scenario: Scenario) -> Reference:
         If the file is missing, damaged, or not of this scenario; names the line and the command
         that makes references.
     """
-    path = scenario.reference_folder / f"{model_name(scenario)}_ref.csv"
+    path = scenario.reference_folder / f"{model.name}_ref.csv"
     reader = _Reader(path, scenario)
-    names, table = read_csv(path, reader.fail)
-    reader.check_names(names)
+    names, table = trajectory_csv.read(path, reader.fail)
+    reader.check_names(names[1:], model)
     reader.check_times(table[:, 0])
-    return Reference(path, table[:, 0], names[1:], table[:, 1:])
+    summed = read_summed(scenario.reference_folder.parent)
+    return Reference(path, table[:, 0], names[1:], table[:, 1:], summed)
 
 
-def scales(reference: Reference) -> dict[str, float]:
-    """Return what the error of each variable is divided by, in the variable's unit."""
-    scale = {name: _largest(reference.column(name)) for name in reference.names}
-    if set(EXCHANGED) <= set(reference.names):
-        exchanged = sum(np.abs(reference.column(name)) for name in EXCHANGED)
-        for name in SCALED_BY_EXCHANGE:
-            scale[name] = _largest(exchanged)
-    return scale
+def read_summed(folder: Path) -> Summed:
+    """Which errors have the scale of a sum: scales.toml of a folder of references, if there is one.
+
+    Raises
+    ------
+    UserError
+        If the file is wrong.
+    """
+    path = folder / project.SCALES
+    if not is_file(path):
+        return {}
+    content = read_toml(path)
+    for name, terms in content.items():
+        if not (isinstance(terms, list) and terms and all(isinstance(x, str) for x in terms)):
+            raise UserError(f"{path}: {name}: expected a list of variables")
+    return {name: tuple(terms) for name, terms in content.items()}
+
+
+def scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
+    """What an error of a variable is divided by, in its unit: its largest value, or that of a sum.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray
+        Reference of all variables, (rows,) each.
+    name : str
+    summed : mapping
+        As `read_summed` gives it; a sum of which a term is missing does not count.
+    """
+    terms = summed.get(name, ())
+    if not terms or not set(terms) <= set(columns):
+        terms = (name,)
+    largest = float(np.max(sum(np.abs(columns[term]) for term in terms)))
+    return max(largest, SMALLEST_SCALE)
 
 
 def errors(result: Result, reference: Reference) -> dict[str, float]:
     """Relative error of each variable of `result`: max |value - reference| / scale."""
-    scale = scales(reference)
     return {
-        name: float(np.max(np.abs(values - reference.column(name)))) / scale[name]
+        name: float(np.max(np.abs(values - reference.column(name)))) / reference.scale(name)
         for name, values in zip(result.names, result.values.T, strict=True)
     }
 
@@ -94,12 +127,8 @@ def bound(tolerance: float) -> float:
     return min([ERROR_PER_TOLERANCE * tolerance, *applying])
 
 
-def _largest(values: np.ndarray) -> float:
-    return max(float(np.max(np.abs(values))), SMALLEST_SCALE)
-
-
 class _Reader:
-    """Reads one file; errors name the file, the line and the way out."""
+    """Checks one file; errors name the file, the line and the way out."""
 
     def __init__(self, path: Path, scenario: Scenario) -> None:
         self.path = path
@@ -107,22 +136,24 @@ class _Reader:
 
     def fail(self, message: str, line: int | None = None) -> UserError:
         place = f"{self.path}, line {line}" if line else f"{self.path}"
-        # relative to the project's folder, where the commands of its documentation are meant to run
-        script = f"models/{self.scenario.model}/references/make_references.py {self.scenario.name}"
-        return UserError(f"{place}: {message}; to make it again: build/venv/bin/python {script}")
+        folder = project.model_folder(self.scenario.path)
+        return UserError(
+            f"{place}: {message}; {project.making_references(folder, self.scenario.name)}"
+        )
 
-    def check_names(self, names: tuple[str, ...]) -> None:
-        """Check that every Real output is there, and nothing unknown or twice."""
-        declared = variables.load(self.scenario.model_folder)
-        for name in names[1:]:
-            if declared.get(name, {}).get("type") != "Real":
+    def check_names(self, names: tuple[str, ...], model: Model) -> None:
+        """Check that every Real output is there, and nothing else: all columns are compared."""
+        for name in names:
+            if name not in model.variables or model.variables[name].type != "Real":
                 raise self.fail(f"the model has no Real variable {name!r}", 1)
             if names.count(name) > 1:
                 raise self.fail(f"column {name!r} is there twice", 1)
-        for name, variable in declared.items():
-            wanted = variable["type"] == "Real" and variable.get("causality") == "output"
-            if wanted and name not in names:
+        for name in model.real_outputs:
+            if name not in names:
                 raise self.fail(f"has no column {name!r}", 1)
+        for name in names:
+            if name not in model.real_outputs:
+                raise self.fail(f"{name!r} is not an output of the model", 1)
 
     def check_times(self, times: np.ndarray) -> None:
         """Check that the times are those communication points that the scenario asks for."""

@@ -23,7 +23,7 @@ enum log_category {
     LOG_STATUS_DISCARD,
     LOG_STATUS_ERROR,
     LOG_STATUS_FATAL,
-    LOG_ALL, /* of calls, which have no category of their own */
+    LOG_ALL, /* also of calls, for which the standard has no category */
     LOG_CATEGORY_COUNT,
 };
 

@@ -6,13 +6,23 @@
 # references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
-set(FMU_SOURCES
-  ${FMU_SOURCE_DIR}/component.c
-  ${FMU_SOURCE_DIR}/fmu_state.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2_calls.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2_co_simulation.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2_model_exchange.c)
+# An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
+set(FMI_VERSIONS fmi2)
+
+file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/*.c)
+foreach(version IN LISTS FMI_VERSIONS)
+  file(GLOB ${version}_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/${version}/*.c)
+endforeach()
+
+# The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS.
+function(add_fmu_library target version description folder)
+  add_library(${target} MODULE ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
+  set_target_properties(${target} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
+                        LIBRARY_OUTPUT_DIRECTORY ${folder})
+  target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
+  target_link_libraries(${target} PRIVATE ${description} reserved_allocation)
+  target_link_options(${target} PRIVATE ${FMU_LINK_OPTIONS})
+endfunction()
 
 function(add_fmu name)
   cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
@@ -22,12 +32,14 @@ function(add_fmu name)
 
   # tables and model description, again whenever a declaration changes
   file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
+  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
+                        ${FMU_SOURCE_DIR}/atomic_write.py)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
-            --output ${out} --version ${PROJECT_VERSION}
-    DEPENDS ${folder}/variables.toml ${shared_variables} ${FMU_SOURCE_DIR}/generate.py
-            ${FMU_SOURCE_DIR}/description.py ${FMU_SOURCE_DIR}/whole.py
+            --output ${out} --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE
+    DEPENDS ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})
@@ -40,13 +52,13 @@ function(add_fmu name)
   target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR})
   target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
-  # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
-  add_library(${name} MODULE ${FMU_SOURCES})
-  set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
-                      LIBRARY_OUTPUT_DIRECTORY ${out})
-  target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${name} PRIVATE ${name}_description reserved_allocation)
-  target_link_options(${name} PRIVATE ${FMU_LINK_OPTIONS})
+  foreach(version IN LISTS FMI_VERSIONS)
+    if(version STREQUAL "fmi2")
+      add_fmu_library(${name} fmi2 ${name}_description ${out})
+    else()
+      add_fmu_library(${name}_${version} ${version} ${name}_description ${out}/${version})
+    endif()
+  endforeach()
 
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
@@ -57,8 +69,8 @@ function(add_fmu name)
             --readme ${folder}/README.md --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
-            ${FMU_SOURCE_DIR}/formula.py ${FMU_SOURCE_DIR}/whole.py ${folder}/README.md
-            ${pictures} ${out}/modelDescription.xml
+            ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py
+            ${folder}/README.md ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
@@ -74,7 +86,8 @@ function(add_fmu name)
             documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
             documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
     DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
-            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/whole.py
+            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
+            ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Packing ${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
@@ -103,7 +116,7 @@ function(add_ssp name)
   add_custom_command(
     OUTPUT ${ssp}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${ssp} ${entries}
-    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/whole.py
+    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Packing ${name}.ssp"
     VERBATIM)
   add_custom_target(${name}_ssp ALL DEPENDS ${ssp})

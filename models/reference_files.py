@@ -1,7 +1,8 @@
 """What the scripts that make a model's references share: their command line and their files.
 
 A reference is three files in the format of the FMI cross-check, in a folder of the scenario's name:
-UNIT_ref.csv with the outputs, UNIT_in.csv with the inputs, UNIT_ref.opt with the times.
+MODEL_ref.csv with the outputs, MODEL_in.csv with the inputs, MODEL_ref.opt with the times.
+Scenarios are checked against the built FMU, and start values are those that it declares.
 """
 
 import argparse
@@ -11,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim import project, trajectory_csv
 from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.files import write_csv
-from cosim.outputs import whole
+from cosim.fmu_file import read_model
+from cosim.output_files import whole
 from cosim.scenario import Scenario
-
-ROOT = Path(__file__).resolve().parents[1]
 
 # Writes the reference of a scenario to a folder.
 Writer = Callable[[Scenario, Path], None]
@@ -26,7 +26,7 @@ Writer = Callable[[Scenario, Path], None]
 def write(
     scenario: Scenario,
     folder: Path,
-    unit: str,
+    model: str,
     outputs: tuple[Sequence[str], np.ndarray],
     inputs: tuple[Sequence[str], np.ndarray],
 ) -> None:
@@ -36,9 +36,9 @@ def write(
     ----------
     scenario : Scenario
     folder : Path
-        Made where it is missing.
-    unit : str
-        Name of the model's FMU.
+        Made if it is missing.
+    model : str
+        Name of the model, which its FMU has too.
     outputs : names and ndarray, shape (rows, names)
         At the communication points of the reference.
     inputs : names and ndarray, shape (n + 1, names)
@@ -48,14 +48,14 @@ def write(
     times = {"ref": scenario.times[scenario.reference_rows], "in": scenario.times}
     for file, (names, values) in (("ref", outputs), ("in", inputs)):
         rounded = values.astype(np.float64) + 0.0  # no negative zeros
-        write_csv(folder / f"{unit}_{file}.csv", times[file], names, rounded)
+        trajectory_csv.write(folder / f"{model}_{file}.csv", times[file], names, rounded)
     options = {
         "StartTime": scenario.start,
         "StopTime": scenario.stop,
         "StepSize": scenario.steps[0] if len(scenario.steps) == 1 else 0.0,  # 0: variable
         "RelTol": scenario.tolerance,
     }
-    with whole(folder / f"{unit}_ref.opt") as path:
+    with whole(folder / f"{model}_ref.opt") as path:
         text = "".join(f"{key},{value!r}\n" for key, value in options.items())
         path.write_text(text, encoding="utf-8", newline="\n")
 
@@ -72,15 +72,16 @@ def main(model_folder: Path, prepare: Callable[[], Writer]) -> None:
     try:
         known = {
             name: path
-            for name, path in scenarios.find_all(ROOT).items()
-            if path.parent.parent == model_folder
+            for name, path in project.scenario_files().items()
+            if project.model_folder(path) == model_folder
         }
         for name in arguments.names:
             if name not in known:
                 raise UserError(f"no scenario {name!r} of this model (known: {', '.join(known)})")
+        model = read_model(project.built(model_folder, ".fmu"))
         write_one = prepare()
         for name in arguments.names or known:
-            scenario = scenarios.load(known[name])
+            scenario = scenarios.load(known[name], model)
             write_one(
                 scenario, arguments.output / name if arguments.output else scenario.reference_folder
             )

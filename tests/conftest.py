@@ -10,7 +10,7 @@ import pytest
 from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
-    from cosim.unit import Fmu
+    from cosim.fmu_file import Fmu
 
 
 @pytest.fixture(scope="session")
@@ -24,20 +24,19 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="module")
 def opened(fmu: Path) -> Iterator["Fmu"]:
-    from cosim.unit import Fmu
+    from cosim.fmu_file import Fmu
 
-    with Fmu(fmu) as unit:
-        yield unit
+    with Fmu(fmu) as opened:
+        yield opened
 
 
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with two scenarios, for the command line to work in."""
-    from cosim import __main__ as cli
     from tests.support.cosim_project import copy_project
 
     copy_project(tmp_path)
-    monkeypatch.setattr(cli, "ROOT", tmp_path)
+    monkeypatch.setattr("cosim.project.ROOT", tmp_path)
     return tmp_path
 
 

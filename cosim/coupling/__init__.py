@@ -1,1 +1,1 @@
-"""A master for connected units, and the study of what its coupling costs."""
+"""A master that steps connected FMUs, and its step-size control."""

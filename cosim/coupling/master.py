@@ -1,4 +1,4 @@
-"""A master that steps connected co-simulation units.
+"""A master that steps connected FMUs.
 
 Every component is an instance of an FMU; connections lead from Real outputs to Real inputs. In
 Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
@@ -14,16 +14,17 @@ Gauss-Seidel order those from components before it meet value and slope at the e
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from ctypes import byref, c_double
+from ctypes import c_double
 
 import numpy as np
-from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from cosim.coupling.part import Part
+from cosim.coupling.connected_instance import ConnectedInstance, Wiring
 from cosim.errors import UserError
-from cosim.system.ssp import Connection
-from cosim.unit import Fmu
+from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmu_file import Fmu
+from cosim.model import Value
+from cosim.system.structure import Connection
 
 ORDERS = ("jacobi", "gauss_seidel")
 INPUTS = ("held", "extrapolated")
@@ -34,49 +35,39 @@ class Snapshot:
 
     def __init__(self, master: "Master") -> None:
         self._master = master
-        self._states = [fmi2.fmi2FMUstate() for _ in master.parts]
-        for part in master.parts.values():
-            if not part.fmu.description.coSimulation.canGetAndSetFMUstate:
-                raise UserError(f"{part.name}: {part.fmu.path} has no FMU state to go back to")
+        for component in master.components.values():
+            fmu = component.instance.fmu
+            if not fmu.model.saves_states:
+                raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
+        self._states = [
+            component.instance.saved_state() for component in master.components.values()
+        ]
 
     def __enter__(self) -> "Snapshot":
         return self
 
     def __exit__(self, *_: object) -> None:
-        for part, state in zip(self._master.parts.values(), self._states, strict=True):
-            if state.value is not None:
-                part.slave.fmi2FreeFMUstate(part.slave.component, byref(state))
+        for state in self._states:
+            state.free()
 
     def take(self) -> None:
         """Keep the present state, in place of the one kept before."""
         master = self._master
-        for part, state in zip(master.parts.values(), self._states, strict=True):
-            with master.blame(part, "at the communication point"):
-                part.slave.fmi2GetFMUstate(part.slave.component, byref(state))
+        for component, state in zip(master.components.values(), self._states, strict=True):
+            with component.instance.explained(self._when()):
+                state.take()
         self._kept = master.time, master.values.copy(), master.slopes.copy()
 
     def restore(self) -> None:
         """Bring the system back to the state kept, as often as wanted."""
         master = self._master
-        for part, state in zip(master.parts.values(), self._states, strict=True):
-            with master.blame(part, "at the communication point"):
-                part.slave.fmi2SetFMUstate(part.slave.component, state)
+        for component, state in zip(master.components.values(), self._states, strict=True):
+            with component.instance.explained(self._when()):
+                state.restore()
         master.time, master.values[:], master.slopes[:] = self._kept
 
-
-class _Blame:
-    """Turns a failing call of a component into the user's error."""
-
-    def __init__(self, master: "Master", part: Part, when: str) -> None:
-        self._master, self._part, self._when = master, part, when
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
-        if isinstance(error, FMICallException):
-            when = f"{self._when}, t = {self._master.time!r} s,"
-            raise self._part.failure(error, when) from error
+    def _when(self) -> str:
+        return f"at the communication point t = {self._master.time!r} s"
 
 
 class Master:
@@ -101,7 +92,7 @@ class Master:
     values : ndarray, shape (len(names),)
         As read right after the last step, before inputs are set for the next one.
     slopes : ndarray, shape (len(names),)
-        Their derivatives with respect to time; only those that are connected, and only where
+        Their derivatives with respect to time; only those that are connected, and only if
         `inputs` is "extrapolated".
     time : float
         s.
@@ -132,14 +123,14 @@ class Master:
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
-        self.parts: dict[str, Part] = {}
         try:
-            for name, fmu in fmus.items():
-                self.parts[name] = self._stack.enter_context(Part(fmu, name))
+            instances = {
+                name: self._stack.enter_context(fmu.instance(name)) for name, fmu in fmus.items()
+            }
         except BaseException:
             self._stack.close()
             raise
-        self._connect(connections, also)
+        self._connect(instances, connections, also)
 
     def __enter__(self) -> "Master":
         return self
@@ -147,37 +138,43 @@ class Master:
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)
 
-    def _connect(self, connections: Sequence[Connection], also: Sequence[tuple[str, str]]) -> None:
-        """Lay out the system's values, and where each input finds its source among them."""
-        for part in self.parts.values():
-            part.outputs = [variable.name for variable in part.fmu.real_outputs]
-            extra = (name for component, name in also if component == part.name)
-            part.outputs += [name for name in extra if name not in part.outputs]
-        keys = [(part.name, name) for part in self.parts.values() for name in part.outputs]
+    def _connect(
+        self,
+        instances: Mapping[str, Fmi2Instance],
+        connections: Sequence[Connection],
+        also: Sequence[tuple[str, str]],
+    ) -> None:
+        """Lay out the system's values, and find the source of each input among them."""
+        # what is read, by component
+        outputs = {}
+        for name, instance in instances.items():
+            further = [variable for component, variable in also if component == name]
+            outputs[name] = list(dict.fromkeys([*instance.fmu.model.real_outputs, *further]))
+
+        # where it is among the system's values
+        keys = [(name, output) for name, read in outputs.items() for output in read]
         place = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
         self.values = np.frombuffer(memory)[: len(keys)]
         self.slopes = np.zeros(len(keys))
-        first = 0
-        for position, part in enumerate(self.parts.values()):
-            incoming = [c for c in connections if c.end_component == part.name]
-            part.inputs = [c.end_connector for c in incoming]
-            part.sources = np.array(
-                [place[c.start_component, c.start_connector] for c in incoming], dtype=int
-            )
-            before = list(self.parts)[:position]
-            part.ahead = np.array(
-                [c.start_component in before and not self.jacobi for c in incoming]
-            )
-            used = {c.start_connector for c in connections if c.start_component == part.name}
-            part.sloped = [i for i, name in enumerate(part.outputs) if name in used]
-            part.attach(memory, first, self.slopes)
-            first += len(part.outputs)
 
-    def blame(self, part: Part, when: str) -> _Blame:
-        """Context in which a failing call of `part` becomes the user's error."""
-        return _Blame(self, part, when)
+        # the components with their sources
+        self.components: dict[str, ConnectedInstance] = {}
+        first = 0
+        for name, instance in instances.items():
+            incoming = [c for c in connections if c.end_component == name]
+            feeding = {c.start_connector for c in connections if c.start_component == name}
+            wiring = Wiring(
+                inputs=[c.end_connector for c in incoming],
+                outputs=outputs[name],
+                first=first,
+                connected=[i for i, output in enumerate(outputs[name]) if output in feeding],
+                sources=[place[c.start_component, c.start_connector] for c in incoming],
+                ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+            )
+            self.components[name] = ConnectedInstance(instance, wiring, memory, self.slopes)
+            first += len(outputs[name])
 
     # ---- Initialization --------------------------------------------------------------------------
 
@@ -185,7 +182,7 @@ class Master:
         self,
         start: float,
         stop: float | None = None,
-        parameters: Mapping[str, Mapping[str, float | str]] | None = None,
+        parameters: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> None:
         """From instantiated to the first communication point, with consistent outputs there.
 
@@ -198,100 +195,104 @@ class Master:
         """
         parameters = parameters or {}
         for name in parameters:
-            if name not in self.parts:
-                raise UserError(f"{name}: no such component (there are: {', '.join(self.parts)})")
+            if name not in self.components:
+                raise UserError(
+                    f"{name}: no such component (there are: {', '.join(self.components)})"
+                )
         self.time = start
-        for part in self.parts.values():
-            part.begin(start, stop, parameters.get(part.name, {}))
+        for component in self.components.values():
+            component.begin(start, stop, parameters.get(component.name, {}))
         self._propagate()
-        for part in self.parts.values():
-            part.end()
+        for component in self.components.values():
+            component.instance.exit_initialization()
         if self.extrapolates:
             self._propagate_slopes()
 
     def _propagate(self) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
         before = np.full(len(self.names), np.nan)
-        for _ in range(len(self.parts) + 2):
-            for part in self.parts.values():
-                self._read_early(part)
+        for _ in range(len(self.components) + 2):
+            for component in self.components.values():
+                self._read_early(component)
             changing = np.flatnonzero(before != self.values)
             if not len(changing):
                 return
             before = self.values.copy()
-            for part in self.parts.values():
-                with self.blame(part, "in initialization"):
-                    part.set_inputs(self.values[part.sources])
+            for component in self.components.values():
+                with component.instance.explained("in initialization"):
+                    component.set_inputs(self.values[component.sources])
         names = ", ".join(self.names[i] for i in changing)
         raise UserError(f"the connections form an algebraic loop: {names}")
 
-    def _read_early(self, part: Part) -> None:
-        """Read in initialization mode; parameters that do not go together tell so at its end."""
+    def _read_early(self, component: ConnectedInstance) -> None:
+        """Read in initialization mode; at its end FMUs explain which parameters are wrong."""
         try:
-            part.read()
+            component.read()
         except FMICallException as error:
-            part.end()
-            raise part.failure(error, "in initialization") from error
-        self._check_finite(part)
+            component.instance.exit_initialization()
+            raise component.instance.failure(error, "in initialization") from error
+        self._check_finite(component)
 
     def _propagate_slopes(self) -> None:
-        """Slopes at the start, where inputs' slopes show in those of outputs: once each."""
-        for _ in self.parts:
-            for part in self.parts.values():
-                with self.blame(part, "at the start"):
-                    part.read_slopes()
-            for part in self.parts.values():
-                with self.blame(part, "at the start"):
-                    part.set_inputs(self.values[part.sources])
-                    part.set_slopes(self.slopes[part.sources])
-        for part in self.parts.values():
-            with self.blame(part, "at the start"):
-                part.read_slopes()
+        """Slopes at the start: once per component, since those of inputs show in outputs'."""
+        for _ in self.components:
+            for component in self.components.values():
+                with component.instance.explained(f"at the start, t = {self.time!r} s,"):
+                    component.read_slopes()
+            for component in self.components.values():
+                with component.instance.explained(f"at the start, t = {self.time!r} s,"):
+                    component.set_inputs(self.values[component.sources])
+                    component.set_slopes(self.slopes[component.sources])
+        for component in self.components.values():
+            with component.instance.explained(f"at the start, t = {self.time!r} s,"):
+                component.read_slopes()
 
     # ---- Steps -----------------------------------------------------------------------------------
 
     def advance(self, end: float) -> None:
         """One step to the time `end`, s."""
         length = end - self.time
-        groups = [self.parts.values()] if self.jacobi else [[p] for p in self.parts.values()]
+        components = list(self.components.values())
+        groups = [components] if self.jacobi else [[component] for component in components]
         for group in groups:
-            for part in group:
+            for component in group:
                 try:
-                    self._set_inputs(part, length)
-                    part.slave.fmi2DoStep(part.slave.component, self.time, length, fmi2.fmi2False)
+                    self._set_inputs(component, length)
+                    component.instance.do_step(self.time, length, goes_back=True)
                 except FMICallException as error:
                     when = f"in the step from t = {self.time!r} s"
-                    raise part.failure(error, when) from error
+                    raise component.instance.failure(error, when) from error
                 self.do_steps += 1
-            for part in group:
-                self._read(part, end)
+            for component in group:
+                self._read(component, end)
         self.time = end
 
-    def _set_inputs(self, part: Part, length: float) -> None:
+    def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
         """Inputs at the beginning of the step, of sources ahead and of others."""
-        values = self.values[part.sources]
+        values = self.values[component.sources]
         if self.extrapolates:
-            slopes = self.slopes[part.sources]
-            part.set_inputs(values - length * part.ahead * slopes)
-            part.set_slopes(slopes)
+            slopes = self.slopes[component.sources]
+            component.set_inputs(values - length * component.ahead * slopes)
+            component.set_slopes(slopes)
         else:
-            part.set_inputs(values)
+            component.set_inputs(values)
 
-    def _read(self, part: Part, end: float) -> None:
+    def _read(self, component: ConnectedInstance, end: float) -> None:
         try:
-            part.read()
+            component.read()
             if self.extrapolates:
-                part.read_slopes()
+                component.read_slopes()
         except FMICallException as error:
-            raise part.failure(error, f"at t = {end!r} s") from error
-        self._check_finite(part, end)
+            raise component.instance.failure(error, f"at t = {end!r} s") from error
+        self._check_finite(component, end)
 
-    def _check_finite(self, part: Part, time: float | None = None) -> None:
-        if not np.isfinite(part.out_view).all():
-            name = part.outputs[int(np.flatnonzero(~np.isfinite(part.out_view))[0])]
-            value = part.out_view[part.outputs.index(name)]
+    def _check_finite(self, component: ConnectedInstance, time: float | None = None) -> None:
+        values = component.outputs.view
+        if not np.isfinite(values).all():
+            i = int(np.flatnonzero(~np.isfinite(values))[0])
             when = "in initialization" if time is None else f"at t = {time!r} s"
-            raise UserError(f"{part.name}.{name} is {value} {when}: a finite value is expected")
+            name = f"{component.name}.{component.outputs.names[i]}"
+            raise UserError(f"{name} is {values[i]} {when}: a finite value is expected")
 
     def run(
         self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
@@ -316,7 +317,7 @@ class Master:
 def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | None) -> None:
     if component not in fmus:
         raise UserError(f"{component}: no such component (there are: {', '.join(fmus)})")
-    variable = fmus[component].variables.get(name)
+    variable = fmus[component].model.variables.get(name)
     fits = variable is not None and variable.type == "Real"
     if not fits or causality not in (None, variable.causality):
         kind = f"Real {causality}" if causality else "Real variable"
@@ -334,15 +335,15 @@ def _check(fmus: Mapping[str, Fmu], connections: Sequence[Connection], sloped: b
             raise UserError(f"{'.'.join(end)}: is connected more than once")
         seen.add(end)
         source, target = fmus[connection.start_component], fmus[connection.end_component]
-        if sloped and not (source.description.coSimulation.maxOutputDerivativeOrder or 0) >= 1:
+        if sloped and not source.model.gives_output_derivatives:
             raise UserError(
                 f"{connection.start_component}: {source.path} has no output derivatives"
             )
-        if sloped and not target.description.coSimulation.canInterpolateInputs:
+        if sloped and not target.model.interpolates_inputs:
             raise UserError(
                 f"{connection.end_component}: {target.path} does not interpolate inputs"
             )
     for component, fmu in fmus.items():
-        for variable in fmu.variables.values():
+        for variable in fmu.model.variables.values():
             if variable.causality == "input" and (component, variable.name) not in seen:
                 raise UserError(f"{component}.{variable.name}: the input is not connected")

@@ -1,20 +1,20 @@
-"""Step-size control by step doubling, for any master of cosim.master.
+"""Step-size control by step doubling, for any master of cosim.coupling.master.
 
-A step H is made at once and, rolled back by the FMU states, again as two steps H/2. Where the
-coupling is of order p, so that an error of C H^(p+1) is made in a step, the two results are
-C H^(p+1) (1 - 2^-p) apart, and the second one, which is kept, is off by 1/(2^p - 1) of that. The
-step is accepted where this estimate is within the tolerance; the next one aims at a little less.
+A step H is made at once and, rolled back by the FMU states, again as two steps H/2. A coupling of
+order p makes an error of C H^(p+1) in a step. Then the two results are C H^(p+1) (1 - 2^-p) apart,
+and the second one, which is kept, is off by 1/(2^p - 1) of that. The step is accepted if this
+estimate is within the tolerance; the next one aims at a little less.
 
-The estimate takes the step to be a function of the state at its beginning, a one-step method. That
+The estimate takes the step for a function of the state at its beginning, a one-step method. That
 holds in Gauss-Seidel order with a controller in front of its plant: its efforts are those of the
 measurements at the beginning of the step. In Jacobi order the plant moves by efforts that are one
 step old: the outputs kept from the step before are part of the state, and a change of the step
 changes their age.
 
-Hidden from the estimate are corners of what drives the system: where a reference's slope jumps
-within the first half of the step, both results may meet it with the same line, and after a rest
-neither knows of it. Corners that are known are given as such: steps end at them, and begin anew
-with the first length.
+Corners of what drives the system are hidden from the estimate: if a reference's slope jumps within
+the first half of the step, both results may meet it with the same line, and after a rest neither
+knows of it. Known corners are given to the control: steps end at them, and the first length is
+taken again.
 """
 
 from collections import deque
@@ -32,7 +32,7 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
 
 @dataclass(frozen=True)
 class Control:
-    """What is asked of the steps.
+    """What the steps have to keep.
 
     The norm of a difference is the largest over the signals of `scales`, each divided by its
     scale.
@@ -43,7 +43,9 @@ class Control:
     first: float  # s
     shortest: float  # s
     longest: float  # s
-    corners: Sequence[float] = ()  # s, where inputs of the system are not smooth: steps end there
+    corners: Sequence[
+        float
+    ] = ()  # s, at which inputs of the system are not smooth: steps end there
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +76,13 @@ def run(
     Parameters
     ----------
     master : Master
-        One with held inputs is taken for of order 1, one that extrapolates for of order 2.
+        With held inputs its order is 1, with extrapolated ones 2.
     stop : float
         s; the last step ends exactly there.
     control : Control
     before : callable, optional
-        Called with the length of each accepted step, the system being brought back to the
-        beginning of the step; it may step the system.
+        Called with the length of each accepted step while the system is back at the beginning of
+        that step; it may step the system.
 
     Raises
     ------
@@ -99,6 +101,8 @@ def run(
             start = times[-1]
             target, cut = _fit(start, ends[0], wanted)
             length = target - start
+
+            # the step at once, and in two halves
             calls = master.do_steps
             master.advance(target)
             coarse = master.values[places]
@@ -106,9 +110,13 @@ def run(
             master.advance(start + length / 2)
             master.advance(target)
             do_steps += master.do_steps - calls
+
+            # the error, and the step that would meet the tolerance
             difference = np.abs(master.values[places] - coarse) / scales
             estimate = float(difference.max()) / (2**order - 1)
             factor = _factor(estimate, control.tolerance, order)
+
+            # rejected: back to the beginning, with a shorter step
             if estimate > control.tolerance:
                 rejected, was_rejected = rejected + 1, True
                 wanted = length * min(factor, SAFETY)
@@ -119,16 +127,22 @@ def run(
                     )
                 begin.restore()
                 continue
-            limits = control.longest, LARGEST_FACTOR * length
+
+            # accepted
             times.append(target)
             rows.append(master.values.copy())
             estimates.append(estimate)
             limited.append(cut or length >= control.longest or was_rejected)
+
+            # to the beginning and back, for `before`
             end.take()
             begin.restore()
             before(length)
             end.restore()
             begin.take()
+
+            # the next step
+            limits = control.longest, LARGEST_FACTOR * length
             grown = length * factor if not was_rejected else length * min(factor, 1.0)
             wanted = max(min(grown if not cut else max(grown, wanted), *limits), control.shortest)
             was_rejected = False

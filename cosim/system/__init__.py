@@ -1,1 +1,1 @@
-"""The closed loop as an SSP: read, checked, run in Ecos, compared with its references."""
+"""Systems of FMUs as SSPs: read, checked, run in Ecos, compared with their references."""

@@ -1,6 +1,6 @@
-"""Runs a system in Ecos, in a process of its own.
+"""Runs a system in Ecos, in a child process.
 
-Ecos goes on when a component fails, tells so in its log at level debug alone, and leaves its
+Ecos goes on when a component fails, says so in its log only at level debug, and leaves its
 temporary files behind. So the run is a child process whose log is read and whose temporary folder
 is removed: `python -m cosim.system.ecos FOLDER` is that child.
 """
@@ -22,16 +22,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cosim import project
 from cosim.errors import UserError
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # the child has no need of what this imports
     from cosim.system.ssp import Ssp
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
 # of an FMU: [path of the FMU] status text
 MESSAGE = re.compile(r"\[(?P<fmu>[^\]]*\.fmu)\] (?P<status>fmi2\w+) (?P<text>.*)")
 BAD = ("fmi2Discard", "fmi2Error", "fmi2Fatal")
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +106,9 @@ def _start(folder: Path) -> int:
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
-            cwd=ROOT,
+            cwd=project.ROOT,
             env=environment,
-            process_group=0,  # Ecos starts programs of its own, which write to the folder too
+            process_group=0,  # Ecos starts further programs, which write to the folder too
         )
     try:
         return child.wait()
@@ -120,7 +120,7 @@ def _start(folder: Path) -> int:
 
 
 def _components(ssp: "Ssp", fmu: str) -> str:
-    """Name of the component whose FMU it is; Ecos's log tells the FMU alone."""
+    """Name of the component whose FMU it is: Ecos's log names only the FMU."""
     names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
     return " or ".join(map(repr, names)) or repr(Path(fmu).name)
 

@@ -1,14 +1,16 @@
-"""Checks the system of an SSP against its FMUs, before anything runs."""
+"""Checks a system against the FMUs of its components, before anything runs."""
 
-import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import NoReturn
 
 from fmpy import read_model_description
-from fmpy.model_description import ModelVariable
 
-from cosim.errors import UserError, did_you_mean
-from cosim.files import check_archive, is_file
-from cosim.system.ssp import Component, Connector, Parameter, Ssp
+from cosim.archives import check_archive
+from cosim.errors import UserError, did_you_mean, one_line
+from cosim.input_files import is_file
+from cosim.model import Model, Variable, described
+from cosim.system.structure import Component, Connector, Parameter, System
 
 # type of a variable -> types of a parameter's value that engines can give it
 SETTABLE = {
@@ -21,33 +23,44 @@ SETTABLE = {
 PARAMETERS = ("parameter", "input", "output")  # causalities of what has a start value
 
 
-def check(ssp: Ssp) -> None:
-    """Check that the system can be run and that nothing in it is left to chance.
+def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]:
+    """Read what the FMU of each component declares, and check the system against it.
 
     Every component has its FMU, every connector is a variable of it with that causality, type and
     unit, connections go from an output to an input of the same type and unit, every input of every
     FMU is connected exactly once, and parameters are variables that can be set.
+
+    Parameters
+    ----------
+    path : Path
+        The SSP, for messages.
+    folder : Path
+        Where it is unpacked.
+    system : System
 
     Raises
     ------
     UserError
         If not; the text names component and variable.
     """
-    _Checker(ssp).check()
+    checker = _Checker(path, system)
+    for component in system.components:
+        checker.models[component.name] = checker.read(folder, component)
+    checker.check()
+    return checker.models
 
 
 class _Checker:
-    def __init__(self, ssp: Ssp) -> None:
-        self.ssp = ssp
-        self.system = ssp.system
-        self.variables: dict[str, dict[str, ModelVariable]] = {}
+    def __init__(self, path: Path, system: System) -> None:
+        self.path = path
+        self.system = system
+        self.models: dict[str, Model] = {}
 
     def fail(self, message: str) -> NoReturn:
-        raise UserError(f"{self.ssp.path}: {message}")
+        raise UserError(f"{self.path}: {message}")
 
     def check(self) -> None:
         for component in self.system.components:
-            self.variables[component.name] = self.read(component)
             for connector in component.connectors.values():
                 self.connector(component, connector)
         self.connections()
@@ -57,34 +70,36 @@ class _Checker:
                 for name, parameter in values.items():
                     self.parameter(variant, component, name, parameter)
 
-    def read(self, component: Component) -> dict[str, ModelVariable]:
-        """Variables of the component's FMU, by name."""
-        path = self.ssp.fmu(component.name)
+    def read(self, folder: Path, component: Component) -> Model:
+        """What the component's FMU declares."""
+        path = folder / component.source
         where = f"component {component.name!r}: {component.source}"
         if not is_file(path):
             self.fail(f"{where} is missing in the SSP")
         try:
             check_archive(path)
             description = read_model_description(path, validate=False)
+            if description.fmiVersion == "2.0" and description.coSimulation is not None:
+                return described(description)
         except Exception as error:  # fmpy raises bare exceptions, zipfile its own
-            self.fail(f"{where} is no FMU: {' '.join(str(error).split())}")
-        if description.fmiVersion != "2.0" or description.coSimulation is None:
-            self.fail(f"{where} is no FMI 2.0 co-simulation unit")
-        return {variable.name: variable for variable in description.modelVariables}
+            self.fail(f"{where} is no FMU: {one_line(error)}")
+        self.fail(f"{where} is no FMU of FMI 2.0 for co-simulation")
 
     def connector(self, component: Component, connector: Connector) -> None:
         where = f"component {component.name!r}: connector {connector.name!r}"
-        variables = self.variables[component.name]
-        variable = variables.get(connector.name)
-        if variable is None:
-            hint = did_you_mean(connector.name, variables)
-            self.fail(f"{where}: its FMU has no such variable{hint}")
+        variable = self.variable(component.name, connector.name, where, "such variable")
         if variable.causality != connector.kind:
             self.fail(f"{where} is an {connector.kind}, in its FMU {_causality(variable)}")
         if variable.type != connector.type:
             self.fail(f"{where} is of type {connector.type}, in its FMU {variable.type}")
         if variable.unit != connector.unit:
             self.fail(f"{where} is in {_unit(connector.unit)}, in its FMU {_unit(variable.unit)}")
+
+    def variable(self, component: str, name: str, where: str, what: str) -> Variable:
+        variables: Mapping[str, Variable] = self.models[component].variables
+        if name not in variables:
+            self.fail(f"{where}: its FMU has no {what}{did_you_mean(name, variables)}")
+        return variables[name]
 
     def connections(self) -> None:
         fed: dict[tuple[str, str], str] = {}
@@ -119,18 +134,14 @@ class _Checker:
 
     def inputs(self) -> None:
         fed = {(c.end_component, c.end_connector) for c in self.system.connections}
-        for component, variables in self.variables.items():
-            for variable in variables.values():
+        for component, model in self.models.items():
+            for variable in model.variables.values():
                 if variable.causality == "input" and (component, variable.name) not in fed:
                     self.fail(f"component {component!r}: input {variable.name!r} is not connected")
 
     def parameter(self, variant: str, component: str, name: str, parameter: Parameter) -> None:
         where = f"parameter set {variant!r}: component {component!r}"
-        variables = self.variables[component]
-        variable = variables.get(name)
-        if variable is None:
-            hint = did_you_mean(name, variables)
-            self.fail(f"{where}: its FMU has no variable {name!r}{hint}")
+        variable = self.variable(component, name, where, f"variable {name!r}")
         where = f"{where}: {name!r}"
         if variable.causality not in PARAMETERS or variable.start is None:
             self.fail(f"{where} is {_causality(variable)} and cannot be set")
@@ -139,17 +150,15 @@ class _Checker:
         if parameter.unit is not None and parameter.unit != variable.unit:
             self.fail(f"{where} is in {_unit(parameter.unit)}, in its FMU {_unit(variable.unit)}")
         if parameter.type in ("Real", "Integer"):
-            least = -math.inf if variable.min is None else float(variable.min)
-            greatest = math.inf if variable.max is None else float(variable.max)
+            least, greatest = variable.least, variable.greatest
             if not least <= parameter.value <= greatest:
-                range_text = f"{least:g} to {greatest:g}"
-                self.fail(f"{where} is {parameter.value!r}, expected {range_text}")
+                self.fail(f"{where} is {parameter.value!r}, expected {least:g} to {greatest:g}")
 
 
 def _unit(unit: str | None) -> str:
     return "no unit" if unit is None else repr(unit)
 
 
-def _causality(variable: ModelVariable) -> str:
+def _causality(variable: Variable) -> str:
     article = "an" if variable.causality[0] in "aeiou" else "a"
     return f"{article} {variable.causality}"

@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0 that Co-Simulation has of its own (section 4.2). */
+/* The functions of FMI 2.0 for Co-Simulation only (section 4.2). */
 #include "derivatives.h"
 #include "fmi2_component.h"
 #include "stepping.h"

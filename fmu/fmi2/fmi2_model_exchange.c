@@ -1,5 +1,4 @@
-/* The functions of FMI 2.0 that Model Exchange has of its own (section 3.2). Units have no events
- * of their own and no event indicators. */
+/* The functions of FMI 2.0 for Model Exchange only (section 3.2). Models have no events so far. */
 #include "continuous_states.h"
 #include "fmi2_component.h"
 

@@ -1,5 +1,5 @@
 /* Time of an instance, kept as an unevaluated sum of two doubles. Communication points far from
- * zero are coarse (1e-10 s apart at 1e6 s) and masters round them anew at every step; with the
+ * zero are coarse (1e-10 s apart at 1e6 s) and masters round them again at every step; with the
  * rounding carried along, the time that is integrated is exactly the time that has passed. */
 #ifndef CLOCK_H
 #define CLOCK_H

@@ -76,11 +76,11 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
     return STATUS_OK;
 }
 
-/* Of all calculated values, into instance->first and second, which may be NULL. */
+/* Of all calculated values, into instance->first_derivatives and second, which may be NULL. */
 static enum status propagate(struct instance *instance, double dt, char *second) {
     const double t = instance->state.time.s;
-    const enum status status =
-        instance->model->propagate(instance->memory.values, t, dt, instance->first, second);
+    const enum status status = instance->model->propagate(instance->memory.values, t, dt,
+                                                          instance->first_derivatives, second);
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no derivatives at t = %.17g: %s", t,
                       status_text(status));
@@ -98,24 +98,24 @@ static enum status derive_by_time(struct instance *instance) {
         return status;
     }
 
-    memset(instance->first, 0, model->values_size);
-    memcpy(doubles_of(instance->first, model->states),
+    memset(instance->first_derivatives, 0, model->values_size);
+    memcpy(doubles_of(instance->first_derivatives, model->states),
            doubles_of(memory->values, model->derivatives), model->states.size);
     for (size_t i = 0; i < count_of(model->inputs); i++) {
-        doubles_of(instance->first, model->inputs)[i] = memory->current[i].d[1];
+        doubles_of(instance->first_derivatives, model->inputs)[i] = memory->current[i].d[1];
     }
     status = propagate(instance, 1.0, NULL);
     if (status != STATUS_OK) {
         return status;
     }
 
-    memset(instance->second, 0, model->values_size);
-    memcpy(doubles_of(instance->second, model->states),
-           doubles_of(instance->first, model->derivatives), model->states.size);
+    memset(instance->second_derivatives, 0, model->values_size);
+    memcpy(doubles_of(instance->second_derivatives, model->states),
+           doubles_of(instance->first_derivatives, model->derivatives), model->states.size);
     for (size_t i = 0; i < count_of(model->inputs); i++) {
-        doubles_of(instance->second, model->inputs)[i] = memory->current[i].d[2];
+        doubles_of(instance->second_derivatives, model->inputs)[i] = memory->current[i].d[2];
     }
-    return propagate(instance, 1.0, instance->second);
+    return propagate(instance, 1.0, instance->second_derivatives);
 }
 
 static double value_in(const char *structure, const struct variable *variable) {
@@ -126,7 +126,7 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
                                             size_t count, const int orders[], double values[]) {
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable =
-            find_as(instance, references[i], is_output, "an output of type Real");
+            find_as(instance, references[i], is_output, "an output of type float64");
         if (variable == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
@@ -142,8 +142,9 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < count; i++) {
             const struct variable *variable = variable_of(instance->description, references[i]);
-            const double value =
-                value_in(orders[i] == 1 ? instance->first : instance->second, variable);
+            const double value = value_in(orders[i] == 1 ? instance->first_derivatives
+                                                         : instance->second_derivatives,
+                                          variable);
             if (!isfinite(value)) {
                 return instance_not_finite(instance, variable->name);
             }
@@ -194,10 +195,10 @@ enum status instance_get_directional_derivative(struct instance *instance,
         return status;
     }
 
-    memset(instance->first, 0, instance->model->values_size);
+    memset(instance->first_derivatives, 0, instance->model->values_size);
     for (size_t i = 0; i < known_count; i++) {
         const struct variable *variable = variable_of(instance->description, knowns[i]);
-        *(double *)(void *)(instance->first + variable->offset) += v[i];
+        *(double *)(void *)(instance->first_derivatives + variable->offset) += v[i];
     }
     status = propagate(instance, 0.0, NULL);
     if (status != STATUS_OK) {
@@ -206,7 +207,7 @@ enum status instance_get_directional_derivative(struct instance *instance,
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < unknown_count; i++) {
             const struct variable *variable = variable_of(instance->description, unknowns[i]);
-            const double value = value_in(instance->first, variable);
+            const double value = value_in(instance->first_derivatives, variable);
             if (!isfinite(value)) {
                 return instance_not_finite(instance, variable->name);
             }

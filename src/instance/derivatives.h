@@ -5,7 +5,7 @@
 #include "instance.h"
 
 /* Derivatives of inputs with respect to time, of orders 1 to 3, at the beginning of the next step:
- * over it the inputs are Taylor polynomials. They apply to that step alone. All or nothing. */
+ * over it the inputs are Taylor polynomials. They apply to that step only. All or nothing. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_set_input_derivatives(struct instance *instance, const unsigned references[],
                                    size_t count, const int orders[], const double values[]);

@@ -21,8 +21,8 @@ static bool lies_in(struct span span, const struct variable *variable) {
     return variable->offset >= span.offset && variable->offset - span.offset < span.size;
 }
 
-/* The fields that variables.toml binds are where the model says that such values are: a wrong
- * binding compiles, but the value would have no effect. */
+/* Each variable is bound to a field of its own kind: a wrong binding compiles, but the value would
+ * have no effect. */
 static enum status check_bindings(const struct model_description *description,
                                   const struct message_sink *sink) {
     for (size_t i = 0; i < description->variable_count; i++) {
@@ -52,12 +52,12 @@ static enum status setup(struct instance *instance) {
 
     memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial);
     memory->block = calloc(1, memory->size);
-    instance->first = calloc(2, values_size);
-    instance->work = calloc(input_count + 1, sizeof(double));
-    if (memory->block == NULL || instance->first == NULL || instance->work == NULL) {
+    instance->first_derivatives = calloc(2, values_size);
+    instance->u = calloc(input_count + 1, sizeof(double));
+    if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
-    instance->second = instance->first + values_size;
+    instance->second_derivatives = instance->first_derivatives + values_size;
     memory->values = memory->block;
     memory->held = memory->values + values_size;
     memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
@@ -105,8 +105,8 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
-    free(instance->work);
-    free(instance->first);
+    free(instance->u);
+    free(instance->first_derivatives);
     free(instance->memory.block);
     free(instance);
 }

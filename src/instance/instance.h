@@ -1,5 +1,6 @@
-/* One instance of a model: its values by reference, its time, and steps from one communication
- * point to the next. Knows no particular model and no FMI.
+/* One instance of a model: its life from creation to the end of initialization. Knows no particular
+ * model and no FMI. Values are in values.h, steps in stepping.h, derivatives in derivatives.h,
+ * integration from outside in continuous_states.h, snapshots in snapshot.h and serialization.h.
  *
  * Every function that can fail reports the status it returns, with one line of text that says what
  * was wrong and what was expected, to the sink given at creation. Functions that set or get values
@@ -13,13 +14,13 @@
 
 struct instance;
 
-/* Values of the variables with owner = "instance" (src/time_variable.toml, solver_variables.toml).
+/* Values of the variables with owner = "instance" (time_variable.toml, solver_variables.toml).
  */
 struct instance_values {
     double time;                         /* s */
     int solver_steps;                    /* internal steps since initialization */
     int solver_rhs_evaluations;          /* the integrator's, since initialization */
-    double relative_tolerance;           /* asked for; 0: that of the experiment */
+    double relative_tolerance;           /* 0: that of the experiment */
     int max_internal_steps;              /* per communication step */
     double effective_relative_tolerance; /* what the integrator runs at */
     int solver_restarts;                 /* since initialization */
@@ -56,7 +57,7 @@ instance_setup_experiment(struct instance *instance, const struct instance_exper
 
 MUST_CHECK NONNULL enum status instance_enter_initialization(struct instance *instance);
 
-/* Ends initialization: the parameters must go together. */
+/* Ends initialization. Inconsistent parameters are refused. */
 MUST_CHECK NONNULL enum status instance_exit_initialization(struct instance *instance);
 
 /* Time that the instance has reached, s. */

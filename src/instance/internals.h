@@ -30,7 +30,7 @@ struct instance_state {
     struct clock_time time;
 
     /* The integrator's history, from which it goes on while nothing changes. It follows from the
-     * restart and the first and the last time asked for since then (integrator_advance). */
+     * restart and the first and the last advance since then (integrator_advance). */
     bool has_history;
     struct clock_time restart_time;
     double span;        /* s since the restart that the integrator may not pass */
@@ -38,8 +38,8 @@ struct instance_state {
     double latest_time; /* s since the restart */
     struct integrator_statistics statistics;
     long steps_before_restart; /* internal steps */
-    double restart_step;       /* s: first internal step asked for at the last restart; 0: none */
-    double next_step;          /* s: the same, for a restart now */
+    double restart_step; /* s: first internal step of the last restart; 0: the method found one */
+    double next_step;    /* s: the same, for a restart now */
 };
 
 /* Parts of one block of memory, of which a snapshot is a copy. */
@@ -64,13 +64,13 @@ struct instance {
 
     bool outputs_are_valid;        /* the calculated values belong to the others */
     bool history_is_lost;          /* the integrator is not where state says: replay first */
-    struct integrator *integrator; /* NULL where the model has no states */
+    struct integrator *integrator; /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the
                                               tolerances of the states */
-    bool inputs_move; /* since the last restart; otherwise work holds their values */
-    double *work;     /* one value per input: those that the right-hand side sees */
-    char *first;      /* value structures for derivatives */
-    char *second;
+    bool inputs_move;        /* since the last restart; otherwise u holds their values */
+    double *u;               /* one value per input, as the right-hand side sees them */
+    char *first_derivatives; /* value structures, along a curve (struct model) */
+    char *second_derivatives;
     struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */
     struct instance_snapshot *oldest;
 };
@@ -79,7 +79,7 @@ static inline size_t count_of(struct span span) {
     return span.size / sizeof(double);
 }
 
-/* The doubles of a value structure that a span tells. */
+/* The doubles at a span of a value structure. */
 static inline double *doubles_of(char *values, struct span span) {
     return (double *)(void *)(values + span.offset);
 }

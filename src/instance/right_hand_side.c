@@ -16,7 +16,7 @@ bool instance_inputs_move(const struct polynomial inputs[], size_t count) {
 static void evaluate_inputs(const struct instance *instance, double t) {
     const size_t input_count = count_of(instance->model->inputs);
     for (size_t i = 0; i < input_count; i++) {
-        instance->work[i] = polynomial_value(&instance->memory.running[i], t);
+        instance->u[i] = polynomial_value(&instance->memory.running[i], t);
     }
 }
 
@@ -31,8 +31,8 @@ enum status instance_rhs(double t, const double x[], double dx[], void *instance
     if (instance->inputs_move) {
         evaluate_inputs(instance, t);
     }
-    return instance->model->right_hand_side(
-        instance->memory.held, instance->state.restart_time.s + t, x, instance->work, dx);
+    return instance->model->right_hand_side(instance->memory.held,
+                                            instance->state.restart_time.s + t, x, instance->u, dx);
 }
 
 /* Column by column: derivatives along each state. */
@@ -41,21 +41,22 @@ enum status instance_jacobian(double t, const double x[], double J[], void *inst
     const struct model *model = instance->model;
     const double time = instance->state.restart_time.s + t;
     const size_t n = count_of(model->states);
-    char *point = instance->second;
+    char *point = instance->second_derivatives;
     if (instance->inputs_move) {
         evaluate_inputs(instance, t);
     }
     memcpy(point, instance->memory.held, model->values_size);
     memcpy(doubles_of(point, model->states), x, model->states.size);
     if (model->inputs.size > 0) {
-        memcpy(doubles_of(point, model->inputs), instance->work, model->inputs.size);
+        memcpy(doubles_of(point, model->inputs), instance->u, model->inputs.size);
     }
     enum status status = model->outputs(point, time);
     for (size_t j = 0; j < n && status == STATUS_OK; j++) {
-        memset(instance->first, 0, model->values_size);
-        doubles_of(instance->first, model->states)[j] = 1.0;
-        status = model->propagate(point, time, 0.0, instance->first, NULL);
-        memcpy(&J[n * j], doubles_of(instance->first, model->derivatives), n * sizeof(double));
+        memset(instance->first_derivatives, 0, model->values_size);
+        doubles_of(instance->first_derivatives, model->states)[j] = 1.0;
+        status = model->propagate(point, time, 0.0, instance->first_derivatives, NULL);
+        memcpy(&J[n * j], doubles_of(instance->first_derivatives, model->derivatives),
+               n * sizeof(double));
     }
     return status;
 }

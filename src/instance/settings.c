@@ -87,7 +87,7 @@ bool instance_is_configured_otherwise(const struct instance *instance) {
 enum status instance_configure_integrator(struct instance *instance) {
     const struct span states = instance->model->states;
     const double tolerance = instance->state.own.effective_relative_tolerance;
-    double *absolute = doubles_of(instance->first, states);
+    double *absolute = doubles_of(instance->first_derivatives, states);
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         const size_t from_states = variable->offset - states.offset;

@@ -55,7 +55,7 @@ static void update_statistics(struct instance *instance) {
     own->solver_last_order = statistics->last_order;
 }
 
-/* Inputs at the end of a step of the length elapsed (s); their derivatives applied to it alone. */
+/* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
 static void end_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
     const size_t input_count = count_of(instance->model->inputs);

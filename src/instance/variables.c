@@ -36,5 +36,5 @@ enum status variable_check_value(const struct variable *variable, double value,
 }
 
 const char *variable_type_name(enum variable_type type) {
-    return type == VARIABLE_FLOAT64 ? "Real" : "Integer";
+    return type == VARIABLE_FLOAT64 ? "float64" : "int32";
 }

@@ -1,5 +1,5 @@
-/* Row type of the variable table that fmu/generate.py makes from variables.toml, and what can be
- * told from a row alone. Terms as in section 2.2.7 of the FMI 2.0 specification. */
+/* The table of variables that fmu/generate.py makes from variables.toml, and what follows from a
+ * row of it. Terms as in section 2.2.7 of the FMI 2.0 specification. */
 #ifndef VARIABLES_H
 #define VARIABLES_H
 
@@ -40,9 +40,9 @@ struct variable {
     enum causality causality;
     enum variability variability;
     enum initial initial;
-    double start;   /* 0 where the variable has none */
-    double min;     /* -INFINITY where there is none */
-    double max;     /* INFINITY where there is none */
+    double start;   /* 0: none */
+    double min;     /* -INFINITY: none */
+    double max;     /* INFINITY: none */
     double nominal; /* > 0 */
 };
 
@@ -50,7 +50,7 @@ struct variable {
 struct model_description {
     const char *name; /* model name and identifier */
     const char *guid;
-    double default_tolerance; /* relative, where neither experiment nor parameter gives one */
+    double default_tolerance; /* relative, if neither experiment nor parameter gives one */
     const struct model *model;
     const struct variable *variables;
     size_t variable_count;

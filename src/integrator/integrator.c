@@ -29,10 +29,6 @@ static const struct method *const methods[INTEGRATOR_METHODS] = {
     INTEGRATOR_METHOD_LIST(METHOD_ENTRY)};
 #undef METHOD_ENTRY
 
-const char *integrator_method_name(enum integrator_method method) {
-    return methods[method]->name;
-}
-
 double integrator_tolerance_fraction(enum integrator_method method) {
     return methods[method]->tolerance_fraction;
 }
@@ -90,7 +86,7 @@ void integrator_destroy(struct integrator *integrator) {
     free(integrator);
 }
 
-/* Where this fails there is no method: the next call starts anew. */
+/* After a failure there is no method; the next call creates one. */
 static enum status configure(struct integrator *integrator, enum integrator_method wanted) {
     const struct method *method = methods[wanted];
     if (integrator->method != method) {
@@ -169,8 +165,8 @@ static bool can_interpolate(struct integrator *integrator, double t) {
            problem_are_finite(integrator->x, integrator->problem.ode.state_count);
 }
 
-/* What the method left in x can be used: with extreme values a solver ends with success where its
- * step has underflowed to nothing, or with a state that is not finite. */
+/* The state in x can be used. With extreme values a solver reports success although its step has
+ * underflowed to nothing, or its state is not finite. */
 static bool has_reached(const struct integrator *integrator, double t) {
     // at a stop time the solver may be short of it by its own rounding
     return problem_are_finite(integrator->x, integrator->problem.ode.state_count) &&

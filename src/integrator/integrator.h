@@ -1,9 +1,9 @@
 /* Integration of an ode by SUNDIALS, which stays behind this handle: no type or message of it
  * leaves.
  *
- * Time here is counted from the last restart, so that its rounding does not grow with the time of
- * the simulation. CVODE steps past the points asked for and interpolates; a restart drops what lies
- * beyond. The Runge-Kutta method ends its steps at the points asked for and has no history. One
+ * Time is counted from the last restart, so that its rounding does not grow with the time of the
+ * simulation. CVODE steps past the requested times and interpolates; a restart drops what lies
+ * beyond. The Runge-Kutta method ends its steps at the requested times and has no history. One
  * handle serves one thread at a time; handles share nothing. */
 #ifndef INTEGRATOR_H
 #define INTEGRATOR_H
@@ -34,11 +34,7 @@ enum integrator_method {
 };
 #undef INTEGRATOR_METHOD_CODE
 
-/* As in the variable solver_method. */
-const char *integrator_method_name(enum integrator_method method);
-
-/* To be multiplied with the tolerance asked for: with it the method keeps that tolerance over
- * thousands of restarts. */
+/* A method keeps a tolerance over thousands of restarts if it runs at this fraction of it. */
 double integrator_tolerance_fraction(enum integrator_method method);
 
 struct integrator_settings {
@@ -73,18 +69,17 @@ void integrator_destroy(struct integrator *integrator);
 MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrator,
                                                     const struct integrator_settings *settings);
 
-/* After a stop, further advances go on from a history of internal steps. Otherwise each advance
- * starts anew, and a restart there changes nothing. */
+/* True: an advance goes on from the internal steps before it. False: each advance starts fresh, and
+ * a restart between two of them changes nothing. */
 NONNULL bool integrator_has_history(const struct integrator *integrator);
 
-/* Starts anew from x at time 0 with no history. span (> 0): the right-hand side is not evaluated at
- * times beyond it, nor may integrator_advance go there; INFINITY where there is no such limit.
+/* Starts from x at time 0 with no history. span (> 0): the right-hand side is not evaluated beyond
+ * it, nor may integrator_advance go there; INFINITY: no limit.
  * first_step: what integrator_next_step gave for a solution like this one, s; 0: none is known. */
 MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator, const double x[],
                                                   double span, double first_step);
 
-/* After an advance: how long a first internal step can be after a restart here, s; 0 where that
- * cannot be told. */
+/* After an advance: how long a first internal step can be after a restart here, s; 0: unknown. */
 NONNULL double integrator_next_step(const struct integrator *integrator);
 
 /* Integrates to the time t, not before the one of the last call, in max_steps (>= 1) internal steps
@@ -92,9 +87,8 @@ NONNULL double integrator_next_step(const struct integrator *integrator);
  * Where that fails (STATUS_TOO_MANY_STEPS, STATUS_NO_CONVERGENCE, STATUS_NOT_FINITE), *reached <= t
  * is the last time with a valid state and x that state; on success *reached is t.
  *
- * What follows a restart is a function of its state, span and first step and of the first t after
- * it, which bounds the first internal step; at which further times there was a stop does not matter
- * where the integrator has a history. */
+ * Deterministic: after a restart, results depend only on its arguments and the first t, which
+ * bounds the first internal step. With a history, stops at further times do not matter. */
 MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
                                                   long max_steps, double *reached, double x[]);
 

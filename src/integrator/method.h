@@ -18,7 +18,7 @@ struct method {
     /* As in the variable solver_method. */
     const char *name;
 
-    /* The method runs at this fraction of the tolerance asked for, because each restart adds an
+    /* The method runs at this fraction of the requested tolerance, because each restart adds an
      * error and thousands of them add up. Larger: faster and less accurate. */
     double tolerance_fraction;
 
@@ -50,8 +50,9 @@ struct method {
      * advance must. NULL with no history. */
     bool (*interpolate)(void *memory, double t, double x[]);
 
-    /* Length of a first internal step after a restart from here, where the state is x, s; 0: not
-     * known. */
+    /* Length of a first internal step after a restart from here, where the state is x, s; 0:
+     * unknown.
+     */
     double (*next_step)(void *memory, const double x[]);
 };
 

@@ -17,7 +17,7 @@ typedef enum status ode_jacobian(double t, const double x[], double J[], void *c
 struct ode {
     size_t state_count; /* > 0 */
     ode_rhs *rhs;
-    ode_jacobian *jacobian; /* for INTEGRATOR_CVODE_BDF alone */
+    ode_jacobian *jacobian; /* for INTEGRATOR_CVODE_BDF only */
     void *context;
 };
 

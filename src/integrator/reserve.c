@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Threads that have entered a reserve: SUNDIALS passes nothing to malloc that could tell the
+/* Threads that have entered a reserve: SUNDIALS passes nothing to malloc that would identify the
  * instance. Thread-local storage would be the usual place, but in a shared object that is loaded
  * later it either allocates at a thread's first access, and ends the process where that fails, or
  * takes from room that the loader does not always get back: after a hundred cycles of loading and
@@ -25,7 +25,7 @@ enum { SLOTS = 256 };
 static struct slot slots[SLOTS];
 static atomic_size_t used_slots; /* all from this one on were always free */
 
-/* Every thread has an errno of its own. */
+/* Each thread has its own errno. */
 static const void *this_thread(void) {
     return &errno;
 }

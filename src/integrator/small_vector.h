@@ -10,7 +10,7 @@
 
 #include <sundials/sundials_nvector.h>
 
-/* What a linear combination was made of: see small_vector_note_terms. */
+/* The terms of a linear combination: see small_vector_note_terms. */
 enum { SMALL_VECTOR_MOST_TERMS = 16 };
 struct small_vector_terms {
     int count; /* 0: none, or more than there is room for */

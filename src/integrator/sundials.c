@@ -86,7 +86,7 @@ static enum status rest_jacobian(double t, const double x[], double J[], void *s
     return STATUS_OK;
 }
 
-/* With settings of its own: the user's may ask for more steps than are spent here. */
+/* Uses its own settings: with the user's it could take more steps than are spent here. */
 enum status sundials_warm_up(void *memory) {
     struct sundials *sundials = memory;
     const struct method *method = sundials->method;

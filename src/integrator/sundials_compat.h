@@ -15,7 +15,7 @@ struct sundials_texts {
     void *context;
 };
 
-/* A function that ERKStep had of its own and shares with ARKODE's other methods since 7.1. */
+/* Functions of ERKStep that all of ARKODE's methods share since 7.1. */
 #if SUNDIALS_VERSION_MAJOR > 7 || (SUNDIALS_VERSION_MAJOR == 7 && SUNDIALS_VERSION_MINOR >= 1)
 #define ERK(name) ARKode##name
 #else

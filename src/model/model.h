@@ -1,6 +1,5 @@
-/* What a model gives to the instance that runs it. A model keeps all its values in one structure of
- * its own, made of doubles and ints; the instance reads and writes them through the generated
- * table.
+/* What a model gives to the instance that runs it. A model keeps all its values in one structure
+ * made of doubles and ints; the instance reads and writes them through the generated table.
  */
 #ifndef MODEL_H
 #define MODEL_H
@@ -38,7 +37,7 @@ struct model {
      * the derivative of time along the curve, which is straight in time. */
     enum status (*propagate)(const void *values, double t, double dt, void *first, void *second);
 
-    /* STATUS_OK where the parameters go together; otherwise STATUS_INVALID_PARAMETERS with one line
+    /* STATUS_OK if the parameters are consistent; otherwise STATUS_INVALID_PARAMETERS and one line
      * in text (size bytes) that says what is wrong and what is expected. */
     enum status (*check_parameters)(const void *values, char *text, size_t size);
 };

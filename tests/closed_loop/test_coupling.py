@@ -1,7 +1,6 @@
 """The closed loop under the master: against the references, and what the study claims."""
 
 import os
-import sys
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -9,12 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.coupling import doubling as coupling_doubling
-from cosim.coupling import report as coupling
-from cosim.coupling import study as coupling_study
-from cosim.coupling.doubling import CORNERS, FAST, FAST_AND_SLOW, STATES, FastAndSlow
-from cosim.coupling.study import METHODS, REFERENCE_AHEAD, REFERENCES, Loop
+from cosim.__main__ import main
 from cosim.errors import UserError
+from models.closed_loop.coupling import delays, run_study, step_doubling, step_errors, tables
+from models.closed_loop.coupling import loop as closed_loop
+from models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
+from models.closed_loop.coupling.payload import study_payload
+from models.closed_loop.coupling.step_doubling import (
+    CORNERS,
+    FAST,
+    FAST_AND_SLOW,
+    FAST_STOP,
+    STATES,
+    FastAndSlow,
+)
+from models.closed_loop.coupling.step_errors import StepErrors
 from tests.support.paths import ROOT
 
 VARIANTS = (
@@ -29,19 +37,17 @@ BOUND = 1e-7  # relative, at the relative tolerance of the variants, 1e-11
 SMALLEST_SCALE = 1e-3
 INTEGRALS = ("controller.integral1", "controller.integral2")
 
-sys.path.insert(0, str(ROOT))
-
 
 @pytest.fixture(scope="module")
-def loop() -> Iterator[Loop]:
+def loop() -> Iterator[ClosedLoop]:
     """The built system."""
     build = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
-    with coupling_study.opened(build / "ClosedLoop.ssp") as opened:
+    with closed_loop.opened(build / "ClosedLoop.ssp") as opened:
         yield opened
 
 
 @pytest.fixture(scope="module")
-def motion(loop: Loop) -> FastAndSlow:
+def motion(loop: ClosedLoop) -> FastAndSlow:
     """The motion of the step-size control."""
     return FastAndSlow(loop)
 
@@ -62,8 +68,8 @@ def flat(parameters: dict) -> dict:
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_jacobi_steps_meet_the_sampled_reference(loop: Loop, variant: str) -> None:
-    expected = coupling_study.read_reference(REFERENCES / variant / "sampled.csv")
+def test_jacobi_steps_meet_the_sampled_reference(loop: ClosedLoop, variant: str) -> None:
+    expected = closed_loop.read_reference(REFERENCES / variant / "sampled.csv")
     columns, calls = loop.run(METHODS[0], STEP, variant)
     assert calls == 3 * (len(columns["time"]) - 1)
     every = round(expected["time"][1] / STEP)
@@ -74,7 +80,7 @@ def test_jacobi_steps_meet_the_sampled_reference(loop: Loop, variant: str) -> No
 
 
 @pytest.mark.parametrize("variant", ["nominal", "limited_effort"])
-def test_gauss_seidel_steps_meet_their_reference(loop: Loop, variant: str) -> None:
+def test_gauss_seidel_steps_meet_their_reference(loop: ClosedLoop, variant: str) -> None:
     """With the trajectory first, then the controller, then the arm."""
     from models.closed_loop.references.closed_loop import sampled
 
@@ -90,11 +96,11 @@ def test_gauss_seidel_steps_meet_their_reference(loop: Loop, variant: str) -> No
 
 
 @pytest.fixture(scope="module")
-def convergence(loop: Loop) -> coupling_study.Convergence:
-    return coupling_study.study_convergence(loop, (8e-3, 4e-3, 2e-3, 1e-3))
+def convergence(loop: ClosedLoop) -> StepErrors:
+    return step_errors.study_step_errors(loop, (8e-3, 4e-3, 2e-3, 1e-3))
 
 
-def test_errors_and_energy_fall_with_the_order(convergence: coupling_study.Convergence) -> None:
+def test_errors_and_energy_fall_with_the_order(convergence: StepErrors) -> None:
     for i, method in enumerate(convergence.methods):
         assert convergence.slopes(convergence.errors)[i] == pytest.approx(method.power, abs=0.2)
         assert convergence.slopes(convergence.energies)[i] == pytest.approx(method.power, abs=0.2)
@@ -102,34 +108,34 @@ def test_errors_and_energy_fall_with_the_order(convergence: coupling_study.Conve
     assert [m.power for m in convergence.methods] == [1, 1, 2, 2]
 
 
-def test_a_slope_that_is_off_is_seen(convergence: coupling_study.Convergence) -> None:
+def test_a_slope_that_is_off_is_seen(convergence: StepErrors) -> None:
     errors = convergence.errors * convergence.steps**0.5
-    changed = coupling_study.Convergence(
+    changed = StepErrors(
         convergence.methods, convergence.steps, errors, convergence.energies, convergence.calls
     )
     assert not any(changed.holds(i) for i in range(4))
-    assert "FAILED" in "\n".join(coupling.convergence_lines(changed))
+    assert "FAILED" in "\n".join(tables.step_error_lines(changed))
 
 
-def test_the_law_is_the_controllers_own(loop: Loop) -> None:
+def test_the_law_is_the_controllers_own(loop: ClosedLoop) -> None:
     """In a step-0 limit the efforts are the law's at the momentary motion."""
     columns, _ = loop.run(METHODS[3], STEP, stop=1.2)
-    efforts = coupling_study.law(loop, columns)
+    efforts = step_errors.law(loop, columns)
     applied = np.array([columns["controller.tau1"], columns["controller.f2"]])
     # the controller extrapolates the measurements over a step: second order
     assert np.abs(efforts - applied)[:, 1:].max() < 5e-5
     held, _ = loop.run(METHODS[0], STEP, stop=1.2)
-    assert np.abs(coupling_study.law(loop, held)[0] - held["controller.tau1"]).max() > 3e-3
+    assert np.abs(step_errors.law(loop, held)[0] - held["controller.tau1"]).max() > 3e-3
 
 
 def test_simpson_is_exact_for_cubics() -> None:
     t = np.linspace(0, 2, 9)
-    assert coupling_study.simpson(t**3 - t, t[1]) == pytest.approx(2.0, rel=1e-14)
+    assert step_errors.simpson(t**3 - t, t[1]) == pytest.approx(2.0, rel=1e-14)
 
 
 @pytest.mark.parametrize("step", [2e-3, 1e-3])
-def test_the_end_effectors_error_is_what_the_delays_predict(loop: Loop, step: float) -> None:
-    jacobi, gauss_seidel, ahead = tracking = coupling_study.study_tracking(loop, step)
+def test_the_end_effectors_error_is_what_the_delays_predict(loop: ClosedLoop, step: float) -> None:
+    jacobi, gauss_seidel, ahead = tracking = delays.study_tracking(loop, step)
     for found in tracking:
         assert abs(found.deviation) <= 0.1
         rms = np.sqrt(np.mean((found.measured - found.predicted) ** 2))
@@ -137,11 +143,11 @@ def test_the_end_effectors_error_is_what_the_delays_predict(loop: Loop, step: fl
     assert jacobi.largest < 1e-3
     assert gauss_seidel.largest < jacobi.largest / 2
     assert ahead.largest > jacobi.largest
-    assert coupling.tracking_passed(tracking)
+    assert delays.tracking_passed(tracking)
 
 
-def test_integral_action_removes_what_the_payload_costs(loop: Loop) -> None:
-    payload = coupling_study.study_payload(loop, 2e-3)
+def test_integral_action_removes_what_the_payload_costs(loop: ClosedLoop) -> None:
+    payload = study_payload(loop, 2e-3)
     assert payload.largest["heavy_payload"] > 10 * payload.largest["nominal"]
     np.testing.assert_allclose(payload.held["heavy_payload"], payload.theory, rtol=1e-6)
     assert np.abs(payload.held["heavy_payload_integral"]).max() < 1e-8
@@ -154,7 +160,7 @@ def test_integral_action_removes_what_the_payload_costs(loop: Loop) -> None:
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-5])
 def test_step_doubling_holds_the_local_error(motion: FastAndSlow, tolerance: float) -> None:
-    """Against the continuous loop, started anew from every accepted state."""
+    """Against the continuous loop, started from every accepted state."""
     from models.closed_loop.references.closed_loop import monolithic
 
     run, local, names = motion.controlled(tolerance)
@@ -168,16 +174,16 @@ def test_step_doubling_holds_the_local_error(motion: FastAndSlow, tolerance: flo
     assert errors.max() <= 3 * tolerance
     assert np.median(errors[~run.limited]) >= tolerance / 3
     assert np.abs(errors - local).max() <= 0.05 * tolerance  # what the study measures by itself
-    assert run.times[-1] == coupling_doubling.FAST_STOP
+    assert run.times[-1] == FAST_STOP
     assert set(CORNERS) <= set(run.times)
     whole = monolithic(flat(FAST), run.times)
     found = np.array([whole[name] for name in STATES], float).T
     assert np.abs(found - motion.states(run.times)).max() <= 1e-2 * np.abs(found - states).max()
 
 
-def test_step_doubling_takes_fewer_steps(loop: Loop, motion: FastAndSlow) -> None:
-    (found,) = coupling_doubling.study_doubling(loop, [1e-5])
-    fixed = found.fixed_steps / (coupling_doubling.FAST_STOP / 0.1)
+def test_step_doubling_takes_fewer_steps(loop: ClosedLoop, motion: FastAndSlow) -> None:
+    (found,) = step_doubling.study_doubling(loop, [1e-5])
+    fixed = found.fixed_steps / (FAST_STOP / 0.1)
     assert motion.fixed_error(round(fixed)) <= found.error
     assert motion.fixed_error(round(0.9 * fixed)) > found.error
     assert found.fixed_steps >= 3 * found.run.accepted
@@ -205,28 +211,28 @@ def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
 def test_a_missing_system_is_named(tmp_path: Path) -> None:
     with (
         pytest.raises(UserError, match=r"none\.ssp: no such file"),
-        coupling_study.opened(tmp_path / "none.ssp"),
+        closed_loop.opened(tmp_path / "none.ssp"),
     ):
         pass
 
 
-def test_an_unknown_variant_is_named(loop: Loop) -> None:
+def test_an_unknown_variant_is_named(loop: ClosedLoop) -> None:
     with pytest.raises(UserError, match="no variant 'light'.*nominal"):
         loop.run(METHODS[0], STEP, "light")
 
 
 def test_tables_and_picture(
-    loop: Loop,
-    convergence: coupling_study.Convergence,
+    loop: ClosedLoop,
+    convergence: StepErrors,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    doubling = coupling_doubling.study_doubling(loop, [1e-4])
-    monkeypatch.setattr(coupling.study, "opened", lambda _: nullcontext(loop))
-    monkeypatch.setattr(coupling.study, "study_convergence", lambda _: convergence)
-    monkeypatch.setattr(coupling, "study_doubling", lambda _: doubling)
-    assert coupling.run(tmp_path / "new")
+    doubling = step_doubling.study_doubling(loop, [1e-4])
+    monkeypatch.setattr(run_study, "opened", lambda _: nullcontext(loop))
+    monkeypatch.setattr(run_study, "study_step_errors", lambda _: convergence)
+    monkeypatch.setattr(run_study, "study_doubling", lambda _: doubling)
+    assert main(["coupling", "--report", str(tmp_path / "new")]) == 0
     assert (tmp_path / "new" / "coupling.png").stat().st_size > 50_000
     text = capsys.readouterr().out
     assert "FAILED" not in text

@@ -11,6 +11,8 @@ from lxml import etree
 from cosim.__main__ import main
 from cosim.errors import UserError
 from cosim.system import ssp
+from cosim.system.ssp_reader import NAMESPACES
+from cosim.system.structure import Connector
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
 
@@ -85,7 +87,7 @@ def test_units_that_are_used_are_defined() -> None:
             if name.endswith((".ssd", ".ssv")):
                 root = etree.fromstring(archive.read(name))
                 used = set(root.xpath("//@unit"))
-                defined = root.xpath("//ssc:Unit/@name", namespaces=ssp.NAMESPACES)
+                defined = root.xpath("//ssc:Unit/@name", namespaces=NAMESPACES)
                 assert set(defined) == used, name
                 assert len(defined) == len(used)
 
@@ -100,7 +102,7 @@ def test_units_are_those_of_the_fmus() -> None:
             files = [opened.folder / STRUCTURE]
             files += sorted((opened.folder / "resources").glob(f"{component}_*.ssv"))
             for path in files:
-                for unit in etree.parse(path).iterfind(".//ssc:Unit", ssp.NAMESPACES):
+                for unit in etree.parse(path).iterfind(".//ssc:Unit", NAMESPACES):
                     if unit.get("name") in units:
                         wanted = [getattr(units[unit.get("name")], b) or 0 for b in bases]
                         given = [int(unit[0].get(b, 0)) for b in bases]
@@ -122,7 +124,7 @@ def test_structure() -> None:
         ]
         assert sorted(found) == sorted(wanted)
         assert (system.start, system.stop, system.step, system.steps) == (0.0, 6.0, 1e-3, 6000)
-        assert system.component("arm").connectors["tau1"] == ssp.Connector(
+        assert system.component("arm").connectors["tau1"] == Connector(
             "tau1", "input", "Real", "N.m"
         )
         for component, fmu in FMUS.items():
@@ -152,16 +154,16 @@ def test_variants() -> None:
 
 def test_every_importer_gets_a_whole_variant() -> None:
     """The first set, as libcosim reads it, is nominal; so is what is left where all sets apply in
-    turn, as the standard has it; and in any order the last one alone tells the values."""
+    turn, as the standard has it; and in any order the last one gives all values."""
     with zipfile.ZipFile(SSP) as archive:
         root = etree.fromstring(archive.read(STRUCTURE))
         for component in FMUS:
             path = f".//ssd:Component[@name='{component}']//ssd:ParameterBinding"
-            sources = [node.get("source") for node in root.iterfind(path, ssp.NAMESPACES)]
+            sources = [node.get("source") for node in root.iterfind(path, NAMESPACES)]
             assert sources[0] == sources[-1] == f"resources/{component}_nominal.ssv"
             names = [
                 etree.fromstring(archive.read(source)).xpath(
-                    "//ssv:Parameter/@name", namespaces=ssp.NAMESPACES
+                    "//ssv:Parameter/@name", namespaces=NAMESPACES
                 )
                 for source in sources
             ]
@@ -377,7 +379,7 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
     assert "cannot be unpacked" in refused(path)
 
 
-def test_the_command_line_tells_in_one_line(
+def test_the_command_line_explains_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     edits, _ = BAD["input without a connection"]

@@ -15,8 +15,8 @@ from fmpy.validation import validate_fmu
 
 from cosim.__main__ import main
 from cosim.errors import UserError
-from cosim.system import ecos, ssp
-from cosim.system import runs as system
+from cosim.system import comparison, ecos, ssp
+from models.closed_loop.study import EXPERIMENT
 from tests.importers.test_importers import folder_of
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, replace
@@ -63,7 +63,7 @@ def difference(values: np.ndarray, expected: np.ndarray) -> float:
 def run(variant: str) -> dict[str, np.ndarray]:
     """The variant in Ecos: all recorded values by name."""
     with ssp.unpacked(SSP) as opened:
-        result = ecos.run(opened, variant, system.recorded(opened))
+        result = ecos.run(opened, variant, comparison.recorded(opened))
     return {"time": result.times} | dict(zip(result.names, result.values.T, strict=True))
 
 
@@ -108,7 +108,7 @@ def test_the_bound_tells_one_order_from_another() -> None:
 
 def test_recorded_are_all_outputs_and_states() -> None:
     with ssp.unpacked(SSP) as opened:
-        names = system.recorded(opened)
+        names = comparison.recorded(opened)
     components = [name.partition(".")[0] for name in names]
     assert names[:2] == ["trajectory.q1_ref", "trajectory.q2_ref"]
     assert names[-2:] == ["controller.integral1", "controller.integral2"]
@@ -140,7 +140,7 @@ def test_variants_differ_as_they_should() -> None:
 
 
 def first_variant(variant: str) -> Edit:
-    """Edit that leaves the bindings of one variant alone: libcosim takes the first."""
+    """Edit that leaves only the bindings of one variant: libcosim takes the first."""
     others = "|".join(name for name in VARIANTS if name != variant)
     binding = re.compile(rf'\s*<ssd:ParameterBinding source="resources/[a-z]+_({others})\.ssv"/>')
 
@@ -345,7 +345,7 @@ def test_a_component_that_fails_in_a_step_is_named(
     assert "component 'arm' failed by t = 0.001 s" in err
 
 
-def test_ecos_that_crashes_is_told(
+def test_ecos_that_crashes_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -380,8 +380,9 @@ def test_a_damaged_reference_is_refused(tmp_path: Path) -> None:
     if not good.is_file():
         pytest.skip(f"{good}: no such file yet")
     lines = good.read_text(encoding="utf-8").splitlines(keepends=True)
-    path = tmp_path / "nominal" / "ecos.csv"
-    path.parent.mkdir()
+    system = tmp_path / "closed_loop"
+    path = system / "references" / "nominal" / "ecos.csv"
+    path.parent.mkdir(parents=True)
     cases = {
         "no such file": None,
         "header": lines[1:],
@@ -399,5 +400,5 @@ def test_a_damaged_reference_is_refused(tmp_path: Path) -> None:
             if content is not None:
                 path.write_text("".join(content), encoding="utf-8")
             with pytest.raises(UserError, match=message) as caught:
-                system.load_reference(opened, "nominal", tmp_path)
+                comparison.load_reference(opened, "nominal", system, EXPERIMENT)
             assert "make_references.py nominal" in str(caught.value)

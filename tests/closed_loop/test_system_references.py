@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cosim import variables
 from cosim.errors import UserError
 from models.closed_loop.references import closed_loop, equations, make_references
 from models.closed_loop.references.closed_loop import COLUMNS, STATE, Columns, monolithic, sampled
+from tests.support.cosim_project import declared
 from tests.support.paths import ROOT
 from tests.support.rp_symbolic import PARAMETERS, STATES, TERMS, terms_of_the_motion
 
@@ -84,13 +84,12 @@ def test_controller_knows_the_dynamics_of_the_notes() -> None:
 
 
 def test_columns_are_the_outputs_of_the_models() -> None:
-    declared = [
+    outputs = [
         f"{component}.{name}"
         for component, folder in closed_loop.COMPONENTS.items()
-        for name, v in variables.load(ROOT / "models" / folder).items()
-        if v["causality"] == "output" and v["type"] == "Real"
+        for name in declared(folder).real_outputs
     ]
-    assert list(COLUMNS) == [*declared, "controller.integral1", "controller.integral2"]
+    assert list(COLUMNS) == [*outputs, "controller.integral1", "controller.integral2"]
 
 
 def blended(x: mpmath.mpf) -> mpmath.mpf:
@@ -132,9 +131,9 @@ CASES = {
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 def test_reference_follows_the_path(case: dict) -> None:
     """The end effector's position from the joints, and the derivatives, as seen by mpmath."""
-    declared = variables.load(ROOT / "models" / "rp_trajectory")
-    values = {name: v["start"] for name, v in declared.items() if "start" in v}
-    values |= {"motion": "circle", "branch": "forward"} | case
+    values = (
+        declared("rp_trajectory").start_values | {"motion": "circle", "branch": "forward"} | case
+    )
     times = [0.2, 0.9, 1.4, 2.7] if values["motion"] == "circle" else [0.2, 0.9, 1.4]
     column = monolithic({f"trajectory.{n}": v for n, v in case.items()}, times)
     column = {n.removeprefix("trajectory."): v for n, v in column.items() if "trajectory" in n}
@@ -270,10 +269,9 @@ class Holding:
 
     def __init__(self) -> None:
         self.p = {
-            f"{component}.{name}": v["start"]
+            f"{component}.{name}": start
             for component, folder in (("controller", "rp_controller"), ("arm", "rp_manipulator"))
-            for name, v in variables.load(ROOT / "models" / folder).items()
-            if "start" in v
+            for name, start in declared(folder).start_values.items()
         } | ROUGH
         pair = lambda name: np.array([self.p[f"controller.{name}{i}"] for i in (1, 2)])  # noqa: E731
         self.Kp, self.Kd, self.Ki = pair("Kp"), pair("Kd"), pair("Ki")

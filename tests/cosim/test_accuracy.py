@@ -9,10 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cosim import accuracy, reference, report, simulation
-from cosim.accuracy import Runs, Sweep
+from cosim import comparison, reference, simulation, tolerance_sweep
+from cosim.comparison import Runs
+from cosim.fmu_file import Fmu
 from cosim.reference import Reference
-from cosim.unit import Fmu
+from cosim.report import pages
+from cosim.tolerance_sweep import Sweep
 from tests.support.cosim_project import (
     LONG,
     NAMES,
@@ -35,15 +37,19 @@ def runs(opened: Fmu) -> Iterator[Runs]:
 
 @pytest.fixture(scope="module")
 def sweeps(runs: Runs) -> dict[str, Sweep]:
-    return {name: accuracy.sweep(runs, load(name)) for name in NAMES}
+    return {name: tolerance_sweep.sweep(runs, load(name)) for name in NAMES}
 
 
 # ---- error measure and bounds
 
 
+ENERGIES = ("kinetic_energy", "potential_energy")
+SUMMED = {"potential_energy": ENERGIES, "total_energy": ENERGIES}
+
+
 def measured(expected: dict[str, list[float]], got: dict[str, list[float]]) -> dict[str, float]:
-    names = tuple(expected)
-    table = Reference(Path("ref.csv"), np.arange(2.0), names, np.array([*expected.values()]).T)
+    values = np.array([*expected.values()]).T
+    table = Reference(Path("ref.csv"), np.arange(2.0), tuple(expected), values, SUMMED)
     result = SimpleNamespace(names=tuple(got), values=np.array([*got.values()]).T)
     return reference.errors(result, table)
 
@@ -74,6 +80,10 @@ def test_energies_are_relative_to_what_is_exchanged() -> None:
     assert errors == pytest.approx(wanted)
 
 
+def test_the_arms_energies_have_that_scale(runs: Runs) -> None:
+    assert runs.run(load(SHORT), 1e-8).reference.summed == SUMMED
+
+
 def test_energy_scale_needs_both_energies() -> None:
     assert measured({"total_energy": [2.0, 2.0]}, {"total_energy": [2.0, 3.0]}) == {
         "total_energy": 0.5
@@ -83,7 +93,7 @@ def test_energy_scale_needs_both_energies() -> None:
 def test_values_that_are_not_finite_fail(runs: Runs) -> None:
     run = runs.run(load(SHORT), 1e-8)
     errors = {**run.errors, "q2": math.nan}
-    broken = accuracy.Run(run.scenario, run.fmu, run.result, run.reference, errors)
+    broken = comparison.Run(run.scenario, run.fmu, run.result, run.reference, errors)
     assert math.isnan(broken.error) and broken.worst == "q2" and not broken.passed
 
 
@@ -103,16 +113,16 @@ def test_bounds_are_met_exactly_at_their_tolerances() -> None:
 
 def test_rules_on_errors_over_tolerances() -> None:
     tolerances = (1e-4, 1e-5, 1e-6)
-    assert not accuracy.violations(tolerances, (1e-3, 3e-3, 1e-6))
-    assert not accuracy.violations(tolerances, (2e-10, 5e-11, 9e-11))
-    assert not accuracy.violations(tolerances, (0.0, 0.0, 0.0))
-    (above,) = accuracy.violations(tolerances, (0.2, 1e-5, 1e-6))
+    assert not tolerance_sweep.violations(tolerances, (1e-3, 3e-3, 1e-6))
+    assert not tolerance_sweep.violations(tolerances, (2e-10, 5e-11, 9e-11))
+    assert not tolerance_sweep.violations(tolerances, (0.0, 0.0, 0.0))
+    (above,) = tolerance_sweep.violations(tolerances, (0.2, 1e-5, 1e-6))
     assert "2.00e-01 at tolerance 0.0001 is above its bound 1e-01" in above
-    (rise,) = accuracy.violations(tolerances, (1e-2, 1e-6, 3.1e-6))
+    (rise,) = tolerance_sweep.violations(tolerances, (1e-2, 1e-6, 3.1e-6))
     assert "more than 3 times" in rise
-    (gain,) = accuracy.violations(tolerances, (1e-4, 1e-5, 1.1e-7))
+    (gain,) = tolerance_sweep.violations(tolerances, (1e-4, 1e-5, 1.1e-7))
     assert "above 1/1000" in gain
-    assert len(accuracy.violations(tolerances, (1e-4, math.nan, 1e-8))) == 3
+    assert len(tolerance_sweep.violations(tolerances, (1e-4, math.nan, 1e-8))) == 3
 
 
 # ---- the built FMU
@@ -145,9 +155,9 @@ def test_nothing_runs_twice(
     runs: Runs, sweeps: dict[str, Sweep], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr(simulation, "simulate")
-    again = accuracy.sweep(runs, load(LONG))
+    again = tolerance_sweep.sweep(runs, load(LONG))
     assert again.errors == sweeps[LONG].errors
-    assert runs.steps_ahead(load(LONG), accuracy.TOLERANCES) == 0
+    assert runs.steps_ahead(load(LONG), tolerance_sweep.TOLERANCES) == 0
 
 
 # ---- report
@@ -155,7 +165,7 @@ def test_nothing_runs_twice(
 
 def test_report_shows_every_scenario(runs: Runs, sweeps: dict[str, Sweep], tmp_path: Path) -> None:
     done = [runs.run(load(name), tolerance) for name in NAMES for tolerance in (1e-8, 1e-11)]
-    index = report.write(tmp_path / "new" / "report", done, list(sweeps.values()))
+    index = pages.write_runs(tmp_path / "new" / "report", done, list(sweeps.values()))
     page = index.read_text(encoding="utf-8")
     for name in [*NAMES, "accuracy"]:
         picture = index.with_name(f"{name}.png").read_bytes()
@@ -168,8 +178,8 @@ def test_report_shows_every_scenario(runs: Runs, sweeps: dict[str, Sweep], tmp_p
 
 def test_report_shows_failures(runs: Runs, tmp_path: Path) -> None:
     run = runs.run(load(SHORT), 1e-8)
-    failed = accuracy.Run(run.scenario, run.fmu, run.result, run.reference, {"q1": 1.0})
+    failed = comparison.Run(run.scenario, run.fmu, run.result, run.reference, {"q1": 1.0})
     broken = Sweep(run.scenario, (1e-4, 1e-5), (1e-3, math.nan), ["<broken>"])
-    page = report.write(tmp_path, [failed], [broken]).read_text(encoding="utf-8")
+    page = pages.write_runs(tmp_path, [failed], [broken]).read_text(encoding="utf-8")
     assert page.count("FAILED") == 2
     assert "&lt;broken&gt;" in page

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from cosim import __main__ as cli
-from cosim import simulation
-from cosim.files import write_csv
+from cosim import simulation, trajectory_csv
+from cosim.commands import run as run_command
 from tests.support.cosim_project import (
     LONG,
     NAMES,
@@ -58,7 +58,7 @@ def test_run_of_one_scenario_at_one_tolerance(
 def test_slow_scenarios_called_by_name_are_not_swept(
     project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cli, "QUICK", 0.0)
+    monkeypatch.setattr(run_command, "QUICK", 0.0)
     code, out, _ = call(capsys, "run", SHORT, "--fmu", fmu, "--report", project / "report")
     assert code == 0 and f"{SHORT}: no sweep" in out and "error at tolerance" not in out
 
@@ -85,7 +85,7 @@ def test_run_with_a_worse_reference_fails(
         (["run", "constant_efort"], "did you mean 'constant_effort'"),
         (["run", "--fmu", "/nowhere/X.fmu"], "/nowhere/X.fmu: no such file"),
         (["run", "--fmu", "/"], "is a folder"),
-        (["run"], "RPManipulator.fmu: no such file, ./run.sh builds it"),
+        (["run"], "build: has no FMU of rp_manipulator, ./run.sh builds it"),
         (["run", "--tolerance", "0"], "between 0 and 1"),
         (["run", "--tolerance", "tight"], "between 0 and 1"),
         (["run", "--fmux", "a"], "--fmux"),
@@ -181,7 +181,7 @@ def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) 
     rows = np.loadtxt(file, delimiter=",", skiprows=1)
     rows[:, 0] = load(LONG, project).times[load(LONG, project).reference_rows]
     names = [name.strip('"') for name in file.read_text().splitlines()[0].split(",")]
-    write_csv(file, rows[:, 0], names[1:], rows[:, 1:])
+    trajectory_csv.write(file, rows[:, 0], names[1:], rows[:, 1:])
 
     shutil.copytree(ROOT / "cosim", project / "cosim")
     command = [sys.executable, "-u", "-m", "cosim", "run", LONG, "--fmu", str(fmu)]

@@ -16,11 +16,14 @@ import pytest
 import sympy as sp
 
 from cosim import __main__ as cli
-from cosim import convergence, report
-from cosim import scenario as scenarios
-from cosim.convergence import FACTORS, ORDERS, Convergence, Problem, Sines
+from cosim import console, convergence
+from cosim.convergence import FACTORS, ORDERS, Convergence, Problem
 from cosim.errors import UserError
-from cosim.unit import Fmu
+from cosim.fmu_file import Fmu
+from cosim.project import convergence_files
+from cosim.report import pages
+from cosim.signals import Sines
+from tests.support.cosim_project import declared, load
 from tests.support.paths import ROOT
 
 MODEL = ROOT / "models" / "rp_manipulator"
@@ -40,14 +43,8 @@ def maker() -> Iterator[ModuleType]:
 
 
 @pytest.fixture(scope="module")
-def opened(fmu: Path) -> Iterator[Fmu]:
-    with Fmu(fmu) as unit:
-        yield unit
-
-
-@pytest.fixture(scope="module")
 def problem() -> Problem:
-    return convergence.load(PATH)
+    return convergence.load(PATH, declared(MODEL.name))
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +63,7 @@ def made_up(problem: Problem, *coefficients: float, floor: float = 1e-13) -> Con
 
 def test_exact_state_made_again_is_the_same(tmp_path: Path) -> None:
     subprocess.run([sys.executable, SCRIPT, "--output", tmp_path], check=True, cwd=tmp_path)
-    folders = [path.stem for path in convergence.find_all(ROOT)]
+    folders = [path.stem for path in convergence_files()]
     assert sorted(path.name for path in tmp_path.iterdir()) == folders
     for name in folders:
         files = (MODEL / "references" / name / "exact.json", tmp_path / name / "exact.json")
@@ -127,7 +124,7 @@ def test_order_of_convergence(study: Convergence, order: int) -> None:
 def test_error_of_the_integration_by_itself(
     maker: ModuleType, opened: Fmu, study: Convergence
 ) -> None:
-    """Against the exact solution for the very polynomials that the FMU is told, 3rd order.
+    """Against the exact solution for the very polynomials that the FMU is given, 3rd order.
 
     This has no error of the inputs: what is left is the integrator's. The study's estimate of it,
     the error at the shortest step, is near the largest; in every run that the slope is fitted to
@@ -187,12 +184,17 @@ def test_errors_near_that_of_the_integration_do_not_count(problem: Problem) -> N
     ],
 )
 def test_slopes_from_too_few_errors_fail(
-    problem: Problem, coefficients: tuple[float, ...], floor: float, complaint: str
+    problem: Problem,
+    coefficients: tuple[float, ...],
+    floor: float,
+    complaint: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = made_up(problem, *coefficients, floor=floor)
     assert not found.passed
     assert any(text.startswith(complaint) for text in found.violations)
-    assert any("FAILED" in line for line in convergence.lines(found))
+    console.convergence(found)
+    assert "FAILED" in capsys.readouterr().out
 
 
 def test_wrong_slopes_fail(problem: Problem) -> None:
@@ -211,9 +213,8 @@ def test_values_that_are_not_finite_fail(problem: Problem) -> None:
 
 
 def test_inputs_that_are_not_smooth_are_refused(problem: Problem) -> None:
-    path = scenarios.find(ROOT, "hanging_swing")
     with pytest.raises(UserError, match=r"hanging_swing.toml: \[inputs.f2\]: expected sines"):
-        convergence.read_inputs(scenarios.load(path))
+        convergence.smooth_inputs(load("hanging_swing"))
 
 
 @pytest.mark.parametrize(
@@ -231,25 +232,16 @@ def test_damaged_exact_states_are_refused(tmp_path: Path, content: str | None, r
     model = tmp_path / "models" / "arm"
     for folder in ("convergence", "references/smooth_inputs"):
         (model / folder).mkdir(parents=True)
-    (model / "variables.toml").write_text(
-        "".join(
-            f'[variables.{name}]\nreference = {i}\ncausality = "{causality}"\n{more}\n'
-            for i, (name, causality, more) in enumerate(
-                [(x, "output", 'initial = "exact"') for x in ("q1", "q2", "dq1", "dq2")]
-                + [(x, "input", "") for x in ("tau1", "f2")]
-            )
-        )
-    )
     path = model / "convergence" / PATH.name
     path.write_bytes(PATH.read_bytes())
     if content is not None:
         (model / "references/smooth_inputs/exact.json").write_text(content)
     with pytest.raises(UserError, match=f"exact.json: {reason}"):
-        convergence.load(path)
+        convergence.load(path, declared(MODEL.name))
 
 
 def test_report_shows_the_order(study: Convergence, tmp_path: Path) -> None:
-    index = report.write(tmp_path, [], [], sections=[convergence.section(study)])
+    index = pages.write_runs(tmp_path, [], convergences=[study])
     page = index.read_text(encoding="utf-8")
     picture = (tmp_path / "convergence.png").read_bytes()
     assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
@@ -259,10 +251,12 @@ def test_report_shows_the_order(study: Convergence, tmp_path: Path) -> None:
 
 def test_report_shows_a_failure(problem: Problem, tmp_path: Path) -> None:
     errors = np.array([problem.steps, problem.steps, problem.steps**3, problem.steps**4])
-    section = convergence.section(Convergence(problem, errors), "broken")
-    page = report.write(tmp_path, [], [], sections=[section]).read_text(encoding="utf-8")
+    broken = Convergence(problem, errors)
+    index = pages.write_runs(tmp_path, [], convergences=[made_up(problem, 1, 1, 1, 1), broken])
+    page = index.read_text(encoding="utf-8")
     assert page.count("FAILED") == 1 and "1st derivatives: slope 1.00" in page
-    assert (tmp_path / "broken.png").is_file()
+    for name in ("convergence", f"convergence_{PATH.stem}"):  # the first one, and each further one
+        assert (tmp_path / f"{name}.png").is_file() and f'src="{name}.png"' in page
 
 
 # ---- Command line ------------------------------------------------------------------------------
@@ -273,15 +267,11 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with one quick scenario, for the command line to work in."""
     model, scenario = tmp_path / "models" / MODEL.name, "constant_effort_single_step"
     (model / "scenarios").mkdir(parents=True)
-    (tmp_path / "src" / "instance").mkdir(parents=True)
-    shutil.copy(MODEL / "variables.toml", model)
-    for file in (ROOT / "src" / "instance").glob("*.toml"):
-        shutil.copy(file, tmp_path / "src" / "instance")
     shutil.copy(MODEL / "scenarios" / f"{scenario}.toml", model / "scenarios")
     shutil.copytree(PATH.parent, model / "convergence")
     for name in (scenario, PATH.stem):
         shutil.copytree(MODEL / "references" / name, model / "references" / name)
-    monkeypatch.setattr(cli, "ROOT", tmp_path)
+    monkeypatch.setattr("cosim.project.ROOT", tmp_path)
     return tmp_path
 
 

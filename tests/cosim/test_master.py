@@ -10,8 +10,8 @@ import pytest
 from cosim.coupling import step_control
 from cosim.coupling.master import Master, Snapshot
 from cosim.errors import UserError
-from cosim.system.ssp import Connection
-from cosim.unit import Fmu
+from cosim.fmu_file import Fmu
+from cosim.system.structure import Connection
 from tests.support.paths import ROOT
 
 H, STEPS = 0.05, 40
@@ -167,10 +167,11 @@ def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatc
     with ring(oscillator) as master:
         master.initialize(0.0, None, PARAMETERS)
         freed = []
-        for part in master.parts.values():
-            free = part.slave.fmi2FreeFMUstate
+        for component in master.components.values():
+            fmi = component.instance.fmi
+            free = fmi.fmi2FreeFMUstate
             monkeypatch.setattr(
-                part.slave,
+                fmi,
                 "fmi2FreeFMUstate",
                 lambda *arguments, free=free: (freed.append(arguments), free(*arguments)),
             )
@@ -179,7 +180,7 @@ def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatc
             snapshot.take()
             raise RuntimeError
         assert len(freed) == 2
-        assert all(state.value is None for state in snapshot._states)
+        assert all(state._state.value is None for state in snapshot._states)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -188,20 +189,21 @@ def test_a_value_that_is_not_finite_is_named(
 ) -> None:
     with ring(oscillator) as master:
         master.initialize(0.0, None, PARAMETERS)
-        part = master.parts["b"]
-        read = part.read
+        component = master.components["b"]
+        read = component.read
 
         def spoil() -> None:
             read()
             if master.time >= 0.1:
-                part.out_view[part.outputs.index("energy")] = value
+                outputs = component.outputs
+                outputs.view[outputs.names.index("energy")] = value
 
-        monkeypatch.setattr(part, "read", spoil)
+        monkeypatch.setattr(component, "read", spoil)
         with pytest.raises(UserError, match=rf"b\.energy is {value} at t = 0\.15000"):
             master.run(np.arange(10) * H)
 
 
-def test_a_failing_step_is_told_with_the_message_of_the_unit(oscillator: Fmu) -> None:
+def test_a_failing_step_is_explained_with_the_message_of_the_fmu(oscillator: Fmu) -> None:
     parameters = {**PARAMETERS, "b": {**PARAMETERS["b"], "max_internal_steps": 1}}
     with ring(oscillator) as master:
         master.initialize(0.0, None, parameters)

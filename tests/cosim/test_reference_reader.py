@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import reference, variables
+from cosim import reference
 from cosim.errors import UserError
-from tests.support.cosim_project import LONG, NAMES, edit, load, reference_file
+from tests.support.cosim_project import LONG, NAMES, declared, edit, load, reference_file
 
 MAKE_REFERENCES = "build/venv/bin/python models/rp_manipulator/references/make_references.py"
 
 
 def refused(project: Path, name: str = LONG) -> str:
     with pytest.raises(UserError) as caught:
-        reference.load(load(name, project))
+        reference.load(load(name, project), declared("rp_manipulator"))
     text = str(caught.value)
     assert str(reference_file(project, name)) in text
     assert f"{MAKE_REFERENCES} {name}" in text
@@ -25,10 +25,9 @@ def refused(project: Path, name: str = LONG) -> str:
 def test_reads_references() -> None:
     for name in NAMES:
         loaded = load(name)
-        read = reference.load(loaded)
-        declared = variables.load(loaded.model_folder)
-        outputs = [name for name, v in declared.items() if v["causality"] == "output"]
-        assert list(read.names) == outputs
+        model = declared(loaded.model)
+        read = reference.load(loaded, model)
+        assert list(read.names) == model.real_outputs
         assert read.values.shape == (len(loaded.reference_rows), len(read.names))
         assert np.array_equal(read.times, loaded.times[loaded.reference_rows])
 
@@ -101,7 +100,26 @@ def test_reference_with_wrong_columns(project: Path, old: str, new: str, reason:
     assert "line 1: " in text and reason in text
 
 
+def test_reference_with_a_column_that_is_not_compared(project: Path) -> None:
+    file = reference_file(project, LONG)
+    head, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([f'{head},"D11"', *(f"{row},1.0" for row in rows)]) + "\n")
+    assert "line 1: 'D11' is not an output of the model" in refused(project)
+
+
 def test_reference_of_another_scenario(project: Path) -> None:
     edit(project / f"models/rp_manipulator/scenarios/{LONG}.toml", "step = 0.01", "step = 0.0125")
     text = refused(project)
     assert "line 3: does not match" in text and "0.0125" in text
+
+
+@pytest.mark.parametrize("content", ["total_energy = 1", "total_energy = []", "total_energy = [1]"])
+def test_wrong_scales(project: Path, content: str) -> None:
+    path = project / "models/rp_manipulator/references/scales.toml"
+    path.write_text(content)
+    with pytest.raises(
+        UserError, match=r"scales\.toml: total_energy: expected a list of variables"
+    ):
+        reference.load(load(LONG, project), declared("rp_manipulator"))
+    path.unlink()
+    assert reference.load(load(LONG, project), declared("rp_manipulator")).summed == {}

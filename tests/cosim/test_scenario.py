@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import scenario, variables
+from cosim import project, scenario
 from cosim.errors import UserError
-from tests.support.toy_model import HEAD, INCLUDED, TIME, timed
+from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, timed, toy
 
 
 def load_times(write, start: object, stop: object, step: object) -> np.ndarray:
-    return scenario.load(write(timed(start, stop, step))).times
+    return scenario.load(write(timed(start, stop, step)), TOY).times
 
 
 # what a right file gives
@@ -24,7 +24,7 @@ def test_everything_given(write) -> None:
         HEAD + "reference_every = 3\n" + TIME + "[parameters]\nmass = 2\nmax_steps = 10\n"
         "[initial]\nspeed = -1\n[inputs.force]\nconstant = 4\n"
     )
-    run = scenario.load(path)
+    run = scenario.load(path, TOY)
     assert (run.name, run.model, run.title, run.description) == ("run", "toy", "A", "B")
     assert run.parameters == {"mass": 2.0, "max_steps": 10.0}
     assert run.initial == {"speed": -1.0}
@@ -37,25 +37,37 @@ def test_everything_given(write) -> None:
 
 
 def test_only_what_is_needed(write) -> None:
-    run = scenario.load(write(HEAD + TIME))
+    run = scenario.load(write(HEAD + TIME), TOY)
     assert run.parameters == run.initial == run.inputs == {}
     assert run.reference_rows.tolist() == [0, 1, 2, 3, 4]
 
 
-def test_variables_are_read_with_their_includes(write) -> None:
-    declared = variables.load(write("").parents[1])
-    assert list(declared) == ["time", "mass", "speed", "power", "force", "gear", "max_steps"]
-    assert declared["mass"]["type"] == "Real" and declared["max_steps"]["type"] == "Integer"
+def test_what_is_not_given_has_its_start_value(write) -> None:
+    run = scenario.load(write(f"{HEAD}{TIME}[parameters]\nmass = 3\n[initial]\nspeed = 1\n"), TOY)
+    assert run.start_values == {
+        "mass": 3.0, "speed": 1.0, "force": 2.5, "gear": 2, "max_steps": 7, "quiet": False,
+    }  # fmt: skip
+    assert run.input("force").tolist() == [2.5] * 5
+    run = scenario.load(write(f"{HEAD}{TIME}[inputs.force]\nconstant = 4\n"), TOY)
+    assert run.input("force").tolist() == [4.0] * 5
 
 
-def test_an_enumeration_starts_at_the_number_of_its_item(write) -> None:
-    gear = variables.load(write("").parents[1])["gear"]
-    assert (gear["start"], gear["min"], gear["max"]) == (2, 1, 3)
+def test_variables_have_the_types_of_their_values() -> None:
+    assert list(TOY.variables) == [
+        "time", "mass", "speed", "power", "force", "gear", "max_steps", "quiet",
+    ]  # fmt: skip
+    mass, gear, quiet = (TOY.variables[name] for name in ("mass", "gear", "quiet"))
+    assert (mass.start, mass.least, mass.greatest, mass.unit) == (1.0, 0.5, math.inf, "kg")
+    assert (gear.start, gear.least, gear.greatest) == (2, 1, 3)
+    assert gear.items == {"first": 1, "second": 2, "third": 3}
+    assert (quiet.start, quiet.items, TOY.real_outputs) == (False, {}, ["speed", "power"])
+    with pytest.raises(ValueError, match="heavy"):
+        toy(DESCRIPTION.replace('min="0.5"', 'min="heavy"'))
 
 
 @pytest.mark.parametrize(("item", "number"), [("first", 1), ("second", 2), ("third", 3)])
 def test_an_enumeration_is_given_by_the_name_of_an_item(write, item: str, number: int) -> None:
-    run = scenario.load(write(f'{HEAD}{TIME}[parameters]\ngear = "{item}"\n'))
+    run = scenario.load(write(f'{HEAD}{TIME}[parameters]\ngear = "{item}"\n'), TOY)
     assert run.parameters == {"gear": number}
 
 
@@ -71,32 +83,9 @@ def test_an_enumeration_is_given_by_the_name_of_an_item(write, item: str, number
 )
 def test_what_is_no_item_is_refused_with_the_items(write, given: str, shown: str) -> None:
     with pytest.raises(UserError) as caught:
-        scenario.load(write(f"{HEAD}{TIME}[parameters]\ngear = {given}\n"))
+        scenario.load(write(f"{HEAD}{TIME}[parameters]\ngear = {given}\n"), TOY)
     message = f'[parameters] gear: expected one of "first", "second", "third", got {shown}'
     assert str(caught.value).endswith(f"run.toml: {message}")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('start = "second"', 'start = "fourth"', "start must be one of first, second, third"),
-        ("[variables.gear.items]", "[variables.gear.things]", "an Enumeration needs items"),
-    ],
-)
-def test_a_wrong_enumeration_is_refused(write, old: str, new: str, message: str) -> None:
-    path = write(HEAD + TIME)
-    declared = path.parents[1] / "variables.toml"
-    declared.write_text(declared.read_text().replace(old, new))
-    with pytest.raises(UserError, match=re.escape(f"[variables.gear]: {message}")):
-        scenario.load(path)
-
-
-def test_variable_declared_twice(write, tmp_path: Path) -> None:
-    path = write(HEAD + TIME)
-    more = tmp_path / "models" / "more" / "solver.toml"
-    more.write_text(INCLUDED + "[variables.mass]\nreference = 12\n")
-    with pytest.raises(UserError, match=r"solver\.toml: \[variables\.mass\] is already in .*toy"):
-        scenario.load(path)
 
 
 # communication points
@@ -146,7 +135,8 @@ def test_sines_count_from_start(write) -> None:
         write(
             f"{HEAD}{TIME}[inputs.force]\noffset = 0.5\n"
             "sines = [{amplitude = 2, frequency = 0.5}, {amplitude = 1, frequency = 3, phase = 1}]"
-        )
+        ),
+        TOY,
     )
     expected = [
         0.5 + 2 * math.sin(math.pi * t) + math.sin(6 * math.pi * t + 1) for t in run.times - 1.0
@@ -156,43 +146,85 @@ def test_sines_count_from_start(write) -> None:
 
 def test_table_is_linear_and_constant_beyond_its_ends(write) -> None:
     run = scenario.load(
-        write(f"{HEAD}{TIME}[inputs.force]\ntable = [[0.25, 1], [0.5, 2], [0.75, -2]]")
+        write(f"{HEAD}{TIME}[inputs.force]\ntable = [[0.25, 1], [0.5, 2], [0.75, -2]]"), TOY
     )
     assert run.inputs["force"].tolist() == [1.0, 1.0, 2.0, -2.0, -2.0]
-    run = scenario.load(write(f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 1], [1, 3]]"))
+    run = scenario.load(write(f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 1], [1, 3]]"), TOY)
     assert run.inputs["force"].tolist() == [1.0, 1.5, 2.0, 2.5, 3.0]
 
 
 # finding scenarios
 
 
-def test_find_by_name(write, tmp_path: Path) -> None:
+@pytest.fixture
+def root(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The project is elsewhere."""
+    monkeypatch.setattr(project, "ROOT", tmp_path)
+    return tmp_path
+
+
+def test_find_by_name(write, root: Path) -> None:
     first, second = write("", "swing"), write("", "fall")
     write("").with_name("README.md").write_text("")
-    assert scenario.find_all(tmp_path)["swing"] == first
-    assert scenario.find(tmp_path, "fall") == second
+    assert project.scenario_files()["swing"] == first
+    assert project.scenario_file("fall") == second
 
 
-def test_find_suggests_a_name(write, tmp_path: Path) -> None:
+def test_find_suggests_a_name(write, root: Path) -> None:
     write("", "swing")
     write("", "fall")
     message = re.escape("no scenario 'swinf', did you mean 'swing'? (known: fall, swing)")
     with pytest.raises(UserError, match=f"^{message}$"):
-        scenario.find(tmp_path, "swinf")
+        project.scenario_file("swinf")
     with pytest.raises(UserError, match=re.escape("no scenario 'x' (known: fall, swing)")):
-        scenario.find(tmp_path, "x")
+        project.scenario_file("x")
 
 
-def test_find_without_scenarios(tmp_path: Path) -> None:
-    assert scenario.find_all(tmp_path) == {}
+def test_find_without_scenarios(root: Path) -> None:
+    assert project.scenario_files() == {}
     with pytest.raises(UserError, match=re.escape("no scenario 'x' (known: none)")):
-        scenario.find(tmp_path, "x")
+        project.scenario_file("x")
 
 
-def test_two_models_with_a_scenario_of_the_same_name(write, tmp_path: Path) -> None:
+def test_two_models_with_a_scenario_of_the_same_name(write, root: Path) -> None:
     write("", "run")
-    other = tmp_path / "models" / "zoo" / "scenarios" / "run.toml"
+    other = root / "models" / "zoo" / "scenarios" / "run.toml"
     other.parent.mkdir(parents=True)
     other.touch()
     with pytest.raises(UserError, match=r"zoo.*: the name 'run' is taken by .*toy"):
-        scenario.find_all(tmp_path)
+        project.scenario_files()
+
+
+def test_a_title_is_read_from_an_otherwise_wrong_file(write) -> None:
+    assert scenario.title(write('title = " A "\n[parameters]\nmass = "x"\n')) == "A"
+    for text, message in (("", "missing key 'title'"), ("title = 1\n", "title: expected a text")):
+        with pytest.raises(UserError, match=message):
+            scenario.title(write(text))
+
+
+# what has been built
+
+
+def test_what_is_built_has_the_name_of_its_folder(root: Path) -> None:
+    (root / "build").mkdir()
+    for name in ("RPPlant.fmu", "RPPlantTwo.fmu", "RPPlant.ssp"):
+        (root / "build" / name).touch()
+    folder = root / "models" / "rp_plant"
+    assert project.built(folder, ".fmu") == root / "build" / "RPPlant.fmu"
+    assert project.built(folder, ".ssp") == root / "build" / "RPPlant.ssp"
+    with pytest.raises(UserError, match=r"build: has no FMU of toy, \./run\.sh builds it"):
+        project.built(root / "models" / "toy", ".fmu")
+
+
+def test_there_is_one_system(root: Path) -> None:
+    with pytest.raises(
+        UserError, match=r"expected one folder with SystemStructure\.ssd, found none"
+    ):
+        project.system_folder()
+    for name in ("loop", "other"):
+        (root / "models" / name).mkdir(parents=True)
+    (root / "models" / "loop" / "SystemStructure.ssd").touch()
+    assert project.system_folder() == root / "models" / "loop"
+    (root / "models" / "other" / "SystemStructure.ssd").touch()
+    with pytest.raises(UserError, match="found loop, other"):
+        project.system_folder()

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
+from cosim import progress as progress_module
 from cosim import scenario as scenarios
-from cosim import simulation
+from cosim import simulation, trajectory_csv
 from cosim.errors import UserError
-from cosim.files import write_csv
-from cosim.unit import Fmu
+from cosim.fmu_file import Fmu
 from tests.support.cosim_project import LONG, SHORT, edit, load, repacked
 
 
@@ -35,7 +35,7 @@ def test_the_same_run_gives_the_same_bits(opened: Fmu) -> None:
 
 
 def test_progress_counts_all_steps(opened: Fmu, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation, "PROGRESS_CALL_EVERY", 0.0)
+    monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
     counted: list[int] = []
     result = simulation.simulate(opened, load(LONG), progress=counted.append)
     assert sum(counted) == result.steps and len(counted) > 1
@@ -44,8 +44,8 @@ def test_progress_counts_all_steps(opened: Fmu, monkeypatch: pytest.MonkeyPatch)
 def test_progress_prints_lines_where_there_is_no_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(simulation, "PROGRESS_LINE_EVERY", 0.0)
-    with simulation.Progress("work", 200) as progress:
+    monkeypatch.setattr(progress_module, "LINE_EVERY", 0.0)
+    with progress_module.Progress("work", 200) as progress:
         progress(50)
         progress(50)
     assert capsys.readouterr().err == "work: 25 %, 0 s\nwork: 50 %, 0 s\n"
@@ -61,7 +61,7 @@ def test_instances_are_freed_whatever_happens(opened: Fmu, monkeypatch: pytest.M
             return original(self)
 
         monkeypatch.setattr(fmi2.FMU2Slave, name, counted)
-    monkeypatch.setattr(simulation, "PROGRESS_CALL_EVERY", 0.0)
+    monkeypatch.setattr(simulation, "PROGRESS_EVERY", 0.0)
 
     def interrupt(_: int) -> None:
         raise KeyboardInterrupt
@@ -76,7 +76,7 @@ def test_a_step_that_fails_is_explained(project: Path, opened: Fmu) -> None:
     path = project / f"models/rp_manipulator/scenarios/{SHORT}.toml"
     edit(path, "[parameters]", "[parameters]\nmax_internal_steps = 3")
     with pytest.raises(UserError) as caught:
-        simulation.simulate(opened, scenarios.load(path))
+        simulation.simulate(opened, load(SHORT, project))
     text = str(caught.value)
     assert text.startswith(f"{SHORT}: fmi2DoStep in the step from t = 0.0 s failed (discard): ")
     assert not text.endswith("no message")
@@ -86,13 +86,13 @@ def test_a_failing_initialization_is_explained(project: Path, opened: Fmu) -> No
     path = project / f"models/rp_manipulator/scenarios/{SHORT}.toml"
     edit(path, "I2z = 0.1", "I1z = 0.0\nI2z = 0.0\nm1 = 0.0")
     with pytest.raises(UserError, match=r"ExitInitializationMode .* failed \(error\): .*m1"):
-        simulation.simulate(opened, scenarios.load(path))
+        simulation.simulate(opened, load(SHORT, project))
 
 
 def test_csv_is_in_the_cross_check_layout(tmp_path: Path) -> None:
     file = tmp_path / "out.csv"
     values = np.array([[1 / 3, -0.1], [1e300, 5e-324]])
-    write_csv(file, np.array([0.0, 0.1]), ["q1", "a,b"], values)
+    trajectory_csv.write(file, np.array([0.0, 0.1]), ["q1", "a,b"], values)
     lines = file.read_text().splitlines()
     assert lines[0] == '"time","q1","a,b"'
     assert lines[1] == "0,0.33333333333333331,-0.10000000000000001"
@@ -109,7 +109,7 @@ def test_csv_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(np, "savetxt", half)
     with pytest.raises(OSError, match="disk full"):
-        write_csv(file, np.zeros(2), ["q1"], np.zeros((2, 1)))
+        trajectory_csv.write(file, np.zeros(2), ["q1"], np.zeros((2, 1)))
     assert file.read_text() == "before"
     assert list(tmp_path.iterdir()) == [file]
 
@@ -193,9 +193,10 @@ def test_fmu_without_a_variable_of_the_scenario(project: Path, fmu: Path, tmp_pa
     def change(xml: str) -> str:
         return xml.replace('name="l1"', 'name="length1"')
 
-    reason = rf"{SHORT}\.toml: .*old\.fmu has no parameter 'l1'"
+    path = project / f"models/rp_manipulator/scenarios/{SHORT}.toml"
+    reason = rf"{SHORT}\.toml: \[parameters\]: the model has no variable 'l1', .*known: .*length1"
     with (
         Fmu(repacked(fmu, tmp_path / "old.fmu", change)) as other,
         pytest.raises(UserError, match=reason),
     ):
-        simulation.simulate(other, load(SHORT, project))
+        scenarios.load(path, other.model)

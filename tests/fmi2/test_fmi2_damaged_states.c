@@ -238,3 +238,64 @@ EACH_METHOD static void test_forged_states_do_no_harm(void) {
     forge(held);
     alarm(0);
 }
+
+/* A value that no instance can have is refused by its name. The fields are found by their bits,
+ * which no other field has. */
+static void test_an_impossible_value_is_named(void) {
+    static const double marked = 0.12345678901234567;
+    static const double impossible = -0.5;
+    static const struct {
+        fmi2ValueReference reference;
+        const char *name;
+    } cases[] = {
+        {RP_MANIPULATOR_m2, "m2 = -0.5"},
+        {RP_MANIPULATOR_I1z, "I1z = -0.5"},
+        {RP_MANIPULATOR_relative_tolerance, "relative_tolerance = -0.5"},
+        {RP_MANIPULATOR_max_step, "max_step = -0.5"},
+    };
+    for (size_t i = 0; i < FMU_COUNT(cases); i++) {
+        const fmi2Component c = fmu_instantiate(&messages, false);
+        fmu_set(c, cases[i].reference, marked);
+        fmu_initialize(c, 0.0, 0.0);
+        struct fmu_bytes bytes = fmu_save_bytes(c);
+        size_t replaced = 0;
+        for (size_t at = 0; at + sizeof marked <= bytes.size; at++) {
+            if (memcmp(bytes.data + at, &marked, sizeof marked) == 0) {
+                memcpy(bytes.data + at, &impossible, sizeof impossible);
+                replaced++;
+            }
+        }
+        TEST_ASSERT_GREATER_THAN_size_t(0, replaced);
+        set_checksum(&bytes);
+
+        fmi2FMUstate made = NULL;
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
+        TEST_ASSERT_NULL(made);
+        fmu_assert_logged(&messages, cases[i].name);
+        fmu_bytes_free(&bytes);
+        fmu_free(c);
+    }
+}
+
+/* Times of a history that contradict each other: by name too. */
+static void test_an_impossible_history_is_named(void) {
+    const fmi2Component c = fmu_initialized_with(FMU_CVODE_ADAMS, &messages, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.125, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.125, 0.0625, fmi2True));
+    struct fmu_bytes bytes = fmu_save_bytes(c);
+    const double first_time = 0.125; // s since the restart; the latest is 0.1875
+    const double late = 0.25;
+    size_t replaced = 0;
+    for (size_t at = 0; at + sizeof late <= bytes.size; at++) {
+        if (memcmp(bytes.data + at, &first_time, sizeof late) == 0) {
+            memcpy(bytes.data + at, &late, sizeof late);
+            replaced++;
+        }
+    }
+    TEST_ASSERT_EQUAL_size_t(1, replaced);
+    set_checksum(&bytes);
+    fmi2FMUstate made = NULL;
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
+    fmu_assert_logged(&messages, "latest_time = 0.1875");
+    fmu_bytes_free(&bytes);
+}

@@ -65,6 +65,30 @@ static double effective_tolerance(double parameter, double experiment) {
     return tolerance;
 }
 
+/* An experiment's tolerance above 1e-4, as of a master that passes its own, is used as 1e-4. */
+static void test_a_coarse_tolerance_of_the_experiment_is_cut_and_reported(void) {
+    const double coarsest = effective_tolerance(0.0, 1e-4);
+    const double coarser_parameter = effective_tolerance(1e-3, 0.0);
+    TEST_ASSERT_EQUAL_UINT(0, fmu_log_count(&messages, "logStatusWarning"));
+    TEST_ASSERT_TRUE(coarser_parameter > coarsest);
+
+    const double tolerances[] = {1.01e-4, 1e-3, 0.1, 1e300};
+    for (size_t i = 0; i < FMU_COUNT(tolerances); i++) {
+        fmu_log_clear(&messages);
+        TEST_ASSERT_TRUE(effective_tolerance(0.0, tolerances[i]) == coarsest);
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_count(&messages, "logStatusWarning"));
+        TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2OK]);
+        TEST_ASSERT_EQUAL_UINT(1, fmu_log_total(&messages));
+        fmu_assert_logged(&messages, "0.0001");
+        fmu_assert_logged(&messages, "relative_tolerance");
+
+        // the parameter wins, without a word
+        fmu_log_clear(&messages);
+        TEST_ASSERT_TRUE(effective_tolerance(1e-3, tolerances[i]) == coarser_parameter);
+        TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
+    }
+}
+
 /* The integrator runs at a fraction of the tolerance asked for: the fraction is not tested. */
 static void test_the_tolerance_parameter_wins_over_the_experiment(void) {
     const double by_default = effective_tolerance(0.0, 0.0);

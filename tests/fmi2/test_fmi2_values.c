@@ -67,15 +67,15 @@ static void test_type_mismatches_are_named(void) {
         fmi2ValueReference reference;
         const char *words[2]; /* of the message */
     } cases[] = {
-        {FMU_GetInteger, RP_MANIPULATOR_q1, {"Integer", "10"}},
+        {FMU_GetInteger, RP_MANIPULATOR_q1, {"int32", "10"}},
         {FMU_GetBoolean, RP_MANIPULATOR_q1, {"Boolean", "10"}},
         {FMU_GetString, RP_MANIPULATOR_q1, {"String", "10"}},
-        {FMU_GetReal, RP_MANIPULATOR_solver_steps, {"Real", "80"}},
+        {FMU_GetReal, RP_MANIPULATOR_solver_steps, {"float64", "80"}},
         {FMU_GetBoolean, RP_MANIPULATOR_solver_steps, {"Boolean", "80"}},
-        {FMU_SetInteger, RP_MANIPULATOR_tau1, {"Integer", "20"}},
+        {FMU_SetInteger, RP_MANIPULATOR_tau1, {"int32", "20"}},
         {FMU_SetBoolean, RP_MANIPULATOR_tau1, {"Boolean", "20"}},
         {FMU_SetString, RP_MANIPULATOR_tau1, {"String", "20"}},
-        {FMU_SetReal, RP_MANIPULATOR_max_internal_steps, {"Real", "83"}},
+        {FMU_SetReal, RP_MANIPULATOR_max_internal_steps, {"float64", "83"}},
     };
     for (size_t i = 0; i < FMU_COUNT(cases); i++) {
         double value = untouched;

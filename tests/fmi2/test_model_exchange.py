@@ -10,15 +10,14 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from cosim import reference, variables
-from cosim import scenario as scenarios
+from cosim import reference
 from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.simulation import Result
+from tests.support.cosim_project import declared, load, names_of
 from tests.support.instances import ERROR, INPUTS, STATES, Instance, Unit, status_of
-from tests.support.paths import ROOT
 
-NAMES = [name for name, path in scenarios.find_all(ROOT).items() if "rp_manipulator" in path.parts]
+NAMES = names_of("rp_manipulator")
 SECOND = [
     ("q1", "dq1"),
     ("q2", "dq2"),
@@ -65,9 +64,7 @@ def staircase(scenario: Scenario) -> np.ndarray | None:
     """Inputs held over each step, with an event for fmpy wherever one of them changes."""
     if not scenario.inputs:
         return None
-    start = {name: v.get("start") for name, v in variables.load(scenario.model_folder).items()}
-    rest = np.zeros(len(scenario.times))
-    values = np.column_stack([scenario.inputs.get(name, start[name] + rest) for name in INPUTS])
+    values = np.column_stack([scenario.input(name) for name in INPUTS])
     rows = [(scenario.times[0], *values[0])]
     for i in range(1, len(values) - 1):
         if np.any(values[i] != values[i - 1]):
@@ -115,8 +112,8 @@ def test_fmpy_follows_the_reference(unit: Unit, name: str) -> None:
     an input: up to 5000 times, each with an error of the order of the tolerance. That the error is
     the solver's shows in how it follows the tolerance.
     """
-    scenario = scenarios.load(scenarios.find(ROOT, name))
-    expected = reference.load(scenario)
+    scenario = load(name)
+    expected = reference.load(scenario, declared(scenario.model))
     error = simulate(unit, scenario, expected, 1e-8)
     if error > 1e-5:
         assert error <= 2e-3
@@ -126,8 +123,9 @@ def test_fmpy_follows_the_reference(unit: Unit, name: str) -> None:
 
 def test_inputs_at_rest_need_no_finer_tolerance(unit: Unit) -> None:
     for name in ("coasting", "constant_effort", "constant_effort_single_step"):
-        scenario = scenarios.load(scenarios.find(ROOT, name))
-        assert simulate(unit, scenario, reference.load(scenario), 1e-8) <= 1e-5
+        scenario = load(name)
+        expected = reference.load(scenario, declared(scenario.model))
+        assert simulate(unit, scenario, expected, 1e-8) <= 1e-5
 
 
 # ---- States and derivatives --------------------------------------------------------------------

@@ -29,6 +29,7 @@ from tests.fmi2.rollback_sequences import (
     serialized,
     times,
 )
+from tests.support.cosim_project import declared
 from tests.support.instances import ERROR, STATES, Instance, Unit, status_of
 from tests.support.paths import ROOT
 
@@ -188,7 +189,9 @@ def test_states_of_the_initialization_are_restored(unit: Unit) -> None:
 
 def test_master_with_step_doubling(unit: Unit) -> None:
     """A step, undone, and two halves: their difference controls the step, errors go back."""
-    problem = convergence.load(ROOT / "models/rp_manipulator/convergence/smooth_inputs.toml")
+    problem = convergence.load(
+        ROOT / "models/rp_manipulator/convergence/smooth_inputs.toml", declared("rp_manipulator")
+    )
     stop, bound = problem.scenario.stop, 1e-5
 
     def tell(instance: Instance, t: float) -> None:

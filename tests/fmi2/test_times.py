@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from cosim import scenario as scenarios
+from tests.support.cosim_project import declared, load
 from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, Unit, status_of
 from tests.support.paths import ROOT
 
@@ -42,11 +42,7 @@ def maker() -> Iterator[ModuleType]:
 
 def reference(maker: ModuleType, values: dict[str, float]) -> hy.taylor_adaptive:
     """The motion from `values`, the inputs being heyoka's parameters; in long double."""
-    initial = {name: values.get(name, 0.0) for name in STATES}
-    case = SimpleNamespace(
-        parameters={name: v for name, v in values.items() if name in maker.PARAMETERS},
-        initial=initial,
-    )
+    case = SimpleNamespace(start_values=declared("rp_manipulator").start_values | values)
     inputs = {name: hy.par[i] for i, name in enumerate(INPUTS)}
     motion = maker.integrator(case, inputs, pars=len(INPUTS))
     motion.pars[:] = [np.longdouble(values.get(name, 0.0)) for name in INPUTS]
@@ -324,7 +320,7 @@ def test_parameters_set_to_what_they_are_change_nothing(unit: Unit) -> None:
 
 def debug_run(unit: Unit, prepare: Callable[[Instance], object], **options: object) -> Instance:
     """The scenario hanging_swing, from SetupExperiment to Terminate; the instance is freed."""
-    scenario = scenarios.load(scenarios.find(ROOT, "hanging_swing"))
+    scenario = load("hanging_swing")
     with Instance(unit, **options) as instance:
         prepare(instance)
         values = scenario.parameters | scenario.initial

@@ -26,12 +26,15 @@ from description import DescriptionError  # noqa: E402
 from cosim import reference  # noqa: E402
 from cosim import scenario as scenarios  # noqa: E402
 from cosim.errors import UserError  # noqa: E402
-from cosim.system import runs as system  # noqa: E402
-from cosim.system import ssp  # noqa: E402
+from cosim.fmu_file import read_model  # noqa: E402
+from cosim.model import Model  # noqa: E402
+from cosim.system import comparison, ssp  # noqa: E402
+from models.closed_loop.study import EXPERIMENT  # noqa: E402
 
 SLOWEST = 20.0  # s, of one file
 MODEL = "rp_manipulator"
 SCENARIO = "constant_effort_single_step"
+CLOSED_LOOP = ROOT / "models" / "closed_loop"
 # literals of TOML, to put in the place of any value
 VALUES = (
     *("nan", "inf", "-inf", "1e308", "-1e308", "5e-324", "0", "-1", "-0.0", "1e999", "1e-300"),
@@ -159,12 +162,15 @@ class Fuzz:
         self.scenario = self.model / "scenarios" / f"{SCENARIO}.toml"
         self.reference = self.model / "references" / SCENARIO / "RPManipulator_ref.csv"
         self.scenario_texts = [x.read_text() for x in self.scenario.parent.glob("*.toml")]
+        self.declared = read_model(ROOT / "build" / "RPManipulator.fmu")
+        with zipfile.ZipFile(ROOT / "build" / "RPManipulator.fmu") as archive:
+            self.fmu = {name: archive.read(name) for name in archive.namelist()}
         with zipfile.ZipFile(ROOT / "build" / "ClosedLoop.ssp") as archive:
             self.system = {name: archive.read(name) for name in archive.namelist()}
 
     def run(self, seconds: float) -> None:
         end = time.monotonic() + seconds
-        kinds = (self.a_scenario, self.a_declaration, self.a_reference, self.a_system)
+        kinds = (self.a_scenario, self.a_declaration, self.a_reference, self.an_fmu, self.a_system)
         while time.monotonic() < end:
             kinds[self.executions % len(kinds)]()
 
@@ -178,7 +184,7 @@ class Fuzz:
         self.with_file(
             self.scenario,
             self.either_way(self.chance.choice(self.scenario_texts)),
-            lambda: scenarios.load(self.scenario),
+            lambda: scenarios.load(self.scenario, self.declared),
         )
 
     def a_declaration(self) -> None:
@@ -188,8 +194,7 @@ class Fuzz:
         ]
         file = self.chance.choice(files)
         content = self.either_way(file.read_text(encoding="utf-8"))
-        for check in (lambda: reference.load(scenarios.load(self.scenario)), self.generate):
-            self.with_file(file, content, check)
+        self.with_file(file, content, self.generate)
 
     def generate(self) -> None:
         description = generate.load(self.model / "variables.toml")
@@ -202,32 +207,40 @@ class Fuzz:
         self.with_file(
             self.reference,
             text.encode(errors="surrogatepass"),
-            lambda: reference.load(scenarios.load(self.scenario)),
+            lambda: self.read_scenario(self.declared),
         )
+
+    def read_scenario(self, declared: Model) -> None:
+        reference.load(scenarios.load(self.scenario, declared), declared)
+
+    def an_fmu(self) -> None:
+        path = self.folder / "model.fmu"
+        self.archive(path, self.fmu, "modelDescription.xml")
+        self.check(lambda: self.read_scenario(read_model(path)), path.read_bytes())
 
     def a_system(self) -> None:
         path = self.folder / "system.ssp"
         names = [name for name in self.system if name.endswith((".ssd", ".ssv"))]
         name = self.chance.choice((names[0], "SystemStructure.ssd", self.chance.choice(names)))
+        self.archive(path, self.system, name)
+        self.check(lambda: self.read_system(path), path.read_bytes())
+
+    def archive(self, path: Path, files: dict[str, bytes], name: str) -> None:
+        """Write an archive with a mutation of one of its files, sometimes of its bytes."""
+        changed = mutated_text(files[name].decode(), self.chance).encode(errors="surrogatepass")
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w") as archive:
-            for entry, content in self.system.items():
-                changed = content
-                if entry == name:
-                    changed = mutated_text(content.decode(), self.chance).encode(
-                        errors="surrogatepass"
-                    )
-                archive.writestr(entry, changed)
+            for entry, content in files.items():
+                archive.writestr(entry, changed if entry == name else content)
         content = buffer.getvalue()
         if self.chance.random() < 0.4:
             content = mutated_bytes(content, self.chance)
         path.write_bytes(content)
-        self.check(lambda: self.read_system(path), content)
 
     def read_system(self, path: Path) -> None:
         with ssp.unpacked(path) as unpacked:
-            for name in system.choose(unpacked, []):
-                system.load_reference(unpacked, name)
+            for name in comparison.choose(unpacked, []):
+                comparison.load_reference(unpacked, name, CLOSED_LOOP, EXPERIMENT)
 
     def with_file(self, file: Path, content: bytes, check: Check) -> None:
         kept = file.read_bytes()

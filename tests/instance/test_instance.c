@@ -287,7 +287,7 @@ static void test_a_vector_is_read_as_a_whole_or_not_at_all(void) {
                           instance_get_real(instance, references, 2, values));
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, values[0]);
     TEST_ASSERT_EQUAL_STRING(
-        "steps (value reference 80) is accessed as Real: it is of type Integer", last_text);
+        "steps (value reference 80) is accessed as float64: it is of type int32", last_text);
 
     int integers[] = {-7, -7};
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,

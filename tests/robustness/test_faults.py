@@ -185,7 +185,6 @@ def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "cosim", tmp_path / "cosim")
     model = tmp_path / "models" / "m"
     (model / "scenarios").mkdir(parents=True)
-    (model / "variables.toml").write_text("")
     text = (
         'title = "A"\ndescription = "B"\ntolerance = 1e-6\n[time]\nstart = 0\nstop = 1\nstep = 1\n'
     )

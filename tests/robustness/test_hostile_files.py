@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from cosim import reference, variables
+from cosim import input_files, reference
 from cosim import scenario as scenarios
-from cosim.coupling import study as coupling_study
 from cosim.errors import UserError
+from cosim.fmu_file import Fmu
 from cosim.system import ssp
-from cosim.unit import Fmu
+from models.closed_loop.coupling.loop import opened as opened_loop
+from tests.support.cosim_project import declared
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, replace
 
@@ -28,11 +29,10 @@ DESCRIPTION = "modelDescription.xml"
 @pytest.fixture
 def model(tmp_path: Path) -> Path:
     """A copy of the model's folder with one scenario."""
-    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=shutil.ignore_patterns("*.[ch]"))
     folder = tmp_path / "models" / MODEL
-    for part in ("variables.toml", f"scenarios/{SCENARIO}.toml"):
-        (folder / part).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / "models" / MODEL / part, folder / part)
+    part = f"scenarios/{SCENARIO}.toml"
+    (folder / part).parent.mkdir(parents=True)
+    shutil.copy(ROOT / "models" / MODEL / part, folder / part)
     source = ROOT / "models" / MODEL / "references" / SCENARIO
     shutil.copytree(source, folder / "references" / SCENARIO)
     return folder
@@ -47,7 +47,7 @@ def reference_file(model: Path) -> Path:
 
 
 def read(model: Path) -> None:
-    reference.load(scenarios.load(scenario_file(model)))
+    reference.load(scenarios.load(scenario_file(model), declared(MODEL)), declared(MODEL))
 
 
 def refused(action: Callable[[], object], *parts: str) -> None:
@@ -100,19 +100,19 @@ def test_a_pipe_is_no_archive(tmp_path: Path, action: Callable[[Path], None]) ->
 
 
 def test_files_of_other_editors_are_read(model: Path) -> None:
-    for path in (scenario_file(model), reference_file(model), model / "variables.toml"):
+    for path in (scenario_file(model), reference_file(model)):
         path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
     read(model)
 
 
 def test_files_that_are_too_large(model: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(variables, "LARGEST_FILE", 10_000_000)
+    monkeypatch.setattr(input_files, "LARGEST_TOML", 10_000_000)
     with scenario_file(model).open("r+b") as file:
         file.truncate(10_000_001)
     refused(lambda: read(model), f"{SCENARIO}.toml: is larger than 10 MB")
 
 
-# ---- scenarios and declarations ----------------------------------------------------------------
+# ---- scenarios -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -142,42 +142,18 @@ def test_a_pattern_of_too_many_steps(model: Path) -> None:
     refused(lambda: read(model), "[time] step: has 1001 lengths, expected at most 1000")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("include = 1", "include: expected a list of files"),
-        ('include = ["a\\u0000"]', "include: expected a list of files"),
-        ("variables = 1", "variables: expected tables"),
-        ("[variables.x]\nreference = 'a'", "[variables.x]: reference: expected a whole number"),
-        ("[variables.x]\nreference = true", "[variables.x]: reference: expected a whole number"),
-        ("[variables.x]\nreference = 1\nmin = 'a'", "[variables.x]: min: expected a number"),
-        ("[variables.x]\nreference = 1\ntype = []", "[variables.x]: type: expected a text"),
-    ],
-)
-def test_declarations_of_wrong_types(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "variables.toml").write_text(text)
-    refused(lambda: variables.load(tmp_path), "variables.toml: ", message)
-
-
-def test_a_model_without_a_usable_name(model: Path) -> None:
-    path = model / "variables.toml"
-    text = path.read_text(encoding="utf-8")
-    for name in ("3", '"../x"'):
-        path.write_text(text.replace('name = "RPManipulator"', f"name = {name}"), encoding="utf-8")
-        refused(lambda: read(model), "[model] needs a name")
-
-
 # ---- references --------------------------------------------------------------------------------
 
 
 def test_a_reference_cut_anywhere_is_refused(model: Path) -> None:
-    path, scenario = reference_file(model), scenarios.load(scenario_file(model))
+    path = reference_file(model)
+    scenario = scenarios.load(scenario_file(model), declared(MODEL))
     content = path.read_bytes()
     for length in range(len(content)):
         path.write_bytes(content[:length])
-        refused(lambda: reference.load(scenario), str(path), "make_references.py")
+        refused(lambda: reference.load(scenario, declared(MODEL)), str(path), "make_references.py")
     path.write_bytes(content)
-    reference.load(scenario)
+    reference.load(scenario, declared(MODEL))
 
 
 @pytest.mark.parametrize(
@@ -220,7 +196,7 @@ def test_archives_that_grow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     nested: dict[str, Edit] = {"resources/RPManipulator.fmu": lambda _: content}
     path = edited(SSP, tmp_path / "nested.ssp", nested)
     refused(lambda: open_ssp(path), "component 'arm'", "modelDescription.xml has 65 MB")
-    monkeypatch.setattr("cosim.files.LARGEST_CONTENT", 64_000_000)
+    monkeypatch.setattr("cosim.archives.LARGEST_CONTENT", 64_000_000)
     bomb(tmp_path / "large.ssp", "data", 65_000_000)
     refused(lambda: open_ssp(tmp_path / "large.ssp"), "has 65 MB inside, expected at most 64 MB")
 
@@ -297,14 +273,14 @@ def test_a_system_that_the_study_does_not_know(
     path = edited(SSP, tmp_path / "a.ssp", {STRUCTURE: replace(old, new, -1)})
 
     def study() -> None:
-        with coupling_study.opened(path):
+        with opened_loop(path):
             pass
 
     refused(study, f"{path}: ", message)
 
 
 def without_variables(content: bytes) -> bytes:
-    """A model description with the time alone."""
+    """A model description with no variable but the time."""
     text = content.decode()
     for section, rest in (
         (
@@ -319,11 +295,37 @@ def without_variables(content: bytes) -> bytes:
     return text.encode()
 
 
-def test_an_fmu_without_what_is_compared(fmu: Path, tmp_path: Path, model: Path) -> None:
+def without_an_output(content: bytes) -> bytes:
+    """A model description in which the total energy is no output any more."""
+    before, name, after = content.decode().partition('name="total_energy"')
+    return (before + name + after.replace('causality="output"', 'causality="local"', 1)).encode()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (without_variables, f"{SCENARIO}.toml: [parameters]: the model has no variable"),
+        (without_an_output, "_ref.csv, line 1: 'total_energy' is not an output of the model"),
+    ],
+)
+def test_an_fmu_without_what_is_compared(
+    fmu: Path, tmp_path: Path, model: Path, change: Edit, message: str
+) -> None:
     """It must not pass because there is nothing to compare."""
-    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: without_variables})
+    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
     command = [sys.executable, "-m", "cosim", "run", SCENARIO, "--fmu", str(path)]
     shutil.copytree(ROOT / "cosim", tmp_path / "cosim")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr.startswith(f"error: {path}: has no variable 'q1', which is in ")
+    assert message in done.stderr and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [('start="2.0" min="0.0"', 'start="two" min="0.0"'), ('value="2"', 'value="second"')],
+)
+def test_a_model_description_with_wrong_numbers(
+    fmu: Path, tmp_path: Path, old: str, new: str
+) -> None:
+    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: replace(old, new)})
+    refused(lambda: open_fmu(path), "a.fmu: wrong modelDescription.xml: ", new.split('"')[1])

@@ -19,18 +19,17 @@ import pytest
 import sympy as sp
 from fmpy.validation import validate_fmu
 
-from cosim import reference, scenario
-from cosim.accuracy import Runs
-from cosim.unit import Fmu
+from cosim import reference
+from cosim.comparison import Runs
+from cosim.fmu_file import Fmu
+from tests.support.cosim_project import declared, load, names_of
 from tests.support.instances import DISCARD, ERROR, OK, Instance, Unit, status_of
 from tests.support.paths import ROOT
 from tests.support.rp_symbolic import PARAMETERS as ARM
 from tests.support.rp_symbolic import TERMS, Model
 
 FOLDER = ROOT / "models" / "rp_controller"
-SCENARIOS = {
-    name: path for name, path in scenario.find_all(ROOT).items() if path.parts[-3] == FOLDER.name
-}
+SCENARIOS = names_of(FOLDER.name)
 
 MODES = {"pd": 1, "pd_gravity": 2, "computed_torque": 3}
 LAW = ("Kp1", "Kp2", "Kd1", "Kd2", "Ki1", "Ki2", "inertia1", "inertia2", "tracking_time")
@@ -382,7 +381,8 @@ def test_references_are_those_of_the_script(tmp_path: Path) -> None:
     [("limited_integral", "tau1", 14), ("limited_integral", "f2", 9), ("pd_gravity", "f2", 12)],
 )
 def test_scenarios_meet_limits_and_leave_them(name: str, effort: str, limit: float) -> None:
-    column = reference.load(scenario.load(SCENARIOS[f"controller_{name}"])).column(effort)
+    scenario = load(f"controller_{name}")
+    column = reference.load(scenario, declared(FOLDER.name)).column(effort)
     assert {max(-1, min(1, int(u / limit))) for u in column} == {-1, 0, 1}
     assert abs(column).max() == limit
 
@@ -391,8 +391,8 @@ def test_scenarios_meet_limits_and_leave_them(name: str, effort: str, limit: flo
 def test_scenarios_meet_their_references(path: Path, name: str) -> None:
     with Fmu(path) as opened:
         runs = Runs({"rp_controller": opened})
-        loaded = scenario.load(SCENARIOS[name])
-        errors = [runs.run(loaded, tolerance).error for tolerance in (1e-5, 1e-8, 1e-11)]
+        scenario = load(name)
+        errors = [runs.run(scenario, tolerance).error for tolerance in (1e-5, 1e-8, 1e-11)]
     assert all(np.array(errors) <= [1e-6, 1e-8, 1e-10]), errors
 
 

@@ -11,18 +11,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cosim import scenario, variables
 from cosim.scenario import Scenario
+from tests.support.cosim_project import declared, load, names_of
 from tests.support.paths import ROOT
 
 MODEL = ROOT / "models" / "rp_manipulator"
 SCRIPT = MODEL / "references" / "make_references.py"
 FILES = ("RPManipulator_ref.csv", "RPManipulator_in.csv", "RPManipulator_ref.opt")
-SCENARIOS = {
-    name: scenario.load(path)
-    for name, path in scenario.find_all(ROOT).items()
-    if path.parts[-3] == MODEL.name
-}
+SCENARIOS = {name: load(name) for name in names_of(MODEL.name)}
 each_scenario = pytest.mark.parametrize("run", SCENARIOS.values(), ids=SCENARIOS.keys())
 
 
@@ -43,7 +39,7 @@ def reference(maker: ModuleType):
 
 @pytest.fixture(scope="session")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All references, made again in a folder of their own by another process."""
+    """All references, made again in another folder by another process."""
     folder = tmp_path_factory.mktemp("references")
     subprocess.run([sys.executable, SCRIPT, "--output", folder], check=True, cwd=folder)
     return folder
@@ -81,7 +77,7 @@ def test_nothing_is_left_over(made: Path) -> None:
         assert {path.name for path in folder.iterdir()} == set(FILES)
 
 
-def test_made_alone_or_after_another_gives_identical_bytes(
+def test_made_by_itself_or_after_another_gives_identical_bytes(
     maker: ModuleType, made: Path, tmp_path: Path
 ) -> None:
     reference = maker.Reference()
@@ -100,11 +96,10 @@ def test_unknown_scenario_is_refused() -> None:
 
 @each_scenario
 def test_files_have_the_cross_check_format(run: Scenario) -> None:
-    real = [name for name, v in variables.load(MODEL).items() if v["type"] == "Real"]
-    declared = variables.load(MODEL)
+    real = [v for v in declared(MODEL.name).variables.values() if v.type == "Real"]
     kind = {
-        FILES[0]: [name for name in real if declared[name]["causality"] == "output"],
-        FILES[1]: [name for name in real if declared[name]["causality"] == "input"],
+        FILES[0]: [v.name for v in real if v.causality == "output"],
+        FILES[1]: [v.name for v in real if v.causality == "input"],
     }
     times = {FILES[0]: run.times[run.reference_rows], FILES[1]: run.times}
     for file, names in kind.items():
@@ -169,8 +164,7 @@ def test_energy_in_the_files_with_constant_efforts(name: str) -> None:
 @each_scenario
 def test_outputs_in_the_files_belong_together(run: Scenario) -> None:
     """Single columns against formulas written here: no column is mixed up with another."""
-    value = {name: v.get("start") for name, v in variables.load(MODEL).items()}
-    p = value | run.parameters
+    p = run.start_values
     c = columns(run)
     x = (p["l1"] + c["q2"]) * np.cos(c["q1"]) - p["a"] * np.sin(c["q1"])
     y = (p["l1"] + c["q2"]) * np.sin(c["q1"]) + p["a"] * np.cos(c["q1"])

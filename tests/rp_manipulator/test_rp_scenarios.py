@@ -5,16 +5,11 @@ import csv
 import numpy as np
 import pytest
 
-from cosim import scenario, variables
 from cosim.scenario import Scenario
-from tests.support.paths import ROOT
+from tests.support.cosim_project import declared, load, names_of
 
-SHIPPED = {
-    name: scenario.load(path)
-    for name, path in scenario.find_all(ROOT).items()
-    if path.parts[-3] == "rp_manipulator"
-}
-DECLARED = variables.load(ROOT / "models" / "rp_manipulator")
+SHIPPED = {name: load(name) for name in names_of("rp_manipulator")}
+DECLARED = declared("rp_manipulator").start_values
 SHORT = {"free_fall", "constant_effort_single_step"}  # need not last, step and turn as the others
 
 
@@ -29,7 +24,7 @@ def is_driven(run: Scenario) -> bool:
 
 
 def gravity(run: Scenario) -> float:
-    return run.parameters.get("g", DECLARED["g"]["start"])
+    return run.start_values["g"]
 
 
 def test_expected_scenarios_are_there() -> None:
@@ -57,7 +52,7 @@ class TestShipped:
 
     def test_differs_from_start_values(self, run: Scenario) -> None:
         for name, value in (run.parameters | run.initial).items():
-            assert value != DECLARED[name]["start"], name
+            assert value != DECLARED[name], name
 
 
 def test_every_parameter_is_off_its_start_value_somewhere() -> None:

@@ -2,39 +2,32 @@
 
 import dataclasses
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cosim import accuracy, reference, simulation
-from cosim import scenario as scenarios
-from cosim.accuracy import TOLERANCES, Runs
+from cosim import reference, simulation
+from cosim.comparison import Runs
+from cosim.fmu_file import Fmu
 from cosim.reference import Reference
 from cosim.scenario import Scenario
-from cosim.unit import Fmu
+from cosim.tolerance_sweep import TOLERANCES, sweep
+from tests.support.cosim_project import load as load_scenario
+from tests.support.cosim_project import names_of
 from tests.support.paths import ROOT
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3}
-SCENARIOS = [
-    name for name, path in scenarios.find_all(ROOT).items() if path.parts[-3] == "rp_manipulator"
-]
+SCENARIOS = names_of("rp_manipulator")
 JUMPS = [10.0**exponent for exponent in range(-12, 4)]  # relative to the input
 JUMP_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 
 each_method = pytest.mark.parametrize("method", METHODS)
 
 
-@pytest.fixture(scope="module")
-def opened(fmu: Path) -> Iterator[Fmu]:
-    with Fmu(fmu) as unit:
-        yield unit
-
-
 def load(name: str, **parameters: float) -> Scenario:
     """A scenario with further parameters."""
-    found = scenarios.load(scenarios.find(ROOT, name))
+    found = load_scenario(name)
     return dataclasses.replace(found, parameters=found.parameters | parameters)
 
 
@@ -46,7 +39,7 @@ def load(name: str, **parameters: float) -> Scenario:
 def test_errors_stay_within_their_bounds(opened: Fmu, name: str, method: str) -> None:
     """At every tolerance the bound of ./run.sh, and all its rules from one to the next."""
     runs = Runs({"rp_manipulator": opened})
-    swept = accuracy.sweep(runs, load(name, solver_method=METHODS[method]))
+    swept = sweep(runs, load(name, solver_method=METHODS[method]))
     assert swept.tolerances == TOLERANCES
     assert swept.violations == []
 
@@ -87,11 +80,13 @@ def exact() -> dict[float, Reference]:
 
     sys.path.remove(folder)
     equations = make_references.Reference()
+    summed = reference.read_summed(ROOT / "models" / "rp_manipulator" / "references")
     found = {}
     for size in JUMPS:
         scenario = jumping(size)
         values = equations.simulate(scenario).astype(float)
-        found[size] = Reference(Path("none"), scenario.times, tuple(equations.outputs), values)
+        names = tuple(equations.outputs)
+        found[size] = Reference(Path("none"), scenario.times, names, values, summed)
     return found
 
 

@@ -18,17 +18,17 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
-from cosim import scenario as scenarios
-from cosim import variables
+from tests.support.cosim_project import declared, load, names_of
 from tests.support.instances import ERROR, Instance, Unit
 from tests.support.paths import ROOT
 
 MODEL = ROOT / "models" / "rp_trajectory"
 SCRIPT = MODEL / "references" / "make_references.py"
-DECLARED = variables.load(MODEL)
-OUTPUTS = [name for name, v in DECLARED.items() if v["causality"] == "output"]
-SCENARIOS = [n for n, path in scenarios.find_all(ROOT).items() if path.parts[-3] == MODEL.name]
-ENUMERATIONS = {n: list(v["items"]) for n, v in DECLARED.items() if v["type"] == "Enumeration"}
+DECLARED = declared(MODEL.name).variables
+START = {name: v.start for name, v in DECLARED.items() if v.causality == "parameter"}
+OUTPUTS = [name for name, v in DECLARED.items() if v.causality == "output"]
+SCENARIOS = names_of(MODEL.name)
+ENUMERATIONS = {name: list(v.items) for name, v in DECLARED.items() if v.type == "Enumeration"}
 
 AROUND = {"x_center": 0.05, "y_center": -0.1, "radius": 0.45, "start_angle": 2.0}
 AROUND |= {"frequency": -0.8, "turns": 2.75, "ramp_time": 0.7}
@@ -147,7 +147,7 @@ def test_outputs_and_their_derivatives(unit: Unit, maker: ModuleType, motion: st
     """At random times of each segment, against derivatives of the same motion in 40 digits."""
     parameters = MOTIONS[motion]
     times = random_times(parameters)
-    exact = maker.Motion(numbered(parameters))
+    exact = maker.Motion(START | numbered(parameters))
     assert list(maker.OUTPUTS) == OUTPUTS
     got, expected = {0: [], 1: [], 2: []}, {0: [], 1: [], 2: []}
     with running(unit, parameters, start=times[0] - 0.01) as instance:
@@ -176,13 +176,12 @@ def test_outputs_and_their_derivatives(unit: Unit, maker: ModuleType, motion: st
 @each_motion
 def test_derivatives_by_parameters(unit: Unit, maker: ModuleType, motion: str) -> None:
     """Directional derivatives in initialization mode, against differences in 40 digits."""
-    parameters = numbered(MOTIONS[motion])
-    start = {n: v["start"] for n, v in DECLARED.items() if v["causality"] == "parameter"}
-    names = [name for name in start if DECLARED[name]["type"] == "Real"]
+    parameters = START | numbered(MOTIONS[motion])
+    names = [name for name in START if DECLARED[name].type == "Real"]
     times, h = random_times(MOTIONS[motion], 1), mp.mpf("1e-12")
     expected = np.empty((len(times), len(names), len(OUTPUTS)))
     for k, name in enumerate(names):
-        value = mp.mpf((start | parameters)[name])
+        value = mp.mpf(parameters[name])
         sides = (maker.Motion(parameters | {name: value + side * h}) for side in (-1, 1))
         rows = [[follow(moved, t) for t in times] for moved in sides]
         difference = (np.array(rows[1]) - np.array(rows[0])) / (2 * h)
@@ -322,7 +321,8 @@ def test_fmpy_simulates_it(path: Path, maker: ModuleType, kind: str) -> None:
         output_interval=0.125,
         start_values={"motion": "2", "branch": "1", "duration": 2.0},
     )
-    exact = maker.Motion(numbered({"motion": "line", "branch": "forward", "duration": 2.0}))
+    line = numbered({"motion": "line", "branch": "forward", "duration": 2.0})
+    exact = maker.Motion(START | line)
     assert len(result) == 49
     expected = np.array([[float(x) for x in exact.outputs(t)] for t in result["time"]])
     got = np.array([result[name] for name in OUTPUTS]).T
@@ -383,8 +383,7 @@ def test_references_made_again_are_the_same(tmp_path: Path) -> None:
 
 
 def test_every_motion_and_branch_has_a_scenario() -> None:
-    found = [scenarios.load(scenarios.find(ROOT, name)).parameters for name in SCENARIOS]
-    start = {name: DECLARED[name]["start"] for name in ENUMERATIONS}
+    found = [load(name).start_values for name in SCENARIOS]
     for name, items in ENUMERATIONS.items():
-        given = {parameters.get(name, start[name]) for parameters in found}
+        given = {values[name] for values in found}
         assert given == set(range(1, len(items) + 1)), name

@@ -1,5 +1,7 @@
 """A copy of the project with few scenarios, and changed files, for the tests of the Python side."""
 
+import functools
+import os
 import re
 import shutil
 import zipfile
@@ -9,26 +11,47 @@ from pathlib import Path
 import pytest
 
 from cosim import __main__ as cli
+from cosim import project
 from cosim import scenario as scenarios
+from cosim.fmu_file import read_model
+from cosim.model import Model
 from cosim.scenario import Scenario
 from tests.support.paths import ROOT
 
-NAMES = list(scenarios.find_all(ROOT))
+BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
+FMUS = {
+    "rp_manipulator": BUILD / "RPManipulator.fmu",
+    "rp_controller": BUILD / "RPController.fmu",
+    "rp_trajectory": BUILD / "RPTrajectory.fmu",
+}
+FILES = project.scenario_files()
+NAMES = list(FILES)
 SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion
 
 
+def names_of(model: str) -> list[str]:
+    """Scenarios of one model, by its folder."""
+    return [name for name, path in FILES.items() if project.model_folder(path).name == model]
+
+
+@functools.cache
+def declared(model: str) -> Model:
+    """What the built FMU of a model declares, by the model's folder."""
+    return read_model(FMUS[model])
+
+
 def load(name: str, root: Path = ROOT) -> Scenario:
-    return scenarios.load(scenarios.find(root, name))
+    """A scenario of the project, or of a copy of it."""
+    path = root / FILES[name].relative_to(ROOT)
+    return scenarios.load(path, declared(project.model_folder(path).name))
 
 
 def copy_project(folder: Path) -> None:
     """A project with two scenarios."""
     model = folder / "models" / "rp_manipulator"
     (model / "scenarios").mkdir(parents=True)
-    (folder / "src" / "instance").mkdir(parents=True)
-    shutil.copy(ROOT / "models" / "rp_manipulator" / "variables.toml", model)
-    for file in (ROOT / "src" / "instance").glob("*.toml"):
-        shutil.copy(file, folder / "src" / "instance")
+    (model / "references").mkdir()
+    shutil.copy(ROOT / "models/rp_manipulator/references/scales.toml", model / "references")
     for name in (SHORT, LONG):
         original = load(name)
         shutil.copy(original.path, model / "scenarios")
@@ -58,7 +81,7 @@ def repacked(source: Path, target: Path, change: Callable[[str], str], drop: str
 
 
 def without_progress(error: str) -> str:
-    """Without the lines that tell how far what takes long has come: on a busy machine more does."""
+    """Without the lines on progress, which a busy machine makes more of."""
     return re.sub(r"(?m)^.*: \d+ %, \d+ s\n", "", error)
 
 

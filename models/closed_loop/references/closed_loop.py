@@ -1,7 +1,7 @@
 """Solutions of the closed loop: in continuous time, and sampled as a co-simulation steps it.
 
 Both are exact but for rounding in long double. Parameters are named like the system's variables,
-``arm.m2``; one that is not given has the start value that its model declares.
+``arm.m2``; one that is not given has the start value that the model's FMU declares.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import variables
+from cosim import project
 from cosim.errors import UserError
+from cosim.fmu_file import read_model
+from cosim.model import Value, Variable
 from models.closed_loop.references import equations
 from models.closed_loop.references.loop import COEFFICIENTS, INTEGRALS, SIGNALS, Loop
 from models.rp_manipulator.references.make_references import INPUTS, STATES
@@ -33,7 +35,7 @@ COLUMNS = (
 )
 STATE = (*(f"arm.{name}" for name in STATES), *(f"controller.{name}" for name in INTEGRALS))
 
-Parameters = Mapping[str, float | str]
+Parameters = Mapping[str, Value]
 Columns = dict[str, np.ndarray]
 
 
@@ -50,7 +52,7 @@ def monolithic(
     parameters : mapping
         Values of parameters, ``component.name``.
     times : sequence of float
-        Where to tell the values, in s, ascending; the motion begins at the first.
+        Times of the values, in s, ascending; the motion begins at the first.
     state : sequence of float, optional
         q1, q2, dq1, dq2, integral1, integral2 at the first time, in the units of the variables;
         without it the parameters' start values.
@@ -185,17 +187,17 @@ _loop = cache(Loop)
 
 
 @cache
-def _declared() -> dict[str, dict]:
-    """Parameters of the components, and the states, as the models declare them."""
+def _declared() -> dict[str, Variable]:
+    """Parameters of the components, and the states, as the FMUs declare them."""
     return {
         f"{component}.{name}": variable
         for component, folder in COMPONENTS.items()
-        for name, variable in variables.load(MODELS / folder).items()
-        if variable["causality"] == "parameter" or f"{component}.{name}" in STATE
+        for name, variable in read_model(project.built(MODELS / folder, ".fmu")).variables.items()
+        if variable.causality == "parameter" or f"{component}.{name}" in STATE
     }
 
 
-def _complete(parameters: Parameters) -> dict[str, float | str]:
+def _complete(parameters: Parameters) -> dict[str, Value]:
     """All parameters; items of enumerations, which may be given as numbers too, by name."""
     declared = _declared()
     unknown = [name for name in parameters if name not in declared]
@@ -203,9 +205,9 @@ def _complete(parameters: Parameters) -> dict[str, float | str]:
         raise UserError(f"the closed loop has no parameter {unknown[0]!r}")
     values = {}
     for name, variable in declared.items():
-        value = parameters.get(name, variable["start"])
-        if variable["type"] == "Enumeration":
-            items = dict(enumerate(variable["items"], start=1))
+        value = parameters.get(name, variable.start)
+        if variable.type == "Enumeration":
+            items = {number: item for item, number in variable.items.items()}
             value = items.get(value, value)
             if value not in items.values():
                 raise UserError(f"{name}: no {value!r} (known: {', '.join(items.values())})")

@@ -176,7 +176,7 @@ class Loop:
     def begin(
         self, integrator: hy.taylor_adaptive, at: np.floating, state: Iterable[np.floating]
     ) -> None:
-        """Start an integrator anew with the present runtime values."""
+        """Start an integrator again, with the present runtime values."""
         integrator.time = at
         integrator.state[:] = state
         integrator.pars[:] = self.values[: len(integrator.pars)]

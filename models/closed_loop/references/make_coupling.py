@@ -1,7 +1,7 @@
 """Makes the reference of the study of the coupling: a motion with a fast and a slow part.
 
 The closed loop in continuous time, by the functions that make the other references; the motion is
-that of cosim/coupling/doubling.py. Writes models/closed_loop/coupling/fast_and_slow.csv.
+that of ../coupling/step_doubling.py. Writes models/closed_loop/coupling/fast_and_slow.csv.
 """
 
 import argparse
@@ -14,8 +14,13 @@ FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
-from cosim.coupling.doubling import FAST, FAST_AND_SLOW, FAST_STOP, STATES  # noqa: E402
-from cosim.files import write_csv  # noqa: E402
+from cosim import trajectory_csv  # noqa: E402
+from models.closed_loop.coupling.loop import STATES  # noqa: E402
+from models.closed_loop.coupling.step_doubling import (  # noqa: E402
+    FAST,
+    FAST_AND_SLOW,
+    FAST_STOP,
+)
 from models.closed_loop.references.closed_loop import monolithic  # noqa: E402
 
 ROWS_PER_SECOND = 50
@@ -26,7 +31,7 @@ def write(output: Path) -> None:
     times = np.arange(round(FAST_STOP * ROWS_PER_SECOND) + 1) / ROWS_PER_SECOND
     columns = monolithic(PARAMETERS, times)
     values = np.column_stack([columns[name] for name in STATES]).astype(np.float64) + 0.0
-    write_csv(output, times, STATES, values)
+    trajectory_csv.write(output, times, STATES, values)
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
-"""Makes the references of the closed loop, apart from the code that they check.
+"""Makes the references of the closed loop, without the code that they check.
 
 For every variant ``monolithic.csv``, the solution in continuous time; ``sampled.csv``, that of the
 system stepped in Jacobi order, read before inputs are set; ``ecos.csv``, the same read after inputs
-are set, as Ecos does. closed_loop.py tells what they mean, equations.py where they come from.
+are set, as Ecos does. closed_loop.py says what they mean, equations.py where they come from.
 """
 
 import argparse
@@ -16,9 +16,9 @@ FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
+from cosim import trajectory_csv
 from cosim.errors import UserError
-from cosim.files import write_csv
-from cosim.system.runs import STEPS_PER_SECOND, STOP
+from models.closed_loop.experiment import STEPS_PER_SECOND, STOP
 from models.closed_loop.references.closed_loop import (
     COLUMNS,
     COMPONENTS,
@@ -86,7 +86,7 @@ def main() -> None:
             for file, (times, columns) in make(known[name]).items():
                 values = np.column_stack([columns[name] for name in COLUMNS])
                 rounded = values.astype(np.float64) + 0.0  # no negative zeros
-                write_csv(folder / file, times, COLUMNS, rounded)
+                trajectory_csv.write(folder / file, times, COLUMNS, rounded)
                 print(f"{name}/{file}: {len(times)} rows")
     except UserError as error:
         sys.exit(f"error: {error}")

@@ -1,4 +1,4 @@
-"""Makes the reference trajectories of the controller, apart from the code that they check.
+"""Makes the reference trajectories of the controller, without the code that they check.
 
 sympy derives the arm's equations of motion from the positions of both centers of mass; the laws are
 those of the page. Between two communication points the inputs rest, and the integral parts obey
@@ -18,11 +18,10 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim import variables
 from cosim.scenario import Scenario
 from models import reference_files
 
-UNIT = "RPController"
+MODEL = "RPController"
 ARM = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
@@ -105,7 +104,7 @@ class Law:
             for i in (0, 1):
                 rate = self.push[i] if k == 0 else mpf(0)
                 if sides[i]:
-                    # u - side * limit; of u the offset is in the first coefficient alone
+                    # u - side * limit; the offset of u is only in the first coefficient
                     excess = self.gain[i, 0] * last[0] + self.gain[i, 1] * last[1]
                     if k == 0:
                         excess += self.offset[i] - sides[i] * self.limit[i]
@@ -149,39 +148,28 @@ class Law:
         return [*limited, *self.error, *self.derror]
 
 
-def input_table(scenario: Scenario, declared: dict) -> np.ndarray:
+def input_table(scenario: Scenario) -> np.ndarray:
     """Inputs at every communication point, (n + 1, inputs)."""
-    count = len(scenario.times)
-    return np.stack(
-        [
-            scenario.inputs.get(name, np.full(count, float(declared[name]["start"])))
-            for name in INPUTS
-        ],
-        1,
-    )
+    return np.stack([scenario.input(name) for name in INPUTS], 1)
 
 
-def simulate(scenario: Scenario, declared: dict, arm: Callable[..., tuple]) -> np.ndarray:
+def simulate(scenario: Scenario, arm: Callable[..., tuple]) -> np.ndarray:
     """Outputs at every communication point, (n + 1, outputs).
 
     The inputs of row i are those of the step that ends there; row 0 has those of the start.
     """
-    parameters = {
-        name: mpf(float(scenario.parameters.get(name, variable["start"])))
-        for name, variable in declared.items()
-        if variable["causality"] == "parameter"
-    }
-    inputs = input_table(scenario, declared)
+    start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
+    inputs = input_table(scenario)
     # times of the communication points are exact, their differences need not be
     times = [mpf(float(t)) for t in scenario.times]
     w = [mpf(0), mpf(0)]
     rows = []
     for i in range(len(times)):
         held = inputs[max(i - 1, 0)]
-        law = Law(parameters | {n: mpf(float(x)) for n, x in zip(INPUTS, held, strict=True)}, arm)
+        law = Law(start | {n: mpf(float(x)) for n, x in zip(INPUTS, held, strict=True)}, arm)
         if i > 0:
             length = times[i] - times[i - 1]
-            pieces = int(mp.ceil(length / (LONGEST * parameters["tracking_time"])))
+            pieces = int(mp.ceil(length / (LONGEST * start["tracking_time"])))
             for _ in range(pieces):
                 w = law.advance(w, length / pieces)
         rows.append([float(x) for x in law.outputs(w)])
@@ -190,12 +178,12 @@ def simulate(scenario: Scenario, declared: dict, arm: Callable[..., tuple]) -> n
 
 def prepare() -> Callable[[Scenario, Path], None]:
     """Derive the arm's equations; return what writes the reference of a scenario to a folder."""
-    declared, arm = variables.load(MODEL_FOLDER), equations_of_the_arm()
+    arm = equations_of_the_arm()
 
     def write(scenario: Scenario, folder: Path) -> None:
-        outputs = simulate(scenario, declared, arm)[scenario.reference_rows]
-        inputs = input_table(scenario, declared)
-        reference_files.write(scenario, folder, UNIT, (OUTPUTS, outputs), (INPUTS, inputs))
+        outputs = simulate(scenario, arm)[scenario.reference_rows]
+        inputs = input_table(scenario)
+        reference_files.write(scenario, folder, MODEL, (OUTPUTS, outputs), (INPUTS, inputs))
 
     return write
 

@@ -1,4 +1,4 @@
-"""Makes the reference trajectories of the RP manipulator, apart from the code that they check.
+"""Makes the reference trajectories of the RP manipulator, without the code that they check.
 
 The Lagrangian is written from the positions of both centers of mass, sympy turns it into equations
 of motion, and heyoka's Taylor method integrates them in long double at its precision. No closed
@@ -18,12 +18,11 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim import variables
 from cosim.errors import UserError
 from cosim.scenario import Scenario
 from models import reference_files
 
-UNIT = "RPManipulator"
+MODEL = "RPManipulator"
 PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
 INPUTS = ("tau1", "f2")
 STATES = ("q1", "q2", "dq1", "dq2")
@@ -99,16 +98,8 @@ class Reference:
                 "long double is no wider than double here: make the references elsewhere"
             )
         self.real = real
-        self.declared = variables.load(MODEL_FOLDER)
         equations = derive()
-        self.outputs = [
-            name
-            for name, variable in self.declared.items()
-            if variable["causality"] == "output" and variable["type"] == "Real"
-        ]
-        unknown = [name for name in self.outputs if name not in equations.outputs]
-        if unknown:
-            raise UserError(f"{Path(__file__).name}: no expression for the output {unknown[0]!r}")
+        self.outputs = list(equations.outputs)
 
         states = hy.make_vars(*STATES)
         runtime = {name: hy.par[i] for i, name in enumerate((*PARAMETERS, *INPUTS))}
@@ -121,25 +112,21 @@ class Reference:
             fp_type=real,
         )
         self.evaluate = hy.cfunc(
-            [hy.from_sympy(equations.outputs[name], names) for name in self.outputs],
+            [hy.from_sympy(expression, names) for expression in equations.outputs.values()],
             vars=states,
             fp_type=real,
         )
 
     def inputs(self, scenario: Scenario) -> np.ndarray:
         """Values of tau1 (N.m) and f2 (N) at every communication point, (n + 1, 2)."""
-        start = (np.full(len(scenario.times), self.declared[name]["start"]) for name in INPUTS)
-        return np.stack(
-            [scenario.inputs.get(name, value) for name, value in zip(INPUTS, start, strict=True)], 1
-        )
+        return np.stack([scenario.input(name) for name in INPUTS], 1)
 
     def simulate(self, scenario: Scenario) -> np.ndarray:
-        """Real outputs at every communication point, (n + 1, outputs), in order of value reference.
+        """Real outputs at every communication point, (n + 1, outputs).
 
         The inputs of row i are those of the step that ends there; row 0 has those of the start.
         """
-        given = scenario.parameters | scenario.initial
-        value = {name: given.get(name, self.declared[name].get("start")) for name in self.declared}
+        value = scenario.start_values
         # time counts from the start; the differences of the communication points are exact
         elapsed = scenario.times.astype(self.real) - self.real(scenario.start)
         inputs = self.inputs(scenario)
@@ -170,7 +157,7 @@ class Reference:
         """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
         outputs = self.simulate(scenario)[scenario.reference_rows]
         reference_files.write(
-            scenario, folder, UNIT, (self.outputs, outputs), (INPUTS, self.inputs(scenario))
+            scenario, folder, MODEL, (self.outputs, outputs), (INPUTS, self.inputs(scenario))
         )
 
 

@@ -13,14 +13,15 @@ from pathlib import Path
 import heyoka as hy
 import numpy as np
 import sympy as sp
-from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, ROOT, STATES, derive
+from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 
-from cosim import convergence, variables
+from cosim import convergence, project
 from cosim import scenario as scenarios
-from cosim.convergence import Sines
 from cosim.errors import UserError
-from cosim.outputs import whole
+from cosim.fmu_file import read_model
+from cosim.output_files import whole
 from cosim.scenario import Scenario
+from cosim.signals import Sines
 
 equations = functools.cache(derive)
 
@@ -53,8 +54,7 @@ def integrator(
     pars : int
         How many of heyoka's parameters `inputs` uses.
     """
-    given = scenario.parameters | scenario.initial
-    start = {name: v.get("start") for name, v in variables.load(MODEL_FOLDER).items()} | given
+    start = scenario.start_values
     names = {sp.Symbol(name): hy.expression(real(start[name])) for name in PARAMETERS}
     names |= {sp.Symbol(name): inputs[name] for name in INPUTS}
     states = hy.make_vars(*STATES)
@@ -73,7 +73,7 @@ def final_state(
     """States at the end, and the largest absolute value of each on the way."""
     if real is np.longdouble and np.finfo(real).eps > 2e-19:
         raise UserError("long double is no wider than double here: make the references elsewhere")
-    sines = convergence.read_inputs(scenario)
+    sines = convergence.smooth_inputs(scenario)
     motion = integrator(scenario, {name: signal(s, real) for name, s in sines.items()}, real)
     end = real(scenario.stop) - real(scenario.start)
     outcome, *_, path = motion.propagate_grid(np.linspace(real(0), end, ON_THE_WAY))
@@ -100,9 +100,10 @@ def main() -> None:
     parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")
     arguments = parser.parse_args()
     try:
-        for path in convergence.find_all(ROOT):
-            if path.parent.parent == MODEL_FOLDER:
-                scenario = scenarios.load(path)
+        model = read_model(project.built(MODEL_FOLDER, ".fmu"))
+        for path in project.convergence_files():
+            if project.model_folder(path) == MODEL_FOLDER:
+                scenario = scenarios.load(path, model)
                 folder = arguments.output / path.stem if arguments.output else None
                 write(scenario, folder or scenario.reference_folder)
                 print(f"{path.stem}: {scenario.stop:g} s")

@@ -1,4 +1,4 @@
-"""Makes the reference trajectories of the reference motions, apart from the code that they check.
+"""Makes the reference trajectories of the reference motions, without the code that they check.
 
 The path and its rates come from sympy, the scaling law from the conditions at its ends; the joints
 follow from the forward kinematics, x + i y = exp(i q1) (L + i a), and its first two derivatives by
@@ -19,16 +19,16 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim import variables
 from cosim.scenario import Scenario
 from models import reference_files
 
-UNIT = "RPTrajectory"
+MODEL = "RPTrajectory"
 DIGITS = 40
 JOINTS = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 OUTPUTS = (*JOINTS, "ee_x_ref", "ee_y_ref", "ee_vx_ref", "ee_vy_ref")
-KINDS = tuple(variables.load(MODEL_FOLDER)["motion"]["items"])
-BRANCHES = tuple(variables.load(MODEL_FOLDER)["branch"]["items"])
+# items of the enumerations `motion` and `branch`
+POINT_TO_POINT, LINE, CIRCLE = 1, 2, 3
+FORWARD, BACKWARD = 1, 2
 
 
 @functools.cache
@@ -63,7 +63,7 @@ def segments(value: dict[str, float | mp.mpf]) -> list[Segment]:
     def exact(name: str) -> sp.Expr:
         return fraction(value[name])
 
-    if value["motion"] == KINDS.index("circle") + 1:
+    if value["motion"] == CIRCLE:
         rate, ramp = exact("frequency"), exact("ramp_time")
         full = exact("turns") / abs(rate)  # s: time that the turns take at full speed
         x = sp.Symbol("x")
@@ -80,7 +80,7 @@ def segments(value: dict[str, float | mp.mpf]) -> list[Segment]:
     else:
         duration = exact("duration")
         times = [(0, 0), (duration, scaling_law(u / duration)), (sp.oo, 1)]
-        joints = value["motion"] == KINDS.index("point_to_point") + 1
+        joints = value["motion"] == POINT_TO_POINT
         names = ("q1", "q2") if joints else ("ee_x", "ee_y")
 
         def position(time: sp.Expr) -> list[sp.Expr]:
@@ -115,12 +115,16 @@ def joint_rates(
 
 
 class Motion:
-    """One motion; evaluates it at times that go forward, so that q1 stays continuous."""
+    """One motion; evaluates it at times that go forward, so that q1 stays continuous.
 
-    def __init__(self, parameters: dict[str, float | mp.mpf]) -> None:
-        declared = variables.load(MODEL_FOLDER)
-        start = {n: v["start"] for n, v in declared.items() if v["causality"] == "parameter"}
-        self.value = start | parameters
+    Parameters
+    ----------
+    value : dict
+        Values of all parameters of the model by name.
+    """
+
+    def __init__(self, value: dict[str, float | mp.mpf]) -> None:
+        self.value = value
         self.segments = segments(self.value)
         self.q1: mp.mpf | None = None  # the last one
 
@@ -135,14 +139,14 @@ class Motion:
         """Values of OUTPUTS at `t` (s), which is less than half a turn after the one before."""
         l1, a = mp.mpf(self.value["l1"]), mp.mpf(self.value["a"])
         position, velocity, acceleration = self.coordinates(t)
-        if self.value["motion"] == KINDS.index("point_to_point") + 1:
+        if self.value["motion"] == POINT_TO_POINT:
             L = l1 + position.imag
             q, dq, ddq = position, velocity, acceleration
             turn = mp.expj(q.real)
             position = turn * mp.mpc(L, a)
             velocity = turn * (dq.imag + 1j * dq.real * mp.mpc(L, a))
         else:
-            sign = -1 if self.value["branch"] == BRANCHES.index("backward") + 1 else 1
+            sign = -1 if self.value["branch"] == BACKWARD else 1
             L = sign * mp.sqrt(abs(position) ** 2 - a**2)
             q1 = mp.arg(position / mp.mpc(L, a))
             if self.q1 is not None:
@@ -157,7 +161,7 @@ class Motion:
 def simulate(scenario: Scenario) -> np.ndarray:
     """Values of OUTPUTS at every communication point of the reference, (rows, outputs)."""
     with mp.workdps(DIGITS):
-        motion = Motion(scenario.parameters)
+        motion = Motion(scenario.start_values)
         rows = [motion.outputs(t) for t in scenario.times[scenario.reference_rows]]
         return np.array([[float(x) for x in row] for row in rows])
 
@@ -165,7 +169,7 @@ def simulate(scenario: Scenario) -> np.ndarray:
 def write(scenario: Scenario, folder: Path) -> None:
     """Write the reference of one scenario to `folder`, in the FMI cross-check format."""
     no_inputs = (), np.empty((len(scenario.times), 0))
-    reference_files.write(scenario, folder, UNIT, (OUTPUTS, simulate(scenario)), no_inputs)
+    reference_files.write(scenario, folder, MODEL, (OUTPUTS, simulate(scenario)), no_inputs)
 
 
 if __name__ == "__main__":

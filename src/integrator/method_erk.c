@@ -1,5 +1,5 @@
-/* Explicit Runge-Kutta steps of ARKODE. Each advance starts ERKStep anew, so that nothing but the
- * length of the next step connects one with the next. */
+/* Explicit Runge-Kutta steps of ARKODE. Each advance starts ERKStep again: only the length of the
+ * next step connects one advance with the next. */
 #include "sundials.h"
 
 #include <float.h>
@@ -67,7 +67,8 @@ static bool create_solver(struct erk *erk) {
            sundials_redirect_erk(base->context, erk->solver, &base->texts) == 0 &&
            ERK(SetUserData)(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
-           // steps end at the points asked for: without a polynomial an evaluation each is saved
+           // steps end at the points asked for: no polynomial is needed, which saves an evaluation
+           // each
            ERK(SetInterpolantType)(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
            ERK(SetInterpolantDegree)(erk->solver, 0) == ARK_SUCCESS &&
            ERK(SetMaxHnilWarns)(erk->solver, -1) == ARK_SUCCESS;

@@ -1,18 +1,18 @@
-"""Files that appear complete or not at all, and what is told of them."""
+"""Files that appear complete or not at all."""
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cosim.errors import UserError
+from cosim.errors import UserError, reason
 
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """Temporary path to write to, which becomes `path` at the end and is removed on failure."""
     path = Path(path)
-    # the suffix stays the last: pictures are written in the format that it tells
+    # the suffix stays the last: matplotlib takes the format of a picture from it
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     try:
         yield temporary
@@ -37,8 +37,3 @@ def from_here(path: Path) -> Path:
     except OSError:  # it has been removed
         return path
     return path.relative_to(here) if path.is_relative_to(here) else path
-
-
-def reason(error: Exception) -> str:
-    """What the system says about a file, without number and name."""
-    return getattr(error, "strerror", None) or str(error) or type(error).__name__

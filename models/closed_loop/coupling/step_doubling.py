@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from cosim.coupling import step_control
-from cosim.coupling.study import FINEST, ROOT, STATES, Loop, Method, read_reference
+from models.closed_loop.coupling.loop import FINEST, STATES, ClosedLoop, Method, read_reference
 
-FAST_AND_SLOW = ROOT / "models" / "closed_loop" / "coupling" / "fast_and_slow.csv"
+FAST_AND_SLOW = Path(__file__).resolve().with_name("fast_and_slow.csv")
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")
 
 CORNERS = (0.5, 0.8)  # s, begin and end of the fast part
@@ -49,7 +50,7 @@ class Doubling:
 class FastAndSlow:
     """A motion with a fast part of 0.3 s in 5 s, and its exact solution."""
 
-    def __init__(self, loop: Loop) -> None:
+    def __init__(self, loop: ClosedLoop) -> None:
         self.loop = loop
         runs = [loop.run(FINEST, h, stop=FAST_STOP, changes=FAST)[0] for h in FINE]
         self.step = FINE[0]
@@ -124,7 +125,7 @@ class FastAndSlow:
         return good
 
 
-def study_doubling(loop: Loop, tolerances: Sequence[float] = TOLERANCES) -> list[Doubling]:
+def study_doubling(loop: ClosedLoop, tolerances: Sequence[float] = TOLERANCES) -> list[Doubling]:
     """Step doubling against fixed steps of the same accuracy and coupling."""
     motion = FastAndSlow(loop)
     found = []

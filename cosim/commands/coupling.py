@@ -1,0 +1,13 @@
+"""`coupling`: the study of what the coupling of a system costs, which its folder has."""
+
+import argparse
+
+from cosim import project
+from cosim.system import study
+
+
+def run(options: argparse.Namespace) -> int:
+    """Make the study; 0 if everything is as expected."""
+    folder = project.system_folder()
+    path = options.ssp or project.built(folder, ".ssp")
+    return 0 if study.load(folder).study_coupling(path, options.report) else 1

@@ -1,0 +1,129 @@
+"""`run`: simulate scenarios, compare them with their references, write a report."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from cosim import console, convergence, project
+from cosim import scenario as scenarios
+from cosim.comparison import Run, Runs
+from cosim.convergence import Convergence
+from cosim.errors import UserError
+from cosim.fmu_file import Fmu
+from cosim.output_files import from_here, written
+from cosim.progress import Progress
+from cosim.report import pages
+from cosim.scenario import Scenario
+from cosim.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
+
+QUICK = 20.0  # s, longest sweep that comes with a scenario asked for by name
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the scenarios that the options name, or all."""
+    with ExitStack() as stack:
+        chosen, fmus = _open(options.names, options.fmu, stack)
+        runs = Runs(fmus)
+        for scenario in chosen:
+            runs.reference(scenario)  # a missing one shows before anything has run
+        with written(options.report):  # and so does a report that has no place
+            options.report.mkdir(parents=True, exist_ok=True)
+        sweeps: list[Sweep] = []
+        studies: list[Convergence] = []
+        if options.tolerance is not None:
+            done = _runs(runs, chosen, options.tolerance)
+        else:
+            done = _runs(runs, chosen, None, TIGHTEST)
+            sweeps = _sweeps(runs, _quick(done) if options.names else chosen)
+            studies = [] if options.names else _convergence(fmus)
+        with written(options.report), Progress("report", len(done), "runs") as progress:
+            index = pages.write_runs(options.report, done, sweeps, studies, progress)
+    print(f"\nreport: {from_here(index)}")
+    failed = (x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
+    return console.summary(failed, chosen, "scenario")
+
+
+def _open(
+    names: Sequence[str], path: Path | None, stack: ExitStack
+) -> tuple[list[Scenario], dict[str, Fmu]]:
+    """Scenarios called `names`, or all; and FMUs by their models: the one at `path`, or in build/.
+
+    An FMU is opened once, and every scenario of its model is checked against it.
+    """
+    files = [project.scenario_file(name) for name in dict.fromkeys(names)]
+    files = files or list(project.scenario_files().values())
+    if not files:
+        raise UserError(f"{project.ROOT / 'models'}: has no scenarios")
+    chosen, fmus = [], {}
+    for file in files:
+        folder = project.model_folder(file)
+        if folder.name not in fmus:
+            fmu = Fmu(path or project.built(folder, ".fmu"))
+            fmus[folder.name] = stack.enter_context(fmu)
+        chosen.append(scenarios.load(file, fmus[folder.name].model))
+    return chosen, fmus
+
+
+def _runs(runs: Runs, chosen: Sequence[Scenario], *tolerances: float | None) -> list[Run]:
+    """Run `chosen` at `tolerances`; None: at the tolerance of the scenario."""
+    table = console.RunTable(scenario.name for scenario in chosen)
+    done = []
+    for scenario in chosen:
+        for tolerance in dict.fromkeys(t or scenario.tolerance for t in tolerances):
+            label = f"{scenario.name} at {tolerance:g}"
+            with Progress(label, runs.steps_ahead(scenario, [tolerance])) as progress:
+                run = runs.run(scenario, tolerance, progress)
+            table.row(run)
+            console.messages(f"{label}: the FMU says", run.result.messages)
+            done.append(run)
+    return done
+
+
+def _quick(done: Sequence[Run]) -> list[Scenario]:
+    """Scenarios of `done` whose sweep takes seconds; says which ones are left out."""
+    slowest: dict[Scenario, float] = {}
+    for run in done:
+        slowest[run.scenario] = max(slowest.get(run.scenario, 0.0), run.result.wall_time)
+    quick = []
+    for scenario, wall_time in slowest.items():
+        seconds = wall_time * len(TOLERANCES)
+        if seconds <= QUICK:
+            quick.append(scenario)
+        else:
+            print(f"{scenario.name}: no sweep, it would take {seconds:.0f} s (run all: with sweep)")
+    return quick
+
+
+def _sweeps(runs: Runs, chosen: Sequence[Scenario]) -> list[Sweep]:
+    """Run `chosen` over the tolerances."""
+    if not chosen:
+        return []
+    table = console.SweepTable((scenario.name for scenario in chosen), TOLERANCES)
+    sweeps = []
+    for scenario in chosen:
+        ahead = runs.steps_ahead(scenario, TOLERANCES)
+        with Progress(f"{scenario.name}, all tolerances", ahead) as progress:
+            sweeps.append(sweep(runs, scenario, progress))
+        table.row(sweeps[-1])
+    table.violations(sweeps)
+    return sweeps
+
+
+def _convergence(fmus: Mapping[str, Fmu]) -> list[Convergence]:
+    """Study the order of convergence of the models whose FMUs are open."""
+    studies = []
+    for file in project.convergence_files():
+        fmu = fmus.get(project.model_folder(file).name)
+        if fmu is None:
+            continue
+        problem = convergence.load(file, fmu.model)
+        name = problem.scenario.name
+        if not fmu.model.interpolates_inputs:
+            print(f"\n{name}: left out, the FMU does not interpolate inputs")
+            continue
+        with Progress(f"{name}, all steps", convergence.steps_ahead(problem)) as progress:
+            study = convergence.study(fmu, problem, progress)
+        console.convergence(study)
+        studies.append(study)
+    return studies

@@ -1,0 +1,101 @@
+"""Tables on the console: a head and a rule, then a row as soon as it is known."""
+
+import sys
+from collections.abc import Iterable, Sequence
+
+from cosim.comparison import Run
+from cosim.convergence import Convergence
+from cosim.system.comparison import BOUND, Outcome
+from cosim.system.study import Measure
+from cosim.texts import counted, milliseconds, verdict
+from cosim.tolerance_sweep import Sweep
+
+
+def head(*lines: str) -> None:
+    """Print the head of a table, its last line underlined."""
+    print(*lines, "-" * len(lines[-1]), sep="\n", flush=True)
+
+
+def messages(label: str, texts: Iterable[str]) -> None:
+    """Print what an FMU or an engine has to say, to standard error."""
+    for text in texts:
+        print(f"{label}: {text}", file=sys.stderr)
+
+
+def summary(failed: Iterable[str], done: Sequence[object], name: str) -> int:
+    """Print what has failed, or how many things have passed; the exit code."""
+    names = list(dict.fromkeys(failed))
+    print(f"FAILED: {', '.join(names)}" if names else f"passed: {counted(done, name)}")
+    return 1 if names else 0
+
+
+class RunTable:
+    """Runs of scenarios."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._width = max(map(len, ("scenario", *names)))
+        columns = "  tolerance    steps      error    bound  wall time  result"
+        head(f"{'scenario':<{self._width}}{columns}")
+
+    def row(self, run: Run) -> None:
+        result = run.result
+        text = "passed" if run.passed else f"FAILED ({run.worst})"
+        print(
+            f"{run.scenario.name:<{self._width}}  {result.tolerance:>9.0e} {result.steps:>8} "
+            f"{run.error:>10.2e} {run.bound:>8.0e} {result.wall_time:>8.3f} s  {text}",
+            flush=True,
+        )
+
+
+class SweepTable:
+    """Errors of scenarios over the tolerances."""
+
+    def __init__(self, names: Iterable[str], tolerances: Iterable[float]) -> None:
+        self._width = max(map(len, ("error at tolerance", *names)))
+        columns = " ".join(f"{tolerance:>8.0e}" for tolerance in tolerances)
+        head("", f"{'error at tolerance':<{self._width}} {columns}  result")
+
+    def row(self, sweep: Sweep) -> None:
+        errors = " ".join(f"{error:>8.1e}" for error in sweep.errors)
+        name = sweep.scenario.name
+        print(f"{name:<{self._width}} {errors}  {verdict(sweep.passed)}", flush=True)
+
+    @staticmethod
+    def violations(sweeps: Iterable[Sweep]) -> None:
+        for sweep in sweeps:
+            for text in sweep.violations:
+                print(f"{sweep.scenario.name}: {text}")
+
+
+class VariantTable:
+    """Runs of a system's variants, with the measures of the system."""
+
+    def __init__(self, names: Iterable[str], measures: Sequence[Measure]) -> None:
+        self._width = max(map(len, ("variant", *names)))
+        self._measures = measures
+        titles = "".join(f"  {measure.name}" for measure in measures)
+        columns = f"  steps      error    bound{titles}  wall time  result"
+        head(f"{'variant':<{self._width}}{columns}")
+
+    def row(self, outcome: Outcome) -> None:
+        cells = [f"{outcome.variant:<{self._width}} {outcome.steps:>6} {outcome.error:>10.2e}"]
+        cells.append(f" {BOUND:>8.0e}")
+        for measure in self._measures:
+            text = f"{measure.value(outcome):.4f} {measure.unit}"
+            cells.append(f" {text:>{len(measure.name) + 1}}")
+        text = "passed" if outcome.passed else f"FAILED ({outcome.worst})"
+        print("".join(cells) + f" {outcome.run.wall_time:>8.3f} s  {text}", flush=True)
+
+
+def convergence(study: Convergence) -> None:
+    """Print a table of errors over the communication step, and what is wrong with them."""
+    name, rows = study.scenario.name, study.rows
+    width = max(map(len, (name, *(row.name for row in rows))))
+    steps = "".join(f" {milliseconds(step):>8}" for step in study.problem.steps)
+    head("", f"{name:<{width}}{steps}   slope  result")
+    for row in rows:
+        errors = "".join(f" {error:>8.1e}" for error in row.errors)
+        print(f"{row.name:<{width}}{errors}  {row.slope:>6.2f}  {verdict(row.holds)}")
+    for text in study.violations:
+        print(f"{name}: {text}")
+    sys.stdout.flush()

@@ -1,0 +1,109 @@
+"""A component of a system, as a master drives it."""
+
+from collections.abc import Mapping, Sequence
+from ctypes import Array, c_double, sizeof
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.errors import UserError
+from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmu_file import Fmu
+from cosim.model import INITIAL, PARAMETERS, Value, Variable, WrongValueError
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """How a component is connected."""
+
+    inputs: Sequence[str]  # set before each step
+    outputs: Sequence[str]  # read after each step
+    first: int  # place of the first of `outputs` in the system's values
+    connected: Sequence[int]  # which of `outputs` feed an input
+    sources: Sequence[int]  # of each input, in the system's values
+    ahead: Sequence[bool]  # of each input, whether its source steps before this component
+
+
+class ConnectedInstance:
+    """An instance, its place among the system's values, and the sources of its inputs.
+
+    Parameters
+    ----------
+    instance : Fmi2Instance
+        Instantiated.
+    wiring : Wiring
+    values, slopes : ctypes array of double, ndarray
+        The system's values, and their derivatives with respect to time.
+    """
+
+    def __init__(
+        self, instance: Fmi2Instance, wiring: Wiring, values: Array, slopes: np.ndarray
+    ) -> None:
+        self.instance = instance
+        self.sources = np.array(wiring.sources, dtype=int)
+        self.ahead = np.array(wiring.ahead, dtype=bool)
+        place = wiring.first * sizeof(c_double)
+        memory = (c_double * len(wiring.outputs)).from_buffer(values, place)
+        self.outputs = instance.reals(wiring.outputs, memory)
+        self.inputs = instance.reals(wiring.inputs)
+        self._input_slopes = instance.derivatives(wiring.inputs, [1] * len(wiring.inputs))
+        connected = [wiring.outputs[i] for i in wiring.connected]
+        self._output_slopes = instance.derivatives(connected, [1] * len(connected))
+        self._slopes = slopes
+        self._slope_places = wiring.first + np.array(wiring.connected, dtype=int)
+
+    @property
+    def name(self) -> str:
+        """Name of the component."""
+        return self.instance.name
+
+    def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
+        """From instantiated into initialization mode."""
+        instance = self.instance
+        instance.set_up(start, stop)
+        for name, value in parameters.items():
+            instance.set(name, start_value(instance.fmu, self.name, name, value))
+        instance.enter_initialization()
+
+    def set_inputs(self, values: np.ndarray) -> None:
+        """Set the inputs, (inputs,), in their units."""
+        self.inputs.view[:] = values
+        self.inputs.set()
+
+    def set_slopes(self, slopes: np.ndarray) -> None:
+        """Set the derivatives of the inputs with respect to time, (inputs,)."""
+        self._input_slopes.view[:] = slopes
+        self._input_slopes.set()
+
+    def read(self) -> None:
+        """Read the outputs into the system's values."""
+        self.outputs.get()
+
+    def read_slopes(self) -> None:
+        """Read the derivatives of the connected outputs into the system's slopes."""
+        self._output_slopes.get()
+        self._slopes[self._slope_places] = self._output_slopes.view
+
+
+def start_value(fmu: Fmu, component: str, name: str, value: Value) -> Value:
+    """Value to set before initialization: an Enumeration's item may be given by its name.
+
+    Raises
+    ------
+    UserError
+        If it is not a parameter or the start value of a state.
+    """
+    variable = fmu.model.variables.get(name)
+    if variable is None or not _can_start(variable):
+        raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
+    if variable.type != "Enumeration" or not isinstance(value, str):
+        return value
+    try:
+        return variable.item(value)
+    except WrongValueError as error:
+        raise UserError(f"{component}.{name}: {error}") from None
+
+
+def _can_start(variable: Variable) -> bool:
+    local_state = variable.causality == "local" and variable.initial == "exact"
+    return variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state

@@ -1,0 +1,102 @@
+"""FMUs as files: checked, read and unpacked once, for any number of runs."""
+
+import re
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from zipfile import BadZipFile
+
+import fmpy
+from fmpy.model_description import ModelDescription
+
+from cosim.archives import check_archive, check_library
+from cosim.errors import UserError, one_line, reason
+from cosim.fmi2_instance import Fmi2Instance
+from cosim.input_files import UnreadableError
+from cosim.model import Model, described
+
+LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
+
+
+class Fmu:
+    """An FMU that is unpacked; a context manager that removes the unpacked copy.
+
+    Raises UserError if the file is not an FMU of FMI 2.0 for co-simulation that runs on this
+    platform.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        description, self.model = _read(self.path)
+        self.guid = description.guid
+        self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
+        self._unpacked = TemporaryDirectory(prefix="cosim-")
+        self.folder = Path(self._unpacked.name)
+        try:
+            fmpy.extract(self.path, self.folder)
+        except OSError as error:
+            self.close()
+            raise UserError(f"{self.path}: cannot be unpacked: {reason(error)}") from error
+        except Exception as error:  # fmpy raises bare exceptions, zlib its own
+            self.close()
+            raise UserError(f"{self.path}: cannot be unpacked: {one_line(error)}") from error
+        library = self.folder / "binaries" / fmpy.platform / f"{self.identifier}{LIBRARY_SUFFIX}"
+        try:
+            check_library(library)
+        except (OSError, UnreadableError) as error:
+            self.close()
+            text = error if isinstance(error, UnreadableError) else reason(error)
+            raise UserError(f"{self.path}: {library.name}: {text}") from error
+
+    def __enter__(self) -> "Fmu":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Remove the unpacked copy."""
+        self._unpacked.cleanup()
+
+    def instance(self, name: str) -> Fmi2Instance:
+        """A new instance, of the class for the FMU's version of FMI; `name` is in its messages."""
+        return Fmi2Instance(self, name)
+
+
+def read_model(path: Path) -> Model:
+    """What the FMU at `path` declares; UserError if it cannot be run here."""
+    return _read(Path(path))[1]
+
+
+def _read(path: Path) -> tuple[ModelDescription, Model]:
+    """Model description of an FMU that can be run here."""
+    if path.is_dir():
+        raise UserError(f"{path}: is a folder, expected an FMU")
+    try:
+        check_archive(path)
+        description = fmpy.read_model_description(path)
+        platforms = fmpy.supported_platforms(path)
+    except UnreadableError as error:
+        raise UserError(f"{path}: {error}") from None
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {reason(error)}") from error
+    except BadZipFile:
+        raise UserError(f"{path}: not an FMU, which is a zip archive") from None
+    except KeyError:
+        raise UserError(f"{path}: not an FMU, it has no modelDescription.xml") from None
+    except Exception as error:  # fmpy, lxml and zlib raise what they like for damaged content
+        raise UserError(f"{path}: wrong modelDescription.xml: {one_line(error)}") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        found = f"FMI {description.fmiVersion}"
+        found += " for model exchange" if description.modelExchange else ""
+        raise UserError(f"{path}: expected an FMU of FMI 2.0 for co-simulation, found {found}")
+    identifier = description.coSimulation.modelIdentifier
+    if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
+        raise UserError(f"{path}: expected a C identifier as modelIdentifier, found {identifier!r}")
+    if fmpy.platform not in platforms:
+        raise UserError(
+            f"{path}: has no binary for {fmpy.platform} (has: {', '.join(platforms) or 'none'})"
+        )
+    try:
+        return description, described(description)
+    except ValueError as error:
+        raise UserError(f"{path}: wrong modelDescription.xml: {one_line(error)}") from error

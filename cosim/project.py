@@ -1,0 +1,121 @@
+"""Where everything is: no other module of cosim knows the project's folders and file names.
+
+models/MODEL/scenarios/NAME.toml        a scenario
+models/MODEL/convergence/NAME.toml      a problem for the order of convergence, of that format
+models/MODEL/references/NAME/           the reference of the scenario or problem
+models/MODEL/references/scales.toml     sums that errors are divided by, instead of maxima
+models/SYSTEM/SystemStructure.ssd       connects models to a system
+models/SYSTEM/references/VARIANT/       the references of a variant of the system
+models/SYSTEM/study.py                  what to measure, draw and study there
+build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
+                                        to case and underscores
+build/report/                           what the commands write
+"""
+
+from pathlib import Path
+
+from cosim.errors import UserError, did_you_mean
+
+ROOT = Path(__file__).resolve().parents[1]
+
+STRUCTURE = "SystemStructure.ssd"
+STUDY = "study"  # the module of a system's folder that cosim.system.study describes
+SCALES = "scales.toml"
+SCENARIO_FOLDERS = ("scenarios", "convergence")
+
+
+def scenario_files() -> dict[str, Path]:
+    """All scenarios by name.
+
+    Raises
+    ------
+    UserError
+        If two scenarios have the same name.
+    """
+    found: dict[str, Path] = {}
+    for path in sorted(ROOT.glob("models/*/scenarios/*.toml")):
+        if path.stem in found:
+            raise UserError(f"{path}: the name {path.stem!r} is taken by {found[path.stem]}")
+        found[path.stem] = path
+    return dict(sorted(found.items()))
+
+
+def scenario_file(name: str) -> Path:
+    """The scenario called `name`; if there is none, a UserError lists the known ones."""
+    found = scenario_files()
+    if name not in found:
+        known = ", ".join(found) or "none"
+        raise UserError(f"no scenario {name!r}{did_you_mean(name, found)} (known: {known})")
+    return found[name]
+
+
+def convergence_files() -> list[Path]:
+    """All problems for the order of convergence."""
+    return sorted(ROOT.glob("models/*/convergence/*.toml"))
+
+
+def model_folder(scenario: Path) -> Path:
+    """Folder of the model that a scenario or problem belongs to.
+
+    Raises
+    ------
+    UserError
+        If the file is in no such folder.
+    """
+    folder = scenario.absolute().parent
+    if folder.name not in SCENARIO_FOLDERS:
+        raise UserError(f"{scenario}: expected in models/MODEL/scenarios/")
+    return folder.parent
+
+
+def references(folder: Path) -> Path:
+    """Folder of all references of a model or system."""
+    return folder / "references"
+
+
+def reference_folder(scenario: Path) -> Path:
+    """Folder of the reference of a scenario or problem."""
+    return references(model_folder(scenario)) / scenario.stem
+
+
+def making_references(folder: Path, name: str) -> str:
+    """How to make the reference called `name` of a model or system again, for messages."""
+    # relative to the project's folder, in which its documentation gives all commands
+    script = f"models/{folder.name}/references/make_references.py {name}"
+    return f"to make it again: build/venv/bin/python {script}"
+
+
+def system_folder() -> Path:
+    """Folder of the system.
+
+    Raises
+    ------
+    UserError
+        If there is not exactly one.
+    """
+    found = sorted(path.parent for path in ROOT.glob(f"models/*/{STRUCTURE}"))
+    if len(found) != 1:
+        names = ", ".join(folder.name for folder in found) or "none"
+        raise UserError(f"{ROOT / 'models'}: expected one folder with {STRUCTURE}, found {names}")
+    return found[0]
+
+
+def built(folder: Path, suffix: str) -> Path:
+    """What has been built from the folder of a model (.fmu) or system (.ssp).
+
+    Raises
+    ------
+    UserError
+        If it is not there.
+    """
+    name = folder.name.replace("_", "").lower()
+    for path in sorted((ROOT / "build").glob(f"*{suffix}")):
+        if path.stem.lower() == name:
+            return path
+    kind = suffix.removeprefix(".").upper()
+    raise UserError(f"{ROOT / 'build'}: has no {kind} of {folder.name}, ./run.sh builds it")
+
+
+def report_folder(part: str = "") -> Path:
+    """Where the commands write if no other folder is given."""
+    return ROOT / "build" / "report" / part

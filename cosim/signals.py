@@ -1,0 +1,62 @@
+"""Inputs as functions of time, as scenarios give them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same value at all times."""
+
+    value: float
+
+    def values(self, elapsed: np.ndarray) -> np.ndarray:
+        """Values at `elapsed` seconds after the start, (n,)."""
+        return np.full(len(elapsed), self.value)
+
+
+@dataclass(frozen=True)
+class Sines:
+    """A smooth signal: offset + sum of amplitude sin(2 pi frequency t + phase)."""
+
+    offset: float
+    terms: tuple[tuple[float, float, float], ...]  # amplitude, frequency (Hz), phase (rad)
+
+    def values(self, elapsed: np.ndarray) -> np.ndarray:
+        """Values at `elapsed` seconds after the start, (n,)."""
+        # numpy's sine of doubles depends on the processor; that of long doubles, rounded, does not
+        t = elapsed.astype(np.longdouble)
+        total = np.full(len(t), self.offset, t.dtype)
+        for amplitude, frequency, phase in self.terms:
+            total += amplitude * np.sin(2 * np.pi * frequency * t + phase)
+        return total.astype(np.float64)
+
+    def derivative(self, elapsed: np.ndarray, order: int) -> np.ndarray:
+        """Derivative of an order at `elapsed` seconds after the start, (n,); order 0: the value.
+
+        Exact but for one rounding, unlike `values`, whose pi is a double: what the exact final
+        states of the convergence problems are compared with.
+        """
+        pi = np.arctan2(np.longdouble(0), np.longdouble(-1))
+        t = np.asarray(elapsed, dtype=np.longdouble)
+        total = np.full(t.shape, self.offset if order == 0 else 0.0, t.dtype)
+        for amplitude, frequency, phase in self.terms:
+            omega = 2 * pi * np.longdouble(frequency)
+            total += amplitude * omega**order * np.sin(omega * t + phase + order * pi / 2)
+        return total.astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Linear between points, constant before the first and after the last."""
+
+    points: tuple[tuple[float, float], ...]  # s since the start, value; in order of time
+
+    def values(self, elapsed: np.ndarray) -> np.ndarray:
+        """Values at `elapsed` seconds after the start, (n,)."""
+        times, values = np.array(self.points).T
+        return np.interp(elapsed, times, values)
+
+
+Signal = Constant | Sines | Table

@@ -1,0 +1,52 @@
+"""What only the folder of a system knows: its measures, its picture, the study of its coupling.
+
+The folder has a module study.py with the names of `Study`; `load` gives it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+from matplotlib.figure import Figure
+
+from cosim import project
+from cosim.errors import UserError
+from cosim.input_files import is_file
+from cosim.system.comparison import Outcome
+from cosim.system.ssp import Ssp
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number that a run is measured by, for the tables."""
+
+    name: str
+    unit: str
+    meaning: str  # explains it on the page, after its name and a colon
+    value: Callable[[Outcome], float]
+
+
+class Study(Protocol):
+    """The module study.py of a system's folder."""
+
+    EXPERIMENT: tuple[float, float, float]  # start, stop and step in s that the references are for
+    MEASURES: Sequence[Measure]
+    PICTURE: str  # what `figure` shows, in place of the picture
+
+    def figure(self, ssp: Ssp, outcome: Outcome) -> Figure:
+        """Picture of a run of one variant."""
+        ...
+
+    def study_coupling(self, ssp: Path, report: Path) -> bool:
+        """Study what the coupling costs, print tables, write pictures; whether all is well."""
+        ...
+
+
+def load(folder: Path) -> Study:
+    """The module of a system's folder; UserError if there is none."""
+    file = folder / f"{project.STUDY}.py"
+    if not is_file(file):
+        raise UserError(f"{file}: no such file, cosim/system/study.py says what belongs in it")
+    return cast(Study, import_module(f"models.{folder.name}.{project.STUDY}"))

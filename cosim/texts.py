@@ -1,0 +1,24 @@
+"""Numbers and verdicts as text, the same on the console, on pages and in pictures."""
+
+from collections.abc import Sized
+
+
+def short(number: float) -> str:
+    """1e-8 for 1e-08."""
+    mantissa, exponent = f"{number:.3e}".split("e")
+    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
+
+
+def milliseconds(seconds: float) -> str:
+    """2 ms for 0.002."""
+    return f"{1e3 * seconds:.6g} ms"
+
+
+def counted(things: Sized, name: str) -> str:
+    """1 scenario, 2 scenarios."""
+    return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")
+
+
+def verdict(passed: bool) -> str:
+    """What a check says of itself."""
+    return "passed" if passed else "FAILED"

@@ -1,0 +1,85 @@
+"""Trajectories as CSV files in the layout of the FMI cross-check."""
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cosim.input_files import UnreadableError, read_text
+from cosim.output_files import whole
+
+LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
+
+# What to raise, from what is wrong with the file and the number of the line, if there is one.
+Failure = Callable[[str, int | None], Exception]
+
+
+def write(path: Path, times: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
+    """Write trajectories with 17 significant digits; the file appears complete or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        Its folder exists.
+    times : ndarray, shape (rows,)
+        s.
+    names : sequence of str
+        One name per column of `values`.
+    values : ndarray, shape (rows, len(names))
+        In the variables' units.
+    """
+    header = ",".join(f'"{name}"' for name in ("time", *names))
+    with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+        table = np.column_stack((times, values))
+        np.savetxt(file, table, fmt="%.17g", delimiter=",", header=header, comments="")
+
+
+def read(path: Path, failure: Failure) -> tuple[tuple[str, ...], np.ndarray]:
+    """Read trajectories as `write` writes them.
+
+    Returns
+    -------
+    names : tuple of str
+        Of all columns; the first is "time".
+    table : ndarray, shape (rows, len(names))
+        At least one row; finite.
+    """
+    try:
+        text = read_text(path, LARGEST)
+    except UnreadableError as error:
+        raise failure(str(error), None) from None
+    except UnicodeDecodeError:
+        raise failure("not a text file", None) from None
+    if not text:
+        raise failure("is empty", None)
+    if not text.endswith("\n"):
+        raise failure("is cut off in the middle", text.count("\n") + 1)
+    lines = text.splitlines()
+    try:
+        names = tuple(next(csv.reader(lines[:1])))
+    except csv.Error as error:
+        raise failure(f"not a header: {error}", 1) from None
+    if not names or names[0] != "time":
+        found = f"{names[0]:.40}" if names else ""
+        raise failure(f"expected a header whose first column is 'time', found {found!r}", 1)
+    rows = [
+        _numbers(row.split(","), len(names), line, failure)
+        for line, row in enumerate(lines[1:], start=2)
+    ]
+    if not rows:
+        raise failure("has no values", 1)
+    return names, np.array(rows)
+
+
+def _numbers(row: list[str], columns: int, line: int, failure: Failure) -> list[float]:
+    if len(row) != columns:
+        raise failure(f"expected {columns} values, found {len(row)}", line)
+    try:
+        values = [float(literal) for literal in row]
+    except ValueError as error:
+        raise failure(f"expected numbers, {error}", line) from None
+    if not all(map(math.isfinite, values)):
+        raise failure("expected finite numbers", line)
+    return values

@@ -1,0 +1,124 @@
+"""The picture of the study: errors, energy, delays, and the controlled steps."""
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+from cosim.report.style import DASHED, GRID, INK, MUTED, STYLE
+from cosim.texts import short
+from models.closed_loop.coupling.delays import Tracking
+from models.closed_loop.coupling.step_doubling import LOCAL, Doubling
+from models.closed_loop.coupling.step_errors import StepErrors
+
+COLORS = ("#d1793a", "#1d4e79", "#b0435f", "#2f8f83")
+
+
+def figure(study: StepErrors, tracking: Sequence[Tracking], doubling: Sequence[Doubling]) -> Figure:
+    """Errors over step and calls, energy, the delays' prediction, and the controlled steps."""
+    with mpl.rc_context(STYLE):
+        picture = Figure(figsize=(15, 8.6), layout="constrained")
+        picture.get_layout_engine().set(w_pad=0.1, h_pad=0.08, hspace=0.04, wspace=0.04)
+        axes = picture.subplots(2, 3)
+        _by_step(axes[0, 0], study, study.errors, "Error against step")
+        axes[0, 0].set_ylabel("largest relative error of the arm's states")
+        _by_step(axes[0, 1], study, np.abs(study.energies), "Energy from the coupling")
+        axes[0, 1].set_ylabel("|energy that the coupling adds| (J)")
+        _by_calls(axes[0, 2], study)
+        _delays(axes[1, 0], tracking)
+        _lengths(axes[1, 1], doubling)
+        _local_errors(axes[1, 2], doubling)
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        picture.legend(handles, labels, loc="outside upper center", ncols=len(handles))
+    return picture
+
+
+def _title(axes: Axes, text: str) -> None:
+    axes.set_title(text, loc="left", fontsize=12, weight="bold")
+
+
+def _by_step(axes: Axes, study: StepErrors, values: np.ndarray, title: str) -> None:
+    for i, (method, row) in enumerate(zip(study.methods, values, strict=True)):
+        label = method.name if title.startswith("Error") else None
+        axes.loglog(study.steps, row, "o-", color=COLORS[i], markeredgecolor="white", label=label)
+        slope = study.slopes(values)[i]
+        axes.annotate(
+            f"{slope:.2f}",
+            (study.steps[0], row[0]),
+            xytext=(6, -3),
+            textcoords="offset points",
+            color=COLORS[i],
+        )
+    axes.xaxis.set_major_locator(FixedLocator(study.steps))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda step, _: f"{1e3 * step:g}"))
+    axes.set_xlim(study.steps.min() / 1.2, study.steps.max() * 1.6)
+    axes.set_xlabel("communication step (ms); slopes at the right")
+    _title(axes, title)
+
+
+def _by_calls(axes: Axes, study: StepErrors) -> None:
+    for i, row in enumerate(study.errors):
+        axes.loglog(study.calls[i], row, "o-", color=COLORS[i], markeredgecolor="white")
+    axes.xaxis.set_major_locator(FixedLocator(study.calls[0]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda calls, _: f"{calls:.0f}"))
+    axes.set_xlabel("calls of fmi2DoStep")
+    axes.set_ylabel("largest relative error of the arm's states")
+    _title(axes, "Error against calls")
+
+
+def _delays(axes: Axes, tracking: Sequence[Tracking]) -> None:
+    colors = (COLORS[0], COLORS[1], "#7a5195")
+    for t, color in zip(tracking, colors, strict=True):
+        name = t.method.name.replace(", held", ", controller first")
+        name = name.replace("Gauss-Seidel", "G.-S.") if "Gauss" in name else "Jacobi"
+        axes.semilogy(t.times, np.maximum(t.measured, 1e-9), color=color, label=name, linewidth=2.5)
+        axes.semilogy(t.times, np.maximum(t.predicted, 1e-9), color=INK, linestyle=(0, (2, 3)))
+    axes.plot([], [], color=INK, linestyle=(0, (2, 3)), label="predicted by the delays")
+    axes.set_ylim(3e-8, 6e-3)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("error of the end effector (m)")
+    axes.legend(loc="upper left", fontsize=8.5, ncols=2)
+    _title(axes, f"Circle, inputs held, {1e3 * tracking[0].step:g} ms")
+
+
+def _lengths(axes: Axes, doubling: Sequence[Doubling]) -> None:
+    speed = axes.twinx()
+    speed.fill_between(doubling[-1].run.times, np.abs(doubling[-1].speed), color=GRID, linewidth=0)
+    speed.set_ylabel("|dq1| (rad/s), shaded")
+    speed.grid(False)
+    axes.set_zorder(speed.get_zorder() + 1)
+    axes.patch.set_visible(False)
+    for d, color in zip(doubling, COLORS, strict=False):
+        times, lengths = d.run.times, np.diff(d.run.times)
+        label = f"tolerance {short(d.tolerance)}: {d.run.accepted} steps"
+        axes.stairs(1e3 * lengths, times, color=color, baseline=None, linewidth=1.6, label=label)
+    axes.set_yscale("log")
+    axes.set_ylim(top=3e3)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("step (ms)")
+    axes.legend(loc="upper right", fontsize=8.5)
+    _title(axes, "Step doubling")
+
+
+def _local_errors(axes: Axes, doubling: Sequence[Doubling]) -> None:
+    for d, color in zip(doubling, COLORS, strict=False):
+        error = np.maximum(d.local / d.tolerance, 1e-4)
+        axes.semilogy(d.run.times[1:], error, ".", color=color, markersize=5)
+        axes.semilogy(
+            d.run.times[1:], np.maximum(d.run.estimates / d.tolerance, 1e-4), "_", color=color,
+            alpha=0.5, markersize=4,
+        )  # fmt: skip
+    axes.axhline(LOCAL, color=MUTED, linestyle=DASHED, label="bound")
+    axes.axhline(1, color=INK, linewidth=1.0, label="tolerance")
+    axes.plot([], [], ".", color=MUTED, label="measured")
+    axes.plot([], [], "_", color=MUTED, label="estimated")
+    axes.set_ylim(1e-4, 20)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("local error / tolerance")
+    axes.legend(loc="lower right", fontsize=8.5, ncols=2)
+    _title(axes, "Local error of the accepted steps")

@@ -1,0 +1,80 @@
+"""The study as tables of text, with verdicts."""
+
+import numpy as np
+
+from cosim.texts import short, verdict
+from models.closed_loop.coupling.delays import LARGEST_ERROR, Tracking, tracking_passed
+from models.closed_loop.coupling.payload import Payload
+from models.closed_loop.coupling.step_doubling import Doubling
+from models.closed_loop.coupling.step_errors import StepErrors
+
+
+def step_error_lines(study: StepErrors) -> list[str]:
+    """Errors, calls and energies over the step."""
+    steps = "".join(f"{1e3 * step:>8g} ms" for step in study.steps)
+    width = max(len(method.name) for method in study.methods)
+    blocks = (
+        ("error of the arm's states", study.errors),
+        ("energy from the coupling, J", study.energies),
+    )
+    lines = []
+    for title, values in blocks:
+        head = f"{title:<{width}} {steps}  slope  result"
+        lines += [head, "-" * len(head)]
+        for i, (method, row) in enumerate(zip(study.methods, values, strict=True)):
+            cells = "".join(f"{value:>11.2e}" for value in row)
+            slope = study.slopes(values)[i]
+            good = verdict(method.expects(slope))
+            lines.append(f"{method.name:<{width}}  {cells}  {slope:>5.2f}  {good}")
+        lines.append("")
+    calls = "".join(f"{count:>11}" for count in study.calls[0])
+    return [*lines, f"{'calls of fmi2DoStep':<{width}}  {calls}"]
+
+
+def tracking_lines(tracking: list[Tracking]) -> list[str]:
+    """End effector's error by order of stepping."""
+    title = f"end effector on the circle, {1e3 * tracking[0].step:g} ms"
+    head = f"{title:<34}  {'measured':>11}  {'predicted':>11}  deviation  result"
+    lines = [head, "-" * len(head)]
+    for t in tracking:
+        good = verdict(t.predicts)
+        lines.append(
+            f"{t.method.name:<34}  {t.largest:>9.3e} m  {t.predicted.max():>9.3e} m"
+            f"  {100 * t.deviation:>7.1f} %  {good}"
+        )
+    passed = tracking_passed(tracking)
+    text = f"Jacobi below {LARGEST_ERROR:g} m, Gauss-Seidel smaller, all as predicted"
+    return [*lines, f"{text}: {verdict(passed)}"]
+
+
+def payload_lines(payload: Payload) -> list[str]:
+    """Errors with a payload that the controller does not know."""
+    title = "unknown payload, 1 ms, Jacobi"
+    head = f"{title:<34}  {'on circle':>11}  {'held: q1':>13}  {'q2':>13}"
+    lines = [head, "-" * len(head)]
+    for name, largest in payload.largest.items():
+        q1, q2 = payload.held[name]
+        lines.append(f"{name:<34}  {largest:>9.3e} m  {q1:>9.2e} rad  {q2:>11.2e} m")
+    q1, q2 = payload.theory
+    lines.append(f"{'theory without integral action':<34}  {'':>11}  {q1:>9.2e} rad  {q2:>11.2e} m")
+    return [*lines, f"constant as in theory, removed: {verdict(payload.passed)}"]
+
+
+def doubling_lines(doubling: list[Doubling]) -> list[str]:
+    """Step doubling against fixed steps."""
+    head = (
+        "step doubling, tolerance  accepted  rejected  calls  largest/median local error  "
+        "global error  fixed: steps   calls  fewer steps, calls  result"
+    )
+    lines = [head, "-" * len(head)]
+    for d in doubling:
+        local = d.local.max() / d.tolerance, np.median(d.local[~d.run.limited]) / d.tolerance
+        fewer = d.fixed_steps / d.run.accepted, d.fixed_calls / d.run.do_steps
+        ratio = f"{local[0]:.2f} / {local[1]:.2f} tolerance"
+        lines.append(
+            f"{short(d.tolerance):>24}  {d.run.accepted:>8}  {d.run.rejected:>8}"
+            f"  {d.run.do_steps:>5}  {ratio:>26}  {d.error:>12.2e}"
+            f"  {d.fixed_steps:>12}  {d.fixed_calls:>6}  {fewer[0]:>11.1f}, {fewer[1]:>5.1f}"
+            f"  {verdict(d.passed)}"
+        )
+    return lines

@@ -1,0 +1,30 @@
+"""cosim drives any FMU: it names no model."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.support.cosim_project import FMUS, declared
+from tests.support.paths import ROOT
+
+SOURCES = sorted(path for path in (ROOT / "cosim").rglob("*") if path.suffix in (".py", ".html"))
+SOLVER = {"time", "solver_steps", "solver_rhs_evaluations"}  # of every model with states
+# words of English, letters and an argument of Ecos that are names of variables too
+WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
+WORDS |= {"start_time"}
+
+
+@pytest.fixture(scope="module")
+def names() -> set[str]:
+    """Names of models, FMUs, systems and variables."""
+    found = {*FMUS, *(fmu.stem for fmu in FMUS.values()), "closed_loop", "ClosedLoop"}
+    for model in FMUS:
+        found |= set(declared(model).variables) - SOLVER - WORDS
+    assert {"q1", "tau1", "Kp1", "q1_ref", "kinetic_energy"} <= found
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_model_is_named(path: Path, names: set[str]) -> None:
+    assert names.intersection(re.findall(r"\w+", path.read_text(encoding="utf-8"))) == set()
