@@ -137,14 +137,14 @@ def test_omsimulator_finds_what_it_needs() -> None:
     with ssp.unpacked(SSP) as opened:
         step = opened.system.step
         root = etree.parse(opened.folder / STRUCTURE).getroot()
-    types = [node.get("type") for node in root.iterfind(".//ssd:Component", ssp.NAMESPACES)]
+    types = [node.get("type") for node in root.iterfind(".//ssd:Component", NAMESPACES)]
     assert types == ["application/x-fmu-sharedlibrary"] * len(FMUS)
-    system = root.find("ssd:System", ssp.NAMESPACES)
+    system = root.find("ssd:System", NAMESPACES)
     assert system is not None
     assert system[-1].tag.endswith("}Annotations")
     masters = root.xpath(
         "//ssc:Annotation[@type='org.openmodelica']//*[local-name()='FixedStepMaster']",
-        namespaces=ssp.NAMESPACES,
+        namespaces=NAMESPACES,
     )
     assert [float(master.get("stepSize")) for master in masters] == [step]
 
