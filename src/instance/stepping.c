@@ -34,29 +34,13 @@ enum status instance_rhs(double t, const double x[], double dx[], void *instance
         instance->memory.held, instance->state.restart_time.s + t, x, instance->work, dx);
 }
 
-/* Column by column: derivatives along each state. */
 enum status instance_jacobian(double t, const double x[], double J[], void *instance_pointer) {
-    struct instance *instance = instance_pointer;
-    const struct model *model = instance->model;
-    const double time = instance->state.restart_time.s + t;
-    const size_t n = count_of(model->states);
-    char *point = instance->second;
+    const struct instance *instance = instance_pointer;
     if (instance->inputs_move) {
         evaluate_inputs(instance, t);
     }
-    memcpy(point, instance->memory.held, model->values_size);
-    memcpy(doubles_of(point, model->states), x, model->states.size);
-    if (model->inputs.size > 0) {
-        memcpy(doubles_of(point, model->inputs), instance->work, model->inputs.size);
-    }
-    enum status status = model->outputs(point, time);
-    for (size_t j = 0; j < n && status == STATUS_OK; j++) {
-        memset(instance->first, 0, model->values_size);
-        doubles_of(instance->first, model->states)[j] = 1.0;
-        status = model->propagate(point, time, 0.0, instance->first, NULL);
-        memcpy(&J[n * j], doubles_of(instance->first, model->derivatives), n * sizeof(double));
-    }
-    return status;
+    return instance->model->jacobian(instance->memory.held, instance->state.restart_time.s + t, x,
+                                     instance->work, J);
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
