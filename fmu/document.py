@@ -17,12 +17,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from formula import FormulaError, mathml
+from atomic_write import atomic_write
+from latex_to_mathml import FormulaError, mathml
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from mdit_py_plugins.anchors import anchors_plugin
 from mdit_py_plugins.dollarmath import dollarmath_plugin
-from whole import whole
 
 STYLE_SHEET = Path(__file__).with_suffix(".css")
 
@@ -73,7 +73,7 @@ def readme_page(readme: Path) -> tuple[str, list[Path]]:
     Returns
     -------
     tuple of str and list of Path
-        the HTML, and the local images it refers to by their name alone.
+        the HTML, and the local images, which it refers to by their names.
     """
 
     def formula(latex: str, options: dict[str, bool]) -> str:
@@ -193,9 +193,9 @@ def document(readme: Path, model_description: Path, output: Path) -> None:
 """
     output.mkdir(parents=True, exist_ok=True)
     for image in images:
-        with whole(output / image.name) as temporary:
+        with atomic_write(output / image.name) as temporary:
             shutil.copyfile(image, temporary)
-    with whole(output / "index.html") as temporary:
+    with atomic_write(output / "index.html") as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
 
 

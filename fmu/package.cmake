@@ -22,12 +22,14 @@ function(add_fmu name)
 
   # tables and model description, again whenever a declaration changes
   file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
+  list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
+                        ${FMU_SOURCE_DIR}/atomic_write.py)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
-            --output ${out} --version ${PROJECT_VERSION}
-    DEPENDS ${folder}/variables.toml ${shared_variables} ${FMU_SOURCE_DIR}/generate.py
-            ${FMU_SOURCE_DIR}/description.py ${FMU_SOURCE_DIR}/whole.py
+            --output ${out} --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE
+    DEPENDS ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})
@@ -57,8 +59,8 @@ function(add_fmu name)
             --readme ${folder}/README.md --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
-            ${FMU_SOURCE_DIR}/formula.py ${FMU_SOURCE_DIR}/whole.py ${folder}/README.md
-            ${pictures} ${out}/modelDescription.xml
+            ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py
+            ${folder}/README.md ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
@@ -74,7 +76,8 @@ function(add_fmu name)
             documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
             documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
     DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
-            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/whole.py
+            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
+            ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Packing ${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
@@ -103,7 +106,7 @@ function(add_ssp name)
   add_custom_command(
     OUTPUT ${ssp}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${ssp} ${entries}
-    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/whole.py
+    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py
     COMMENT "Packing ${name}.ssp"
     VERBATIM)
   add_custom_target(${name}_ssp ALL DEPENDS ${ssp})

@@ -1,4 +1,4 @@
-"""Packs an FMU: a zip archive whose bytes depend on the contents of its files alone."""
+"""Packs an FMU: a zip archive whose bytes depend only on the contents of its files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 import zipfile
 from pathlib import Path
 
-from whole import whole
+from atomic_write import atomic_write
 
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
@@ -32,7 +32,7 @@ def collect(entries: list[str]) -> dict[str, Path]:
 def pack(archive: Path, files: dict[str, Path]) -> None:
     """Write the archive to a temporary name and rename it, so that a broken one never stays."""
     with (
-        whole(archive) as temporary,
+        atomic_write(archive) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
     ):
         for name in sorted(files):

@@ -21,7 +21,7 @@ README = MODEL / "README.md"
 SVG = "{http://www.w3.org/2000/svg}"
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from formula import FormulaError, mathml
+from latex_to_mathml import FormulaError, mathml
 
 
 def run_document(

@@ -1,20 +1,27 @@
-"""The generator: what it writes, that a variable is declared in one place, what it refuses."""
+"""The generator: what it writes, and that a variable is declared in one place."""
 
 import os
 import re
-import shutil
 import subprocess
-import sys
 import tomllib
 import xml.etree.ElementTree as ET
+from datetime import datetime
 from pathlib import Path
 
+import fmpy
 import pytest
+from lxml import etree
 
+from tests.support.generator import (
+    VARIABLES,
+    change,
+    copied,
+    generate,
+    generated,
+    scalars,
+    unknowns,
+)
 from tests.support.paths import ROOT
-
-MODEL = ROOT / "models" / "rp_manipulator"
-VARIABLES = MODEL / "variables.toml"
 
 # the table of variables that users rely on: name -> (value reference, causality, unit)
 PUBLISHED = """
@@ -34,19 +41,6 @@ max_step 91 parameter s
 """
 
 
-def generate(variables: Path, output: Path) -> subprocess.CompletedProcess[str]:
-    """Run the generator as the build does."""
-    command = [sys.executable, ROOT / "fmu" / "generate.py", variables, "--output", output]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def generated(variables: Path, output: Path) -> ET.Element:
-    """Run the generator and parse the model description."""
-    result = generate(variables, output)
-    assert result.returncode == 0, result.stderr
-    return ET.parse(output / "modelDescription.xml").getroot()
-
-
 @pytest.fixture(scope="module")
 def description(tmp_path_factory: pytest.TempPathFactory) -> ET.Element:
     """Model description of the manipulator."""
@@ -55,18 +49,14 @@ def description(tmp_path_factory: pytest.TempPathFactory) -> ET.Element:
 
 @pytest.fixture
 def model_copy(tmp_path: Path) -> Path:
-    """A copy of what the generator reads, to be changed; the path of its variables.toml."""
-    (tmp_path / "src" / "instance").mkdir(parents=True)
-    for shared in (ROOT / "src" / "instance").glob("*.toml"):
-        shutil.copy(shared, tmp_path / "src" / "instance")
-    folder = tmp_path / "models" / "rp_manipulator"
-    folder.mkdir(parents=True)
-    return Path(shutil.copy(VARIABLES, folder))
+    """variables.toml of a copy of the manipulator."""
+    return copied("rp_manipulator", tmp_path)
 
 
-def scalars(root: ET.Element) -> dict[str, ET.Element]:
-    """Map the name of each variable to its element."""
-    return {v.get("name", ""): v for v in root.iterfind("ModelVariables/ScalarVariable")}
+@pytest.fixture
+def trajectory(tmp_path: Path) -> Path:
+    """variables.toml of a copy of the reference motions, which have two enumerations."""
+    return copied("rp_trajectory", tmp_path)
 
 
 def test_the_published_interface_stays(description: ET.Element) -> None:
@@ -121,19 +111,42 @@ def test_derivatives_point_at_their_states(description: ET.Element) -> None:
         for name, v in scalars(description).items()
         if v[0].get("derivative")
     }
-    assert derivatives == {"dq1": "q1", "dq2": "q2", "ddq1": "dq1", "ddq2": "dq2"}
-    listed = [u.get("index") for u in description.iterfind("ModelStructure/Derivatives/Unknown")]
-    assert [variables[int(index) - 1] for index in listed] == list(derivatives)
+    aliases = {"der_q1": "q1", "der_q2": "q2"}
+    accelerations = {"ddq1": "dq1", "ddq2": "dq2"}
+    assert derivatives == {"dq1": "q1", "dq2": "q2"} | aliases | accelerations
+    assert unknowns(description, "Derivatives") == [*aliases, *accelerations]
+
+
+def test_states_that_are_derivatives_have_aliases(description: ET.Element) -> None:
+    """Importers expect each of Derivatives among InitialUnknowns, where no state may be."""
+    variables = scalars(description)
+    for alias, state in (("der_q1", "dq1"), ("der_q2", "dq2")):
+        wanted = dict(variables[state][0].attrib)
+        assert wanted.pop("start") == "0.0"
+        assert variables[alias][0].attrib == wanted
+        assert variables[alias].get("valueReference") == variables[state].get("valueReference")
+        assert variables[alias].get("causality") == "local"
+        assert variables[alias].get("initial") == "calculated"
+    assert set(unknowns(description, "Derivatives")) <= {*unknowns(description, "InitialUnknowns")}
+    references = [v.get("valueReference") for v in variables.values()]
+    assert len(references) - len(set(references)) == 2
+
+
+def test_an_alias_depends_on_its_state(description: ET.Element) -> None:
+    names = list(scalars(description))
+    for section in ("Derivatives", "InitialUnknowns"):
+        for unknown in description.iterfind(f"ModelStructure/{section}/Unknown"):
+            name = names[int(unknown.get("index")) - 1]
+            if name.startswith("der_"):
+                known = names[int(unknown.get("dependencies")) - 1]
+                assert known == name.replace("der_", "d")
 
 
 def test_outputs_are_listed_in_order(description: ET.Element) -> None:
     variables = scalars(description)
-    names = list(variables)
     expected = [n for n, v in variables.items() if v.get("causality") == "output"]
-    unknowns = description.findall("ModelStructure/Outputs/Unknown")
-    assert [names[int(u.get("index")) - 1] for u in unknowns] == expected
-    initial = description.findall("ModelStructure/InitialUnknowns/Unknown")
-    assert [names[int(u.get("index")) - 1] for u in initial] == expected[4:]
+    assert unknowns(description, "Outputs") == expected
+    assert unknowns(description, "InitialUnknowns") == ["der_q1", "der_q2", *expected[4:]]
 
 
 def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> None:
@@ -148,6 +161,52 @@ def test_units_are_defined_and_angles_have_degrees(description: ET.Element) -> N
     assert scalars(description)["q1"][0].get("displayUnit") == "deg"
 
 
+def test_log_categories_are_explained(description: ET.Element) -> None:
+    categories = description.findall("LogCategories/Category")
+    assert len(categories) == 6
+    assert all(category.get("description") for category in categories)
+
+
+def test_where_the_fmu_comes_from(tmp_path: Path) -> None:
+    root = generated(VARIABLES, tmp_path, "--version", "1.2.3", "--license", ROOT / "LICENSE")
+    assert root.get("version") == "1.2.3"
+    assert root.get("generationTool") == "RPManipulator 1.2.3"
+    assert root.get("license") == "BSD-3-Clause"
+    notice = root.get("copyright", "")
+    assert notice in (ROOT / "LICENSE").read_text().splitlines()
+    assert notice.endswith(f", {root.get('author')}")
+    assert "generationDateAndTime" not in root.attrib
+
+
+def test_the_date_is_that_of_the_sources(tmp_path: Path) -> None:
+    dated = generated(VARIABLES, tmp_path, SOURCE_DATE_EPOCH="1700000000")
+    assert dated.get("generationDateAndTime") == "2023-11-14T22:13:20+00:00"
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi2" / "fmi2ModelDescription.xsd"
+    etree.XMLSchema(file=schema).assertValid(etree.parse(tmp_path / "modelDescription.xml"))
+
+
+@pytest.mark.parametrize(
+    ("license_text", "epoch", "message"),
+    [
+        (None, "", "LICENSE: cannot be read"),
+        ("All rights reserved\n", "", "LICENSE: lacks 'NAME License'"),
+        ("MIT License\n", "", "'Copyright (c) YEAR, AUTHOR'"),
+        ("MIT License\nCopyright (c) 2026, Us\n", "soon", "SOURCE_DATE_EPOCH = 'soon'"),
+        ("MIT License\nCopyright (c) 2026, Us\n", "9" * 30, "is not a time in s"),
+    ],
+)
+def test_a_wrong_origin_is_named(
+    tmp_path: Path, license_text: str | None, epoch: str, message: str
+) -> None:
+    if license_text is not None:
+        (tmp_path / "LICENSE").write_text(license_text)
+    options = ("--license", tmp_path / "LICENSE")
+    result = generate(VARIABLES, tmp_path / "out", *options, SOURCE_DATE_EPOCH=epoch)
+    assert result.returncode == 2
+    assert result.stderr.startswith("generate.py: ") and result.stderr.count("\n") == 1
+    assert message in result.stderr
+
+
 def test_the_same_bytes_every_time(tmp_path: Path) -> None:
     generated(VARIABLES, tmp_path / "first")
     generated(VARIABLES, tmp_path / "second")
@@ -157,11 +216,13 @@ def test_the_same_bytes_every_time(tmp_path: Path) -> None:
 
 def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> None:
     built = fmu.parent / "fmu" / "RPManipulator"
-    version = ET.parse(built / "modelDescription.xml").getroot().get("version", "")
-    generated(VARIABLES, tmp_path)
+    root = ET.parse(built / "modelDescription.xml").getroot()
+    date = root.get("generationDateAndTime")
+    epoch = str(int(datetime.fromisoformat(date).timestamp())) if date else ""
+    options = ("--version", root.get("version", ""), "--license", ROOT / "LICENSE")
+    generated(VARIABLES, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
     for name in ("modelDescription.xml", "variables.c", "value_references.h"):
-        fresh = (tmp_path / name).read_text().replace("0.0.0", version)
-        assert (built / name).read_text() == fresh
+        assert (built / name).read_text() == (tmp_path / name).read_text()
 
 
 def test_a_variable_added_to_the_toml_alone_is_built_in(model_copy: Path, tmp_path: Path) -> None:
@@ -173,7 +234,7 @@ def test_a_variable_added_to_the_toml_alone_is_built_in(model_copy: Path, tmp_pa
     root = generated(model_copy, tmp_path / "out")
     assert scalars(root)["lever"].get("valueReference") == "70"
     table = (tmp_path / "out" / "variables.c").read_text()
-    assert '{70, "lever", VARIABLE_REAL, VARIABLE_OF_MODEL' in table
+    assert '{70, "lever", VARIABLE_FLOAT64, VARIABLE_OF_MODEL' in table
     compile_table(tmp_path / "out")
 
 
@@ -222,107 +283,6 @@ def test_the_guid_follows_the_interface_and_not_the_texts(model_copy: Path, tmp_
     assert re.fullmatch(r"\{[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}\}", guids["same"])
 
 
-# what is replaced, by what, and what the message must say beside the file
-REFUSED = {
-    "reference_twice": ("reference = 2\n", "reference = 1\n", ["m2", "value reference 1 is m1's"]),
-    "reference_too_large": ("reference = 65", "reference = 70000", ["tau2_y", "from 0 to 9999"]),
-    "reference_text": ("reference = 65", 'reference = "65"', ["tau2_y", "reference = '65'"]),
-    "reference_true": ("reference = 65", "reference = true", ["tau2_y", "reference = True"]),
-    "misspelt_key": ("causality", "causalty", ["m1", "unknown key 'causalty'"]),
-    "missing_field": ('field = "parameters.m1"\n', "", ["m1", "lacks field"]),
-    "unknown_causality": ('causality = "local"', 'causality = "lokal"', ["D11", "'lokal'"]),
-    "wrong_combination": ('variability = "tunable"', 'variability = "continuous"', ["m1"]),
-    "start_missing": ("start = 2.0\n", "", ["m1", "start is missing"]),
-    "start_not_allowed": ("dependencies = []", "", None),
-    "start_below_min": ("start = 2.0", "start = -1.0", ["m1", "outside [min, max]"]),
-    "start_nan": ("start = 2.0", "start = nan", ["m1", "not a finite number"]),
-    "unknown_unit": ('unit = "kg"', 'unit = "stone"', ["m1", "'stone'"]),
-    "unit_missing": ('unit = "kg"\n', "", ["m1", "lacks unit"]),
-    "unknown_dependency": ('dependencies = ["q1"]', 'dependencies = ["q9"]', ["q1", "'q9'"]),
-    "dependency_on_output": ('dependencies = ["q1"]', 'dependencies = ["ee_x"]', ["q1", "'ee_x'"]),
-    "no_dependencies": ('dependencies = ["q1"]\n', "", ["q1", "lacks dependencies"]),
-    "no_such_state": ('derivative_of = "q1"', 'derivative_of = "q0"', ["dq1", "'q0'"]),
-    "no_parameter": ('parameters = ["l1", "a"]', 'parameters = ["q1"]', ["ee_x", "'q1'"]),
-    "wrong_type": ('unit = "kg"', 'unit = "kg"\ntype = "Boolean"', ["m1", "'Boolean'"]),
-    "model_missing": ("[model]", "[modell]", ["unknown key 'modell'"]),
-    "model_lacks": ('header = "rp_model.h"\n', "", ["[model] lacks header"]),
-    "not_an_identifier": ('name = "RPManipulator"', 'name = "RP arm"', ["C identifier"]),
-    "not_toml": ("[model]", "[model", ["is not valid TOML"]),
-    "no_such_include": ("time_variable.toml", "thyme.toml", ["thyme.toml", "cannot be read"]),
-    "wrong_base_unit": ('"N" = { kg = 1', '"N" = { pound = 1', ["unit N", "'pound'"]),
-    "include_number": ("include = [", "include = [1, ", ["include", "[1, "]),
-    "dependencies_nested": ('dependencies = ["q1"]', 'dependencies = [["q1"]]', ["q1"]),
-    "start_huge": ("start = 2.0", "start = 1" + "0" * 400, ["m1", "not a finite number"]),
-    "name_with_space": ("[variables.m1]", '[variables."m 1"]', ["m 1", "C identifier"]),
-    "name_with_dot": ("[variables.m1]", '[variables."arm.m1"]', ["arm.m1", "C identifier"]),
-    "name_of_a_macro": ("[variables.m1]", "[variables.GUID]", ["GUID", "reserved"]),
-    "tolerance_negative": ("tolerance = 1e-8", "tolerance = -1.0", ["[experiment]", "tolerance"]),
-    "stop_before_start": ("stop = 2.0", "stop = -2.0", ["[experiment]", "stop"]),
-    "step_zero": ("step = 0.001", "step = 0.0", ["[experiment]", "step"]),
-    "section_missing": ("[experiment]\n", "[units.x]\n", ["section [experiment] is missing"]),
-    "variable_no_table": ("[variables.m1]", "[variables]\nx = 1\n[variables.m1]", ["x", "table"]),
-    "unit_no_table": ("[units]", "[units]\nx = 1", ["unit x", "not a table of exponents"]),
-    "wrong_initial": ("start = 2.0", 'start = 2.0\ninitial = "approx"', ["m1", "not approx"]),
-    "nominal_zero": (
-        "start = 2.0",
-        "start = 2.0\nnominal = 0.0",
-        ["m1", "nominal must be above 0"],
-    ),
-    "integer_too_large": (
-        "[variables.m1]",
-        '[variables.n]\nreference = 99\nfield = "n"\ncausality = "parameter"\ntype = "Integer"\n'
-        'variability = "fixed"\nstart = 2147483648\ndescription = "N"\n[variables.m1]',
-        ["variable n", "not an integer of 32 bits"],
-    ),
-    "two_times": (
-        "[variables.m1]",
-        '[variables.t]\nreference = 99\nfield = "t"\ncausality = "independent"\n'
-        'variability = "continuous"\nunit = "s"\ndescription = "Time"\n[variables.m1]',
-        ["variable t", "independent variable already"],
-    ),
-    "declared_twice": ("[variables.m1]", "[variables.time]", ["time", "declared twice"]),
-}
-REFUSED["start_not_allowed"] = (
-    'field = "D[0][0]"',
-    'field = "D[0][0]"\nstart = 1.0',
-    ["D11", "start is not allowed"],
-)
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_a_wrong_file_is_refused_with_a_reason(model_copy: Path, tmp_path: Path, case: str) -> None:
-    old, new, words = REFUSED[case]
-    original = model_copy.read_text()
-    assert old in original
-    model_copy.write_text(original.replace(old, new, 1))
-    result = generate(model_copy, tmp_path / "out")
-    assert result.returncode == 2
-    assert len(result.stderr.splitlines()) == 1
-    for word in [".toml", *words]:
-        assert word in result.stderr
-    assert not (tmp_path / "out").exists()
-
-
-# Enumerations: the reference motions have two
-
-
-@pytest.fixture
-def trajectory(tmp_path: Path) -> Path:
-    """A copy of what the generator reads for RPTrajectory, as model_copy."""
-    (tmp_path / "src" / "instance").mkdir(parents=True)
-    for shared in (ROOT / "src" / "instance").glob("*.toml"):
-        shutil.copy(shared, tmp_path / "src" / "instance")
-    folder = tmp_path / "models" / "rp_trajectory"
-    folder.mkdir(parents=True)
-    return Path(shutil.copy(ROOT / "models" / "rp_trajectory" / "variables.toml", folder))
-
-
-def change(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-
-
 def test_an_enumeration_in_the_model_description(trajectory: Path, tmp_path: Path) -> None:
     root = generated(trajectory, tmp_path / "out")
     types = {t.get("name"): t for t in root.iterfind("TypeDefinitions/SimpleType")}
@@ -347,7 +307,7 @@ def test_an_enumeration_is_an_integer_in_the_table(trajectory: Path, tmp_path: P
     generated(trajectory, tmp_path / "out")
     table = (tmp_path / "out" / "variables.c").read_text()
     row = table.partition('{1, "motion", ')[2].partition("}")[0]
-    assert row.startswith("VARIABLE_INTEGER, VARIABLE_OF_MODEL, ")
+    assert row.startswith("VARIABLE_INT32, VARIABLE_OF_MODEL, ")
     assert "3.0, 1.0, 3.0, 1.0" in row  # start, min, max, nominal
     compile_table(tmp_path / "out", "rp_trajectory")
 
@@ -366,60 +326,6 @@ def test_items_belong_to_the_guid_and_their_texts_do_not(trajectory: Path, tmp_p
     assert guids[0] == guids[1] != guids[2]
 
 
-# what is replaced, by what, and what the message must say beside the file
-WRONG_ENUMERATIONS = {
-    "no_items": (
-        "[variables.branch.items]",
-        "[variables.other.items]",
-        ["branch", "an Enumeration needs [items.NAME]"],
-    ),
-    "empty_items": (
-        'field = "parameters.l1"',
-        'field = "parameters.l1"\ntype = "Enumeration"\nitems = {}',
-        ["l1", "an Enumeration needs [items.NAME]"],
-    ),
-    "items_of_a_real": (
-        'field = "parameters.l1"',
-        'field = "parameters.l1"\nitems.one = { constant = "ONE", description = "One" }',
-        ["l1", "items belong to an Enumeration"],
-    ),
-    "start_no_item": ('start = "circle"', 'start = "ellipse"', ["motion", "'ellipse'", "circle"]),
-    "start_number": ('start = "circle"', "start = 3", ["motion", "start = 3", "circle"]),
-    "start_missing": ('start = "circle"\n', "", ["motion", "start is missing"]),
-    "start_of_a_real": ("start = 0.1\n", 'start = "circle"\n', ["variable a", "finite number"]),
-    "constant_missing": (
-        '{ constant = "RP_TRAJECTORY_LINE", ',
-        "{ ",
-        ["motion", "item line", "lacks constant"],
-    ),
-    "constant_no_identifier": (
-        "RP_TRAJECTORY_LINE",
-        "RP TRAJECTORY LINE",
-        ["item line", "C identifier"],
-    ),
-    "description_missing": (
-        ', description = "The end effector moves along a circle"',
-        "",
-        ["item circle", "lacks description"],
-    ),
-    "item_no_table": ("line = {", "arc = 1\nline = {", ["motion", "item arc", "not a table"]),
-    "item_key_unknown": ("line = {", "line = { value = 2,", ["item line", "unknown key 'value'"]),
-    "own_minimum": ('start = "circle"', 'start = "circle"\nmin = 1', ["motion", "min and max"]),
-    "with_unit": ('start = "circle"', 'start = "circle"\nunit = "m"', ["motion", "no unit"]),
-}
-
-
-@pytest.mark.parametrize("case", WRONG_ENUMERATIONS)
-def test_a_wrong_enumeration_is_refused(trajectory: Path, tmp_path: Path, case: str) -> None:
-    old, new, words = WRONG_ENUMERATIONS[case]
-    change(trajectory, old, new)
-    result = generate(trajectory, tmp_path / "out")
-    assert result.returncode == 2
-    assert len(result.stderr.splitlines()) == 1
-    for word in [".toml", *words]:
-        assert word in result.stderr
-
-
 @pytest.mark.parametrize(
     ("old", "new", "word"),
     [
@@ -435,12 +341,6 @@ def test_a_constant_of_another_value_does_not_compile(
     generated(trajectory, tmp_path / "out")
     with pytest.raises(ValueError, match=word):
         compile_table(tmp_path / "out", "rp_trajectory")
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    result = generate(tmp_path / "none.toml", tmp_path / "out")
-    assert result.returncode == 2
-    assert "none.toml: cannot be read" in result.stderr
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")

@@ -1,4 +1,4 @@
-"""The packing of an FMU: its bytes depend on the contents of its files alone."""
+"""The packing of an FMU: its bytes depend only on the contents of its files."""
 
 import subprocess
 import sys

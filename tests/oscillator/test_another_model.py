@@ -1,4 +1,4 @@
-"""Another model, built by the same generator, slave and adapter from a folder of its own."""
+"""Another model, built from its folder by the same generator, instance and adapter."""
 
 import os
 from pathlib import Path

@@ -9,11 +9,8 @@ from pathlib import Path
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
-    """Temporary path to write to, which becomes `path` at the end and is removed on failure.
-
-    cosim/outputs.py has the same: neither of the two folders needs the other.
-    """
+def atomic_write(path: Path) -> Iterator[Path]:
+    """Temporary path to write to, which becomes `path` at the end and is removed on failure."""
     temporary = path.with_name(f".{os.getpid()}.{path.name}")
     try:
         yield temporary

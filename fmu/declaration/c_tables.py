@@ -1,0 +1,116 @@
+"""Writes what C needs of a declaration: value_references.h and the table in variables.c."""
+
+from __future__ import annotations
+
+from declaration.load import Declaration
+from declaration.schema import Enumeration, Variable
+
+C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int"}
+TABLE_TYPES = {"float64": "FLOAT64", "int32": "INT32", "enumeration": "INT32"}
+
+
+def value_references(declaration: Declaration) -> str:
+    """Text of value_references.h."""
+    name = declaration.model.name
+    prefix = macro_prefix(name)
+    lines = [
+        "/* Generated from variables.toml. */",
+        f"#ifndef {prefix}_VALUE_REFERENCES_H",
+        f"#define {prefix}_VALUE_REFERENCES_H",
+        "",
+        f'#define {prefix}_NAME "{name}"',
+        f'#define {prefix}_GUID "{declaration.guid}"',
+        "",
+        "enum {",
+        *(f"    {prefix}_{n} = {v.reference}," for n, v in declaration.variables.items()),
+        "};",
+        "",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def macro_prefix(name: str) -> str:
+    """Prefix of the model's macros, for example RP_MANIPULATOR for RPManipulator."""
+    words = [
+        ("_" if i and c.isupper() and not name[i + 1 : i + 2].isupper() else "") + c.upper()
+        for i, c in enumerate(name)
+    ]
+    return "".join(words)
+
+
+def variable_table(declaration: Declaration) -> str:
+    """Text of variables.c: the rows, and the check that each field has the declared type."""
+    model, variables = declaration.model, declaration.variables
+    structures = {"model": model.values, "instance": "struct instance_values"}
+    checks, rows = [], []
+    for name, variable in variables.items():
+        structure = structures[variable.owner]
+        checks += type_checks(name, variable, structure)
+        rows.append(table_row(name, variable, structure))
+    row_of = {v.reference: row for row, v in enumerate(variables.values())}
+    entries = [str(row_of.get(reference, -1)) for reference in range(max(row_of, default=-1) + 1)]
+    lines = [
+        "/* Generated from variables.toml. */",
+        '#include "instance.h"',
+        f'#include "{model.header}"',
+        '#include "model_description.h"',
+        "",
+        "#include <math.h>",
+        "",
+        *checks,
+        "",
+        "static const struct variable variables[] = {",
+        *rows,
+        "};",
+        "",
+        "static const short row_of_reference[] = {",
+        *("    " + ", ".join(entries[i : i + 20]) + "," for i in range(0, len(entries), 20)),
+        "};",
+        "",
+        "const struct model_description model_description = {",
+        f'    .name = "{model.name}",',
+        f'    .guid = "{declaration.guid}",',
+        f"    .default_tolerance = {declaration.experiment.tolerance!r},",
+        f"    .model = &{model.symbol},",
+        "    .variables = variables,",
+        "    .variable_count = sizeof variables / sizeof variables[0],",
+        "    .row_of_reference = row_of_reference,",
+        "    .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],",
+        "};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def type_checks(name: str, variable: Variable, structure: str) -> list[str]:
+    """Checks by the compiler: the type of the field, and the constants of an enumeration."""
+    c_type, field = C_TYPES[variable.type], variable.field
+    checks = [
+        f"_Static_assert(_Generic((({structure} *)0)->{field}, {c_type}: 1, "
+        f'default: 0), "{name}: {field} must be of type {c_type}");'
+    ]
+    items = variable.items.values() if isinstance(variable, Enumeration) else ()
+    checks += [
+        f'_Static_assert({item.constant} == {value}, "{name}: {item.constant} must be {value}");'
+        for value, item in enumerate(items, start=1)
+    ]
+    return checks
+
+
+def table_row(name: str, variable: Variable, structure: str) -> str:
+    """A row of the table: struct variable of src/instance/variables.h."""
+    nominal = getattr(variable, "nominal", None)
+    return (
+        f'    {{{variable.reference}, "{name}", VARIABLE_{TABLE_TYPES[variable.type]}, '
+        f"VARIABLE_OF_{variable.owner.upper()}, offsetof({structure}, {variable.field}),\n"
+        f"     CAUSALITY_{variable.causality.upper()}, "
+        f"VARIABILITY_{variable.variability.upper()}, "
+        f"INITIAL_{(variable.initial or 'none').upper()},\n"
+        f"     {c_number(variable.start, '0.0')}, {c_number(variable.min, '-INFINITY')}, "
+        f"{c_number(variable.max, 'INFINITY')}, {c_number(nominal, '1.0')}}},"
+    )
+
+
+def c_number(value: float | None, otherwise: str) -> str:
+    """Text of a double that reads back as the same value."""
+    return otherwise if value is None else repr(float(value))

@@ -1,0 +1,209 @@
+"""Reads a variables.toml with what it includes, and checks all of it together."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from declaration.schema import (
+    TYPES,
+    Experiment,
+    File,
+    Float64,
+    Item,
+    Model,
+    Table,
+    Unit,
+    Variable,
+)
+
+
+class DeclarationError(Exception):
+    """A variables.toml that cannot be used: file, place and reason in one line."""
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """All that is declared of a model; its variables are sorted by value reference."""
+
+    path: Path  # of its variables.toml
+    model: Model
+    experiment: Experiment
+    units: dict[str, Unit]
+    variables: dict[str, Variable]
+
+    @property
+    def guid(self) -> str:
+        """Hash of what defines the interface: all but texts, C names and default experiment."""
+        interface = {
+            "model": self.model.name,
+            "units": {name: unit.model_dump() for name, unit in self.units.items()},
+            "variables": {name: v.interface for name, v in self.variables.items()},
+        }
+        digest = hashlib.sha256(json.dumps(interface, sort_keys=True).encode()).hexdigest()
+        parts = (digest[0:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])
+        return "{" + "-".join(parts) + "}"
+
+
+def load(path: Path) -> Declaration:
+    """Read variables.toml and the files that it includes.
+
+    Raises
+    ------
+    DeclarationError
+        where something in them is wrong.
+    """
+    units: dict[str, Unit] = {}
+    variables: dict[str, Variable] = {}
+    places: dict[str, str] = {}
+    for source, file in files_of(path, including=()):
+        for name, unit in file.units.items():
+            if units.setdefault(name, unit) != unit:
+                raise DeclarationError(f"{source}: unit {name}: is declared otherwise elsewhere")
+        for name, variable in file.variables.items():
+            place = f"{source}: variable {name}"
+            if name in variables:
+                raise DeclarationError(f"{place}: is declared twice")
+            variables[name], places[name] = variable, place
+    for section in ("model", "experiment", "variables"):
+        if not getattr(file, section):  # of the last file, which is that of the model
+            raise DeclarationError(f"{path}: the section [{section}] is missing")
+    check_references(variables, places)
+    check_names(variables, units, places)
+    check_dependencies(variables, places)
+    by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
+    return Declaration(path, file.model, file.experiment, units, dict(by_reference))
+
+
+def files_of(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[Path, File]]:
+    """What a file includes, and the file itself at the end; `including`: the files on the way."""
+    file = read(path)
+    if path.resolve() in including:
+        raise DeclarationError(f"{path}: includes itself")
+    for name in file.include:
+        yield from files_of(path.parent / name, (*including, path.resolve()))
+    yield path, file
+
+
+def read(path: Path) -> File:
+    """Read one file and check each of its tables."""
+    try:
+        return File.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except ValidationError as error:
+        raise DeclarationError(f"{path}: {first_mistake(error)}") from None
+    except OSError as error:
+        raise DeclarationError(f"{path}: cannot be read: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
+        raise DeclarationError(f"{path}: is not valid TOML: {error}") from None
+
+
+def first_mistake(error: ValidationError) -> str:
+    """Place and reason of one mistake; a misspelt key comes before what is then missing."""
+    mistakes = error.errors(include_url=False)
+    mistake = min(mistakes, key=lambda m: m["type"] != "extra_forbidden")
+    words, table, key = place_of(list(mistake["loc"]))
+    return ": ".join([*words, reason(mistake, table, key)])
+
+
+def place_of(location: list[str | int]) -> tuple[list[str], type[Table], str]:
+    """Words for a table of the file, its class, and the path of the value within it."""
+    match location:
+        case ["model", *keys]:
+            words, table = ["[model]"], Model
+        case ["experiment", *keys]:
+            words, table = ["[experiment]"], Experiment
+        case ["units", name, *keys]:
+            words, table = [f"unit {name}"], Unit
+        case ["variables", name, kind, "items", item, *keys] if kind in TYPES:
+            words, table = [f"variable {name}", f"item {item}"], Item
+        case ["variables", name, kind, *keys] if kind in TYPES:
+            words, table = [f"variable {name}"], TYPES[kind]
+        case ["variables", name, *keys]:
+            words, table = [f"variable {name}"], Variable
+        case keys:
+            words, table = [], File
+    path = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
+    return words, table, path.removeprefix(".")
+
+
+def reason(mistake: Any, table: type[Table], key: str) -> str:
+    """What is wrong with the value of a key, or with the table where `key` is empty."""
+    context = mistake.get("ctx", {})
+    subject = f"{key} = {shown(mistake['input'])} " if key else ""
+    match mistake["type"]:
+        case "missing":
+            return f"{key} is missing"
+        case "extra_forbidden":
+            for kind, of_kind in TYPES.items():
+                if table is of_kind and any(key in keys_of(other) for other in TYPES.values()):
+                    return f"{kind} variables have no {key}"
+            return f"unknown key '{key}', expected one of {', '.join(keys_of(table))}"
+        case "model_type" | "dict_type":
+            return f"{subject}is not a table"
+        case "union_tag_invalid":
+            return f"type = {shown(context['tag'])} should be one of {', '.join(TYPES)}"
+        case "value_error":
+            subject = "the name " if mistake["loc"][-1] == "[key]" else subject
+            return f"{subject}{context['error']}"
+    return subject + mistake["msg"].removeprefix("Input ")
+
+
+def keys_of(table: type[Table]) -> list[str]:
+    """Keys that a table of the file may have."""
+    return [field.alias or name for name, field in table.model_fields.items()]
+
+
+def shown(value: object) -> str:
+    """Short form of a value; an integer may have more digits than Python writes."""
+    try:
+        return f"{value!r:.40}"
+    except ValueError:
+        return "a very large number"
+
+
+def check_references(variables: dict[str, Variable], places: dict[str, str]) -> None:
+    """Check that value references are unique, and that there is one independent variable."""
+    owners: dict[int, str] = {}
+    for name, variable in variables.items():
+        owner = owners.setdefault(variable.reference, name)
+        if owner != name:
+            reference = variable.reference
+            raise DeclarationError(f"{places[name]}: value reference {reference} is {owner}'s")
+    independent = [n for n, v in variables.items() if v.causality == "independent"]
+    if len(independent) > 1:
+        time, other = independent[:2]
+        raise DeclarationError(f"{places[other]}: {time} is the independent variable already")
+
+
+def check_names(
+    variables: dict[str, Variable], units: dict[str, Unit], places: dict[str, str]
+) -> None:
+    """Check that units and variables that are referred to are declared."""
+    for name, variable in variables.items():
+        if isinstance(variable, Float64) and variable.unit not in units:
+            raise DeclarationError(f"{places[name]}: unit '{variable.unit}' is not among [units]")
+        listed = [*(variable.dependencies or []), *variable.parameters]
+        listed += [variable.derivative_of] if variable.derivative_of is not None else []
+        for other in listed:
+            if other not in variables:
+                raise DeclarationError(f"{places[name]}: '{other}' is not declared")
+
+
+def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -> None:
+    """Check that variables depend on what the model structure knows."""
+    states = {v.derivative_of for v in variables.values()}
+    for name, variable in variables.items():
+        for other in variable.dependencies or []:
+            causality = variables[other].causality
+            if causality not in ("input", "independent") and other not in states:
+                raise DeclarationError(f"{places[name]}: '{other}' is no input, state or time")
+        for other in variable.parameters:
+            if variables[other].causality != "parameter":
+                raise DeclarationError(f"{places[name]}: '{other}' is not a parameter")

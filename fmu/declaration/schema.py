@@ -1,0 +1,287 @@
+"""The tables of a variables.toml, and the checks that need one table only.
+
+include       further files, relative to this one, whose [variables] and [units] count too
+[model]       name (also the identifier), description, header, values (C type of the value
+              structure), symbol (the C object of type struct model)
+[experiment]  start, stop, tolerance, step: the default experiment
+[units]       "name" = { exponents of the SI base units, display.NAME = factor }
+[variables.NAME]
+    reference     value reference, unique, 0 to 9999
+    owner         "model" (default) or "instance": the structure that holds the value
+    field         C designator of the value in that structure
+    type          "float64" (default), "int32" or "enumeration"
+    causality, variability, initial, description
+                  as in section 2.2.7 of the FMI 2.0 specification
+    start         where initial is exact, and of inputs; of an enumeration the name of an item
+    unit, nominal of a float64
+    min, max      of a float64 or int32
+    items         of an enumeration: [variables.NAME.items.ITEM] with description and constant,
+                  the C constant of that value; the values are 1, 2, ... in the order of the
+                  file
+    derivative_of name of the variable that this one is the time derivative of
+    dependencies  of outputs and derivatives: the inputs, states and time they depend on
+    parameters    of calculated outputs and derivatives: the parameters they depend on
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+# allowed values of initial, the default first (table in section 2.2.7 of the specification)
+INITIALS = {
+    ("parameter", "fixed"): ("exact",),
+    ("parameter", "tunable"): ("exact",),
+    ("input", "discrete"): (None,),
+    ("input", "continuous"): (None,),
+    ("output", "discrete"): ("calculated", "exact"),
+    ("output", "continuous"): ("calculated", "exact"),
+    ("local", "fixed"): ("calculated",),
+    ("local", "tunable"): ("calculated",),
+    ("local", "discrete"): ("calculated", "exact"),
+    ("local", "continuous"): ("calculated", "exact"),
+    ("independent", "continuous"): (None,),
+}
+
+
+def identifier(text: str) -> str:
+    """Refuse what is not a C identifier."""
+    if not re.fullmatch("[A-Za-z_][A-Za-z0-9_]*", text):
+        raise ValueError("must be a C identifier")
+    return text
+
+
+def variable_name(text: str) -> str:
+    """Refuse names that the generated header, where they get a prefix, needs for its macros."""
+    if text in ("GUID", "NAME"):
+        raise ValueError("is reserved for the generated header")
+    return identifier(text)
+
+
+def usual_initial(keys: dict[str, Any]) -> str | None:
+    """`initial` of a variable that does not give it."""
+    return INITIALS.get((keys["causality"], keys["variability"]), (None,))[0]
+
+
+Identifier = Annotated[str, AfterValidator(identifier)]
+VariableName = Annotated[str, AfterValidator(variable_name)]
+Int32Value = Annotated[int, Field(ge=-(2**31), le=2**31 - 1)]
+
+
+class Table(BaseModel):
+    """A table without unknown keys, whose values have the declared types and are finite."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class Model(Table):
+    """The model that the variables belong to."""
+
+    name: Identifier
+    description: str
+    header: str
+    values: str
+    symbol: Identifier
+
+
+class Experiment(Table):
+    """The default experiment, times in s."""
+
+    start: float
+    stop: float
+    tolerance: float = Field(gt=0, lt=1)
+    step: float = Field(gt=0)
+
+    @model_validator(mode="after")
+    def check_times(self) -> Self:
+        """Refuse times at which nothing can be run."""
+        if self.stop <= self.start:
+            raise ValueError(f"stop = {self.stop} must be after start = {self.start}")
+        if self.step > self.stop - self.start:
+            raise ValueError(f"step = {self.step} is longer than the experiment")
+        return self
+
+
+class Unit(Table):
+    """Exponents of the SI base units, and factors of the display units."""
+
+    kg: int = 0
+    m: int = 0
+    s: int = 0
+    A: int = 0
+    K: int = 0
+    mol: int = 0
+    cd: int = 0
+    rad: int = 0
+    display: dict[str, float] = {}
+
+    @property
+    def exponents(self) -> dict[str, int]:
+        """Exponents that are not 0, by base unit."""
+        return self.model_dump(exclude={"display"}, exclude_defaults=True)
+
+
+class Item(Table):
+    """An item of an enumeration."""
+
+    constant: Identifier
+    description: str
+
+
+class Variable(Table):
+    """What variables of all types have; each type adds start, min and max as numbers or None."""
+
+    reference: int = Field(ge=0, le=9999)
+    owner: Literal["model", "instance"] = "model"
+    field: str
+    causality: Literal["parameter", "input", "output", "local", "independent"]
+    variability: Literal["fixed", "tunable", "discrete", "continuous"]
+    initial: Literal["exact", "calculated"] | None = Field(default_factory=usual_initial)
+    description: str
+    derivative_of: str | None = None
+    dependencies: list[str] | None = None
+    parameters: list[str] = []
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether the model structure lists the variable."""
+        return self.causality == "output" or self.derivative_of is not None
+
+    @property
+    def interface(self) -> dict[str, Any]:
+        """What users depend on: neither the texts nor where C keeps the value."""
+        return self.model_dump(exclude={"owner", "field", "description"}, exclude_none=True)
+
+    @model_validator(mode="after")
+    def check_together(self) -> Self:
+        """Check the keys against each other."""
+        kind = (self.causality, self.variability)
+        if kind not in INITIALS:
+            raise ValueError(f"causality '{kind[0]}' with variability '{kind[1]}' does not exist")
+        if self.initial not in INITIALS[kind]:
+            allowed = " or ".join(str(initial) for initial in INITIALS[kind])
+            raise ValueError(f"initial must be {allowed}, not {self.initial}")
+        if self.is_unknown and self.dependencies is None:
+            raise ValueError("dependencies is missing")
+        needs_start = self.initial == "exact" or self.causality == "input"
+        if needs_start != (self.start is not None):
+            raise ValueError(f"start is {'missing' if needs_start else 'not allowed'}")
+        below = needs_start and self.min is not None and self.start < self.min
+        above = needs_start and self.max is not None and self.start > self.max
+        if below or above:
+            raise ValueError(f"start = {self.start} is outside [min, max]")
+        return self
+
+
+class Float64(Variable):
+    """A floating-point number."""
+
+    type: Literal["float64"] = "float64"
+    unit: str
+    start: float | None = None
+    min: float | None = None
+    max: float | None = None
+    nominal: float | None = Field(default=None, gt=0)
+
+
+class Discrete(Variable):
+    """What does not change continuously and has no unit."""
+
+    @model_validator(mode="after")
+    def check_discrete(self) -> Self:
+        """Refuse what only a floating-point number can be."""
+        if self.variability == "continuous" or self.derivative_of is not None:
+            raise ValueError(f"an {self.type} is not continuous")
+        return self
+
+
+class Int32(Discrete):
+    """An integer."""
+
+    type: Literal["int32"]
+    start: Int32Value | None = None
+    min: Int32Value | None = None
+    max: Int32Value | None = None
+
+
+class Enumeration(Discrete):
+    """A choice, whose values count from 1 in the order of the items."""
+
+    type: Literal["enumeration"]
+    items: dict[str, Item]
+    start_item: str | None = Field(default=None, alias="start")
+
+    @field_validator("items")
+    @classmethod
+    def check_items(cls, items: dict[str, Item]) -> dict[str, Item]:
+        """Refuse an enumeration of nothing."""
+        if not items:
+            raise ValueError("must have one item at least")
+        return items
+
+    @field_validator("start_item", mode="before")
+    @classmethod
+    def check_start(cls, name: Any, info: ValidationInfo) -> Any:
+        """Refuse a start that is no item."""
+        items = [*info.data.get("items", {})]
+        if items and name not in items:
+            raise ValueError(f"should be one of {', '.join(items)}")
+        return name
+
+    @property
+    def start(self) -> int | None:
+        """Value of the item at the start."""
+        return None if self.start_item is None else [*self.items].index(self.start_item) + 1
+
+    @property
+    def min(self) -> int:
+        """Value of the first item."""
+        return 1
+
+    @property
+    def max(self) -> int:
+        """Value of the last item."""
+        return len(self.items)
+
+    @property
+    def interface(self) -> dict[str, Any]:
+        """What users depend on: of the items their names and order."""
+        return super().interface | {"items": [*self.items]}
+
+
+TYPES = {"float64": Float64, "int32": Int32, "enumeration": Enumeration}
+
+
+def type_of(variable: Any) -> Any:
+    """`type` of a variable as it stands in the file."""
+    return variable.get("type", "float64") if isinstance(variable, dict) else "float64"
+
+
+AnyVariable = Annotated[
+    Annotated[Float64, Tag("float64")]
+    | Annotated[Int32, Tag("int32")]
+    | Annotated[Enumeration, Tag("enumeration")],
+    Discriminator(type_of),
+]
+
+
+class File(Table):
+    """One file: a variables.toml, or what it includes."""
+
+    include: list[str] = []
+    model: Model | None = None
+    experiment: Experiment | None = None
+    units: dict[str, Unit] = {}
+    variables: dict[VariableName, AnyVariable] = {}

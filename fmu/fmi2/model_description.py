@@ -1,0 +1,194 @@
+"""Writes modelDescription.xml of FMI 2.0 (section 2.2 of the specification)."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from declaration.load import Declaration, DeclarationError
+from declaration.schema import Enumeration, Float64, Unit, Variable
+from provenance import Provenance
+
+TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration"}
+
+LOG_CATEGORIES = {
+    "logEvents": "Events, for example initialization and reset",
+    "logStatusWarning": "Why a function returns fmi2Warning",
+    "logStatusDiscard": "Why a function returns fmi2Discard",
+    "logStatusError": "Why a function returns fmi2Error",
+    "logStatusFatal": "Why a function returns fmi2Fatal",
+    "logAll": "All messages, and every call",
+}
+
+
+def model_description(declaration: Declaration, provenance: Provenance) -> str:
+    """Text of modelDescription.xml."""
+    model, experiment = declaration.model, declaration.experiment
+    variables = with_aliases(declaration)
+    index = {name: str(i) for i, name in enumerate(variables, start=1)}
+
+    texts = {
+        "author": provenance.author,
+        "version": provenance.version,
+        "copyright": provenance.copyright,
+        "license": provenance.license,
+        "generationTool": f"{model.name} {provenance.version}",
+        "generationDateAndTime": provenance.date,
+    }
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="2.0",
+        modelName=model.name,
+        guid=declaration.guid,
+        description=model.description,
+        **{key: text for key, text in texts.items() if text is not None},
+        variableNamingConvention="flat",
+        numberOfEventIndicators="0",
+    )
+    add_interfaces(root, model.name)
+    add_units(root, declaration.units)
+    add_types(root, variables)
+    categories = ET.SubElement(root, "LogCategories")
+    for name, description in LOG_CATEGORIES.items():
+        ET.SubElement(categories, "Category", name=name, description=description)
+    ET.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime=repr(experiment.start),
+        stopTime=repr(experiment.stop),
+        tolerance=repr(experiment.tolerance),
+        stepSize=repr(experiment.step),
+    )
+    scalars = ET.SubElement(root, "ModelVariables")
+    for name, variable in variables.items():
+        add_variable(scalars, name, variable, index, declaration.units)
+    add_structure(root, variables, index)
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def with_aliases(declaration: Declaration) -> dict[str, Variable]:
+    """All variables, and after each state that is the derivative of another one its alias.
+
+    Importers expect each state derivative among the initial unknowns, and no variable that has a
+    start value, as states do. So the alias, der_STATE, is the derivative: it has the value
+    reference of the state, and no start value.
+    """
+    variables: dict[str, Variable] = {}
+    for name, variable in declaration.variables.items():
+        variables[name] = variable
+        if variable.derivative_of is None or variable.initial != "exact":
+            continue
+        alias = f"der_{variable.derivative_of}"
+        if alias in declaration.variables:
+            place = f"{declaration.path}: variable {alias}"
+            raise DeclarationError(f"{place}: FMI 2.0 needs the name for an alias of {name}")
+        changes = {
+            "causality": "local",
+            "initial": "calculated",
+            "start": None,
+            "description": f"Time derivative of {variable.derivative_of}: alias of {name}",
+        }
+        variables[alias] = variable.model_copy(update=changes)
+    return variables
+
+
+def add_interfaces(root: ET.Element, identifier: str) -> None:
+    """Write ModelExchange and CoSimulation with what they can do."""
+    shared = {
+        "modelIdentifier": identifier,
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    }
+    ET.SubElement(root, "ModelExchange", shared)
+    ET.SubElement(
+        root,
+        "CoSimulation",
+        shared,
+        canHandleVariableCommunicationStepSize="true",
+        canInterpolateInputs="true",
+        maxOutputDerivativeOrder="2",
+    )
+
+
+def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
+    """Write UnitDefinitions: SI base exponents, and the display units."""
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for name, unit in sorted(units.items()):
+        element = ET.SubElement(definitions, "Unit", name=name)
+        exponents = {base: str(exponent) for base, exponent in unit.exponents.items()}
+        ET.SubElement(element, "BaseUnit", exponents)
+        for display, factor in unit.display.items():
+            ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+
+
+def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
+    """Write TypeDefinitions: one type for each enumeration."""
+    enumerations = {n: v for n, v in variables.items() if isinstance(v, Enumeration)}
+    if not enumerations:
+        return
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    for name, variable in enumerations.items():
+        simple = ET.SubElement(definitions, "SimpleType", name=type_name(name))
+        enumeration = ET.SubElement(simple, "Enumeration")
+        for value, (item, keys) in enumerate(variable.items.items(), start=1):
+            ET.SubElement(
+                enumeration, "Item", name=item, value=str(value), description=keys.description
+            )
+
+
+def type_name(variable: str) -> str:
+    """Name of the type of an enumeration, for example SolverMethodType for solver_method."""
+    return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
+
+
+def add_variable(
+    parent: ET.Element, name: str, variable: Variable, index: dict[str, str], units: dict[str, Unit]
+) -> None:
+    """Write one ScalarVariable."""
+    attributes = {
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": variable.initial,
+    }
+    scalar = ET.SubElement(
+        parent,
+        "ScalarVariable",
+        name=name,
+        valueReference=str(variable.reference),
+        **{key: text for key, text in attributes.items() if text},
+    )
+    element = ET.SubElement(scalar, TYPES[variable.type])
+    if isinstance(variable, Enumeration):
+        element.set("declaredType", type_name(name))
+    if isinstance(variable, Float64):
+        element.set("unit", variable.unit)
+        for display in list(units[variable.unit].display)[:1]:
+            element.set("displayUnit", display)
+    if variable.derivative_of is not None:
+        element.set("derivative", index[variable.derivative_of])
+    for key in ("start", "min", "max", "nominal"):
+        value = getattr(variable, key, None)
+        if value is not None:
+            element.set(key, repr(value))
+
+
+def add_structure(root: ET.Element, variables: dict[str, Variable], index: dict[str, str]) -> None:
+    """Write ModelStructure with exact dependencies (section 2.2.8 of the specification)."""
+    structure = ET.SubElement(root, "ModelStructure")
+    calculated = {n: v for n, v in variables.items() if v.is_unknown and v.initial == "calculated"}
+    for section, unknowns, with_parameters in (
+        ("Outputs", {n: v for n, v in variables.items() if v.causality == "output"}, False),
+        ("Derivatives", {n: v for n, v in calculated.items() if v.derivative_of}, False),
+        ("InitialUnknowns", calculated, True),
+    ):
+        if not unknowns:
+            continue
+        element = ET.SubElement(structure, section)
+        for name, unknown in unknowns.items():
+            knowns = (unknown.dependencies or []) + (unknown.parameters if with_parameters else [])
+            indices = sorted(int(index[known]) for known in knowns)
+            dependencies = " ".join(map(str, indices))
+            ET.SubElement(element, "Unknown", index=index[name], dependencies=dependencies)

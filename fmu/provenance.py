@@ -1,0 +1,53 @@
+"""What an FMU says of where it comes from: version, author, license, copyright and date."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+
+class ProvenanceError(Exception):
+    """A license or a date that cannot be read: source and reason in one line."""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Texts for the model description; None is left out of it."""
+
+    version: str = "0.0.0"
+    author: str | None = None
+    license: str | None = None  # by its SPDX identifier
+    copyright: str | None = None
+    date: str | None = None  # UTC, ISO 8601
+
+
+def license_texts(path: Path) -> dict[str, str]:
+    """Author, license and copyright, from the project's LICENSE.
+
+    Its first line is "NAME License", another one "Copyright (c) YEAR, AUTHOR".
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ProvenanceError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise ProvenanceError(f"{path}: is not UTF-8: {error}") from None
+    title = re.match(r"(.+) License\n", text)
+    notice = re.search(r"^Copyright \(c\) [-\d]+, (.+)$", text, re.MULTILINE)
+    if not title or not notice:
+        raise ProvenanceError(f"{path}: lacks 'NAME License' or 'Copyright (c) YEAR, AUTHOR'")
+    return {"license": title[1].replace(" ", "-"), "copyright": notice[0], "author": notice[1]}
+
+
+def build_date(environment: Mapping[str, str]) -> str | None:
+    """Date by SOURCE_DATE_EPOCH; without it none, so that equal sources give equal bytes."""
+    epoch = environment.get("SOURCE_DATE_EPOCH")
+    if not epoch:
+        return None
+    try:
+        return datetime.fromtimestamp(int(epoch), UTC).isoformat()
+    except (ValueError, OverflowError, OSError):
+        raise ProvenanceError(f"SOURCE_DATE_EPOCH = {epoch!r:.40} is not a time in s") from None

@@ -1,0 +1,209 @@
+"""A mistake in a variables.toml is named in one line: file, place and reason."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.generator import change, copied, generate
+from tests.support.paths import ROOT
+
+sys.path.insert(0, str(ROOT / "fmu"))
+from declaration.load import DeclarationError, load  # noqa: E402
+from fmi2.model_description import model_description  # noqa: E402
+from provenance import Provenance  # noqa: E402
+
+EXPERIMENT = "[experiment]\nstart = 0.0\nstop = 2.0\ntolerance = 1e-8\nstep = 0.001\n"
+
+# what is replaced, by what, and what the message must say beside the file
+MISTAKES = {
+    "reference_twice": ("reference = 2\n", "reference = 1\n", ["m2", "value reference 1 is m1's"]),
+    "reference_too_large": (
+        "reference = 65",
+        "reference = 70000",
+        ["tau2_y", "reference = 70000", "9999"],
+    ),
+    "reference_text": ("reference = 65", 'reference = "65"', ["tau2_y", "reference = '65'"]),
+    "reference_true": ("reference = 65", "reference = true", ["tau2_y", "reference = True"]),
+    "misspelt_key": ("causality", "causalty", ["m1", "key 'causalty'", "causality"]),
+    "missing_field": ('field = "parameters.m1"\n', "", ["m1", "field is missing"]),
+    "unknown_causality": ('causality = "local"', 'causality = "lokal"', ["D11", "'lokal'"]),
+    "wrong_combination": ('variability = "tunable"', 'variability = "continuous"', ["m1"]),
+    "start_missing": ("start = 2.0\n", "", ["m1", "start is missing"]),
+    "start_not_allowed": (
+        'field = "D[0][0]"',
+        'field = "D[0][0]"\nstart = 1.0',
+        ["D11", "start is not allowed"],
+    ),
+    "start_below_min": ("start = 2.0", "start = -1.0", ["m1", "outside [min, max]"]),
+    "start_nan": ("start = 2.0", "start = nan", ["m1", "start = nan", "finite number"]),
+    "unknown_unit": ('unit = "kg"', 'unit = "stone"', ["m1", "'stone'"]),
+    "unit_missing": ('unit = "kg"\n', "", ["m1", "unit is missing"]),
+    "unknown_dependency": ('dependencies = ["q1"]', 'dependencies = ["q9"]', ["q1", "'q9'"]),
+    "dependency_on_output": ('dependencies = ["q1"]', 'dependencies = ["ee_x"]', ["q1", "'ee_x'"]),
+    "no_dependencies": ('dependencies = ["q1"]\n', "", ["q1", "dependencies is missing"]),
+    "no_such_state": ('derivative_of = "q1"', 'derivative_of = "q0"', ["dq1", "'q0'"]),
+    "no_parameter": ('parameters = ["l1", "a"]', 'parameters = ["q1"]', ["ee_x", "'q1'"]),
+    "wrong_type": (
+        'unit = "kg"',
+        'unit = "kg"\ntype = "boolean"',
+        ["m1", "type = 'boolean'", "float64"],
+    ),
+    "model_missing": ("[model]", "[modell]", ["unknown key 'modell'"]),
+    "model_lacks": ('header = "rp_model.h"\n', "", ["[model]: header is missing"]),
+    "not_an_identifier": ('name = "RPManipulator"', 'name = "RP arm"', ["C identifier"]),
+    "not_toml": ("[model]", "[model", ["is not valid TOML"]),
+    "no_such_include": ("time_variable.toml", "thyme.toml", ["thyme.toml", "cannot be read"]),
+    "wrong_base_unit": ('"N" = { kg = 1', '"N" = { pound = 1', ["unit N", "'pound'"]),
+    "include_number": ("include = [", "include = [1, ", ["include[0] = 1 "]),
+    "dependencies_nested": ('dependencies = ["q1"]', 'dependencies = [["q1"]]', ["q1"]),
+    "start_huge": ("start = 2.0", "start = 1" + "0" * 400, ["m1", "start = 1000", "number"]),
+    "name_with_space": ("[variables.m1]", '[variables."m 1"]', ["m 1", "C identifier"]),
+    "name_with_dot": ("[variables.m1]", '[variables."arm.m1"]', ["arm.m1", "C identifier"]),
+    "name_of_a_macro": ("[variables.m1]", "[variables.GUID]", ["GUID", "reserved"]),
+    "tolerance_negative": ("tolerance = 1e-8", "tolerance = -1.0", ["[experiment]", "tolerance"]),
+    "stop_before_start": ("stop = 2.0", "stop = -2.0", ["[experiment]", "stop"]),
+    "step_zero": ("step = 0.001", "step = 0.0", ["[experiment]", "step"]),
+    "section_missing": (EXPERIMENT, "", ["section [experiment] is missing"]),
+    "variable_no_table": ("[variables.m1]", "[variables]\nx = 1\n[variables.m1]", ["x", "table"]),
+    "unit_no_table": ("[units]", "[units]\nx = 1", ["unit x", "not a table"]),
+    "wrong_initial": (
+        "start = 2.0",
+        'start = 2.0\ninitial = "approx"',
+        ["m1", "initial = 'approx'"],
+    ),
+    "nominal_zero": (
+        "start = 2.0",
+        "start = 2.0\nnominal = 0.0",
+        ["m1", "nominal = 0.0", "greater than 0"],
+    ),
+    "integer_too_large": (
+        "[variables.m1]",
+        '[variables.n]\nreference = 99\nfield = "n"\ncausality = "parameter"\ntype = "int32"\n'
+        'variability = "fixed"\nstart = 2147483648\ndescription = "N"\n[variables.m1]',
+        ["variable n", "start = 2147483648", "2147483647"],
+    ),
+    "two_times": (
+        "[variables.m1]",
+        '[variables.t]\nreference = 99\nfield = "t"\ncausality = "independent"\n'
+        'variability = "continuous"\nunit = "s"\ndescription = "Time"\n[variables.m1]',
+        ["variable t", "independent variable already"],
+    ),
+    "step_too_long": ("step = 0.001", "step = 3.0", ["[experiment]", "longer than the experiment"]),
+    "unit_otherwise": ("[units]", '[units]\n"s" = { s = 2 }', ["unit s", "declared otherwise"]),
+    "includes_itself": (
+        "time_variable.toml",
+        "../../models/rp_manipulator/variables.toml",
+        ["itself"],
+    ),
+    "discrete_derivative": (
+        "[variables.m1]",
+        '[variables.n]\nreference = 99\nfield = "n"\ncausality = "local"\ntype = "int32"\n'
+        'variability = "discrete"\nderivative_of = "q1"\ndependencies = []\ndescription = "N"\n'
+        "[variables.m1]",
+        ["variable n", "an int32 is not continuous"],
+    ),
+    "name_of_an_alias": ("[variables.ee_x]", "[variables.der_q1]", ["der_q1", "FMI 2.0", "dq1"]),
+    "declared_twice": ("[variables.m1]", "[variables.time]", ["time", "declared twice"]),
+}
+
+# what is replaced, by what, and what the message must say beside the file
+MISTAKES_IN_ENUMERATIONS = {
+    "no_items": (
+        "[variables.branch.items]",
+        "[variables.other.items]",
+        ["other", "float64 variables have no items"],
+    ),
+    "empty_items": (
+        "[variables.l1]",
+        '[variables.choice]\nreference = 99\nfield = "c"\ntype = "enumeration"\nitems = {}\n'
+        'causality = "parameter"\nvariability = "fixed"\ndescription = "C"\n[variables.l1]',
+        ["choice", "items = {} must have one item at least"],
+    ),
+    "items_of_a_number": (
+        'field = "parameters.l1"',
+        'field = "parameters.l1"\nitems.one = { constant = "ONE", description = "One" }',
+        ["l1", "float64 variables have no items"],
+    ),
+    "start_no_item": ('start = "circle"', 'start = "ellipse"', ["motion", "'ellipse'", "circle"]),
+    "start_number": ('start = "circle"', "start = 3", ["motion", "start = 3", "circle"]),
+    "start_missing": ('start = "circle"\n', "", ["motion", "start is missing"]),
+    "start_of_a_number": ("start = 0.1\n", 'start = "circle"\n', ["variable a", "valid number"]),
+    "constant_missing": (
+        '{ constant = "RP_TRAJECTORY_LINE", ',
+        "{ ",
+        ["motion", "item line", "constant is missing"],
+    ),
+    "constant_no_identifier": (
+        "RP_TRAJECTORY_LINE",
+        "RP TRAJECTORY LINE",
+        ["item line", "C identifier"],
+    ),
+    "description_missing": (
+        ', description = "The end effector moves along a circle"',
+        "",
+        ["item circle", "description is missing"],
+    ),
+    "item_no_table": ("line = {", "arc = 1\nline = {", ["motion", "item arc", "not a table"]),
+    "item_key_unknown": ("line = {", "line = { value = 2,", ["item line", "unknown key 'value'"]),
+    "own_minimum": (
+        'start = "circle"',
+        'start = "circle"\nmin = 1',
+        ["motion", "enumeration variables have no min"],
+    ),
+    "with_unit": (
+        'start = "circle"',
+        'start = "circle"\nunit = "m"',
+        ["motion", "enumeration variables have no unit"],
+    ),
+}
+
+
+def complaint(path: Path) -> str:
+    """What is said of a wrong file: one line that begins with a file."""
+    with pytest.raises(DeclarationError) as caught:
+        model_description(load(path), Provenance())
+    text = str(caught.value)
+    assert re.match(r"[^\n]+\.toml: [^\n]+$", text)
+    return text
+
+
+CASES = [
+    pytest.param(model, *mistake, id=name)
+    for model, mistakes in (
+        ("rp_manipulator", MISTAKES),
+        ("rp_trajectory", MISTAKES_IN_ENUMERATIONS),
+    )
+    for name, mistake in mistakes.items()
+]
+
+
+@pytest.mark.parametrize(("model", "old", "new", "words"), CASES)
+def test_a_mistake_is_named(
+    tmp_path: Path, model: str, old: str, new: str, words: list[str]
+) -> None:
+    variables = copied(model, tmp_path)
+    change(variables, old, new)
+    text = complaint(variables)
+    assert [word for word in words if word not in text] == []
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    assert complaint(tmp_path / "none.toml").endswith(
+        "none.toml: cannot be read: No such file or directory"
+    )
+
+
+def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
+    (tmp_path / "variables.toml").write_bytes(b"\xff\xfe")
+    assert "is not valid TOML" in complaint(tmp_path / "variables.toml")
+
+
+def test_the_command_line_writes_nothing_for_a_wrong_file(tmp_path: Path) -> None:
+    variables = copied("rp_manipulator", tmp_path)
+    change(variables, 'field = "parameters.m1"\n', "")
+    result = generate(variables, tmp_path / "out")
+    assert result.returncode == 2
+    assert result.stderr == f"generate.py: {variables}: variable m1: field is missing\n"
+    assert not (tmp_path / "out").exists()
