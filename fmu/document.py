@@ -47,7 +47,7 @@ class DocumentError(Exception):
 
 
 def is_remote(address: str) -> bool:
-    """Tell whether a link leads out of the folder of the page."""
+    """Whether a link leads out of the folder of the page."""
     parts = urlsplit(address)
     return bool(parts.scheme or parts.netloc)
 

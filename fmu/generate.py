@@ -18,7 +18,7 @@ from provenance import Provenance, ProvenanceError, build_date, license_texts
 
 
 def write_if_changed(path: Path, text: str) -> None:
-    """Write a file, but leave an equal one alone so that nothing is rebuilt for it."""
+    """Write a file unless it has this text already, so that nothing is rebuilt for it."""
     if not path.is_file() or path.read_bytes() != text.encode():
         with atomic_write(path) as temporary:
             temporary.write_bytes(text.encode())

@@ -6,13 +6,23 @@
 # references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
-set(FMU_SOURCES
-  ${FMU_SOURCE_DIR}/component.c
-  ${FMU_SOURCE_DIR}/fmu_state.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2_calls.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2_co_simulation.c
-  ${FMU_SOURCE_DIR}/fmi2/fmi2_model_exchange.c)
+# An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
+set(FMI_VERSIONS fmi2)
+
+file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/*.c)
+foreach(version IN LISTS FMI_VERSIONS)
+  file(GLOB ${version}_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/${version}/*.c)
+endforeach()
+
+# The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS.
+function(add_fmu_library target version description folder)
+  add_library(${target} MODULE ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
+  set_target_properties(${target} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
+                        LIBRARY_OUTPUT_DIRECTORY ${folder})
+  target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
+  target_link_libraries(${target} PRIVATE ${description} reserved_allocation)
+  target_link_options(${target} PRIVATE ${FMU_LINK_OPTIONS})
+endfunction()
 
 function(add_fmu name)
   cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
@@ -42,13 +52,13 @@ function(add_fmu name)
   target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR})
   target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
-  # the shared object: exports what fmi2Functions.h marks, hides all of SUNDIALS
-  add_library(${name} MODULE ${FMU_SOURCES})
-  set_target_properties(${name} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
-                      LIBRARY_OUTPUT_DIRECTORY ${out})
-  target_include_directories(${name} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${name} PRIVATE ${name}_description reserved_allocation)
-  target_link_options(${name} PRIVATE ${FMU_LINK_OPTIONS})
+  foreach(version IN LISTS FMI_VERSIONS)
+    if(version STREQUAL "fmi2")
+      add_fmu_library(${name} fmi2 ${name}_description ${out})
+    else()
+      add_fmu_library(${name}_${version} ${version} ${name}_description ${out}/${version})
+    endif()
+  endforeach()
 
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)

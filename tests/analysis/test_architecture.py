@@ -202,8 +202,8 @@ def write(project: Path, name: str, text: str) -> None:
     ("name", "header"),
     [
         ("src/model/status.c", "math.h"),
-        ("src/integrator/cvode.c", "cvode/cvode.h"),
-        ("src/integrator/cvode.c", "method.h"),
+        ("src/integrator/method_cvode.c", "cvode/cvode.h"),
+        ("src/integrator/method_cvode.c", "method.h"),
         ("src/instance/values.c", "ode.h"),
         ("fmu/component.c", "instance.h"),
         ("fmu/fmi2/fmi2.c", "fmi2Functions.h"),
@@ -222,7 +222,7 @@ def test_what_may_be_included(project: Path, name: str, header: str) -> None:
     [
         ("src/model/status.c", "ode.h"),
         ("src/model/status.c", "sched.h"),
-        ("src/integrator/cvode.c", "instance.h"),
+        ("src/integrator/method_cvode.c", "instance.h"),
         ("src/instance/values.c", "method.h"),
         ("src/instance/values.c", "component.h"),
         ("src/instance/values.c", "cvode/cvode.h"),

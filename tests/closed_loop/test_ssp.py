@@ -132,6 +132,23 @@ def test_structure() -> None:
             assert opened.fmu(component).read_bytes() == built.read_bytes()
 
 
+def test_omsimulator_finds_what_it_needs() -> None:
+    """The type of each component, and its own annotation with the step that the others take too."""
+    with ssp.unpacked(SSP) as opened:
+        step = opened.system.step
+        root = etree.parse(opened.folder / STRUCTURE).getroot()
+    types = [node.get("type") for node in root.iterfind(".//ssd:Component", NAMESPACES)]
+    assert types == ["application/x-fmu-sharedlibrary"] * len(FMUS)
+    system = root.find("ssd:System", NAMESPACES)
+    assert system is not None
+    assert system[-1].tag.endswith("}Annotations")
+    masters = root.xpath(
+        "//ssc:Annotation[@type='org.openmodelica']//*[local-name()='FixedStepMaster']",
+        namespaces=NAMESPACES,
+    )
+    assert [float(master.get("stepSize")) for master in masters] == [step]
+
+
 def test_variants() -> None:
     with ssp.unpacked(SSP) as opened:
         sets = opened.system.parameter_sets

@@ -225,7 +225,7 @@ def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> No
         assert (built / name).read_text() == (tmp_path / name).read_text()
 
 
-def test_a_variable_added_to_the_toml_alone_is_built_in(model_copy: Path, tmp_path: Path) -> None:
+def test_a_variable_needs_only_its_declaration(model_copy: Path, tmp_path: Path) -> None:
     model_copy.write_text(
         model_copy.read_text()
         + '[variables.lever]\nreference = 70\nfield = "loads.f1[1]"\ncausality = "local"\n'

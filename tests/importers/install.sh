@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs importers other than fmpy for test_importers.py, each into a folder of its own,
+# Installs importers other than fmpy for test_importers.py, each into its folder
 # build/importers/TOOL. Quick when there is nothing to do. A tool that cannot be installed is named,
 # the others are installed all the same, and the exit code is 1.
 set -euo pipefail

@@ -31,7 +31,7 @@ def run(plan: Plan) -> Rows:
     check(execution.add_manipulator(manipulator))
     last_value = CosimObserver.create_last_value()
     check(execution.add_observer(last_value))
-    # the first values are seen by this observer alone: initialization is part of the first step
+    # only this observer sees the first values: initialization is part of the first step
     first_values = CosimObserver.create_time_series(plan.steps + 1)
     check(execution.add_observer(first_values))
     for reference in outputs:
