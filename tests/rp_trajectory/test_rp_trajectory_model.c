@@ -163,7 +163,8 @@ static void test_a_path_stays_beyond_the_smallest_distance(void) {
 /* Zero is written without a sign, whatever the direction of the line. */
 static void test_a_coordinate_of_zero_has_no_sign(void) {
     v.parameters.motion = RP_TRAJECTORY_LINE;
-    for (double end = -0.5; end <= 0.5; end += 1.0) {
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const double end = 0.5 * sign;
         v.parameters.ee_from[0] = v.parameters.ee_to[0] = 0.0625;
         v.parameters.ee_from[1] = -end;
         v.parameters.ee_to[1] = end;
