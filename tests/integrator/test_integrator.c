@@ -64,8 +64,9 @@ static void create(ode_rhs *rhs) {
 
 static void configure(double tolerance) {
     const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
-    const struct integrator_settings settings = {
-        .method = method, .relative_tolerance = tolerance, .absolute_tolerances = absolute};
+    const struct integrator_settings settings = {.method = (enum integrator_method)method,
+                                                 .relative_tolerance = tolerance,
+                                                 .absolute_tolerances = absolute};
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
 }
 
@@ -313,8 +314,9 @@ EACH_METHOD static void test_no_step_is_longer_than_the_limit(void) {
     static const double limits[] = {1e-4, 0.0, 0.01};
     double x[2];
     const double absolute[2] = {1e-6, 1e-6};
-    struct integrator_settings settings = {
-        .method = method, .relative_tolerance = 1e-4, .absolute_tolerances = absolute};
+    struct integrator_settings settings = {.method = (enum integrator_method)method,
+                                           .relative_tolerance = 1e-4,
+                                           .absolute_tolerances = absolute};
     struct integrator_statistics statistics;
     integrator_destroy(integrator);
     create(circle_rhs);
@@ -396,8 +398,9 @@ EACH_METHOD static void test_another_method_may_take_over(void) {
 EACH_METHOD static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
     static const double limits[] = {1e-3, 1e-9, 5e-324, 1e300};
     const double absolute[2] = {1e-16, 1e-16};
-    struct integrator_settings settings = {
-        .method = method, .relative_tolerance = 1e-14, .absolute_tolerances = absolute};
+    struct integrator_settings settings = {.method = (enum integrator_method)method,
+                                           .relative_tolerance = 1e-14,
+                                           .absolute_tolerances = absolute};
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
         settings.max_step = limits[i];
         integrator_destroy(integrator);

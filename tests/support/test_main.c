@@ -10,12 +10,9 @@
 
 int method;
 
-static const char *const method_names[INTEGRATOR_METHODS] = {
-    [INTEGRATOR_CVODE_ADAMS] = "cvode_adams",
-    [INTEGRATOR_CVODE_BDF] = "cvode_bdf",
-    [INTEGRATOR_ERK] = "erk",
-};
-_Static_assert(INTEGRATOR_METHODS == INTEGRATOR_ERK + 1, "a method has no name here");
+#define METHOD_NAME(code, symbol) [code] = #code,
+static const char *const method_names[] = {INTEGRATOR_METHOD_LIST(METHOD_NAME)};
+#undef METHOD_NAME
 
 // a file defines those that it needs
 __attribute__((weak)) void suiteSetUp(void) {}
@@ -40,7 +37,7 @@ static void run(const struct test *test, const char *name, const char *text) {
 }
 
 static void run_with_methods(const struct test *test, const char *text) {
-    for (method = INTEGRATOR_CVODE_ADAMS; method < INTEGRATOR_METHODS; method++) {
+    for (method = INTEGRATOR_NO_METHOD + 1; method < INTEGRATOR_METHODS; method++) {
         if (test->kind == TEST_EACH_METHOD || is_cvode()) {
             char name[256];
             snprintf(name, sizeof name, "%s(%s)", test->name, method_names[method]);
