@@ -15,8 +15,10 @@
 #error "include the arithmetic before the equations"
 #endif
 
+#include "platform.h"
+
 /* Begins each equation. Inlined wherever it is used: only then do compilers leave out what a result
  * does not need, such as second derivatives, and keep the rest in registers. */
-#define EQUATION static inline __attribute__((always_inline))
+#define EQUATION ALWAYS_INLINE
 
 #endif

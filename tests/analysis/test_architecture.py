@@ -23,7 +23,7 @@ MAY_INCLUDE = {
     r"src/instance": ("src/integrator", "src/model"),
     r"fmu": ("src/instance", "src/model"),
     r"fmu/fmi\d": ("fmu", "src/instance", "src/model"),
-    r"models": (),
+    r"models": ("src/model",),
     r"models/\w+": ("models", "src/model"),
 }
 # the equations of another model

@@ -2,7 +2,7 @@
  * gives no value, and works again afterwards. */
 #include "derivatives.h"
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 #include "stepping.h"
 #include "values.h"
 

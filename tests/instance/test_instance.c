@@ -1,7 +1,7 @@
 #include "instance.h"
 
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 #include "stepping.h"
 #include "values.h"
 

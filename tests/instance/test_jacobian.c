@@ -3,7 +3,8 @@
 
 #include "derivatives.h"
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
+#include "right_hand_side.h"
 #include "stepping.h"
 #include "values.h"
 
@@ -221,4 +222,21 @@ static void test_that_of_the_oscillator_is_what_propagation_gives(void) {
         ASSERT_OK(oscillator_model.propagate(&at, 0.0, 0.0, &first, NULL));
         TEST_ASSERT_TRUE(J[j][0] == first.v && J[j][1] == first.a);
     }
+}
+
+/* The Jacobian is that of its own time: inputs are evaluated there, not where the right-hand side
+ * was asked for last. */
+static void test_inputs_are_those_of_the_jacobians_time(void) {
+    begin(INTEGRATOR_CVODE_BDF, 3.0, 0.5);
+    set(OSCILLATOR_U, 0.25);
+    set_slope(2.0);
+    ASSERT_OK(instance_do_step(instance, start, 0.5));
+    const double x[2] = {0.3, -0.1};
+    double dx[2];
+    double J[4];
+    ASSERT_OK(instance_rhs(0.0, x, dx, instance));
+    ASSERT_OK(instance_jacobian(0.125, x, J, instance));
+    const double stiffness_then = 3.0 * 3.0 * (1.0 + start + 0.125 + 0.25 + 2.0 * 0.125);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14 * stiffness_then, -stiffness_then * cos(0.3), J[1]);
+    TEST_ASSERT_EQUAL_DOUBLE(-0.5, J[3]);
 }

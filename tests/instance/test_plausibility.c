@@ -3,7 +3,7 @@
 #include "plausibility.h"
 
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 #include "stepping.h"
 
 #include <limits.h>

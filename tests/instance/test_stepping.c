@@ -6,7 +6,7 @@
 #include "derivatives.h"
 #include "each_method.h"
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 #include "stepping.h"
 #include "values.h"
 

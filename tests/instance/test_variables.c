@@ -1,5 +1,5 @@
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 
 #include <math.h>
 #include <string.h>

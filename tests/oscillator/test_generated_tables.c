@@ -1,7 +1,7 @@
 /* The table that fmu/generate.py makes from oscillator/variables.toml is the one written by hand.
  */
 #include "model_description.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 #include "value_references.h"
 
 #include <string.h>

@@ -2,7 +2,7 @@
  * that are not finite: a step then ends at a state that is right, and can be undone. */
 #include "captured_stderr.h"
 #include "last_text.h"
-#include "oscillator.h"
+#include "oscillator_by_hand.h"
 #include "snapshot.h"
 #include "stepping.h"
 #include "values.h"
