@@ -1,5 +1,6 @@
 #include "instance.h"
 
+#include "continuous_states.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
 #include "stepping.h"
@@ -210,6 +211,29 @@ static void test_a_wrong_field_in_the_first_row_is_refused(void) {
     wrong.variable_count = 1;
     TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
     TEST_ASSERT_NULL(none);
+}
+
+/* Nominal values are found wherever in the table a state stands. */
+static void test_nominal_values_of_states_in_the_first_rows(void) {
+    struct variable rows[2];
+    struct model_description states_only = oscillator_description;
+    struct instance *created = NULL;
+    double nominals[2] = {0.0, 0.0};
+    for (size_t i = 0, row = 0; i < oscillator_description.variable_count; i++) {
+        const struct variable *variable = &oscillator_description.variables[i];
+        if (variable->reference == OSCILLATOR_X || variable->reference == OSCILLATOR_V) {
+            rows[row] = *variable;
+            rows[row].nominal = 5.0 + (double)row;
+            row++;
+        }
+    }
+    states_only.variables = rows;
+    states_only.variable_count = 2;
+    ASSERT_OK(instance_create(&states_only, &last_text_sink, &created));
+    ASSERT_OK(instance_get_nominals(created, nominals, 2));
+    TEST_ASSERT_EQUAL_DOUBLE(5.0, nominals[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(6.0, nominals[1]);
+    instance_destroy(created);
 }
 
 /* What was calculated before a reset does not show after it. */

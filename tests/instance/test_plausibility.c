@@ -168,6 +168,25 @@ static void test_a_history_does_not_contradict_itself(void) {
     TEST_ASSERT_TRUE(is_plausible());
 }
 
+/* A history that does not reach its first time in the steps it names cannot be replayed, though it
+ * would reach its latest time from there. */
+static void test_a_history_that_is_too_short_is_found_at_the_next_step(void) {
+    struct instance *forged;
+    const struct instance_experiment experiment = {0};
+    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &forged));
+    ASSERT_OK(instance_setup_experiment(forged, &experiment));
+    ASSERT_OK(instance_enter_initialization(forged));
+    ASSERT_OK(instance_exit_initialization(forged));
+    ASSERT_OK(instance_do_step(forged, 0.0, 0.5));
+    const long needed = forged->state.statistics.steps;
+    TEST_ASSERT_GREATER_THAN_INT(2, needed);
+    ASSERT_OK(instance_do_step(forged, 0.5, 1e-3));
+    forged->state.steps_before_restart = forged->state.statistics.steps - (needed - 1);
+    forged->history_is_lost = true;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_do_step(forged, 0.501, 1e-3));
+    instance_destroy(forged);
+}
+
 static char *place(const void *own) {
     return block + ((const char *)own - instance->memory.block);
 }

@@ -45,6 +45,18 @@ static void test_blocks_are_zeroed_aligned_and_apart(void) {
     reserve_leave(&reserve);
 }
 
+static void test_a_destroyed_reserve_is_empty(void) {
+    reserve_enter(&reserve);
+    TEST_ASSERT_NOT_NULL(reserve_take(100));
+    reserve_leave(&reserve);
+    for (int i = 0; i < 2; i++) {
+        reserve_destroy(&reserve);
+        TEST_ASSERT_NULL(reserve.block);
+        TEST_ASSERT_EQUAL_UINT64(0, reserve.size);
+        TEST_ASSERT_EQUAL_UINT64(0, reserve.used);
+    }
+}
+
 static void test_no_more_than_there_is_is_given_out(void) {
     reserve_enter(&reserve);
     TEST_ASSERT_NULL(reserve_take(1025));

@@ -205,6 +205,18 @@ static void check_polynomial(void) {
     assert_same(COUNT * 256.0 * DBL_EPSILON);
 }
 
+static void check_space(void) {
+    sunindextype reals = -1;
+    sunindextype integers = -1;
+    N_VSpace(small[0][0], &reals, &integers);
+    TEST_ASSERT_EQUAL_INT(length, reals);
+    TEST_ASSERT_EQUAL_INT(1, integers);
+}
+
+static void test_space(void) {
+    at_every_length(check_space);
+}
+
 static void test_linear_sum(void) {
     at_every_length(check_linear_sum);
 }

@@ -161,13 +161,15 @@ class Workshop:
         run("cmake", "-S", self.sources, "-B", build, *generator, *options, *self.settings)
         run("cmake", "--build", build, "--parallel", "1")
         self.tests[kind] = c_tests(build)
-        self.programs[kind] = {test.name: self.digest(test) for test in self.tests[kind]}
+        self.programs[kind] = {test.name: self.digest(build, test) for test in self.tests[kind]}
 
     @staticmethod
-    def digest(test: Test) -> str:
-        """Hash of the program of a test and of the FMUs that it loads."""
+    def digest(build: Path, test: Test) -> str:
+        """Hash of a test's program, of the files in its command, and of the FMUs that it names."""
         files = [Path(part) for part in test.command if part.startswith("/")]
         parts = [file.read_bytes() for file in files if file.is_file()]
+        libraries = sorted(build.glob("fmu/*/*.so"))
+        parts += [each.read_bytes() for each in libraries if str(each).encode() in parts[0]]
         return hashlib.sha256(b"".join(parts)).hexdigest()
 
     def make(self, kind: str, targets: list[str]) -> bool:
@@ -212,7 +214,7 @@ class Workshop:
 
     def passes(self, kind: str, test: Test) -> str:
         """How a test ends; one whose program is as without a mutant need not run."""
-        if self.digest(test) == self.programs[kind][test.name]:
+        if self.digest(self.builds[kind], test) == self.programs[kind][test.name]:
             return "passed"
         return self.run(kind, test)
 

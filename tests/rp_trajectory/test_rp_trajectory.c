@@ -133,6 +133,26 @@ static void test_the_start_is_the_principal_solution(void) {
     }
 }
 
+/* Near an end the way that is left has all its digits: s(x) = 10 x^3 - 15 x^4 + 6 x^5 of 1e-10. */
+static void test_small_ways_near_an_end_keep_their_digits(void) {
+    const double duration = 100.0;
+    const double x = 0.02 / duration;
+    const double s = x * x * x * (10.0 + x * (-15.0 + x * 6.0));
+    p.motion = RP_TRAJECTORY_POINT_TO_POINT;
+    p.start_time = 0.0;
+    p.duration = duration;
+    for (int i = 0; i < 2; i++) {
+        p.q_from[i] = 0.0;
+        p.q_to[i] = 1.0;
+    }
+    const double first = at(0.02).q[0].position.value;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * s, s, first);
+    p.q_from[0] = -1.0;
+    p.q_to[0] = 0.0;
+    const double last = at(duration - 0.02).q[0].position.value;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9 * s, -s, last);
+}
+
 static void test_ends_are_reached_exactly(void) {
     p.motion = RP_TRAJECTORY_POINT_TO_POINT;
     for (int i = 0; i < 2; i++) {
