@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
+from cosim import project, simulation
 from cosim import scenario as scenarios
-from cosim import simulation
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmu_file import Fmu
@@ -157,7 +157,7 @@ def load(path: Path, model: Model) -> Problem:
     if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
         raise UserError(f"{path}: [time] step: {FACTORS[0]} of it do not divide the duration")
     inputs = smooth_inputs(scenario)
-    file = scenario.reference_folder / "exact.json"
+    file = project.exact_state_file(path)
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         exact, largest = content["final"], content["largest"]

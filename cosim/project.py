@@ -2,10 +2,10 @@
 
 models/MODEL/scenarios/NAME.toml        a scenario
 models/MODEL/convergence/NAME.toml      a problem for the order of convergence, of that format
-models/MODEL/references/NAME/           the reference of the scenario or problem
+models/MODEL/references/NAME/           MODEL_ref.csv of a scenario, exact.json of a problem
 models/MODEL/references/scales.toml     sums that errors are divided by, instead of maxima
 models/SYSTEM/SystemStructure.ssd       connects models to a system
-models/SYSTEM/references/VARIANT/       the references of a variant of the system
+models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores
@@ -20,7 +20,6 @@ ROOT = Path(__file__).resolve().parents[1]
 
 STRUCTURE = "SystemStructure.ssd"
 STUDY = "study"  # the module of a system's folder that cosim.system.study describes
-SCALES = "scales.toml"
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 
 
@@ -76,6 +75,26 @@ def references(folder: Path) -> Path:
 def reference_folder(scenario: Path) -> Path:
     """Folder of the reference of a scenario or problem."""
     return references(model_folder(scenario)) / scenario.stem
+
+
+def reference_file(scenario: Path, model: str) -> Path:
+    """Reference of a scenario, of a model whose FMU has the name `model`."""
+    return reference_folder(scenario) / f"{model}_ref.csv"
+
+
+def scales_file(folder: Path) -> Path:
+    """Sums that errors of a model or system are divided by."""
+    return references(folder) / "scales.toml"
+
+
+def exact_state_file(problem: Path) -> Path:
+    """Exact final state of a problem for the order of convergence."""
+    return reference_folder(problem) / "exact.json"
+
+
+def variant_reference_file(system: Path, variant: str) -> Path:
+    """Reference of a system's variant: Jacobi stepping, read after inputs are set, as in Ecos."""
+    return references(system) / variant / "ecos.csv"
 
 
 def making_references(folder: Path, name: str) -> str:

@@ -64,24 +64,24 @@ def load(scenario: Scenario, model: Model) -> Reference:
         If the file is missing, damaged, or not of this scenario; names the line and the command
         that makes references.
     """
-    path = scenario.reference_folder / f"{model.name}_ref.csv"
+    path = project.reference_file(scenario.path, model.name)
     reader = _Reader(path, scenario)
     names, table = trajectory_csv.read(path, reader.fail)
     reader.check_names(names[1:], model)
     reader.check_times(table[:, 0])
-    summed = read_summed(scenario.reference_folder.parent)
+    summed = read_summed(project.model_folder(scenario.path))
     return Reference(path, table[:, 0], names[1:], table[:, 1:], summed)
 
 
 def read_summed(folder: Path) -> Summed:
-    """Which errors have the scale of a sum: scales.toml of a folder of references, if there is one.
+    """Which errors of a model or system, by its folder, have the scale of a sum; maybe none.
 
     Raises
     ------
     UserError
         If the file is wrong.
     """
-    path = folder / project.SCALES
+    path = project.scales_file(folder)
     if not is_file(path):
         return {}
     content = read_toml(path)

@@ -240,7 +240,7 @@ class _Reader:
         times = times[stop - times >= np.tile(remainder, cycles)]
         times = np.concatenate(([start], times[times > start], [stop]))
         if not np.all(np.diff(times) > 0):
-            self.fail("[time] step: too short to tell the communication points apart")
+            self.fail("[time] step: too short, communication points coincide")
         times.setflags(write=False)
         return times
 

@@ -38,8 +38,8 @@ void component_make_harmless(const char *text, char out[LOG_TEXT_SIZE]) {
 
 static void send_text(const struct component *component, enum component_status status,
                       enum log_category category, const char *raw) {
-    char text[LOG_TEXT_SIZE];
     if (component->is_logged[category]) {
+        char text[LOG_TEXT_SIZE];
         component_make_harmless(raw, text);
         component->adapter->send(component, status, category_names[category], text);
     }

@@ -1,6 +1,7 @@
 #include "fmu_state.h"
 
 #include "serialization.h"
+#include "snapshot.h"
 
 /* A saved state carries the FMI state and the kind of its instance. */
 enum { TAG_KIND_SHIFT = 16, TAG_STATE_MASK = 0xffff };

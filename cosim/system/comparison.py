@@ -12,7 +12,6 @@ from cosim.reference import Summed
 from cosim.system import ecos
 from cosim.system.ssp import Ssp
 
-REFERENCE = "ecos.csv"  # of Jacobi stepping, read after inputs are set
 BOUND = 1e-7  # on the relative error of every variable
 
 
@@ -115,7 +114,7 @@ def load_reference(
         that makes references.
     """
     _check_experiment(ssp, experiment)
-    path = project.references(system) / variant / REFERENCE
+    path = project.variant_reference_file(system, variant)
 
     def wrong(message: str, line: int | None = None) -> UserError:
         place = f"{path}, line {line}" if line else f"{path}"
@@ -132,7 +131,7 @@ def load_reference(
             raise wrong(f"has no column {name!r}", 1)
     steps = _steps(ssp, table[:, 0], wrong)
     values = dict(zip(names, table[:, 1:].T, strict=True))
-    return Reference(path, steps, values, reference.read_summed(project.references(system)))
+    return Reference(path, steps, values, reference.read_summed(system))
 
 
 def _steps(ssp: Ssp, times: np.ndarray, wrong: trajectory_csv.Failure) -> np.ndarray:

@@ -12,7 +12,7 @@ TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration"}
 
 LOG_CATEGORIES = {
     "logEvents": "Events, for example initialization and reset",
-    "logStatusWarning": "Why a function returns fmi2Warning",
+    "logStatusWarning": "Something to know about a call that succeeded",
     "logStatusDiscard": "Why a function returns fmi2Discard",
     "logStatusError": "Why a function returns fmi2Error",
     "logStatusFatal": "Why a function returns fmi2Fatal",

@@ -57,4 +57,10 @@ void rp_controller_integral_rates(const struct rp_controller_parameters *p,
                                   const struct rp_controller_inputs *inputs,
                                   const double unlimited[2], double rates[2]);
 
+/* Derivatives of these rates, with the efforts that the law asks for, by the integral parts: row i,
+ * column j is that of rate i by w[j] (1/s). One-sided where an effort just meets its limit. */
+void rp_controller_integral_jacobian(const struct rp_controller_parameters *p,
+                                     const struct rp_controller_inputs *inputs, const double w[2],
+                                     double rates_by_w[2][2]);
+
 #endif

@@ -1,5 +1,7 @@
 #include "rp_controller_model.h"
 
+#include "arithmetic_double.h"
+#include "rp_controller_calculated.h"
 #include "rp_controller_propagation.h"
 
 #include <stdio.h>
@@ -22,19 +24,28 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
     return STATUS_OK;
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_controller_values *v = values_pointer;
-    const struct rp_controller_parameters *p = &v->parameters;
-    const struct rp_controller_inputs *inputs = &v->inputs;
+static enum status jacobian(const void *values_pointer, double t, const double x[],
+                            const double u[], double J[]) {
+    const struct rp_controller_parameters *p =
+        &((const struct rp_controller_values *)values_pointer)->parameters;
     (void)t;
+    struct rp_controller_inputs inputs;
+    memcpy(&inputs, u, sizeof inputs);
 
-    rp_controller_unlimited(p, inputs, v->integral, v->unlimited);
-    rp_controller_limited(p, v->unlimited, v->effort);
-    rp_controller_integral_rates(p, inputs, v->unlimited, v->dintegral);
-    for (int i = 0; i < 2; i++) {
-        v->error[i] = inputs->q_ref[i] - inputs->q[i];
-        v->derror[i] = inputs->dq_ref[i] - inputs->dq[i];
+    double by_w[2][2];
+    rp_controller_integral_jacobian(p, &inputs, x, by_w);
+    for (size_t i = 0; i < 2; i++) {
+        J[i] = by_w[i][0];
+        J[i + 2] = by_w[i][1];
     }
+    return STATUS_OK;
+}
+
+static enum status outputs(void *values_pointer, double t) {
+    struct rp_controller_values *values = values_pointer;
+    const struct rp_controller_values *from = values;
+    (void)t;
+    calculate(&from, &values);
     return STATUS_OK;
 }
 
@@ -67,6 +78,7 @@ const struct model rp_controller_model = {
     .states = {offsetof(struct rp_controller_values, integral), sizeof(double[2])},
     .derivatives = {offsetof(struct rp_controller_values, dintegral), sizeof(double[2])},
     .right_hand_side = right_hand_side,
+    .jacobian = jacobian,
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,

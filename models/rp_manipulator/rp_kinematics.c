@@ -1,9 +1,10 @@
-#include "rp_manipulator.h"
+#include "arithmetic_double.h"
+#include "rp_equations.h"
 
-#include <math.h>
 #include <string.h>
 
 static const double half_pi = 1.57079632679489661923;
+static const double at_rest[2] = {0.0, 0.0};
 
 void rp_dh_table(const struct rp_parameters *p, const double q[2], struct rp_dh_row rows[2]) {
     rows[0] = (struct rp_dh_row){.a = p->a, .alpha = half_pi, .d = 0.0, .theta = half_pi + q[0]};
@@ -42,22 +43,16 @@ void rp_forward_kinematics(const struct rp_parameters *p, const double q[2], dou
     }
 }
 
-/* L along z1 = (c1, s1) and a along x1 = (-s1, c1). */
 void rp_end_effector_position(const struct rp_parameters *p, const double q[2],
                               double position[2]) {
-    const double L = p->l1 + q[1];
-    const double s1 = sin(q[0]);
-    const double c1 = cos(q[0]);
-    position[0] = L * c1 - p->a * s1;
-    position[1] = L * s1 + p->a * c1;
+    const struct arm arm = arm_in_state(&p, q, at_rest);
+    arm_end_effector_position(&arm, position);
 }
 
 void rp_end_effector_velocity(const struct rp_parameters *p, const double q[2], const double dq[2],
                               double velocity[2]) {
-    double J[3][2];
-    rp_jacobian_linear_link2(p, q, J);
-    velocity[0] = J[0][0] * dq[0] + J[0][1] * dq[1];
-    velocity[1] = J[1][0] * dq[0] + J[1][1] * dq[1];
+    const struct arm arm = arm_in_state(&p, q, dq);
+    arm_end_effector_velocity(&arm, velocity);
 }
 
 /* Length of a vector, without overflow or underflow in between. Not hypot: since glibc 2.35 that is
@@ -108,13 +103,7 @@ void rp_jacobian_linear_link1(const struct rp_parameters *p, const double q[2], 
 }
 
 void rp_jacobian_linear_link2(const struct rp_parameters *p, const double q[2], double J[3][2]) {
-    const double L = p->l1 + q[1];
-    const double s1 = sin(q[0]);
-    const double c1 = cos(q[0]);
-    const double jacobian[3][2] = {
-        {-L * s1 - p->a * c1, c1},
-        {L * c1 - p->a * s1, s1},
-        {0.0, 0.0},
-    };
-    memcpy(J, jacobian, sizeof jacobian);
+    const struct arm arm = arm_in_state(&p, q, at_rest);
+    arm_end_effector_jacobian(&arm, J);
+    J[2][0] = J[2][1] = 0.0;
 }

@@ -8,6 +8,9 @@
  * Frames 1 and 2 turn with link 1: x along the short side a, y parallel to z0, z along the slide.
  * SI units throughout; generalized forces tau = (torque on joint 1 in N.m, force on joint 2 in N).
  *
+ * The equations themselves are in rp_equations.h and rp_recursion.h, once for values and
+ * derivatives; the functions here are their values.
+ *
  * All functions are pure: they read their inputs, write their trailing outputs, keep nothing,
  * allocate nothing. Inputs are taken as they are; results for parameters that
  * rp_parameters_check refuses, and for states that overflow, may be infinite or NaN. */
@@ -109,7 +112,8 @@ void rp_inverse_dynamics(const struct rp_parameters *p, const double q[2], const
 void rp_forward_dynamics(const struct rp_parameters *p, const double q[2], const double dq[2],
                          const double tau[2], double ddq[2]);
 
-/* Derivatives of rp_forward_dynamics: row i, column j is d ddq[i] / d (argument)[j]. */
+/* Derivatives of rp_forward_dynamics (rp_jacobians.c): row i, column j is
+ * d ddq[i] / d (argument)[j]. */
 struct rp_dynamics_jacobians {
     double q[2][2];
     double dq[2][2];

@@ -1,37 +1,46 @@
 #include "rp_model.h"
 
+#include "arithmetic_double.h"
+#include "rp_calculated.h"
 #include "rp_propagation.h"
 
 #include <stdio.h>
 
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
-    const struct rp_values *values = values_pointer;
+    const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
     (void)t;
+    const struct arm arm = arm_in_state(&p, x, x + 2);
     dx[0] = x[2];
     dx[1] = x[3];
-    rp_forward_dynamics(&values->parameters, x, x + 2, u, dx + 2);
+    arm_forward_dynamics(&arm, u, dx + 2);
+    return STATUS_OK;
+}
+
+static enum status jacobian(const void *values_pointer, double t, const double x[],
+                            const double u[], double J[]) {
+    const struct rp_values *values = values_pointer;
+    struct rp_dynamics_jacobians ddq_by;
+    (void)t;
+    rp_dynamics_jacobians(&values->parameters, x, x + 2, u, &ddq_by);
+    for (size_t j = 0; j < 2; j++) {
+        double *by_q = J + 4 * j;
+        double *by_dq = J + 4 * (2 + j);
+        for (size_t i = 0; i < 2; i++) {
+            by_q[i] = 0.0;
+            by_q[2 + i] = ddq_by.q[i][j];
+            by_dq[i] = i == j ? 1.0 : 0.0;
+            by_dq[2 + i] = ddq_by.dq[i][j];
+        }
+    }
     return STATUS_OK;
 }
 
 static enum status outputs(void *values_pointer, double t) {
-    struct rp_values *v = values_pointer;
-    const struct rp_parameters *p = &v->parameters;
+    struct rp_values *values = values_pointer;
+    const struct rp_values *from = values;
     (void)t;
-
-    rp_forward_dynamics(p, v->q, v->dq, v->tau, v->ddq);
-    rp_end_effector_position(p, v->q, v->ee_position);
-    rp_end_effector_velocity(p, v->q, v->dq, v->ee_velocity);
-
-    v->kinetic_energy = rp_kinetic_energy(p, v->q, v->dq);
-    v->potential_energy = rp_potential_energy(p, v->q);
-    v->total_energy = v->kinetic_energy + v->potential_energy;
-    v->actuator_power = v->tau[0] * v->dq[0] + v->tau[1] * v->dq[1];
-
-    rp_mass_matrix(p, v->q, v->D);
-    rp_coriolis_forces(p, v->q, v->dq, v->coriolis);
-    rp_gravity_forces(p, v->q, v->gravity);
-    rp_newton_euler(p, v->q, v->dq, v->ddq, &v->loads);
+    calculate(&from, &values);
     return STATUS_OK;
 }
 
@@ -62,6 +71,7 @@ const struct model rp_model = {
     .states = {offsetof(struct rp_values, q), sizeof(double[4])},
     .derivatives = {offsetof(struct rp_values, dq), sizeof(double[4])},
     .right_hand_side = right_hand_side,
+    .jacobian = jacobian,
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,

@@ -27,6 +27,11 @@ struct model {
     enum status (*right_hand_side)(const void *values, double t, const double x[], const double u[],
                                    double dx[]);
 
+    /* Writes the derivatives of f by the states to J: J[i + state_count j] is that of x'_i by x_j.
+     * Implicit methods need it. Pure as right_hand_side; NULL if the model has no states. */
+    enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
+                            double J[]);
+
     /* Writes all calculated fields of values from its parameters, inputs and states at time t. */
     enum status (*outputs)(void *values, double t);
 

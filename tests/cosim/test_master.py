@@ -59,7 +59,7 @@ def recurrence(order: str, inputs: str, sequence: str = "ab") -> np.ndarray:
     rows = [[*state["a"], *state["b"]]]
     for _ in range(STEPS):
         first, second = sequence
-        # the component in front, and in Jacobi order both, know the beginning of the step alone
+        # the component in front, and in Jacobi order both, know only the beginning of the step
         x, v = state[second]
         ahead = exact_step(first, state[first], x, v * linear)
         if order == "jacobi":

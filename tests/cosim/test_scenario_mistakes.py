@@ -76,7 +76,7 @@ MISTAKES = {
     "step lost at stop": (timed(0, 1e6, 1e-11), "[time] step: 1e-11 s is lost in rounding"),
     "points that coincide": (
         timed(1e9, 1000000000.0001, 9e-8),
-        "[time] step: too short to tell the communication points apart",
+        "[time] step: too short, communication points coincide",
     ),
     "too many steps": (
         timed(0, 1e6, 1e-3),

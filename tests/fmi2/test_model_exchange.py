@@ -19,8 +19,8 @@ from tests.support.instances import ERROR, INPUTS, STATES, Instance, Unit, statu
 
 NAMES = names_of("rp_manipulator")
 SECOND = [
-    ("q1", "dq1"),
-    ("q2", "dq2"),
+    ("q1", "der_q1"),
+    ("q2", "der_q2"),
     ("dq1", "ddq1"),
     ("dq2", "ddq2"),
 ]  # states and their derivatives

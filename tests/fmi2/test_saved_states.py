@@ -118,7 +118,7 @@ def test_damaged_foreign_and_newer_states_are_refused(unit: Unit) -> None:
         ("cut to 100 bytes", "length"),
         ("newer", "version"),
         ("GUID changed", "GUID"),
-        ("other magic", "no saved state"),
+        ("other magic", "not a saved state"),
     ],
 )
 def test_refusals_say_what_is_wrong(unit: Unit, what: str, text: str) -> None:

@@ -20,8 +20,11 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "fmu")]
 
-import generate  # noqa: E402
-from description import DescriptionError  # noqa: E402
+from declaration.c_tables import value_references, variable_table  # noqa: E402
+from declaration.load import DeclarationError  # noqa: E402
+from declaration.load import load as load_declaration  # noqa: E402
+from fmi2.model_description import model_description  # noqa: E402
+from provenance import Provenance  # noqa: E402
 
 from cosim import reference  # noqa: E402
 from cosim import scenario as scenarios  # noqa: E402
@@ -197,10 +200,10 @@ class Fuzz:
         self.with_file(file, content, self.generate)
 
     def generate(self) -> None:
-        description = generate.load(self.model / "variables.toml")
-        generate.model_description(description, "1")
-        generate.value_references(description)
-        generate.variable_table(description)
+        declaration = load_declaration(self.model / "variables.toml")
+        model_description(declaration, Provenance("1"))
+        value_references(declaration)
+        variable_table(declaration)
 
     def a_reference(self) -> None:
         text = mutated_text(self.reference.read_text(encoding="utf-8"), self.chance)
@@ -255,7 +258,7 @@ class Fuzz:
         begin, found = time.monotonic(), None
         try:
             check()
-        except (UserError, DescriptionError) as error:
+        except (UserError, DeclarationError) as error:
             self.refused += 1
             if not str(error):
                 found = "no message"

@@ -97,6 +97,19 @@ static void test_output_derivatives_along_the_motion(void) {
                               derivative(OSCILLATOR_ENERGY, 2));
 }
 
+/* A value set after a step over which the input moved is held: its slope no longer counts. */
+static void test_a_value_set_after_a_moving_step_has_no_slope(void) {
+    const double w = 2.0;
+    const unsigned input = OSCILLATOR_U;
+    const double u = 0.25;
+    ASSERT_OK(instance_exit_initialization(instance));
+    set_derivative(1, 3.0);
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_V) + 3.0, derivative(OSCILLATOR_A, 1));
+    ASSERT_OK(instance_set_real(instance, &input, 1, &u));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -w * w * get(OSCILLATOR_V), derivative(OSCILLATOR_A, 1));
+}
+
 /* Once anything of an input is set after a step over which it moved, outputs answer for the input
  * that the next step will have: the value set last with the new derivatives. */
 static void test_new_derivatives_start_from_the_value_set_last(void) {

@@ -200,6 +200,27 @@ static void test_a_field_of_another_kind_is_refused(void) {
     TEST_ASSERT_NULL(none);
 }
 
+/* The first row is checked as all others. */
+static void test_a_wrong_field_in_the_first_row_is_refused(void) {
+    struct variable variable = oscillator_description.variables[1]; // omega, a parameter
+    struct model_description wrong = oscillator_description;
+    struct instance *none = instance;
+    variable.offset = offsetof(struct oscillator_values, energy);
+    wrong.variables = &variable;
+    wrong.variable_count = 1;
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
+    TEST_ASSERT_NULL(none);
+}
+
+/* What was calculated before a reset does not show after it. */
+static void test_calculated_values_follow_a_reset(void) {
+    const double fresh = get(instance, OSCILLATOR_ENERGY);
+    ASSERT_OK(set(instance, OSCILLATOR_X, 3.0));
+    TEST_ASSERT_TRUE(get(instance, OSCILLATOR_ENERGY) > fresh);
+    instance_reset(instance);
+    TEST_ASSERT_TRUE(get(instance, OSCILLATOR_ENERGY) == fresh);
+}
+
 static void test_initialization_needs_an_experiment(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_enter_initialization(instance));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "the experiment must be set up first"));

@@ -341,3 +341,66 @@ EACH_METHOD static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
         }
     }
 }
+
+/* At 2^53 s a step of 1 s rounds to none, though one of -1 s would not. */
+EACH_METHOD static void test_a_step_that_rounds_to_none_is_refused(void) {
+    const double far = 9007199254740992.0;
+    TEST_ASSERT_TRUE(far + 1.0 == far && far - 1.0 != far);
+    initialize_until(instance, far, INFINITY);
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far, 1.0));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "does not change the time"));
+    ASSERT_OK(instance_do_step(instance, far, 2.0));
+}
+
+/* A nominal value sets the scale of the absolute tolerance: the larger, the fewer internal steps
+ * where the state is small. */
+static int steps_with_nominal(double nominal) {
+    struct variable variables[16];
+    struct model_description description = oscillator_description;
+    struct instance *scaled = NULL;
+    const unsigned steps_reference = OSCILLATOR_STEPS;
+    const unsigned method_reference = OSCILLATOR_SOLVER_METHOD;
+    int steps = 0;
+    for (size_t i = 0; i < oscillator_description.variable_count; i++) {
+        variables[i] = oscillator_description.variables[i];
+        if (variables[i].reference == OSCILLATOR_X || variables[i].reference == OSCILLATOR_V) {
+            variables[i].nominal = nominal;
+        }
+    }
+    description.variables = variables;
+    ASSERT_OK(instance_create(&description, &last_text_sink, &scaled));
+    ASSERT_OK(instance_set_integer(scaled, &method_reference, 1, &method));
+    ASSERT_OK(set(scaled, OSCILLATOR_X, 1e-6));
+    initialize_until(scaled, 0.0, INFINITY);
+    ASSERT_OK(instance_do_step(scaled, 0.0, 10.0));
+    ASSERT_OK(instance_get_integer(scaled, &steps_reference, 1, &steps));
+    instance_destroy(scaled);
+    return steps;
+}
+
+EACH_METHOD static void test_nominal_values_scale_the_absolute_tolerance(void) {
+    TEST_ASSERT_GREATER_THAN_INT(3 * steps_with_nominal(1e2) / 2, steps_with_nominal(1e-2));
+}
+
+/* A restart takes its first step from the last one: it needs no evaluation to find one. */
+EACH_CVODE_METHOD static void test_a_restart_finds_its_first_step_without_evaluations(void) {
+    struct instance *fresh = create();
+    const double x = 0.5;
+    initialize_until(instance, 0.0, INFINITY);
+    ASSERT_OK(instance_do_step(instance, 0.0, 2.0));
+    const int before = get_integer(OSCILLATOR_EVALUATIONS);
+    ASSERT_OK(set(instance, OSCILLATOR_U, x));
+    ASSERT_OK(instance_do_step(instance, 2.0, 1e-6));
+    const int restarted = get_integer(OSCILLATOR_EVALUATIONS) - before;
+
+    ASSERT_OK(set(fresh, OSCILLATOR_X, get(instance, OSCILLATOR_X)));
+    ASSERT_OK(set(fresh, OSCILLATOR_V, get(instance, OSCILLATOR_V)));
+    ASSERT_OK(set(fresh, OSCILLATOR_U, x));
+    initialize_until(fresh, 0.0, INFINITY);
+    ASSERT_OK(instance_do_step(fresh, 0.0, 1e-6));
+    const unsigned reference = OSCILLATOR_EVALUATIONS;
+    int evaluations = 0;
+    ASSERT_OK(instance_get_integer(fresh, &reference, 1, &evaluations));
+    TEST_ASSERT_LESS_THAN_INT(evaluations, restarted);
+    instance_destroy(fresh);
+}

@@ -337,6 +337,44 @@ EACH_METHOD static void test_no_step_is_longer_than_the_limit(void) {
 }
 
 /* Whatever state the one before ended with. */
+/* After an advance the first step of a restart has an estimated error of order 1, h^2 x'' / 2, of a
+ * hundredth of the tolerance: 0.1 sqrt(2 / norm), norm the weighted root mean square of x'' = -x.
+ */
+EACH_CVODE_METHOD static void test_the_next_step_follows_from_the_second_derivative(void) {
+    double x[2];
+    restart(INFINITY);
+    for (int i = 1; i < 12; i++) {
+        const double t = 0.5 * i;
+        advance(t, x);
+        double sum = 0.0;
+        for (int k = 0; k < 2; k++) {
+            const double weighted = x[k] / (1e-10 * fabs(x[k]) + 1e-12);
+            sum += weighted * weighted;
+        }
+        const double expected = 0.1 * sqrt(2.0 / sqrt(sum / 2.0));
+        TEST_ASSERT_DOUBLE_WITHIN(0.02 * expected, expected, integrator_next_step(integrator));
+    }
+}
+
+/* An advance that is no multiple of the step is taken in parts of equal length: none is tried that
+ * the error test must refuse. */
+EACH_METHOD static void test_advances_need_no_second_attempt(void) {
+    struct integrator_statistics statistics;
+    double x[2];
+    double t = 1.0;
+    restart(INFINITY);
+    advance(t, x);
+    integrator_get_statistics(integrator, &statistics);
+    const long failed = statistics.failed_steps;
+    for (int i = 0; i < 50; i++) {
+        t += 2.3 * (integrator_has_history(integrator) ? statistics.last_step
+                                                       : integrator_next_step(integrator));
+        advance(t, x);
+        integrator_get_statistics(integrator, &statistics);
+    }
+    TEST_ASSERT_LESS_OR_EQUAL_INT(failed + 5, statistics.failed_steps);
+}
+
 EACH_METHOD static void test_another_method_may_take_over(void) {
     static const double not_finite[2] = {NAN, INFINITY};
     const double absolute[2] = {1e-12, 1e-12};

@@ -12,6 +12,19 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
     return STATUS_OK;
 }
 
+static enum status jacobian(const void *values_pointer, double t, const double x[],
+                            const double u[], double J[]) {
+    const struct oscillator_values *values = values_pointer;
+    (void)t;
+    (void)x;
+    (void)u;
+    J[0] = 0.0;
+    J[1] = -values->omega * values->omega;
+    J[2] = 1.0;
+    J[3] = 0.0;
+    return STATUS_OK;
+}
+
 static enum status outputs(void *values_pointer, double t) {
     struct oscillator_values *values = values_pointer;
     (void)t;
@@ -56,6 +69,7 @@ const struct model oscillator_model = {
     .states = {offsetof(struct oscillator_values, x), 2 * sizeof(double)},
     .derivatives = {offsetof(struct oscillator_values, v), 2 * sizeof(double)},
     .right_hand_side = right_hand_side,
+    .jacobian = jacobian,
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,

@@ -208,7 +208,7 @@ def test_a_message_is_one_line_whatever_it_quotes(capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize(
-    ("stop", "code", "told"),
+    ("stop", "code", "said"),
     [(signal.SIGINT, 130, "interrupted\n"), (signal.SIGTERM, 143, "")],
     ids=["Ctrl-C", "SIGTERM"],
 )
@@ -218,7 +218,7 @@ def test_stopped_in_the_middle(
     arguments: tuple[str, ...],
     stop: signal.Signals,
     code: int,
-    told: str,
+    said: str,
 ) -> None:
     with place.popen(arguments) as process:
         process.stdout.readline()  # the head of the table: an FMU is unpacked
@@ -226,16 +226,16 @@ def test_stopped_in_the_middle(
         process.send_signal(stop)
         out, err = process.communicate(timeout=20)
     if "report: " not in out:  # else it had ended before
-        assert (process.returncode, without_progress(err)) == (code, told)
+        assert (process.returncode, without_progress(err)) == (code, said)
     place.assert_clean()
 
 
 @pytest.mark.parametrize(
-    ("stop", "code", "told"),
+    ("stop", "code", "said"),
     [("SIGINT", 130, "interrupted\n"), ("SIGTERM", 143, "")],
     ids=["Ctrl-C", "SIGTERM"],
 )
-def test_a_library_may_hide_that_it_was_stopped(stop: str, code: int, told: str) -> None:
+def test_a_library_may_hide_that_it_was_stopped(stop: str, code: int, said: str) -> None:
     program = f"""
 import os, signal, sys
 from cosim import __main__ as cli
@@ -259,7 +259,7 @@ sys.exit(cli._as_program())
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         timeout=60,
     )
-    assert (done.returncode, done.stderr) == (code, told)
+    assert (done.returncode, done.stderr) == (code, said)
 
 
 # ---- surroundings ------------------------------------------------------------------------------

@@ -60,10 +60,11 @@ static enum status right_hand_side(const void *values, double t, const double x[
     return fails_now() ? spoil(&dx[1]) : status;
 }
 
-/* For the Jacobian of the method with Newton's iteration. */
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    const enum status status = oscillator_model.propagate(values, t, dt, first, second);
-    return fails_now() ? spoil(&((struct oscillator_values *)first)->a) : status;
+/* Of the method with Newton's iteration. */
+static enum status jacobian(const void *values, double t, const double x[], const double u[],
+                            double J[]) {
+    const enum status status = oscillator_model.jacobian(values, t, x, u, J);
+    return fails_now() ? spoil(&J[1]) : status;
 }
 
 /* ---- Runs ----------------------------------------------------------------------------------- */
@@ -81,7 +82,7 @@ static struct instance *create(int method) {
     struct instance *instance = NULL;
     model = oscillator_model;
     model.right_hand_side = right_hand_side;
-    model.propagate = propagate;
+    model.jacobian = jacobian;
     model_description = oscillator_description;
     model_description.model = &model;
     ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));

@@ -1,8 +1,9 @@
 /* The controller as the instance sees it: the derivatives of its fields along curves, its
- * integrator's view, what is refused. */
+ * integrator's view with the Jacobian, what is refused. */
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 #include <unity.h>
@@ -102,6 +103,95 @@ static void test_what_is_integrated_are_the_rates_that_are_output(void) {
         TEST_ASSERT_TRUE(dx[0] == 0.0 && dx[1] != 0.0);
     }
 }
+
+/* ---- Jacobian ------------------------------------------------------------------------------- */
+
+enum { BELOW, AT, BEYOND, SIDES }; /* an effort and its limit */
+
+/* A law with its integral parts at both joints, or at joint 2 alone; the effort of each joint on a
+ * side of its limit. */
+static void next_law(int mode, bool has_both, const int side[2]) {
+    next_point(mode, false);
+    struct rp_controller_parameters *p = &at.v.parameters;
+    p->Ki[0] = has_both ? 1.5 : 0.0;
+    double unlimited[2];
+    rp_controller_unlimited(p, &at.v.inputs, at.v.integral, unlimited);
+    for (int i = 0; i < 2; i++) {
+        static const double factors[SIDES] = {[BELOW] = 2.0, [AT] = 1.0, [BEYOND] = 0.5};
+        p->limit[i] = factors[side[i]] * fabs(unlimited[i]);
+    }
+}
+
+/* Column j at J[j]; the states and inputs in the values are not read. */
+static void jacobian(double J[2][2]) {
+    struct rp_controller_values parameters;
+    memset(&parameters, 0xff, sizeof parameters); // NaN
+    parameters.parameters = at.v.parameters;
+    memset(J, 0xff, sizeof(double[2][2]));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.jacobian(&parameters, 3.0, at.v.integral,
+                                                                  at.v.inputs.q_ref, J[0]));
+}
+
+static double rate_at(const double w[2], int i) {
+    double dx[2];
+    TEST_ASSERT_EQUAL_INT(
+        STATUS_OK, rp_controller_model.right_hand_side(&at.v, 3.0, w, at.v.inputs.q_ref, dx));
+    return dx[i];
+}
+
+/* w' = Ki e - (u - limit) / (M Tt) beyond the limit, Ki e below it, 0 without Ki; u changes with w
+ * by M, with computed torque by D. Each rate is linear in w on either side of its limit, so that a
+ * difference on that side has no truncation. */
+static void test_jacobian_is_that_of_the_integral_rates(void) {
+    for (int n = 0; n < 3 * SIDES * SIDES * 2 * 8; n++) {
+        const int side[2] = {n / 3 % SIDES, n / 9 % SIDES};
+        const int mode = RP_CONTROLLER_PD + n % 3;
+        double J[2][2];
+        next_law(mode, n / 27 % 2 == 0, side);
+        jacobian(J);
+
+        const struct rp_controller_parameters *p = &at.v.parameters;
+        double efforts[2];
+        double D[2][2] = {{p->inertia[0], 0.0}, {0.0, p->inertia[1]}};
+        rp_controller_unlimited(p, &at.v.inputs, at.v.integral, efforts);
+        if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
+            rp_mass_matrix(&p->arm, at.v.inputs.q, D);
+        }
+        for (int i = 0; i < 2; i++) {
+            const bool follows = p->Ki[i] > 0.0 && side[i] != BELOW;
+            for (int j = 0; j < 2; j++) {
+                const double expected =
+                    follows ? -D[i][j] / (p->inertia[i] * p->tracking_time) : 0.0;
+                ASSERT_CLOSE(expected, J[j][i], 4 * DBL_EPSILON * fabs(expected));
+
+                // to the side on which the effort grows
+                double w[2] = {at.v.integral[0], at.v.integral[1]};
+                const double h = (D[i][j] < 0.0) == (efforts[i] < 0.0) ? 0.125 : -0.125;
+                w[j] += h;
+                const double difference = (rate_at(w, i) - rate_at(at.v.integral, i)) / h;
+                ASSERT_CLOSE(difference, J[j][i], 1e-10);
+            }
+        }
+    }
+}
+
+static void test_jacobian_is_what_propagation_gives(void) {
+    for (int n = 0; n < 3 * SIDES * SIDES * 2; n++) {
+        double J[2][2];
+        next_law(RP_CONTROLLER_PD + n % 3, n / 27 == 0,
+                 (const int[2]){n / 3 % SIDES, n / 9 % SIDES});
+        jacobian(J);
+        for (int j = 0; j < 2; j++) {
+            memset(&first, 0, sizeof first);
+            first.v.integral[j] = 1.0;
+            TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                                  rp_controller_model.propagate(&at.v, 3.0, 0.0, &first.v, NULL));
+            TEST_ASSERT_TRUE(J[j][0] == first.v.dintegral[0] && J[j][1] == first.v.dintegral[1]);
+        }
+    }
+}
+
+/* ---- What is refused ------------------------------------------------------------------------ */
 
 static void test_an_arm_without_inertia_is_refused(void) {
     next_point(RP_CONTROLLER_PD, false);

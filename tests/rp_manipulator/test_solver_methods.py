@@ -80,7 +80,7 @@ def exact() -> dict[float, Reference]:
 
     sys.path.remove(folder)
     equations = make_references.Reference()
-    summed = reference.read_summed(ROOT / "models" / "rp_manipulator" / "references")
+    summed = reference.read_summed(ROOT / "models" / "rp_manipulator")
     found = {}
     for size in JUMPS:
         scenario = jumping(size)

@@ -1,5 +1,6 @@
 /* The reference motions: geometry, continuity, what is refused, and a model without states. */
 #include "continuous_states.h"
+#include "derivatives.h"
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_manipulator.h"
@@ -307,6 +308,25 @@ static void test_distance_of_a_line(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-16, 0.5, rp_trajectory_distance(&p, nearest));
 }
 
+/* The foot of the perpendicular, for lines in all directions: on the line, and at right angles to
+ * it. */
+static void test_the_nearest_point_of_a_line_is_its_foot(void) {
+    for (int i = 0; i < 16; i++) {
+        const double angle = 0.1 + i * 0.4;
+        const double normal[2] = {cos(angle), sin(angle)};
+        p.motion = RP_TRAJECTORY_LINE;
+        for (int k = 0; k < 2; k++) {
+            const double along = k == 0 ? -normal[1] : normal[0];
+            p.ee_from[k] = 0.4 * normal[k] - 0.3 * along;
+            p.ee_to[k] = 0.4 * normal[k] + 0.2 * along;
+        }
+        double nearest[2];
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.4, rp_trajectory_distance(&p, nearest));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.4 * normal[0], nearest[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.4 * normal[1], nearest[1]);
+    }
+}
+
 /* Against the nearest of many points of the swept arc. */
 static void test_distance_of_an_arc(void) {
     for (int i = 0; i < 12 * 6 * 2; i++) {
@@ -383,6 +403,23 @@ static void test_steps_follow_the_motion(void) {
         TEST_ASSERT_TRUE(values[0] == point.q[0].position.value);
         TEST_ASSERT_TRUE(values[5] == point.q[1].acceleration.value);
         TEST_ASSERT_TRUE(values[8] == point.ee[0].velocity.value);
+    }
+    instance_destroy(instance);
+}
+
+/* The second derivative of a position by time is the acceleration, though no state moves. */
+static void test_derivatives_of_outputs_along_time(void) {
+    const int orders[] = {1, 2, 1};
+    const unsigned references[] = {40, 40, 42}; // q1_ref, q1_ref, dq1_ref
+    struct instance *instance = initialized();
+    for (int i = 0; i < 30; i++) {
+        double values[3];
+        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.17));
+        ASSERT_OK(instance_get_output_derivatives(instance, references, 3, orders, values));
+        const struct rp_trajectory_point point = at(instance_time(instance));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-13, point.q[0].velocity.value, values[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, point.q[0].acceleration.value, values[1]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, point.q[0].acceleration.value, values[2]);
     }
     instance_destroy(instance);
 }

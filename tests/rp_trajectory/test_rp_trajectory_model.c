@@ -160,6 +160,21 @@ static void test_a_path_stays_beyond_the_smallest_distance(void) {
                    "joint 1, and it must stay beyond the smallest reachable distance |a| = 0.1 m");
 }
 
+/* Zero is written without a sign, whatever the direction of the line. */
+static void test_a_coordinate_of_zero_has_no_sign(void) {
+    v.parameters.motion = RP_TRAJECTORY_LINE;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        const double end = 0.5 * sign;
+        v.parameters.ee_from[0] = v.parameters.ee_to[0] = 0.0625;
+        v.parameters.ee_from[1] = -end;
+        v.parameters.ee_to[1] = end;
+        assert_refused(
+            "the path to (0.0625, 0) m is refused: there it is 0.0625 m from the axis of "
+            "joint 1, and it must stay beyond the smallest reachable distance |a| = "
+            "0.1 m");
+    }
+}
+
 static void test_a_circle_about_the_axis_is_everywhere_as_near(void) {
     v.parameters.center[0] = v.parameters.center[1] = 0.0;
     v.parameters.start_angle = 0.0;

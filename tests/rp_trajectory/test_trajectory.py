@@ -104,7 +104,7 @@ def running(
 
 def boundaries(parameters: dict[str, object]) -> list[float]:
     """Times (s) at which segments meet."""
-    value = {name: v.get("start") for name, v in DECLARED.items()} | numbered(parameters)
+    value = START | numbered(parameters)
     t0 = value["start_time"]
     if value["motion"] != ENUMERATIONS["motion"].index("circle") + 1:
         return [t0, t0 + value["duration"]]

@@ -87,11 +87,11 @@ def final_state(
 
 
 def write(scenario: Scenario, folder: Path) -> None:
-    """Write exact.json of `scenario` to `folder`."""
+    """Write the exact final state of `scenario` to `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
     final, largest = final_state(scenario)
     content = {"time": scenario.stop, "final": final, "largest": largest}
-    with whole(folder / "exact.json") as path:
+    with whole(folder / project.exact_state_file(scenario.path).name) as path:
         path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8", newline="\n")
 
 

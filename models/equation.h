@@ -1,0 +1,22 @@
+/* Equations that are written once and calculated in several arithmetics.
+ *
+ * A header of equations is a text in the names real, plus, times, sine ... and READ, WRITE, as
+ * arithmetic_double.h has them. The file that includes it includes one arithmetic before:
+ *
+ *   arithmetic_double.h    values
+ *   arithmetic_taylor.h    first and second derivatives along a curve
+ *   arithmetic_gradient.h  derivatives by each of some variables
+ *
+ * All have the same order of operations, and so the same values bit for bit. */
+#ifndef EQUATION_H
+#define EQUATION_H
+
+#ifndef ARITHMETIC_H
+#error "include the arithmetic before the equations"
+#endif
+
+/* Begins each equation. Inlined wherever it is used: only then do compilers leave out what a result
+ * does not need, such as second derivatives, and keep the rest in registers. */
+#define EQUATION static inline __attribute__((always_inline))
+
+#endif

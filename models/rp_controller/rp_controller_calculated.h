@@ -1,0 +1,25 @@
+/* The calculated fields of struct rp_controller_values, in any arithmetic (equation.h). */
+#ifndef RP_CONTROLLER_CALCULATED_H
+#define RP_CONTROLLER_CALCULATED_H
+
+#include "rp_controller_law.h"
+#include "rp_controller_model.h"
+
+/* From the parameters, inputs and states. */
+EQUATION void calculate(const struct rp_controller_values *const from[SOURCES],
+                        struct rp_controller_values *const to[TARGETS]) {
+    const struct rp_controller_parameters *const p[SOURCES] = PARTS(from, parameters);
+    const struct rp_controller_inputs *const inputs[SOURCES] = PARTS(from, inputs);
+    const real w[2] = {READ(from, integral[0]), READ(from, integral[1])};
+    real unlimited[2];
+    law_unlimited(p, inputs, w, unlimited);
+    for (int i = 0; i < 2; i++) {
+        WRITE(to, unlimited[i], unlimited[i]);
+        WRITE(to, effort[i], law_limited(p, unlimited[i], i));
+        WRITE(to, dintegral[i], law_integral_rate(p, inputs, unlimited[i], i));
+        WRITE(to, error[i], law_error(inputs, i));
+        WRITE(to, derror[i], law_derror(inputs, i));
+    }
+}
+
+#endif

@@ -1,0 +1,224 @@
+/* The Jacobian that the implicit method gets from the model, and what it is worth. */
+#include "instance.h"
+
+#include "derivatives.h"
+#include "last_text.h"
+#include "oscillator.h"
+#include "stepping.h"
+#include "values.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+/* The oscillator with a spring that depends on position, time and input, and with damping:
+ * x'' = -omega^2 (1 + t + u) sin x - gain x'. */
+static double stiffness(const struct oscillator_values *values, double t, double u) {
+    return values->omega * values->omega * (1.0 + t + u);
+}
+
+static enum status right_hand_side(const void *values_pointer, double t, const double x[],
+                                   const double u[], double dx[]) {
+    const struct oscillator_values *values = values_pointer;
+    dx[0] = x[1];
+    dx[1] = -stiffness(values, t, u[0]) * sin(x[0]) - values->gain * x[1];
+    return STATUS_OK;
+}
+
+static enum status jacobian(const void *values_pointer, double t, const double x[],
+                            const double u[], double J[]) {
+    const struct oscillator_values *values = values_pointer;
+    J[0] = 0.0;
+    J[1] = -stiffness(values, t, u[0]) * cos(x[0]);
+    J[2] = 1.0;
+    J[3] = -values->gain;
+    return STATUS_OK;
+}
+
+static struct instance *instance;
+static struct model model;
+static struct model_description model_description;
+
+void setUp(void) {
+    memset(last_text, 0, sizeof last_text);
+    instance = NULL;
+    model = oscillator_model;
+    model.right_hand_side = right_hand_side;
+    model.jacobian = jacobian;
+    model_description = oscillator_description;
+    model_description.model = &model;
+}
+
+void tearDown(void) {
+    instance_destroy(instance);
+}
+
+static const double start = 5.0; /* s */
+
+static void begin(int method, double omega, double gain) {
+    const unsigned solver_method = OSCILLATOR_SOLVER_METHOD;
+    const unsigned parameters[] = {OSCILLATOR_OMEGA, OSCILLATOR_GAIN};
+    const struct instance_experiment experiment = {.start_time = start};
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_set_integer(instance, &solver_method, 1, &method));
+    ASSERT_OK(instance_set_real(instance, parameters, 2, (const double[]){omega, gain}));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+}
+
+static void set(unsigned reference, double value) {
+    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
+}
+
+static void set_slope(double slope) {
+    const unsigned input = OSCILLATOR_U;
+    const int order = 1;
+    ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
+}
+
+static int count(unsigned reference) {
+    int value = -1;
+    ASSERT_OK(instance_get_integer(instance, &reference, 1, &value));
+    return value;
+}
+
+/* ---- What it is asked for ------------------------------------------------------------------- */
+
+/* Newton's iteration takes it where it has just evaluated the right-hand side. */
+static struct { double omega, t, x[2], u; } latest;
+
+/* The input as the test has set it: at a time, and from there on. */
+static struct { double omega, t, u, slope; } expected;
+
+static int jacobians;
+
+static void assert_expected(const struct oscillator_values *values, double t, double u) {
+    TEST_ASSERT_TRUE(values->omega == expected.omega);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-13, expected.u + expected.slope * (t - expected.t), u);
+}
+
+static enum status watched_rhs(const void *values_pointer, double t, const double x[],
+                               const double u[], double dx[]) {
+    const struct oscillator_values *values = values_pointer;
+    assert_expected(values, t, u[0]);
+    latest.omega = values->omega;
+    latest.t = t;
+    memcpy(latest.x, x, sizeof latest.x);
+    latest.u = u[0];
+    return right_hand_side(values, t, x, u, dx);
+}
+
+static enum status watched_jacobian(const void *values_pointer, double t, const double x[],
+                                    const double u[], double J[]) {
+    const struct oscillator_values *values = values_pointer;
+    jacobians++;
+    assert_expected(values, t, u[0]);
+    TEST_ASSERT_TRUE(t == latest.t && u[0] == latest.u && values->omega == latest.omega);
+    TEST_ASSERT_EQUAL_MEMORY(latest.x, x, sizeof latest.x);
+    return jacobian(values, t, x, u, J);
+}
+
+/* Steps with inputs that are held for some, change and move, and with another parameter in the
+ * second half; what is set for the next step must not be seen before. */
+static void run_watched(int method) {
+    const double h = 1.0 / 16.0;
+    model.right_hand_side = watched_rhs;
+    model.jacobian = watched_jacobian;
+    jacobians = 0;
+    expected.omega = 2.0;
+    expected.t = start;
+    expected.u = expected.slope = 0.0;
+    begin(method, expected.omega, 1.0);
+    for (int i = 0; i < 64; i++) {
+        if (i % 4 == 1) {
+            expected.u = 0.25 * (i % 5) + 0.125;
+            set(OSCILLATOR_U, expected.u);
+        }
+        expected.t = start + i * h;
+        expected.slope = i % 4 == 3 ? 3.0 : 0.0;
+        if (expected.slope != 0.0) {
+            set_slope(expected.slope);
+        }
+        if (i == 32) {
+            expected.omega = 3.0;
+            set(OSCILLATOR_OMEGA, expected.omega);
+        }
+        ASSERT_OK(instance_do_step(instance, expected.t, h));
+    }
+}
+
+static void test_it_is_taken_where_the_right_hand_side_was(void) {
+    run_watched(INTEGRATOR_CVODE_BDF);
+    TEST_ASSERT_GREATER_THAN_INT(32, jacobians);
+    TEST_ASSERT_LESS_THAN_INT(count(OSCILLATOR_EVALUATIONS) / 2, jacobians);
+}
+
+static void test_explicit_methods_do_without(void) {
+    run_watched(INTEGRATOR_CVODE_ADAMS);
+    TEST_ASSERT_EQUAL_INT(0, jacobians);
+    instance_destroy(instance);
+    run_watched(INTEGRATOR_ERK);
+    TEST_ASSERT_EQUAL_INT(0, jacobians);
+}
+
+/* ---- What it is worth ----------------------------------------------------------------------- */
+
+static enum status transposed_jacobian(const void *values, double t, const double x[],
+                                       const double u[], double J[]) {
+    const enum status status = jacobian(values, t, x, u, J);
+    const double above = J[2];
+    J[2] = J[1];
+    J[1] = above;
+    return status;
+}
+
+/* Of another time and input. */
+static enum status late_jacobian(const void *values, double t, const double x[], const double u[],
+                                 double J[]) {
+    return jacobian(values, t + 10.0, x, (const double[]){u[0] + 10.0}, J);
+}
+
+static enum status no_jacobian(const void *values, double t, const double x[], const double u[],
+                               double J[]) {
+    (void)values;
+    (void)t;
+    (void)x;
+    (void)u;
+    memset(J, 0, sizeof(double[4]));
+    return STATUS_OK;
+}
+
+/* Evaluations in a second of a stiff motion. */
+static int evaluations(enum status with(const void *values, double t, const double x[],
+                                        const double u[], double J[])) {
+    instance_destroy(instance);
+    model.jacobian = with;
+    begin(INTEGRATOR_CVODE_BDF, 100.0, 2000.0);
+    set(OSCILLATOR_U, 1.0);
+    ASSERT_OK(instance_do_step(instance, start, 1.0));
+    return count(OSCILLATOR_EVALUATIONS);
+}
+
+/* With the right one nearly every step takes one evaluation. */
+static void test_a_wrong_one_shows_in_the_evaluations(void) {
+    const int right = evaluations(jacobian);
+    TEST_ASSERT_LESS_THAN_INT(count(OSCILLATOR_STEPS) * 11 / 10, right);
+    TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(late_jacobian));
+    TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(transposed_jacobian));
+    TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(no_jacobian));
+}
+
+/* ---- The oscillator's own ------------------------------------------------------------------- */
+
+static void test_that_of_the_oscillator_is_what_propagation_gives(void) {
+    const struct oscillator_values at = {.omega = 3.0, .gain = 7.0, .u = 0.5, .x = 1.25, .v = -2.0};
+    double J[2][2];
+    ASSERT_OK(oscillator_model.jacobian(&at, 0.0, &at.x, &at.u, J[0]));
+    for (int j = 0; j < 2; j++) {
+        struct oscillator_values first = {.x = j == 0, .v = j == 1};
+        ASSERT_OK(oscillator_model.propagate(&at, 0.0, 0.0, &first, NULL));
+        TEST_ASSERT_TRUE(J[j][0] == first.v && J[j][1] == first.a);
+    }
+}

@@ -1,0 +1,207 @@
+/* What no instance can be in: each value at its limits, one at a time, and its name in the message.
+ */
+#include "plausibility.h"
+
+#include "last_text.h"
+#include "oscillator.h"
+#include "stepping.h"
+
+#include <limits.h>
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+static struct instance *instance;
+static struct instance_state state; /* of an instance that has taken a step */
+static char block[1024];
+
+void setUp(void) {
+    const struct instance_experiment experiment = {.stop_time_defined = true, .stop_time = 10.0};
+    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &instance));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
+    state = instance->state;
+    TEST_ASSERT_TRUE(state.has_history && instance->memory.size <= sizeof block);
+    memcpy(block, instance->memory.block, instance->memory.size);
+    memset(last_text, 0, sizeof last_text);
+}
+
+void tearDown(void) {
+    instance_destroy(instance);
+}
+
+static bool is_plausible(void) {
+    return instance_check_plausible(instance, &state, block) == STATUS_OK;
+}
+
+static void assert_refused(const char *name) {
+    TEST_ASSERT_FALSE_MESSAGE(is_plausible(), name);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, name), last_text);
+    last_text[0] = '\0';
+}
+
+/* A real at *value: refused with each of bad, accepted with each of good; then as it was. */
+static void check_real(double *value, const char *name, const double good[2], const double bad[2]) {
+    const double kept = *value;
+    for (int i = 0; i < 2; i++) {
+        *value = good[i];
+        TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
+        *value = bad[i];
+        assert_refused(name);
+    }
+    *value = NAN;
+    assert_refused(name);
+    *value = kept;
+    TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
+}
+
+static void check_count(long *value, const char *name, long good, const long bad[2]) {
+    const long kept = *value;
+    *value = good;
+    TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
+    for (int i = 0; i < 2; i++) {
+        *value = bad[i];
+        assert_refused(name);
+    }
+    *value = kept;
+    TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
+}
+
+static void test_a_state_as_it_was_saved_is_plausible(void) {
+    TEST_ASSERT_TRUE(is_plausible());
+    TEST_ASSERT_EQUAL_STRING("", last_text);
+}
+
+static void test_times_are_finite(void) {
+    const double finite[2] = {-1e300, 1e300};
+    const double infinite[2] = {-INFINITY, INFINITY};
+    check_real(&state.time.s, "time", finite, infinite);
+    check_real(&state.time.rest, "rest of time", finite, infinite);
+    check_real(&state.own.time, "variable time", finite, infinite);
+    check_real(&state.restart_time.s, "restart_time", finite, infinite);
+    check_real(&state.restart_time.rest, "rest of restart_time", finite, infinite);
+    check_real(&state.statistics.last_step, "last_step", finite, infinite);
+    check_real(&state.own.solver_last_step, "solver_last_step", finite, infinite);
+}
+
+static void test_steps_and_tolerances_are_not_negative(void) {
+    const double good[2] = {0.0, 1e300};
+    const double bad[2] = {-1e-300, INFINITY};
+    check_real(&state.own.relative_tolerance, "relative_tolerance", good, bad);
+    check_real(&state.own.max_step, "max_step", good, bad);
+    check_real(&state.restart_step, "restart_step", good, bad);
+    check_real(&state.next_step, "next_step", good, bad);
+
+    const double tolerances[2] = {1e-14, 1e-2};
+    const double impossible[2] = {0.99e-14, 1.01e-2};
+    check_real(&state.own.effective_relative_tolerance, "effective_relative_tolerance", tolerances,
+               impossible);
+}
+
+static void test_counts_can_be_counted_on_from(void) {
+    struct integrator_statistics *totals = &state.statistics;
+    const long bad[2] = {-1, LONG_MAX / 2 + 1};
+    check_count(&totals->rhs_evaluations, "solver_rhs_evaluations", 0, bad);
+    check_count(&totals->rhs_evaluations, "solver_rhs_evaluations", LONG_MAX / 2, bad);
+    check_count(&totals->failed_steps, "solver_failed_steps", 0, bad);
+    check_count(&totals->restarts, "solver_restarts", 0, bad);
+    check_count(&totals->steps, "solver_steps", totals->steps, bad);
+    const long before[2] = {-1, totals->steps + 1};
+    check_count(&state.steps_before_restart, "steps before the restart", 0, before);
+}
+
+static void test_phase_method_and_limit_exist(void) {
+    const struct instance_state saved = state;
+    for (int phase = -1; phase <= (int)PHASE_COUNT; phase++) {
+        state.phase = (enum phase)phase;
+        TEST_ASSERT_TRUE(is_plausible() == (phase >= 0 && phase < (int)PHASE_COUNT));
+    }
+    state = saved;
+    for (int method = -1; method <= (int)INTEGRATOR_METHODS; method++) {
+        state.own.solver_method = method;
+        TEST_ASSERT_TRUE(is_plausible() ==
+                         (method > (int)INTEGRATOR_NO_METHOD && method < (int)INTEGRATOR_METHODS));
+    }
+    state = saved;
+    state.own.max_internal_steps = 1;
+    TEST_ASSERT_TRUE(is_plausible());
+    state.own.max_internal_steps = 0;
+    assert_refused("max_internal_steps = 0");
+}
+
+static void test_an_experiment_can_be_run(void) {
+    state.experiment.stop_time = -1.0;
+    assert_refused("stop time");
+    state.experiment_defined = false; // nothing is read from it then
+    TEST_ASSERT_TRUE(is_plausible());
+}
+
+/* A replay goes from the restart to first_time and on to latest_time, within the span and the
+ * steps.
+ */
+static void test_a_history_does_not_contradict_itself(void) {
+    const double first[2] = {1e-300, state.latest_time};
+    const double not_first[2] = {0.0, -1.0};
+    check_real(&state.first_time, "first_time", first, not_first);
+    const double latest[2] = {state.first_time, state.span};
+    const double not_latest[2] = {0.999 * state.first_time, INFINITY};
+    check_real(&state.latest_time, "latest_time", latest, not_latest);
+    const double span[2] = {state.latest_time, INFINITY};
+    const double not_span[2] = {0.999 * state.latest_time, -INFINITY};
+    check_real(&state.span, "span", span, not_span);
+
+    // internal steps since the restart: at least one, and no more than restart and step allow
+    const long most = INSTANCE_LONGEST_HISTORY + (long)state.own.max_internal_steps;
+    state.statistics.steps = state.steps_before_restart + most;
+    TEST_ASSERT_TRUE(is_plausible());
+    state.statistics.steps++;
+    assert_refused("steps since the restart");
+    state.statistics.steps = state.steps_before_restart;
+    assert_refused("steps since the restart");
+
+    // all of that does not matter without a history
+    state.has_history = false;
+    state.first_time = state.latest_time = state.span = -1.0;
+    TEST_ASSERT_TRUE(is_plausible());
+}
+
+static char *place(const void *own) {
+    return block + ((const char *)own - instance->memory.block);
+}
+
+static void test_values_could_have_been_set(void) {
+    struct oscillator_values *values = (void *)place(instance->memory.values);
+    struct oscillator_values *held = (void *)place(instance->memory.held);
+    const double omegas[2] = {-10.0, 100.0};
+    const double no_omegas[2] = {-10.5, 100.5};
+    check_real(&values->omega, "omega", omegas, no_omegas);
+    check_real(&held->omega, "omega", omegas, no_omegas);
+    const double finite[2] = {-1e300, 1e300};
+    const double infinite[2] = {-INFINITY, INFINITY};
+    check_real(&values->x, "x = ", finite, infinite);
+    check_real(&held->v, "v = ", finite, infinite);
+
+    // what is calculated is not read, and the held values only with a history
+    values->energy = held->energy = NAN;
+    TEST_ASSERT_TRUE(is_plausible());
+    state.has_history = false;
+    held->v = NAN;
+    TEST_ASSERT_TRUE(is_plausible());
+}
+
+static void test_inputs_are_finite(void) {
+    const double finite[2] = {-1e300, 1e300};
+    const double infinite[2] = {-INFINITY, INFINITY};
+    struct polynomial *pending = (void *)place(instance->memory.pending);
+    struct polynomial *current = (void *)place(instance->memory.current);
+    struct polynomial *running = (void *)place(instance->memory.running);
+    for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+        check_real(&pending->d[k], "an input =", finite, infinite);
+        check_real(&running->d[k], "an input since the restart", finite, infinite);
+        current->d[k] = INFINITY; // it may have overflowed on its way
+        TEST_ASSERT_TRUE(is_plausible());
+    }
+}

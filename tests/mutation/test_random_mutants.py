@@ -1,0 +1,133 @@
+"""The mutants of tests/mutation: where they are, what they make, and how they are found again."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from samples import Chosen, Places, Renames, order, read_sample, write_sample
+from sites import REMOVED, Mutant, mutants_of, mutated, sources
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = """\
+#define LIMIT (1 + 2)
+/* a + b */
+_Static_assert(sizeof(int) == 4, "1 + 1");
+static const double scale = 0.5;
+enum { COUNT = 3 };
+struct slave {
+    double x[2];
+};
+
+static double slave_sum(const struct slave *slave, const int *n) {
+    double sum[4];
+    sum[0] = slave->x[0] - slave->x[1]; // n < 1
+    if (*n < COUNT && !is_set("a - b")) {
+        return -sum[0];
+    }
+    for (int i = 0; i < *n; i++) {
+        slave_note(slave, sum);
+    }
+    return (struct pair){.a = 1.0 * scale}.a;
+}
+"""
+
+
+def told() -> set[tuple[str, str, str]]:
+    """Function, text and replacement of all mutants of the source."""
+    return {(mutant.function, mutant.before, mutant.after) for mutant in mutants_of("a.c", SOURCE)}
+
+
+def mutant_of(before: str, after: str) -> Mutant:
+    """The first mutant of the source with this replacement."""
+    return next(
+        mutant
+        for mutant in mutants_of("src/slave.c", SOURCE)
+        if (mutant.before, mutant.after) == (before, after)
+    )
+
+
+@pytest.mark.parametrize(
+    ("function", "before", "after"),
+    [
+        ("", "0.5", "(-0.5)"),
+        ("", "3", "(3 + 1)"),
+        ("slave_sum", "-", "+"),
+        ("slave_sum", "-", ""),
+        ("slave_sum", "<", "<="),
+        ("slave_sum", "<", ">="),
+        ("slave_sum", "&&", "||"),
+        ("slave_sum", "!", ""),
+        ("slave_sum", "if", "if not"),
+        ("slave_sum", "*", "/"),
+        ("slave_sum", "1.0", "0.0"),
+        ("slave_sum", "slave_note(slave, sum)", REMOVED),
+        ("slave_sum", "sum[0] = slave->x[0] - slave->x[1]", REMOVED),
+    ],
+)
+def test_mutants_of_every_class_are_made(function: str, before: str, after: str) -> None:
+    assert (function, before, after) in told()
+
+
+def test_what_is_no_code_has_no_mutants() -> None:
+    befores = [before for _, before, _ in told()]
+    assert "+" not in befores  # directive, comment and string
+    assert "==" not in befores  # check of the compiler
+    assert "4" not in befores  # lengths of arrays
+    assert not any("double sum" in before for before in befores)
+    assert befores.count("*") == 1  # no pointer
+
+
+def test_a_mutant_changes_its_place_alone() -> None:
+    changed = mutated(mutant_of("-", ""), SOURCE)
+    assert changed == SOURCE.replace("return -sum", "return sum")
+    changed = mutated(mutant_of("if", "if not"), SOURCE)
+    assert 'if (!(*n < COUNT && !is_set("a - b"))) {' in changed
+    changed = mutated(mutant_of("slave_note(slave, sum)", REMOVED), SOURCE)
+    assert changed == SOURCE.replace("slave_note(slave, sum);", ";")
+
+
+def test_mutants_of_the_sources_can_be_made() -> None:
+    for file, text in sources(ROOT).items():
+        for mutant in mutants_of(file, text)[::20]:
+            assert mutated(mutant, text) != text
+
+
+def test_an_order_follows_from_its_seed() -> None:
+    texts = sources(ROOT)
+    first = order(texts, 1)
+    assert first == order(texts, 1)
+    assert first[:100] != order(texts, 2)[:100]
+    share = sum(mutant.kind == "constant" for mutant in first) / len(first)
+    assert abs(sum(mutant.kind == "constant" for mutant in first[:300]) / 300 - share) < 0.02
+
+
+def test_a_mutant_is_found_after_moves_renames_and_wrapping() -> None:
+    text = SOURCE.replace("slave", "instance").replace("sum[0] = ", "sum[0] =\n        ")
+    texts = {"src/instance/other.c": text.replace("instance_sum", "exact_sum")}
+    renames = Renames(parts={"slave": "instance"}, names={"slave_sum": "exact_sum"})
+    mutant = mutant_of("-", "+")
+    found = Places(texts).find(renames.mutant(mutant))
+    assert found is not None
+    assert (found.file, found.function) == ("src/instance/other.c", "exact_sum")
+    assert "instance->x[0] + instance->x[1]" in mutated(found, texts["src/instance/other.c"])
+
+
+def test_a_place_that_is_gone_is_none() -> None:
+    places = Places({"src/slave.c": SOURCE.replace("return -sum[0]", "return sum[0]")})
+    mutant = mutant_of("-", "")
+    assert places.find(mutant) is None
+    assert places.nearest(mutant) == "src/slave.c, slave_sum: return sum[0]"
+    assert Places({}).nearest(mutant) == "nothing"
+    with pytest.raises(LookupError):
+        mutated(replace(mutant, nth=1), SOURCE)
+
+
+def test_a_sample_is_read_as_it_was_written(tmp_path: Path) -> None:
+    mutants = mutants_of("a.c", SOURCE)
+    chosen = [Chosen(mutants[0]), Chosen(mutants[1], equivalent="no one asks"), Chosen(mutants[2])]
+    path = tmp_path / "sample.json"
+    write_sample(path, 5, chosen)
+    assert read_sample(path) == chosen
