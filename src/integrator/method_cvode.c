@@ -170,9 +170,6 @@ static enum status configure(void *memory) {
     if (flag == CV_SUCCESS) {
         flag = CVodeSetMaxStep(cvode->solver, settings->max_step);
     }
-    if (flag == CV_SUCCESS) {
-        flag = CVodeReInit(cvode->solver, 0.0, base->x);
-    }
     return status_of_flag(base->problem, flag);
 }
 
