@@ -1,4 +1,4 @@
-"""What the tests run of src/, fmu/ and models/: at least 95 % of the lines, 90 % of the branches.
+"""Checks that tests run at least 95 % of the lines and 90 % of the branches of src/, fmu/, models/.
 
 coverage.py SOURCE BUILD builds with the preset coverage into BUILD, runs the C tests there and the
 Python tests of the generator, prints what is not run and fails where the figures are lower, for C
@@ -18,7 +18,7 @@ PYTHON_TESTS = ("generate", "document", "package")
 
 
 def run(*command: object, **options: object) -> None:
-    """Run a command that must succeed; its output is told if it does not."""
+    """Run a command that must succeed; print its output if it fails."""
     arguments = [str(argument) for argument in command]
     result = subprocess.run(arguments, capture_output=True, text=True, check=False, **options)
     if result.returncode != 0:
@@ -63,7 +63,7 @@ def of_python(source: Path, build: Path, folder: Path) -> dict:
 
 
 def is_enough(what: str, lines: float, branches: float) -> bool:
-    """Tell the shares and whether they are as large as required."""
+    """Print the shares and whether they are large enough."""
     enough = lines >= LINES and branches >= BRANCHES
     print(
         f"{what}: {100 * lines:.1f} % of the lines, {100 * branches:.1f} % of the branches"
