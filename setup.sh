@@ -17,7 +17,7 @@ fail() { echo "setup.sh: $*" >&2; exit 1; }
 # a folder that was moved or copied: what CMake and venv keep in build/ names the old place
 home=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' build/CMakeCache.txt 2>/dev/null || true)
 if [ -n "$home" ] && [ ! "$home" -ef "$PWD" ]; then
-  echo "setup.sh: build/ belongs to $home, making it anew"
+  echo "setup.sh: build/ belongs to $home, making a new one"
   rm -rf build
 fi
 mkdir -p build 2>/dev/null && [ -w build ] || fail "the folder $PWD cannot be written"

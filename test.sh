@@ -4,7 +4,7 @@
 # --long: then also the long campaigns (an hour and a half), with a table of their figures at the end.
 # ARGUMENTS go to the ctest that runs everything: ./test.sh -R instance
 set -euo pipefail
-unset PYTHONPATH PYTHONHOME  # what they lead to is not what is tested here
+unset PYTHONPATH PYTHONHOME  # they may lead to other modules than those tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
 long=no
@@ -35,7 +35,7 @@ step "libFuzzer, ten seconds a target"
 build fuzz
 ctest --preset fuzz --progress -j 2
 
-step "other importers, each in an environment of its own"
+step "other importers, each in its own environment"
 # without network the tests of those that are missing are skipped; CI must have them
 tests/importers/install.sh || [ -z "${CI-}" ]
 

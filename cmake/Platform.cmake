@@ -9,7 +9,7 @@ set(reproducible_options
   $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_BINARY_DIR}=build>
   $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_SOURCE_DIR}=.>)
 
-# Protecting the stack costs a comparison in functions with arrays; sanitizers have checks of their own.
+# Protecting the stack costs a comparison in functions with arrays; sanitizers check the stack themselves.
 set(hardening_options
   -fstack-protector-strong
   $<$<CONFIG:Release>:-U_FORTIFY_SOURCE>

@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("MPLCONFIGDIR", str(project.ROOT / "build" / "matplotlib"))
     try:
         options = _parser().parse_args(arguments)
-        # imported late, since it takes long: Ctrl-C meanwhile leaves no traceback
+        # imported here because it takes long: so Ctrl-C during the import leaves no traceback
         code = import_module(f"cosim.commands.{options.command}").run(options)
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -58,7 +58,7 @@ def _refuse(text: str) -> int:
 
 
 def _drop_output() -> None:
-    """Let what is still buffered go nowhere, or the interpreter would fail on it at its end."""
+    """Discard what is still buffered, or the interpreter would fail to write it at exit."""
     with suppress(OSError, ValueError, AttributeError):  # closed, or not of the system
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

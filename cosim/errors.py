@@ -1,4 +1,4 @@
-"""Errors whose text is meant for the user, and what such texts are made of."""
+"""Errors whose text is meant for the user, and functions that form such texts."""
 
 import difflib
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def reason(error: Exception) -> str:
-    """What the system says about a file, without number and name."""
+    """The system's message about a file, without error number and file name."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 

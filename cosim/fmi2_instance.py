@@ -105,7 +105,7 @@ class Fmi2Instance:
 
     @contextmanager
     def explained(self, when: str) -> Iterator[None]:
-        """Turn a call that fails meanwhile into the user's error."""
+        """Turn a call that fails inside into the user's error."""
         try:
             yield
         except FMICallException as error:
@@ -180,7 +180,7 @@ class Fmi2Instance:
         self.fmi.fmi2DoStep(self.fmi.component, start, length, final)
 
     def saved_state(self) -> "SavedState":
-        """A place for a state to go back to, still empty."""
+        """An empty place for a state to go back to."""
         return SavedState(self)
 
 

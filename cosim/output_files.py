@@ -23,7 +23,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def written(path: Path) -> Iterator[None]:
-    """Turn a failure of the system meanwhile into the user's error: `path` cannot be written."""
+    """Turn a failure of the system inside into the user's error: `path` cannot be written."""
     try:
         yield
     except OSError as error:

@@ -12,7 +12,7 @@ from cosim.output_files import whole
 
 LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
 
-# What to raise, from what is wrong with the file and the number of the line, if there is one.
+# Makes the exception to raise, from the mistake and the line number, if known.
 Failure = Callable[[str, int | None], Exception]
 
 

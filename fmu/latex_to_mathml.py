@@ -25,8 +25,8 @@ class FormulaError(Exception):
 def mathml(latex: str, display: str) -> str:
     """Convert one formula.
 
-    The converter passes on what it does not know and does not notice a missing argument. Its result
-    is therefore searched for what the MathML of a correct formula never has.
+    The converter passes on unknown commands and does not notice a missing argument. Its result is
+    therefore searched for signs of either.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 /* Equations that are written once and calculated in several arithmetics.
  *
- * A header of equations is a text in the names real, plus, times, sine ... and READ, WRITE, as
- * arithmetic_double.h has them. The file that includes it includes one arithmetic before:
+ * A header of equations uses the names real, plus, times, sine ... and READ, WRITE, which an
+ * arithmetic such as arithmetic_double.h defines. Include one arithmetic before it:
  *
  *   arithmetic_double.h    values
  *   arithmetic_taylor.h    first and second derivatives along a curve

@@ -17,7 +17,7 @@ from cosim.report import pages
 from cosim.scenario import Scenario
 from cosim.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
 
-QUICK = 20.0  # s, longest sweep that comes with a scenario asked for by name
+QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
 def run(options: argparse.Namespace) -> int:
@@ -26,8 +26,8 @@ def run(options: argparse.Namespace) -> int:
         chosen, fmus = _open(options.names, options.fmu, stack)
         runs = Runs(fmus)
         for scenario in chosen:
-            runs.reference(scenario)  # a missing one shows before anything has run
-        with written(options.report):  # and so does a report that has no place
+            runs.reference(scenario)  # so that a missing reference is reported before anything runs
+        with written(options.report):  # and so is a report folder that cannot be made
             options.report.mkdir(parents=True, exist_ok=True)
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []

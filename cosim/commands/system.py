@@ -23,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
             unpacked = stack.enter_context(ssp.unpacked(path))
         except UserError:
             if not options.list:
-                # of a system that cannot be run, no older results may be taken for its own
+                # if the system cannot be run, older results must not pass for new ones
                 with written(options.report):
                     report.remove(options.report, comparison.reference_names(folder))
             raise

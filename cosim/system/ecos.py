@@ -25,7 +25,7 @@ import numpy as np
 from cosim import project
 from cosim.errors import UserError
 
-if TYPE_CHECKING:  # the child has no need of what this imports
+if TYPE_CHECKING:  # the child does not need these modules
     from cosim.system.ssp import Ssp
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
@@ -36,7 +36,7 @@ BAD = ("fmi2Discard", "fmi2Error", "fmi2Fatal")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What Ecos gave: row i is what can be read of it after step i."""
+    """Results of Ecos: row i holds the values read after step i."""
 
     names: tuple[str, ...]  # component.variable
     times: np.ndarray  # (rows,) s
@@ -52,7 +52,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     ----------
     ssp : Ssp
     variant : str
-        Name of a parameter set; has to exist, Ecos applies nothing for an unknown one.
+        Name of a parameter set; must exist: for an unknown name Ecos sets nothing.
     names : sequence of str
         Real variables to read, ``component.variable``.
 

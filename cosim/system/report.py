@@ -1,4 +1,4 @@
-"""What the runs of a system leave: a picture and the values of each variant, and a page."""
+"""Results of a system's runs as files: a picture and the values of each variant, and a page."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,6 +1,6 @@
 """Reads the structure of a system and its parameter sets from an unpacked SSP 1.0 archive.
 
-What is read is what the engines run: one flat system of FMUs, connected output to input, with
+It accepts what the engines run: one flat system of FMUs, with outputs connected to inputs and
 parameter sets bound at the components. The same set name at several components is one variant of
 the system.
 """

@@ -1,4 +1,4 @@
-"""What only the folder of a system knows: its measures, its picture, the study of its coupling.
+"""Loads what is specific to a system: its measures, its picture, the study of its coupling.
 
 The folder has a module study.py with the names of `Study`; `load` gives it.
 """

@@ -134,7 +134,7 @@ def place_of(location: list[str | int]) -> tuple[list[str], type[Table], str]:
 
 
 def reason(mistake: Any, table: type[Table], key: str) -> str:
-    """What is wrong with the value of a key, or with the table where `key` is empty."""
+    """Say why the value of a key is wrong, or why the table is, if `key` is empty."""
     context = mistake.get("ctx", {})
     subject = f"{key} = {shown(mistake['input'])} " if key else ""
     match mistake["type"]:

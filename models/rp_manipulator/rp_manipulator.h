@@ -67,8 +67,8 @@ void rp_end_effector_velocity(const struct rp_parameters *p, const double q[2], 
 enum rp_branch { RP_BRANCH_FORWARD, RP_BRANCH_BACKWARD };
 
 /* Joint variables that bring the end effector to position; q[0] in (-pi, pi].
- * False, with q left alone, where the target is nearer to the joint axis than |a|, the smallest
- * reachable distance, or is not finite. At L = 0 = a every q[0] serves; 0 is returned. */
+ * False, with q unchanged, if the target is nearer to the joint axis than |a|, the smallest
+ * reachable distance, or is not finite. At L = 0 = a every q[0] is a solution; 0 is returned. */
 bool rp_inverse_kinematics(const struct rp_parameters *p, const double position[2],
                            enum rp_branch branch, double q[2]);
 

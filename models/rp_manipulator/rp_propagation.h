@@ -10,8 +10,8 @@
  * derivatives of all calculated fields are written. second may be NULL where the first derivatives
  * are enough; these do not depend on it.
  *
- * Exact but for rounding, and zero exactly for a field that depends on nothing which moves. Of the
- * calculated fields of values none is read. */
+ * Exact but for rounding, and exactly zero for a field whose arguments do not move. The
+ * calculated fields of values are not read. */
 void rp_propagate(const struct rp_values *values, struct rp_values *first,
                   struct rp_values *second);
 

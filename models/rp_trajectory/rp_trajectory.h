@@ -64,7 +64,7 @@ enum rp_trajectory_fault {
     RP_TRAJECTORY_OUT_OF_REACH, /* the path comes as near as |a| to the axis of joint 1 */
 };
 
-/* Whether the parameters go together. Ranges of single parameters are taken for granted. */
+/* Whether the parameters are consistent. Each must be within its range. */
 enum rp_trajectory_fault rp_trajectory_check(const struct rp_trajectory_parameters *p);
 
 /* Smallest distance (m) of the line or the swept arc from the axis of joint 1; the nearest point

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-/* The variable, or NULL with a text that says for what it would have to serve. */
+/* The variable, or NULL with a message that says what it is needed for. */
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {

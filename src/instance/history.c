@@ -30,8 +30,8 @@ static bool parameters_are_held(const struct instance *instance) {
                   parameters.size) == 0;
 }
 
-/* The integrator may go on from where it is to target. A pure function of what is set now and what
- * the integrator runs with: how often and in what order values were set does not matter.
+/* Whether the integrator may continue to target without a restart. It depends only on the values
+ * set now and those that the integrator runs with, not on how often or in what order they were set.
  *
  * Any change of an input restarts it. Measured with inputs sampled from sines every 1 ms, going on
  * with CVODE's history over a jump has 450 times the error of a restart and is slower where jumps
@@ -56,7 +56,7 @@ static enum status restart(struct instance *instance, struct clock_time end) {
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
     const size_t input_count = count_of(instance->model->inputs);
-    // the last step tells how long the first one can be, unless the parameters are others
+    // the last step gives the length of the first one, unless the parameters have changed
     if (parameters_are_held(instance)) {
         instance_update_next_step(instance);
     } else {
@@ -90,8 +90,8 @@ static enum status restart(struct instance *instance, struct clock_time end) {
                               state->restart_step);
 }
 
-/* Brings the integrator to where the restored state says it is, in the internal steps that it says
- * this took: a state whose bytes were forged ends here. */
+/* Replays the integrator to the time of the restored state, in the number of internal steps that
+ * the state gives. A forged state fails here. */
 static enum status replay(struct instance *instance) {
     const struct instance_state *state = &instance->state;
     const struct span states = instance->model->states;

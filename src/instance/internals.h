@@ -7,8 +7,8 @@
 #include "instance.h"
 #include "polynomial.h"
 
-/* Internal steps after which the integrator restarts though nothing has changed: what a restored
- * snapshot has to replay at most. Larger: fewer restarts, slower rollback. */
+/* Internal steps after which the integrator restarts though nothing has changed: the most that a
+ * restored snapshot has to replay. Larger: fewer restarts, slower rollback. */
 enum { INSTANCE_LONGEST_HISTORY = 1000 };
 
 /* Bounds of what the integrator can run at: below, rounding stops its error test from converging;

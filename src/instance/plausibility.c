@@ -35,7 +35,7 @@ static bool is_step(double value) {
     return value >= 0.0 && isfinite(value);
 }
 
-/* Time, phase and what the integrator is asked for. */
+/* Time, phase and the settings of the integrator. */
 static bool has_possible_settings(const struct instance *instance,
                                   const struct instance_state *state) {
     const struct instance_values *own = &state->own;

@@ -1,4 +1,4 @@
-/* What an instance runs with: its experiment, its parameters, and what follows for the integrator.
+/* Settings of an instance: its experiment, its parameters, and the resulting integrator settings.
  */
 #ifndef INSTANCE_SETTINGS_H
 #define INSTANCE_SETTINGS_H

@@ -58,7 +58,7 @@ struct model_description {
     unsigned reference_count;      /* entries of row_of_reference */
 };
 
-/* Where an instance is in its life, as far as it decides what may be set. */
+/* Phase in the life of an instance; it decides what may be set. */
 enum phase {
     PHASE_INSTANTIATED,
     PHASE_INITIALIZATION,

@@ -23,7 +23,7 @@ struct model {
                                 overlap states */
 
     /* Writes x' = f(t, x, u, p) to dx. A pure function: parameters are read from values, states and
-     * inputs from x and u alone. t in s, the rest in the units of variables.toml. */
+     * inputs only from x and u. t in s, the rest in the units of variables.toml. */
     enum status (*right_hand_side)(const void *values, double t, const double x[], const double u[],
                                    double dx[]);
 

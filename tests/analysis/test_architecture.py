@@ -1,4 +1,4 @@
-"""Who includes and imports whom: arrows between folders go one way.
+"""Which folder may include or import which: arrows between folders go one way.
 
 A C file may include headers of its own folder, public headers of the folders below it, and the C
 standard library. What else a folder may use is in the tables here, and in no other place.

@@ -1,4 +1,4 @@
-"""What the Python peers of the benchmark integrate: the same as problem.c, and its error."""
+"""The problem that the Python peers of the benchmark integrate, as in problem.c, and the error."""
 
 from __future__ import annotations
 

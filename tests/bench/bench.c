@@ -1,7 +1,7 @@
-/* What the FMU costs, through its own functions, against the plain loop of CVodeReInit and CVode on
- * N_Vector_Serial that a user of CVODE would write, at the tolerance that the FMU runs at, and
- * against MuJoCo. All do the same work in turns; a figure is the median of the repeats, with the
- * error beside it. */
+/* Measures the FMU, through its own functions, against MuJoCo and against the plain loop of
+ * CVodeReInit and CVode on N_Vector_Serial that a user of CVODE would write, at the same tolerance
+ * as the FMU. All do the same work in turns. A figure is the median of the repeats, with the error
+ * beside it. */
 #include "bench.h"
 
 #include "measure.h"

@@ -48,7 +48,7 @@ SWEPT = "one step of 2 s, free motion"  # the name that bench gives its sweep
 
 @dataclass
 class Peer:
-    """Who makes a work at which tolerance, and the rows it goes to."""
+    """Which solver does which work at which tolerance, and the rows for its results."""
 
     name: str
     run: Callable[[Work, float], Run]
@@ -168,7 +168,7 @@ def judge(row: dict, limit: float) -> None:
 
 
 def with_figures(page: str, tables: str) -> str:
-    """Replace what stands under the heading Figures of the page, up to the next heading."""
+    """Replace the text under the heading Figures of the page, up to the next heading."""
     before, heading, after = page.partition("\n## Figures\n")
     _, following, after = after.partition("\n## ")
     return f"{before}{heading}\n{tables}{following}{after}"

@@ -11,8 +11,8 @@
 #include <sched.h>
 #include <stdlib.h>
 
-/* Instance i has start i % STARTS, so that whatever the number of instances, the same motions are
- * computed, in another order. */
+/* Instance i has start i % STARTS, so that any number of instances computes the same motions, in
+ * another order. */
 enum { STARTS = 1000, STEPS = 10, COUNTS = 5 };
 
 /* s for a communication step, with count instances stepped in turn; in groups until every start has

@@ -1,7 +1,7 @@
 """The Python peers of the benchmark: others that integrate the arm, as their users call them.
 
-Each peer's run makes all steps of a work once and returns the time of the stepping, s, and the
-states at the end of each step, shape (steps, 4). What it makes before and after is not timed.
+Each peer's run makes all steps of a problem once and returns the time of the stepping, s, and the
+states at the end of each step, shape (steps, 4). Setup and cleanup are not timed.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def run_heyoka(work: Work, tolerance: float) -> Run:
 
 
 def run_dop853(work: Work, tolerance: float) -> Run:
-    """scipy's DOP853, made anew at each communication point with the step size it proposed last."""
+    """scipy's DOP853, restarted at each communication point with its last proposed step."""
     x, proposed = np.array(START), None
 
     def step(i: int, u: list[float]) -> np.ndarray:

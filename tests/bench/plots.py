@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-# color, marker, line; what is measured is drawn in full, peers are dashed
+# color, marker, line: solid for the FMU, dashed for the others
 STYLES = {
     "cvode_adams": ("tab:blue", "o", "-"),
     "cvode_bdf": ("tab:purple", "s", "-"),

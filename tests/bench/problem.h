@@ -23,7 +23,7 @@ struct problem {
 /* Those of the FMU's start values. */
 extern const struct rp_parameters problem_parameters;
 
-/* With the usual start, which shift (rad, m) moves. Ends the program where there is no memory. */
+/* With the usual start, moved by shift (rad, m). Ends the program if memory runs out. */
 struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift);
 void problem_destroy(struct problem *problem);
 

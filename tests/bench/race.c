@@ -145,7 +145,7 @@ void race_tune(struct run *run, const struct fmu_functions *fmu, const struct pr
         run_once(run, fmu, problem, states, &counts);
         while (problem_error(problem, states) > bound) {
             run->substeps += run->substeps / 4 + 1;
-            require(run->substeps < 1000000, "no time step of MuJoCo meets the error asked for");
+            require(run->substeps < 1000000, "no time step of MuJoCo meets the required error");
             run_once(run, fmu, problem, states, &counts);
         }
     } else {
@@ -158,7 +158,7 @@ void race_tune(struct run *run, const struct fmu_functions *fmu, const struct pr
             }
             best = run->tolerance;
         }
-        require(best > 0.0, "no tolerance meets the error asked for");
+        require(best > 0.0, "no tolerance meets the required error");
         run->tolerance = best;
     }
     free(states);

@@ -48,8 +48,8 @@ double race_ratio(const struct race *race, int run, int peer);
 void race_report(const struct race *race, struct report *report, const char *group,
                  const char *work, const struct problem *problem, const struct target *targets);
 
-/* The largest tolerance on a grid of quarter decades from 1e-3 on from which on down to 1e-12 no
- * error is above the bound. MuJoCo: sets the substeps instead. */
+/* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to 1e-12
+ * is above the bound. MuJoCo: sets the substeps instead. */
 void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
                double bound);
 

@@ -1,4 +1,4 @@
-/* What the benchmark tells: lines on stdout, and rows in a JSON file if one is asked for. */
+/* Output of the benchmark: lines on stdout, and rows in a JSON file if a path is given. */
 #ifndef BENCH_REPORT_H
 #define BENCH_REPORT_H
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def result(row: dict) -> str:
-    """Tell what a row must reach and whether it does."""
+    """Say what a row must reach and whether it does."""
     if "judged" not in row:
         return ""
     sign = {"<=": "≤", ">=": "≥"}[row["comparison"]]

@@ -1,4 +1,4 @@
-"""The benchmark runs, and what it compares does the same work. No time is judged here."""
+"""The benchmark runs, and all solvers do the same work. Times are not tested."""
 
 from __future__ import annotations
 

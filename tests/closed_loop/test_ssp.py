@@ -1,4 +1,4 @@
-"""ClosedLoop.ssp is valid and says what it should; what is wrong in an SSP is refused by name."""
+"""ClosedLoop.ssp is valid and complete; an SSP with a mistake is refused, and the mistake named."""
 
 import sys
 import zipfile

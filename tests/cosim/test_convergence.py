@@ -83,7 +83,7 @@ def test_exact_state_does_not_depend_on_the_precision(maker: ModuleType, problem
 
 
 def test_motion_is_bounded_and_not_chaotic(maker: ModuleType, problem: Problem) -> None:
-    """A change of the start by 1e-6 stays as small: errors of steps are not blown up."""
+    """A change of the start by 1e-6 does not grow: the motion does not amplify errors of steps."""
     assert max(problem.largest.values()) < 10
     initial = problem.scenario.initial
     for name in problem.exact:
@@ -126,9 +126,9 @@ def test_error_of_the_integration_by_itself(
 ) -> None:
     """Against the exact solution for the very polynomials that the FMU is given, 3rd order.
 
-    This has no error of the inputs: what is left is the integrator's. The study's estimate of it,
-    the error at the shortest step, is near the largest; in every run that the slope is fitted to
-    it is below a hundredth of the error.
+    The inputs have no error here, so all of it is the integrator's. It is at most twice the study's
+    estimate, the error at the shortest step, and at most a hundredth of every error that the slope
+    is fitted to.
     """
     import heyoka as hy
 

@@ -96,7 +96,7 @@ def test_steps_are_those_of_a_recurrence_by_hand(
     np.testing.assert_allclose(rows[:, columns], expected, rtol=0, atol=1e-8)
     others = [(o, i) for o in ("jacobi", "gauss_seidel") for i in ("held", "extrapolated")]
     for other in others:
-        if other != (order, inputs):  # the test can tell them apart
+        if other != (order, inputs):  # so the test distinguishes them
             assert np.abs(expected - recurrence(*other, sequence)).max() > 1e-4
 
 

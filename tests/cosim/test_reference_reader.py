@@ -1,4 +1,4 @@
-"""References that are read, and files that are refused."""
+"""Good references are read, bad files are refused."""
 
 from pathlib import Path
 

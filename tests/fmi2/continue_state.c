@@ -1,6 +1,6 @@
 /* The other process of test_fmi2_serialization.c: continue_state FROM TO restores the serialized
- * state in a file and steps on; writes the values, and the state from before the step serialized
- * anew, to another file. */
+ * state in a file and steps on; writes the values, and the state before the step, serialized again,
+ * to another file. */
 #include "fmu_snapshots.h"
 
 #include <stdio.h>

@@ -84,7 +84,7 @@ def restore(instance: Instance, content: bytes) -> None:
 
 
 def other(unit: Unit, chance: random.Random) -> Instance:
-    """Another instance in some state or other, with values of its own."""
+    """Another instance in some state, with other values."""
     instance = Instance(unit)
     state = chance.randrange(4)
     if state > 0:

@@ -1,5 +1,5 @@
-/* Between initialization and Terminate an instance allocates memory for FMU states alone: steps and
- * values cost no call of the allocator, whatever the method and whatever happens. */
+/* Between initialization and Terminate an instance allocates memory only for FMU states. Steps, and
+ * setting or getting values, allocate nothing, with any method and after any failure. */
 #include "allocations.h"
 #include "each_method.h"
 #include "fmu_sequences.h"
@@ -23,7 +23,7 @@ static fmi2Status set_slopes(fmi2Component c, int i) {
     return fmu.SetRealInputDerivatives(c, references, 2, orders, values);
 }
 
-/* What comes before step i. */
+/* Sets some values before step i. */
 typedef fmi2Status change(fmi2Component c, int i);
 
 static fmi2Status change_nothing(fmi2Component c, int i) {
@@ -97,7 +97,7 @@ EACH_METHOD static void test_a_long_hold_allocates_nothing(void) {
     assert_steps_allocate_nothing(c, 2.0 * length, change_nothing);
 }
 
-/* Its history is found again, or the integrator becomes one of the state's method. */
+/* The history is replayed, or the integrator is replaced by one with the state's method. */
 EACH_METHOD static void test_steps_after_a_rollback_allocate_nothing(void) {
     for (fmi2Integer other = FMU_CVODE_ADAMS; other < FMU_METHODS; other++) {
         const fmi2Component source = fmu_initialized_with(method, &messages, 0.0);

@@ -1,5 +1,5 @@
 /* Serialized FMU states that are damaged, foreign or forged are refused, or at least do no harm.
- * FMI 2.0, section 2.1.8; the form of a serialized state is told in src/instance/snapshot.h. */
+ * FMI 2.0, section 2.1.8; src/instance/serialization.h defines the format of a serialized state. */
 #define _POSIX_C_SOURCE 200809L
 #include "each_method.h"
 #include "fmu_snapshots.h"
@@ -31,7 +31,7 @@ static void assert_refused(fmi2Component c, fmi2FMUstate good, const struct fmu_
     fmu_restore(c, good);
 }
 
-/* Each case changes the bytes of a used instance; the next step is as if nothing had been. */
+/* Each case damages the bytes of a used instance; its next step is unaffected. */
 static void check_refused(void (*check)(fmi2Component c, fmi2FMUstate good,
                                         const struct fmu_bytes *bytes)) {
     struct fmu_values expected;
@@ -96,7 +96,7 @@ static void test_trailing_bytes_are_refused(void) {
 
 enum { MAGIC_SIZE = 8, VERSION_AT = 8, GUID_AT = 20, CHECKSUM_SIZE = 8 };
 
-/* FNV-1a, as src/instance/snapshot.h tells it, over all but the checksum itself. */
+/* FNV-1a over all but the checksum itself: src/instance/serialization.h. */
 static void set_checksum(struct fmu_bytes *bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i < bytes->size - CHECKSUM_SIZE; i++) {
@@ -239,8 +239,8 @@ EACH_METHOD static void test_forged_states_do_no_harm(void) {
     alarm(0);
 }
 
-/* A value that no instance can have is refused by its name. The fields are found by their bits,
- * which no other field has. */
+/* A value that no instance can have is refused, and the message names it. A field is found by its
+ * bits, which are unique. */
 static void test_an_impossible_value_is_named(void) {
     static const double marked = 0.12345678901234567;
     static const double impossible = -0.5;

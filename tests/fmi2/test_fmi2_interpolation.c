@@ -149,7 +149,7 @@ static void assert_states_within(double tolerance, fmi2Component expected, fmi2C
     }
 }
 
-/* One step is as good as many in which the same polynomials are told anew. */
+/* One step gives the same result as many in which the same polynomials are set again. */
 static void test_a_polynomial_may_be_told_in_parts(void) {
     enum { PARTS = 16 };
     const double length = 0.25;
@@ -195,8 +195,8 @@ static void test_a_polynomial_is_what_many_held_values_tend_to(void) {
     TEST_ASSERT_TRUE(fabs(difference) > 0.05); // the derivatives matter
 }
 
-/* What lies beyond the step is nobody's input: the integrator does not go there, though it could
- * with one large internal step. */
+/* The integrator never evaluates inputs beyond the step, though one large internal step could reach
+ * there. */
 static void test_no_internal_step_passes_the_end(void) {
     const double h = 0.01;
     const fmi2Component c = fmu_slide(&messages, 0.0);

@@ -1,4 +1,4 @@
-/* What the FMU logs, when, and that it writes nowhere else. FMI 2.0, sections 2.1.5 and 2.2.4. */
+/* What the FMU logs and when. It writes nowhere else. FMI 2.0, sections 2.1.5 and 2.2.4. */
 #define _POSIX_C_SOURCE 200809L
 #include "fmu_harness.h"
 

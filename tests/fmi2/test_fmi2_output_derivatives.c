@@ -75,8 +75,8 @@ static void test_output_derivatives_agree_with_each_other(void) {
     }
 }
 
-/* Those of the next step, once the input is set; before the first step and after another one, and
- * in either order of calls. What is not set again is 0. */
+/* Once the input is set, they are those of the next step: before the first step and after another
+ * one, in either order of calls. Derivatives that are not set again are 0. */
 static void test_output_derivatives_follow_what_is_set(void) {
     const fmi2ValueReference f2 = RP_MANIPULATOR_f2;
     const fmi2Integer first = 1;

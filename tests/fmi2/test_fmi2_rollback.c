@@ -20,7 +20,7 @@ static void run_plainly(unsigned seed) {
     fmu_free(c);
 }
 
-/* ---- Saving alone --------------------------------------------------------------------------- */
+/* ---- Only saving ---------------------------------------------------------------------------- */
 
 static void run_saving_everywhere(unsigned seed) {
     char text[64];
@@ -100,7 +100,7 @@ static void move_to_other_instance(struct run *run) {
     fmu_bytes_free(&bytes);
 }
 
-/* Does something that is not in the sequence, which fails or not, and comes back. */
+/* Takes a detour of random calls, which may fail, and restores the state. */
 static void make_detour(struct run *run) {
     static struct fmu_run other_run;
     fmi2FMUstate state = fmu_save(run->component);
@@ -222,7 +222,7 @@ EACH_METHOD static void test_rollback_is_exact_where_the_first_slope_fails(void)
 
 /* ---- Long holds ----------------------------------------------------------------------------- */
 
-/* Thousands of internal steps, long enough for restarts that nothing set asks for. */
+/* Thousands of internal steps, long enough for restarts without any change of a value. */
 static void assert_long(fmi2Component c) {
     TEST_ASSERT_GREATER_THAN_INT(5000, fmu_get_integer(c, RP_MANIPULATOR_solver_steps));
     TEST_ASSERT_GREATER_THAN_INT(3, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));

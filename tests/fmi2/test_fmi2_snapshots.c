@@ -1,4 +1,4 @@
-/* Handles of FMU states: what they hold in each state of an instance, whose they are, and who frees
+/* Handles of FMU states: their contents in each state of an instance, their owner, and who frees
  * them. FMI 2.0, section 2.1.8. That rollback is exact: test_fmi2_rollback.c. */
 #include "each_method.h"
 #include "fmu_model_exchange.h"
@@ -79,7 +79,7 @@ static void test_every_state_is_restored(void) {
     }
 }
 
-/* What a failed step tells is part of the state. */
+/* The status of a failed step is part of the state. */
 static void test_the_time_of_a_failed_step_is_restored(void) {
     double reached = -1.0;
     double restored = -1.0;
@@ -94,7 +94,7 @@ static void test_the_time_of_a_failed_step_is_restored(void) {
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, reached, 0.1, fmi2True));
 }
 
-/* A step that failed is repeated from before it in two halves: section 4.2.2. */
+/* A failed step is undone and repeated in two halves: section 4.2.2. */
 EACH_METHOD static void test_a_failed_step_is_repeated_in_smaller_ones(void) {
     const fmi2Component c = fmu_instantiate(&messages, false);
     fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);

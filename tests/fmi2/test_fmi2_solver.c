@@ -80,8 +80,7 @@ EACH_METHOD static void test_a_reset_brings_the_default_method_back(void) {
     TEST_ASSERT_EQUAL_INT(FMU_CVODE_ADAMS, fmu_get_integer(c, RP_MANIPULATOR_solver_method));
 }
 
-/* Also of the solver nothing is left over: the same method again, after steps of all kinds that
- * failed. */
+/* A reset solver keeps nothing: the same method again, after failed steps of all kinds. */
 EACH_METHOD static void test_a_reset_leaves_nothing_of_what_failed(void) {
     static const struct {
         fmi2ValueReference reference;

@@ -38,7 +38,7 @@ static const struct {
     [FMU_SerializeFMUstate] = {"IMCFTE", "IMVNTE"},
     [FMU_DeSerializeFMUstate] = {"IMCFTE", "IMVNTE"},
     [FMU_GetDirectionalDerivative] = {"-MCFTE", "-MVNTE"},
-    // Co-Simulation alone
+    // only Co-Simulation
     [FMU_SetRealInputDerivatives] = {"IMC---", "------"},
     [FMU_GetRealOutputDerivatives] = {"--CFTE", "------"},
     [FMU_DoStep] = {"--C---", "------"},
@@ -48,7 +48,7 @@ static const struct {
     [FMU_GetIntegerStatus] = {"--CFT-", "------"},
     [FMU_GetBooleanStatus] = {"--CFT-", "------"},
     [FMU_GetStringStatus] = {"--CFT-", "------"},
-    // Model Exchange alone
+    // only Model Exchange
     [FMU_EnterEventMode] = {"------", "--VN--"},
     [FMU_NewDiscreteStates] = {"------", "--V---"},
     [FMU_EnterContinuousTimeMode] = {"------", "--V---"},
@@ -68,7 +68,7 @@ static const char *allowed_states(fmi2Type type, enum fmu_function function) {
 
 static fmi2Status expected_where_allowed(enum fmu_function function) {
     switch (function) {
-    case FMU_GetStatus: // asked for the status of a step that is not pending
+    case FMU_GetStatus: // no step is pending
     case FMU_GetIntegerStatus:
     case FMU_GetStringStatus:
         return fmi2Discard;
@@ -128,7 +128,7 @@ static void assert_refused(const struct pair *pair, fmi2Component c) {
     fmu_assert_in_state(c, fmu_state_of(pair->type, 'E'), 0.0, &messages, pair->text);
 }
 
-/* A refused call is undone by what was saved before it. */
+/* A state saved before a refused call undoes it. */
 static void assert_saved_state_leads_back(const struct pair *pair, fmi2Component c,
                                           fmi2FMUstate saved) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, saved), pair->text);

@@ -89,7 +89,7 @@ static void test_a_coarse_tolerance_of_the_experiment_is_cut_and_reported(void) 
     }
 }
 
-/* The integrator runs at a fraction of the tolerance asked for: the fraction is not tested. */
+/* The integrator runs at a fraction of the requested tolerance. The fraction is not tested. */
 static void test_the_tolerance_parameter_wins_over_the_experiment(void) {
     const double by_default = effective_tolerance(0.0, 0.0);
     const double fine = effective_tolerance(0.0, 1e-9);

@@ -108,9 +108,9 @@ def simulate(unit: Unit, scenario: Scenario, expected: Reference, tolerance: flo
 def test_fmpy_follows_the_reference(unit: Unit, name: str) -> None:
     """Within 1e-5 at tolerance 1e-8, or at 1e-11 where fmpy's solver needs it.
 
-    fmpy integrates with BDF formulas, whose errors add up, and starts them anew at every change of
-    an input: up to 5000 times, each with an error of the order of the tolerance. That the error is
-    the solver's shows in how it follows the tolerance.
+    fmpy integrates with BDF formulas, whose errors add up. It restarts them at every change of an
+    input, up to 5000 times, each with an error of the order of the tolerance. The error follows the
+    tolerance, so it is the solver's.
     """
     scenario = load(name)
     expected = reference.load(scenario, declared(scenario.model))

@@ -1,4 +1,4 @@
-"""Saved states through fmpy: which are refused, and what they cost."""
+"""Saved states through fmpy: which are refused, and how much memory they take."""
 
 import ctypes
 import random

@@ -1,4 +1,4 @@
-/* What every test of the built FMU begins and ends with: link fmu_fixture. */
+/* setUp and tearDown of every test of the built FMU: link fmu_fixture. */
 #include "fmu_harness.h"
 
 #include <unity.h>

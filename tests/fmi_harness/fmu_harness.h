@@ -1,4 +1,4 @@
-/* What the tests of the built FMU share: they see it as an importer does, as a shared object with
+/* Shared by the tests of the built FMU. They load it as an importer does, as a shared object with
  * the functions of the standard header, and link none of its code. FMI 2.0 is cited by section. */
 #ifndef FMU_HARNESS_H
 #define FMU_HARNESS_H

@@ -1,4 +1,4 @@
-/* Inputs that are polynomials of time over a step, and what to apply them to. */
+/* Inputs that are polynomials of time over a step, and instances to apply them to. */
 #ifndef FMU_POLYNOMIALS_H
 #define FMU_POLYNOMIALS_H
 
@@ -22,7 +22,7 @@ void fmu_set_polynomial(fmi2Component component, fmi2ValueReference reference,
 fmi2Component fmu_slide(struct fmu_log *log, double start);
 extern const double fmu_slide_mass; /* kg */
 
-/* f2 of every order alone, and of all at once (the last). */
+/* f2 with one order each, and with all at once (the last). */
 enum { FMU_SLIDE_FORCES = 5 };
 extern const struct fmu_polynomial fmu_slide_forces[FMU_SLIDE_FORCES];
 

@@ -74,7 +74,7 @@ void fmu_assert_in_state(fmi2Component component, const struct fmu_state *state,
                                       message);
         return;
     }
-    // the same functions work in the others: the message of one that does not tells them apart
+    // the same functions work in the other states: only a refusal's message distinguishes them
     fmu_log_clear(log);
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, fmu_try_set(component, RP_MANIPULATOR_tau1, 1.0),
                                   message);

@@ -1,4 +1,4 @@
-"""The shared object in each FMU: what it needs, how it is protected; two builds are the same."""
+"""The shared object in each FMU: its dependencies and its hardening; two builds are the same."""
 
 import os
 import re

@@ -87,7 +87,7 @@ def test_fmpy_simulates_it_by_default(fmu: Path, tmp_path: Path) -> None:
 
 
 def test_inputs_of_a_user_drive_it(fmu: Path) -> None:
-    """At rest in the horizontal plane, a constant force on link 2 alone is uniform acceleration."""
+    """At rest in the horizontal plane, a force on link 2 only accelerates it uniformly."""
     signals = np.array([(0.0, 3.0), (1.0, 3.0)], dtype=[("time", float), ("f2", float)])
     result = fmpy.simulate_fmu(
         str(fmu), stop_time=1.0, step_size=0.01, start_values={"g": 0.0, "a": 0.0, "m2": 1.5},

@@ -1,5 +1,5 @@
 /* What the fuzz targets share: how an input is read, how a finding ends the program, and the
- * figures of a run. README.md tells what each target checks. */
+ * figures of a run. README.md says what each target checks. */
 #ifndef FUZZ_H
 #define FUZZ_H
 
@@ -31,7 +31,7 @@ extern unsigned long fuzz_instance_count;
 
 /* ---- Reading an input ------------------------------------------------------------------------ */
 
-/* Every sequence of bytes is an input; what is read past its end is 0. */
+/* Every sequence of bytes is an input; past its end zeros are read. */
 struct fuzz_input {
     const uint8_t *at;
     size_t left;
@@ -62,7 +62,7 @@ double fuzz_magnitude(struct fuzz_input *input, double low, double high);
 /* An array with nothing behind it that may be touched; NULL for none. Freed with free(). */
 void *fuzz_array(size_t count, size_t size);
 
-/* Fills with a value that no call writes, and tells whether all of it is still there. */
+/* Fills memory with a value that no call writes, and checks that all of it is still there. */
 void fuzz_poison(double values[], size_t count);
 bool fuzz_is_poisoned(const double values[], size_t count);
 

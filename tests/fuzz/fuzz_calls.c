@@ -1,5 +1,5 @@
 /* Random sequences of all FMI functions with hostile and mixed-up arguments, on several instances
- * of both kinds at once. README.md tells how an input is decoded. */
+ * of both kinds at once. README.md says how an input is decoded. */
 #include "fuzz_instance.h"
 #include "fuzz_session.h"
 
@@ -31,7 +31,7 @@ void fuzz_call_GetVersion(struct fuzz_session *session, struct fuzz_instance *in
     }
 }
 
-/* Instances of their own, which are freed at once. */
+/* New instances, which are freed at once. */
 void fuzz_call_Instantiate(struct fuzz_session *session, struct fuzz_instance *instance) {
     static const char *const names[] = {"", "one", "100 %s %n #r1#\n", "Ä"};
     static const char *const guids[] = {RP_MANIPULATOR_GUID, "", "{0}", "%s%s%s%n"};
@@ -119,7 +119,7 @@ void fuzz_call_NewDiscreteStates(struct fuzz_session *session, struct fuzz_insta
     (void)session;
     if (FUZZ_CHECKED(instance, NewDiscreteStates, &info) == fmi2OK &&
         (info.nextEventTimeDefined || info.newDiscreteStatesNeeded || info.terminateSimulation)) {
-        fuzz_fail("fmi2NewDiscreteStates tells of an event");
+        fuzz_fail("fmi2NewDiscreteStates reports an event");
     }
 }
 

@@ -75,7 +75,7 @@ void fuzz_instance_free(struct fuzz_instance *instance) {
 
 /* ---- Status ---------------------------------------------------------------------------------- */
 
-/* What may still succeed after an fmi2Error: sections 3.2.3 and 4.2.4. */
+/* Functions that may still succeed after an fmi2Error: sections 3.2.3 and 4.2.4. */
 static bool works_in_error(enum fmu_function function) {
     switch (function) {
     case FMU_SetDebugLogging:

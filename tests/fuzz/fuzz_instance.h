@@ -18,7 +18,7 @@ struct fuzz_instance {
     bool tells_refusals;            /* errors and discards must come with a text */
     bool in_error;                  /* since an fmi2Error (section 4.2.4) */
     bool had_error;                 /* once in its life */
-    double time;                    /* s: where it is, as far as the calls tell */
+    double time;                    /* s: where it is, by the calls so far */
     unsigned told[fmi2Pending + 1]; /* texts by status since the last fuzz_check */
     char text[256];                 /* the last one */
 };

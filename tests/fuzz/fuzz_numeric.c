@@ -1,5 +1,5 @@
 /* Random valid parameters, states, inputs, tolerances, methods and steps: physics holds at every
- * successful step. README.md tells how an input is decoded and why the bounds are what they are. */
+ * successful step. README.md says how an input is decoded and why the bounds hold. */
 #include "fuzz_instance.h"
 #include "fuzz_physics.h"
 
@@ -35,7 +35,7 @@ struct segment {
 struct simulation {
     bool is_moderate; /* all magnitudes from 1e-3 to 1e3: the energy balance must hold */
     fmi2Integer method;
-    double tolerance; /* relative, as asked for */
+    double tolerance; /* relative, as requested */
     double max_step;  /* s; 0: no limit */
     double start;     /* s */
     double parameters[8];

@@ -76,11 +76,11 @@ static double energies(const struct fuzz_values *values) {
 struct balance {
     double energies;
     double moved;
-    double allowance; /* by the errors that the integrator lets pass in each of its own steps */
+    double allowance; /* from the errors that the integrator accepts in each internal step */
     double rounding;  /* of the terms that make up E and the work */
 };
 
-/* As the model's page tells it: of the integrator, from the one asked for. */
+/* As on the model's page: the integrator's tolerance from the requested one. */
 static double effective_tolerance(const struct fuzz_values *values, double tolerance) {
     const bool is_erk = fuzz_integer_value(values, RP_MANIPULATOR_solver_method) == 3;
     const double used = fmin(tolerance, 1e-4); // of what an experiment asks for
@@ -92,7 +92,7 @@ static double effective_tolerance(const struct fuzz_values *values, double toler
     return effective;
 }
 
-/* tolerance: the one asked for. */
+/* tolerance: the requested one. */
 static void see(struct balance *balance, double tolerance, const struct fuzz_values *values) {
     // weights of the error test: effective tolerance times |x| + 0.01 nominal values, which are 1
     const double effective = effective_tolerance(values, tolerance);
@@ -133,7 +133,7 @@ static void require(fmi2Status status, const struct fuzz_instance *instance) {
     }
 }
 
-/* Sees the step in parts, which the ends alone may not tell of. */
+/* Checks the step in parts: the values at its ends may not be enough. */
 static void see_parts(struct balance *balance, struct fuzz_instance *instance, fmi2FMUstate saved,
                       double tolerance, double length) {
     enum { PARTS = 64 };

@@ -11,8 +11,8 @@ void fuzz_check_newton_euler(const struct fuzz_values *values, bool inputs_are_h
 
 /* |dE - work| <= 1000 tolerance (max(|K| + |P|) + integral of |power|) over a step of this length
  * (s) with held inputs, plus what the integrator's own error test lets pass (README.md). saved: the
- * state before the step; the instance, which is after it, goes through the step again in parts
- * where the values at the ends do not decide, and is brought back. */
+ * state before the step; the instance, which is after it, repeats the step in parts if the values
+ * at its ends do not decide, and is brought back. */
 void fuzz_check_energy(struct fuzz_instance *instance, fmi2FMUstate saved, double tolerance,
                        double length, const struct fuzz_values *before,
                        const struct fuzz_values *after);

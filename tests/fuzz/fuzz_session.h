@@ -25,7 +25,7 @@ struct fuzz_session {
     } serialized[FUZZ_SERIALIZED];
 };
 
-/* The instance that the input says; made where there is none. */
+/* The instance that the input says; made if it does not exist yet. */
 struct fuzz_instance *fuzz_session_instance(struct fuzz_session *session);
 
 /* Frees the instance, and with it the states that it made. */

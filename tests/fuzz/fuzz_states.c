@@ -1,5 +1,5 @@
 /* Deserialization of mutated states, and what an instance does that goes on from one that was
- * taken. README.md tells how an input is decoded. */
+ * taken. README.md says how an input is decoded. */
 #include "fuzz_instance.h"
 
 #include <math.h>
@@ -10,7 +10,7 @@ const char *const fuzz_target_name = "fuzz_states";
 
 enum { BASES = 12, BYTES_CAPACITY = 2048, MAX_MUTATIONS = 12, MAX_OPERATIONS = 10 };
 
-/* An instance that goes on from a restored state is not asked for more internal steps than this. */
+/* An instance steps from a restored state only if its max_internal_steps is at most this. */
 enum { MAX_INTERNAL_STEPS = 3000 };
 
 struct bytes {
@@ -95,9 +95,8 @@ static const struct bytes *base_bytes(fmi2Type kind, unsigned base) {
 
 /* ---- Mutations ------------------------------------------------------------------------------- */
 
-/* src/instance/snapshot.h: magic, version, length and length of the GUID, the GUID, fields of 8
- * bytes, hash
- */
+/* src/instance/serialization.h: magic, version, length and length of the GUID, the GUID, fields of
+ * 8 bytes, hash */
 static const size_t fields_begin = 20 + sizeof RP_MANIPULATOR_GUID - 1;
 enum { LENGTH_AT = 12, HASH_SIZE = 8, FIELD_SIZE = 8 };
 
@@ -145,7 +144,7 @@ static void mutate(struct fuzz_input *input, fmi2Type kind, struct bytes *bytes)
     }
 }
 
-/* FNV-1a, as src/instance/snapshot.h says. */
+/* FNV-1a, as in src/instance/serialization.h. */
 static void repair_hash(struct bytes *bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i + HASH_SIZE < bytes->size; i++) {

@@ -1,5 +1,5 @@
-/* A model that cannot compute its outputs or their derivatives for a while: each call says so,
- * gives no value, and works again afterwards. */
+/* A model that fails to compute its outputs or their derivatives for a while: each call reports it
+ * and gives no value. Afterwards it works again. */
 #include "derivatives.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"

@@ -1,4 +1,4 @@
-/* The Jacobian that the implicit method gets from the model, and what it is worth. */
+/* The Jacobian that the implicit method gets from the model, and the evaluations it saves. */
 #include "instance.h"
 
 #include "derivatives.h"
@@ -85,7 +85,7 @@ static int count(unsigned reference) {
     return value;
 }
 
-/* ---- What it is asked for ------------------------------------------------------------------- */
+/* ---- With which values it is evaluated ------------------------------------------------------ */
 
 /* Newton's iteration takes it where it has just evaluated the right-hand side. */
 static struct { double omega, t, x[2], u; } latest;

@@ -1,5 +1,5 @@
-/* What no instance can be in: each value at its limits, one at a time, and its name in the message.
- */
+/* Impossible states are refused: each value beyond its limits, one at a time, and its name in the
+ * message. */
 #include "plausibility.h"
 
 #include "last_text.h"
@@ -203,7 +203,7 @@ static void test_values_could_have_been_set(void) {
     check_real(&values->x, "x = ", finite, infinite);
     check_real(&held->v, "v = ", finite, infinite);
 
-    // what is calculated is not read, and the held values only with a history
+    // calculated values are not read, and held values only with a history
     values->energy = held->energy = NAN;
     TEST_ASSERT_TRUE(is_plausible());
     state.has_history = false;

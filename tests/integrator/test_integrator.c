@@ -10,7 +10,7 @@
 
 /* x' = v, v' = -x, until failing_from, from where on the right-hand side gives NaN. */
 struct circle {
-    double latest; /* s: latest time asked for */
+    double latest; /* s: latest time requested */
     double failing_from;
     long evaluations;
 };

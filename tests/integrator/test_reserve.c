@@ -239,7 +239,7 @@ static enum status decay_jacobian(double t, const double x[], double J[], void *
     return STATUS_OK;
 }
 
-/* Methods in this order: each after each other. */
+/* Methods in this order: every pair follows one another. */
 static void test_the_reserve_of_an_integrator_is_enough(void) {
     enum { MOST = 100 };
     static const enum integrator_method methods[] = {

@@ -54,7 +54,7 @@ static void create(sunindextype n) {
             }
         }
     }
-    // as fast as the small ones' own: each fused operation is there
+    // each fused operation is there, as in the small vector
     N_VEnableFusedOps_Serial(serial[0][0], SUNTRUE);
     fill();
 }
@@ -83,7 +83,7 @@ static void assert_same(double rounding) {
     fill();
 }
 
-/* Runs a test at every length, those with loops of their own among them. */
+/* Runs a test at every length, also at those with special loops. */
 static void at_every_length(void (*test)(void)) {
     for (sunindextype n = 1; n <= LONGEST; n++) {
         create(n);
@@ -271,7 +271,7 @@ static void test_length(void) {
     at_every_length(check_length);
 }
 
-/* A NaN must not vanish in a norm: it is what tells an integrator that a step went wrong. */
+/* A NaN must not vanish in a norm: the integrator recognizes a failed step by it. */
 static void test_nan_stays_in_the_norm(void) {
     create(4);
     N_VGetArrayPointer(small[0][0])[2] = NAN;

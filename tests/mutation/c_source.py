@@ -1,6 +1,6 @@
 """C sources as tokens that know their function and statement: as much of C as mutants need.
 
-The sources are formatted by clang-format, which tells a product from a pointer: `a * b`, `int *a`.
+clang-format has formatted the sources: so products and pointers look different, `a * b`, `int *a`.
 """
 
 import re

@@ -1,8 +1,8 @@
 """Breaks the equations and the table of states in one place at a time: the tests must notice.
 
 mutate.py BUILD applies every mutant of mutants.toml to a copy of the sources, builds it with the
-settings of the folder BUILD and runs the C tests of that source. --few N takes N of them, drawn
-anew with every --seed.
+settings of the folder BUILD and runs the C tests of that source. --few N takes N of them, which
+--seed chooses.
 """
 
 import argparse

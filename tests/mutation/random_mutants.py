@@ -87,7 +87,7 @@ class Campaign:
             self.judge_one(workshop, index, "sanitized")
 
     def judge_one(self, workshop: Workshop, index: int, kind: str) -> None:
-        """One verdict, which is told."""
+        """Judge one mutant; print the verdict."""
         started = time.monotonic()
         verdict, test = workshop.judge(self.mutants[index].mutant, kind)
         with self.lock:
@@ -96,7 +96,7 @@ class Campaign:
             self.lock.notify_all()
 
     def tell(self, index: int) -> None:
-        """Print a verdict and write all of them."""
+        """Print a verdict; write all verdicts to the file."""
         verdict, test, _ = self.verdicts[index]
         by = f" by {test}" if test else ""
         print(f"{index}: {self.mutants[index].mutant.told()}: {verdict}{by}", flush=True)

@@ -1,7 +1,7 @@
 """All places where random mutants break a C source, and how.
 
-A mutant is told by the file, the function, the statement and what of it is replaced: so it is found
-again after the source was moved, wrapped otherwise or renamed (renames.py).
+A mutant is identified by the file, the function, the statement and the token that it replaces. So
+it is found again after the source was moved, wrapped otherwise or renamed (samples.py).
 """
 
 from collections.abc import Iterator

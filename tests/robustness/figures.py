@@ -14,7 +14,7 @@ TEST = re.compile(r"^\d+/\d+ Test: (\S+)$")
 
 
 def parse(line: str) -> tuple[str, dict[str, str], list[str]]:
-    """Name, figures of COLUMNS by their name, and what else the line tells."""
+    """Name, figures of COLUMNS by their name, and the rest of the line."""
     what, *fields = (field.strip() for field in line.removeprefix(PREFIX).split(";"))
     known: dict[str, str] = {}
     others = []
@@ -28,7 +28,7 @@ def parse(line: str) -> tuple[str, dict[str, str], list[str]]:
 
 
 def failures(text: str) -> list[str]:
-    """Tests of a log that did not pass: those that crashed may tell no figures."""
+    """Tests of a log that did not pass: after a crash they may have no figures."""
     names: dict[str, bool] = {}
     name = ""
     for line in text.splitlines():
@@ -64,7 +64,7 @@ def main() -> None:
         line.strip() for text in texts for line in text.splitlines() if line.startswith(PREFIX)
     ]
     if not lines:
-        sys.exit("the logs tell of no campaign")
+        sys.exit("the logs contain no campaign")
     print(table(lines))
     for text in texts:
         for name in failures(text):

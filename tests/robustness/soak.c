@@ -1,5 +1,5 @@
-/* Long runs in which the resident memory must stay where it is after a warm-up: instances that come
- * and go, steps with snapshots, and loading and unloading of the shared object. */
+/* Long runs in which the resident memory must not grow after a warm-up: instances that come and go,
+ * steps with snapshots, and loading and unloading of the shared object. */
 #define _GNU_SOURCE // mallinfo2, RTLD_NOLOAD
 
 #include "fmu_library.h"
@@ -37,8 +37,8 @@ static void receive(fmi2ComponentEnvironment environment, fmi2String instance_na
 
 /* ---- Memory --------------------------------------------------------------------------------- */
 
-/* KiB, but for used. Pages of files come and go as the kernel likes, 64 KiB at a time: what a leak
- * makes grow are the others. */
+/* KiB, except used. The kernel adds and drops pages of files, 64 KiB at a time: a leak shows in the
+ * other pages. */
 struct memory {
     long resident; /* with pages of files */
     long own;      /* resident without them */

@@ -1,4 +1,4 @@
-"""Commands that the system or the user stops: one line says so, nothing half-written is left."""
+"""Commands that the system or the user stops print one line and leave no half-written file."""
 
 import os
 import re
@@ -95,7 +95,7 @@ def test_no_room_for_files(place: Place, arguments: tuple[str, ...], largest: in
     """Where the copy of the FMU, or the values of a run, find no room."""
     code, _, err = place.call(arguments, largest=largest)
     assert code == 2
-    # matplotlib has a line of its own where it cannot keep its list of fonts
+    # matplotlib prints a line if it cannot store its list of fonts
     assert_one_line(re.sub("^Could not save font_manager.*\n", "", err))
     assert place.written() == []
     place.assert_clean()

@@ -107,7 +107,7 @@ static bool end_fault(const struct subject *subject, bool succeeded) {
     return failed > 0;
 }
 
-/* One call, of which allocation number fails, and what becomes of the instance; whether there was
+/* Makes one call in which this allocation fails, and checks the instance. Returns whether there was
  * such an allocation. */
 typedef bool trial_function(const struct subject *subject, long number, enum allocator_fault fault);
 

@@ -1,5 +1,5 @@
 /* Every evaluation of the model fails in turn, once or from then on, by its status or by values
- * that are not finite: a step then ends at a state that is right, and can be undone. */
+ * that are not finite. A step then ends at a correct state and can be undone. */
 #include "captured_stderr.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
@@ -112,7 +112,7 @@ static void assert_on_solution(const struct state *state, const char *about) {
     TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(tolerance, exact[1], state->x[1], about);
 }
 
-/* What steps without a fault come to. */
+/* The result of the steps without a fault. */
 static struct state expected_end(int method, bool has_first_step) {
     struct instance *instance = create(method);
     double t = start;
@@ -128,7 +128,7 @@ static struct state expected_end(int method, bool has_first_step) {
 
 static char about[120];
 
-/* One step in which evaluation number fails; whether there was one. */
+/* Makes one step in which this evaluation fails. Returns whether there was such an evaluation. */
 static bool try_step(int method, bool has_first_step, long number, enum way way,
                      enum lasting lasting, const struct state *expected) {
     struct instance_snapshot *snapshot = NULL;

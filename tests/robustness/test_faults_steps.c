@@ -1,6 +1,7 @@
-/* Steps that the FMU can do in part only, for want of internal steps or for values that overflow on
- * the way, with each method of the solver: fmi2Discard, at the last state that is right; after a
- * rollback smaller steps give what they would have given at once. FMI 2.0 is cited by section. */
+/* Steps that the FMU can do only in part, with each method of the solver: the internal steps run
+ * out, or values overflow on the way. fmi2DoStep returns fmi2Discard at the last state that is
+ * right. After a rollback, smaller steps give the same values as without the failed step. FMI 2.0
+ * is cited by section. */
 #include "captured_stderr.h"
 #include "fmu_harness.h"
 #include "fmu_snapshots.h"
@@ -121,8 +122,8 @@ static void assert_same(fmi2Component c, fmi2Component other) {
     fmu_assert_same_values(&expected, &values, about);
 }
 
-/* The step is halved until it succeeds, again and again to the end; another instance takes the
- * steps that succeeded, and is never told of the others. */
+/* The step is halved until it succeeds, again and again to the end. Another instance takes only the
+ * steps that succeeded. */
 static void halve_to_the_end(fmi2Component c, fmi2Component other,
                              const struct obstacle *obstacle) {
     fmi2FMUstate state = NULL;

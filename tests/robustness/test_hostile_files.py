@@ -1,4 +1,4 @@
-"""Files that are no files, are cut or are endless: one line that says so, nothing left behind."""
+"""Devices, cut and endless files: the command prints one line and leaves nothing behind."""
 
 import os
 import shutil

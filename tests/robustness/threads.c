@@ -1,6 +1,6 @@
 /* Many threads with many instances each, which step, save, restore, serialize and move to new
- * instances in between. Every value after every step must have the bits that one instance alone, in
- * one thread, has. Run with ThreadSanitizer too: preset tsan. */
+ * instances in between. Every value after every step must have the same bits as that of one
+ * instance alone in one thread. Run with ThreadSanitizer too: preset tsan. */
 #include "fmu_harness.h"
 
 #include <pthread.h>

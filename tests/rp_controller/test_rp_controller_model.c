@@ -30,7 +30,7 @@ void setUp(void) {
     random_source.state = 7;
     text[0] = '\0';
 }
-/* Gains of the integral part at joint 2 alone; limits that are far or exceeded everywhere. */
+/* Integral gain only at joint 2; limits that are far or exceeded everywhere. */
 static void next_point(int mode, bool is_limited) {
     memset(&at, 0, sizeof at);
     memset(&first, 0, sizeof first);
@@ -108,8 +108,8 @@ static void test_what_is_integrated_are_the_rates_that_are_output(void) {
 
 enum { BELOW, AT, BEYOND, SIDES }; /* an effort and its limit */
 
-/* A law with its integral parts at both joints, or at joint 2 alone; the effort of each joint on a
- * side of its limit. */
+/* A law with integral parts at both joints, or only at joint 2; each joint's effort is below, at or
+ * beyond its limit. */
 static void next_law(int mode, bool has_both, const int side[2]) {
     next_point(mode, false);
     struct rp_controller_parameters *p = &at.v.parameters;

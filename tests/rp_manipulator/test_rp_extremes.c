@@ -41,7 +41,7 @@ static void initialize(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_exit_initialization(instance));
 }
 
-/* The horizontal plane without offset: link 2 alone slides uniformly or uniformly accelerated. */
+/* The horizontal plane without offset: only link 2 moves, at constant velocity or acceleration. */
 static void start_sliding(double dq2, double f2) {
     instance_reset(instance);
     set(RP_MANIPULATOR_g, 0.0);
@@ -89,7 +89,7 @@ EACH_METHOD static void test_tiny_steps_are_done_or_refused(void) {
         TEST_ASSERT_TRUE(status_severity(status) <= SEVERITY_DISCARD);
         TEST_ASSERT_DOUBLE_WITHIN(1e-7 * h + DBL_TRUE_MIN, instance_time(instance),
                                   get(RP_MANIPULATOR_q2));
-        // solvers square their step: below 1e-150 s that underflows; erk refuses what may do so
+        // solvers square their step, which underflows below 1e-150 s; erk refuses such steps
         TEST_ASSERT_TRUE(status == STATUS_OK ||
                          exponent < (method == INTEGRATOR_ERK ? -100 : -150));
     }
@@ -100,7 +100,7 @@ EACH_METHOD static void test_the_state_is_that_of_the_time_reached(void) {
     set(RP_MANIPULATOR_g, -9e-20);
     initialize();
     const enum status status = instance_do_step(instance, 0.0, 4e209);
-    // the arm is so long that it stays where it is, which the Runge-Kutta method can tell
+    // the arm is so long that it does not move: only the Runge-Kutta method finds that
     TEST_ASSERT_EQUAL_INT(method == INTEGRATOR_ERK ? SEVERITY_NONE : SEVERITY_DISCARD,
                           status_severity(status));
     TEST_ASSERT_EQUAL_DOUBLE(status == STATUS_OK ? 4e209 : 0.0, instance_time(instance));

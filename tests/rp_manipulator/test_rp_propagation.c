@@ -80,7 +80,8 @@ static double inertia(void) {
     return rp_test_inertia(&x.v.parameters, x.v.q[1]);
 }
 
-/* How far a known alone may move before a field has a pole, where J or m2 is 0; 1 at most. */
+/* How far each known may move, the others fixed, before a field has a pole (J or m2 is 0); 1 at
+ * most. */
 static double radius(int known) {
     const struct rp_parameters *p = &x.v.parameters;
     switch (1 << known) {

@@ -185,7 +185,7 @@ static void test_a_circle_about_the_axis_is_everywhere_as_near(void) {
     assert_accepted();
 }
 
-/* A quarter of a circle that does not come to the axis, with either of its ends next to it. */
+/* A quarter of a circle that stays off the axis, with the start or the end nearest to it. */
 static void test_the_nearest_point_of_an_arc_may_be_an_end(void) {
     v.parameters.center[0] = 0.25;
     v.parameters.center[1] = 0.0;

@@ -1,4 +1,4 @@
-"""RPTrajectory.fmu: exact motions and derivatives, what it refuses, a unit without states."""
+"""RPTrajectory.fmu: exact motions and derivatives, refused parameters, a unit without states."""
 
 import ctypes
 import importlib.util

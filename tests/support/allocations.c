@@ -31,8 +31,8 @@ __attribute__((constructor)) static void install(void) {
 
 #else
 
-// glibc calls a program's own functions of these names in place of its own, and so does all that
-// the program loads; these are those behind them
+// glibc, and all that the program loads, calls the program's functions of these names; they in turn
+// call glibc's, declared here
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t items, size_t size);
 void *__libc_realloc(void *memory, size_t size);

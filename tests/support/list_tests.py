@@ -1,9 +1,9 @@
-"""Lists the tests of a C file for test_main.c, so that a test that is written is run.
+"""Lists the tests of a C file for test_main.c, so that every test in the file runs.
 
 list_tests.py FILE.c HEADER writes a header that the compiler includes in front of FILE.c. It
 declares every `static void test_...(void)` of FILE.c and puts them into a list, in their order.
-The compiler refuses what is overlooked here (static and never used), and what only seems to be
-there, in `#if 0` (used and never defined).
+The compiler refuses a test that is missing from the list (static and never used) and one that is
+left out by `#if 0` (used and never defined).
 """
 
 import re

@@ -1,7 +1,7 @@
 """The arm in sympy, from positions: values and exact derivatives of every output and local.
 
 Shares nothing with the C code: equations of motion and outputs are those of make_references.py,
-what is local to the FMU is derived here. Evaluated with 40 digits.
+local variables are derived here. Evaluated with 40 digits.
 """
 
 import importlib.util

@@ -25,7 +25,7 @@ def settings_of(build: Path) -> list[str]:
 
 
 def run(*command: object) -> None:
-    """Run a command that must succeed; its output is told if it does not."""
+    """Run a command that must succeed; print its output if it fails."""
     arguments = [str(argument) for argument in command]
     result = subprocess.run(arguments, capture_output=True, text=True, check=False)
     if result.returncode != 0:

@@ -1,8 +1,8 @@
 """The closed loop, stepped by the master of cosim.coupling in several ways.
 
 The same components, connections and parameters as in Ecos (ClosedLoop.ssp). Errors are relative to
-the closed loop in continuous time (../references). What is expected, and why, is on the page
-../coupling.md.
+the closed loop in continuous time (../references). The page ../coupling.md says which results are
+expected and why.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

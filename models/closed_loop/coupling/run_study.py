@@ -1,6 +1,6 @@
 """The study of the coupling: run, printed and drawn.
 
-What is expected of it is on the page ../coupling.md.
+The page ../coupling.md says which results are expected.
 """
 
 from pathlib import Path

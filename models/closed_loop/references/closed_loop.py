@@ -129,11 +129,11 @@ def sampled(
     references = loop.references(times, _at(times, segments))
     states = np.empty((len(STATE), len(times)), real)
     states[:, 0] = start if state is None else state
-    signals = np.empty((len(SIGNALS), len(times)), real)  # what the controller last read
+    signals = np.empty((len(SIGNALS), len(times)), real)  # inputs that the controller last read
     signals[:, 0] = np.concatenate((references[:6, 0], states[:4, 0]))
-    commands = np.empty((2, len(times)), real)  # what the controller last said
+    commands = np.empty((2, len(times)), real)  # efforts that the controller last gave
     commands[:, 0] = loop.limited(loop.unlimited(signals[:, 0], states[4:, 0]))
-    efforts = commands.copy()  # what moved the arm to this point
+    efforts = commands.copy()  # efforts that moved the arm to this point
     arm_last, arm_first = order == "gauss_seidel", order == "gauss_seidel_arm_first"
     for i in range(len(times) - 1):
         step = times[i : i + 2]
