@@ -6,9 +6,13 @@
 #   ./run.sh --list                names of the scenarios, without building
 #   ./run.sh system [VARIANT ...]  the closed loop in Ecos; --list: names of its variants
 #   ./run.sh coupling              what the coupling of the closed loop costs
-#   ./run.sh --help                all options; also after system and coupling
+#   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # may lead to other modules than those tested here
+if [ "${1-}" = --help ] || [ "${1-}" = -h ]; then
+  sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+  exit
+fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
 "$root/setup.sh"
@@ -26,6 +30,6 @@ if [ "${1-}" = --list ]; then
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 case "${1-}" in
-  system | coupling) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
+  run | system | coupling) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
   *) exec "$python" -P -m cosim run "$@" ;;
 esac

@@ -7,6 +7,10 @@ set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # they may lead to other modules than those tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
+if [ "${1-}" = --help ] || [ "${1-}" = -h ]; then
+  sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+  exit
+fi
 long=no
 if [ "${1-}" = --long ]; then
   long=yes

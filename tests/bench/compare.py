@@ -24,14 +24,14 @@ from pathlib import Path
 
 from arm import Work
 from peers import (
+    LoadedFmu,
     Run,
-    Unit,
     build_python_plant,
+    run_co_simulation,
     run_dop853,
     run_heyoka,
     run_model_exchange,
     run_mujoco,
-    run_slave,
 )
 from plots import draw
 from table import markdown
@@ -93,7 +93,7 @@ def find(rows: list[dict], work: str, run: str) -> dict:
     return next(row for row in rows if (row["work"], row["run"]) == (work, run))
 
 
-def make_peers(own: Unit, plant: Unit, first: list[dict], quick: bool) -> list[Peer]:
+def make_peers(own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool) -> list[Peer]:
     """All peers at their tolerances; first: rows of bench, to know how exact erk is."""
     model_exchange = partial(run_model_exchange, own)
     swept = [
@@ -102,9 +102,9 @@ def make_peers(own: Unit, plant: Unit, first: list[dict], quick: bool) -> list[P
         ("model exchange, CVode of fmpy", model_exchange),
     ]
     driven = [
-        ("erk, by fmpy", partial(run_slave, own, method=3)),
-        ("cvode_adams, by fmpy", partial(run_slave, own, method=1)),
-        ("Python plant of pythonfmu, by fmpy", partial(run_slave, plant)),
+        ("erk, by fmpy", partial(run_co_simulation, own, method=3)),
+        ("cvode_adams, by fmpy", partial(run_co_simulation, own, method=1)),
+        ("Python plant of pythonfmu, by fmpy", partial(run_co_simulation, plant)),
     ]
     peers = []
     for work in CHANGING:
@@ -199,8 +199,8 @@ def main() -> None:
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        own = Unit(options.fmu, folder / "own")
-        plant = Unit(build_python_plant(folder), folder / "plant")
+        own = LoadedFmu(options.fmu, folder / "own")
+        plant = LoadedFmu(build_python_plant(folder), folder / "plant")
         first = run_bench(program, "--only", "steps", "--repeats", "1")
         peers = make_peers(own, plant, first["rows"], options.quick)
         rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))

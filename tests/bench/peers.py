@@ -117,7 +117,7 @@ def run_mujoco(work: Work, tolerance: float) -> Run:
 # ---- FMUs driven by fmpy
 
 
-class Unit:
+class LoadedFmu:
     """An FMU, extracted into a folder, of which fmpy makes instances."""
 
     def __init__(self, path: Path, folder: Path) -> None:
@@ -148,14 +148,14 @@ class Unit:
         return fmu
 
 
-def run_slave(unit: Unit, work: Work, tolerance: float, method: int = 0) -> Run:
+def run_co_simulation(loaded: LoadedFmu, work: Work, tolerance: float, method: int = 0) -> Run:
     """Co-simulation: setReal, doStep and getReal of fmpy."""
-    fmu = unit.start(FMU2Slave, tolerance, method)
+    fmu = loaded.start(FMU2Slave, tolerance, method)
 
     def step(i: int, u: list[float]) -> list[float]:
-        fmu.setReal(unit.inputs, u)
+        fmu.setReal(loaded.inputs, u)
         fmu.doStep(work.step * i, work.step)
-        return fmu.getReal(unit.states)
+        return fmu.getReal(loaded.states)
 
     run = stepped(work, step)
     fmu.terminate()
@@ -170,10 +170,10 @@ class NoInput:
         """Change nothing."""
 
 
-def run_model_exchange(unit: Unit, work: Work, tolerance: float) -> Run:
+def run_model_exchange(loaded: LoadedFmu, work: Work, tolerance: float) -> Run:
     """Model exchange with the CVODE of fmpy (BDF): each change of inputs is an event, as in
     fmpy.simulate_fmu, where the solver restarts."""
-    fmu = unit.start(FMU2Model, tolerance)
+    fmu = loaded.start(FMU2Model, tolerance)
     fmu.newDiscreteStates()
     fmu.enterContinuousTimeMode()
     solver = CVodeSolver(
@@ -194,14 +194,14 @@ def run_model_exchange(unit: Unit, work: Work, tolerance: float) -> Run:
     def step(i: int, u: list[float]) -> list[float]:
         if work.changing:
             fmu.enterEventMode()
-            fmu.setReal(unit.inputs, u)
+            fmu.setReal(loaded.inputs, u)
             fmu.newDiscreteStates()
             fmu.enterContinuousTimeMode()
             solver.reset(work.step * i)
         solver.step(work.step * i, work.step * (i + 1))
         fmu.setTime(work.step * (i + 1))
         fmu.completedIntegratorStep()
-        return fmu.getReal(unit.states)
+        return fmu.getReal(loaded.states)
 
     run = stepped(work, step)
     fmu.terminate()

@@ -98,9 +98,9 @@ def test_python_peers_do_the_same_work(units: tuple[peers.Unit, peers.Unit]) -> 
         (lambda work: peers.run_heyoka(work, 1e-10), 1e-10, 1e-8),
         (lambda work: peers.run_dop853(work, 1e-10), 1e-10, 1e-8),
         (lambda work: peers.run_model_exchange(own, work, 1e-8), 2e-4, 2e-5),
-        (lambda work: peers.run_slave(own, work, 1e-8, 1), 2e-8, 2e-8),
-        (lambda work: peers.run_slave(own, work, 1e-8, 3), 1e-10, 1e-10),
-        (lambda work: peers.run_slave(plant, work, 1e-8), 1e-10, 1e-10),
+        (lambda work: peers.run_co_simulation(own, work, 1e-8, 1), 2e-8, 2e-8),
+        (lambda work: peers.run_co_simulation(own, work, 1e-8, 3), 1e-10, 1e-10),
+        (lambda work: peers.run_co_simulation(plant, work, 1e-8), 1e-10, 1e-10),
         (lambda work: peers.run_mujoco(work, 1e-8), 1e-10, math.inf),  # one step of 2 s is none
     ]
     for run, changing, free in bounds:

@@ -3,7 +3,7 @@
 import random
 from dataclasses import dataclass
 
-from tests.support.instances import ERROR, INPUTS, Instance, Unit, status_of
+from tests.support.instances import ERROR, INPUTS, Instance, LoadedFmu, status_of
 
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
 WHIRL = {"g": 0.0, "q2": 0.1, "dq1": 20.0, "f2": -60.0, "relative_tolerance": 1e-12}
@@ -62,9 +62,9 @@ def do(instance: Instance, t: float, move: Move) -> bytes:
     return before + instance.everything()
 
 
-def run(unit: Unit, moves: list[Move], start: dict[str, float] = START) -> list[bytes]:
+def run(loaded: LoadedFmu, moves: list[Move], start: dict[str, float] = START) -> list[bytes]:
     """Bytes after every step of a run without any snapshot."""
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(**start)
         return [do(instance, t, move) for t, move in zip(times(moves), moves, strict=False)]
 
@@ -83,9 +83,9 @@ def restore(instance: Instance, content: bytes) -> None:
     instance.fmi.freeFMUstate(state)
 
 
-def other(unit: Unit, chance: random.Random) -> Instance:
+def other(loaded: LoadedFmu, chance: random.Random) -> Instance:
     """Another instance in some state, with other values."""
-    instance = Instance(unit)
+    instance = Instance(loaded)
     state = chance.randrange(4)
     if state > 0:
         instance.initialize(3.0, tolerance=1e-5, q1=0.7, m1=3.0)

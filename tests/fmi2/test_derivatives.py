@@ -17,7 +17,7 @@ import pytest
 import sympy as sp
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Integer, fmi2Real, fmi2ValueReference
 
-from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, Unit, status_of
+from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, LoadedFmu, status_of
 from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values
 
 
@@ -30,8 +30,8 @@ def model() -> Model:
 
 
 @pytest.fixture(scope="module")
-def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(fmu, tmp_path_factory.mktemp("fmu"))
+def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(fmu, tmp_path_factory.mktemp("fmu"))
 
 
 def generic_point(seed: int) -> Values:
@@ -67,8 +67,10 @@ def some(point: Values, names: tuple[str, ...]) -> Values:
 
 
 @contextmanager
-def in_initialization_mode(unit: Unit, seed: int, kind: type = FMU2Slave) -> Iterator[Instance]:
-    with Instance(unit, kind) as instance:
+def in_initialization_mode(
+    loaded: LoadedFmu, seed: int, kind: type = FMU2Slave
+) -> Iterator[Instance]:
+    with Instance(loaded, kind) as instance:
         instance.fmi.setupExperiment()
         instance.set(**generic_point(seed))
         instance.fmi.enterInitializationMode()
@@ -76,8 +78,8 @@ def in_initialization_mode(unit: Unit, seed: int, kind: type = FMU2Slave) -> Ite
 
 
 @contextmanager
-def between_steps(unit: Unit, seed: int) -> Iterator[Instance]:
-    with in_initialization_mode(unit, seed) as instance:
+def between_steps(loaded: LoadedFmu, seed: int) -> Iterator[Instance]:
+    with in_initialization_mode(loaded, seed) as instance:
         instance.fmi.exitInitializationMode()
         instance.step(0.0, 0.01)
         instance.set(**some(generic_point(seed + 1000), INPUTS))
@@ -85,16 +87,16 @@ def between_steps(unit: Unit, seed: int) -> Iterator[Instance]:
 
 
 @contextmanager
-def in_event_mode(unit: Unit, seed: int) -> Iterator[Instance]:
-    with in_initialization_mode(unit, seed, FMU2Model) as instance:
+def in_event_mode(loaded: LoadedFmu, seed: int) -> Iterator[Instance]:
+    with in_initialization_mode(loaded, seed, FMU2Model) as instance:
         instance.fmi.exitInitializationMode()
         instance.set(**some(generic_point(seed + 1000), INPUTS))
         yield instance
 
 
 @contextmanager
-def in_continuous_time_mode(unit: Unit, seed: int) -> Iterator[Instance]:
-    with in_event_mode(unit, seed) as instance:
+def in_continuous_time_mode(loaded: LoadedFmu, seed: int) -> Iterator[Instance]:
+    with in_event_mode(loaded, seed) as instance:
         instance.fmi.newDiscreteStates()
         instance.fmi.enterContinuousTimeMode()
         point = generic_point(seed + 2000)
@@ -130,17 +132,19 @@ def directional(instance: Instance, unknowns: tuple[str, ...], seed: Values) -> 
 # ---- Directional derivatives ---------------------------------------------------------------------
 
 
-def test_the_flags_say_what_is_offered(unit: Unit) -> None:
-    assert unit.description.coSimulation.providesDirectionalDerivative
-    assert unit.description.modelExchange.providesDirectionalDerivative
-    assert unit.description.coSimulation.maxOutputDerivativeOrder == 2
-    assert unit.description.coSimulation.canInterpolateInputs
+def test_the_flags_say_what_is_offered(loaded: LoadedFmu) -> None:
+    assert loaded.description.coSimulation.providesDirectionalDerivative
+    assert loaded.description.modelExchange.providesDirectionalDerivative
+    assert loaded.description.coSimulation.maxOutputDerivativeOrder == 2
+    assert loaded.description.coSimulation.canInterpolateInputs
 
 
-def test_the_symbolic_model_has_every_output_and_local_of_the_arm(unit: Unit, model: Model) -> None:
+def test_the_symbolic_model_has_every_output_and_local_of_the_arm(
+    loaded: LoadedFmu, model: Model
+) -> None:
     of_the_arm = [
         variable.name
-        for variable in unit.description.modelVariables
+        for variable in loaded.description.modelVariables
         if variable.causality in ("output", "local")
         and variable.variability == "continuous"
         and variable.name not in ALIASES
@@ -150,8 +154,10 @@ def test_the_symbolic_model_has_every_output_and_local_of_the_arm(unit: Unit, mo
 
 
 @each_seed
-def test_the_symbolic_model_has_the_values_of_the_unit(unit: Unit, model: Model, seed: int) -> None:
-    with in_initialization_mode(unit, seed) as instance:
+def test_the_symbolic_model_has_the_values_of_the_unit(
+    loaded: LoadedFmu, model: Model, seed: int
+) -> None:
+    with in_initialization_mode(loaded, seed) as instance:
         at = {sp.Symbol(name): mpmath.mpf(value) for name, value in point_of(instance).items()}
         names = tuple(model.expressions)
         expected = [float(model.expressions[name].evalf(40, subs=at)) for name in names]
@@ -162,11 +168,11 @@ def test_the_symbolic_model_has_the_values_of_the_unit(unit: Unit, model: Model,
 @each_mode
 @each_seed
 def test_directional_derivatives_are_exact(
-    unit: Unit, model: Model, enter: Callable, seed: int
+    loaded: LoadedFmu, model: Model, enter: Callable, seed: int
 ) -> None:
     """Every output, local and state derivative with respect to every input and state."""
     unknowns, knowns = tuple(model.expressions), (*INPUTS, *STATES)
-    with enter(unit, seed) as instance:
+    with enter(loaded, seed) as instance:
         exact = model.jacobian(point_of(instance), knowns)
         for known in knowns:
             for unknown, value in directional(instance, unknowns, {known: 1.0}).items():
@@ -176,10 +182,10 @@ def test_directional_derivatives_are_exact(
 @pytest.mark.parametrize("kind", [FMU2Slave, FMU2Model])
 @each_seed
 def test_parameters_are_knowns_of_the_initialization(
-    unit: Unit, model: Model, kind: type, seed: int
+    loaded: LoadedFmu, model: Model, kind: type, seed: int
 ) -> None:
     unknowns = tuple(model.expressions)
-    with in_initialization_mode(unit, seed, kind) as instance:
+    with in_initialization_mode(loaded, seed, kind) as instance:
         exact = model.jacobian(point_of(instance), KNOWNS)
         for known in KNOWNS:
             for unknown, value in directional(instance, unknowns, {known: 1.0}).items():
@@ -187,10 +193,12 @@ def test_parameters_are_knowns_of_the_initialization(
 
 
 @each_mode
-def test_a_call_with_many_knowns_gives_the_sums(unit: Unit, model: Model, enter: Callable) -> None:
+def test_a_call_with_many_knowns_gives_the_sums(
+    loaded: LoadedFmu, model: Model, enter: Callable
+) -> None:
     source = random.Random(5)
     for seed, count in itertools.product(SEEDS, (2, 3, 6)):
-        with enter(unit, seed) as instance:
+        with enter(loaded, seed) as instance:
             exact = model.jacobian(point_of(instance), (*INPUTS, *STATES))
             knowns = source.sample((*INPUTS, *STATES), count)
             unknowns = tuple(source.sample(tuple(model.expressions), 9))
@@ -201,8 +209,8 @@ def test_a_call_with_many_knowns_gives_the_sums(unit: Unit, model: Model, enter:
                 Exact(mpmath.fsum(terms), row).assert_is(value, (unknown, direction))
 
 
-def test_asking_changes_nothing(unit: Unit, model: Model) -> None:
-    with between_steps(unit, 1) as instance, between_steps(unit, 1) as other:
+def test_asking_changes_nothing(loaded: LoadedFmu, model: Model) -> None:
+    with between_steps(loaded, 1) as instance, between_steps(loaded, 1) as other:
         directional(instance, tuple(model.expressions), dict.fromkeys(STATES, 1.0))
         assert instance.everything() == other.everything()
         instance.step(0.01, 0.01)
@@ -233,11 +241,11 @@ def structure(unknowns: list) -> dict[str, set[str]]:
 )
 @each_seed
 def test_model_structure_is_the_pattern_of_the_derivatives(
-    unit: Unit, section: str, enter: Callable, knowns: tuple[str, ...], seed: int
+    loaded: LoadedFmu, section: str, enter: Callable, knowns: tuple[str, ...], seed: int
 ) -> None:
-    declared = structure(getattr(unit.description, section))
+    declared = structure(getattr(loaded.description, section))
     found = {name: set() for name in declared}
-    with enter(unit, seed) as instance:
+    with enter(loaded, seed) as instance:
         for known in knowns:
             for unknown, value in directional(instance, tuple(declared), {known: 1.0}).items():
                 if value != 0.0:
@@ -246,9 +254,9 @@ def test_model_structure_is_the_pattern_of_the_derivatives(
 
 
 @pytest.mark.parametrize("enter", [between_steps, in_continuous_time_mode])
-def test_linearization(unit: Unit, model: Model, enter: Callable) -> None:
+def test_linearization(loaded: LoadedFmu, model: Model, enter: Callable) -> None:
     """A, B, C and D, put together from the model description as an importer does."""
-    description = unit.description
+    description = loaded.description
     rates = [unknown.variable.name for unknown in description.derivatives]
     rates = tuple(ALIASES.get(rate, rate) for rate in rates)
     states = tuple(unknown.variable.derivative.name for unknown in description.derivatives)
@@ -260,7 +268,7 @@ def test_linearization(unit: Unit, model: Model, enter: Callable) -> None:
         "C": (outputs, states),
         "D": (outputs, inputs),
     }
-    with enter(unit, 11) as instance:
+    with enter(loaded, 11) as instance:
         exact = model.jacobian(point_of(instance), (*INPUTS, *STATES))
         matrices = {
             part: np.transpose(
@@ -299,8 +307,8 @@ NO_RATES = [[0.0, 0.0], [0.0, 0.0]]
 
 
 @each_seed
-def test_output_derivatives_with_held_inputs(unit: Unit, model: Model, seed: int) -> None:
-    with in_initialization_mode(unit, seed) as instance:
+def test_output_derivatives_with_held_inputs(loaded: LoadedFmu, model: Model, seed: int) -> None:
+    with in_initialization_mode(loaded, seed) as instance:
         instance.fmi.exitInitializationMode()
         assert_output_derivatives(instance, model, {}, NO_RATES)
         t = 0.0
@@ -314,11 +322,11 @@ def test_output_derivatives_with_held_inputs(unit: Unit, model: Model, seed: int
 @pytest.mark.parametrize("order", [1, 2, 3])
 @each_seed
 def test_output_derivatives_with_input_derivatives(
-    unit: Unit, model: Model, order: int, seed: int
+    loaded: LoadedFmu, model: Model, order: int, seed: int
 ) -> None:
     """At the end of a step they are those of the polynomials from its beginning."""
     source = random.Random(seed)
-    with in_initialization_mode(unit, seed) as instance:
+    with in_initialization_mode(loaded, seed) as instance:
         instance.fmi.exitInitializationMode()
         t = 0.0
         for h in (0.01, 0.004, 0.02):
@@ -352,8 +360,8 @@ def test_output_derivatives_with_input_derivatives(
 
 
 @each_seed
-def test_input_derivatives_apply_to_one_step(unit: Unit, model: Model, seed: int) -> None:
-    with in_initialization_mode(unit, seed) as instance:
+def test_input_derivatives_apply_to_one_step(loaded: LoadedFmu, model: Model, seed: int) -> None:
+    with in_initialization_mode(loaded, seed) as instance:
         instance.fmi.exitInitializationMode()
         instance.set_input_derivatives(tau1=(30.0, -400.0), f2=(-20.0, 0.0, 1e4))
         t = instance.step(0.0, 0.01)
@@ -361,8 +369,8 @@ def test_input_derivatives_apply_to_one_step(unit: Unit, model: Model, seed: int
         assert_output_derivatives(instance, model, {}, NO_RATES)
 
 
-def test_derivatives_of_the_energy_are_the_power_and_its_rate(unit: Unit) -> None:
-    with in_initialization_mode(unit, 3) as instance:
+def test_derivatives_of_the_energy_are_the_power_and_its_rate(loaded: LoadedFmu) -> None:
+    with in_initialization_mode(loaded, 3) as instance:
         instance.fmi.exitInitializationMode()
         instance.set_input_derivatives(tau1=(30.0,), f2=(-20.0,))
         instance.step(0.0, 0.01)
@@ -402,40 +410,42 @@ UNKNOWN_CASES = {
 @pytest.mark.parametrize(("unknowns", "knowns", "words"), UNKNOWN_CASES.values(), ids=UNKNOWN_CASES)
 @each_mode
 def test_wrong_unknowns_and_knowns_are_refused(
-    unit: Unit, enter: Callable, unknowns: list[int], knowns: list[int], words: str
+    loaded: LoadedFmu, enter: Callable, unknowns: list[int], knowns: list[int], words: str
 ) -> None:
-    with enter(unit, 0) as instance:
+    with enter(loaded, 0) as instance:
         call = instance.fmi.getDirectionalDerivative
         assert_refused(instance, words, call, unknowns, knowns, [1.0] * len(knowns))
 
 
 @pytest.mark.parametrize("enter", list(MODES.values())[1:], ids=list(MODES)[1:])
-def test_parameters_are_no_knowns_after_the_initialization(unit: Unit, enter: Callable) -> None:
-    with enter(unit, 0) as instance:
+def test_parameters_are_no_knowns_after_the_initialization(
+    loaded: LoadedFmu, enter: Callable
+) -> None:
+    with enter(loaded, 0) as instance:
         assert_refused(instance, "m1", instance.fmi.getDirectionalDerivative, [DDQ1], [M1], [1.0])
 
 
 @pytest.mark.parametrize("missing", range(4))
 @each_mode
 def test_missing_arrays_of_a_directional_derivative_are_refused(
-    unit: Unit, enter: Callable, missing: int
+    loaded: LoadedFmu, enter: Callable, missing: int
 ) -> None:
     references, value = (fmi2ValueReference * 1)(DDQ1), (fmi2Real * 1)(1.0)
     knowns, result = (fmi2ValueReference * 1)(TAU1), (fmi2Real * 1)(7.0)
     arrays = [references, knowns, value, result]
     arrays[missing] = None
     unknown, known, seed, out = arrays
-    with enter(unit, 0) as instance:
+    with enter(loaded, 0) as instance:
         call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
         assert status_of(call, component, None, 0, None, 0, None, None) == OK
         assert_refused(instance, "NULL", call, component, unknown, 1, known, 1, seed, out)
         assert result[0] == 7.0
 
 
-def test_a_refused_directional_derivative_writes_nothing(unit: Unit) -> None:
+def test_a_refused_directional_derivative_writes_nothing(loaded: LoadedFmu) -> None:
     unknowns, result = (fmi2ValueReference * 2)(DDQ1, TAU1), (fmi2Real * 2)(7.0, 8.0)
     knowns, seed = (fmi2ValueReference * 1)(TAU1), (fmi2Real * 1)(1.0)
-    with between_steps(unit, 0) as instance:
+    with between_steps(loaded, 0) as instance:
         call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
         assert_refused(instance, "tau1", call, component, unknowns, 2, knowns, 1, seed, result)
         assert list(result) == [7.0, 8.0]
@@ -456,23 +466,23 @@ OUTPUT_CASES = {
 
 @pytest.mark.parametrize(("references", "orders", "words"), OUTPUT_CASES.values(), ids=OUTPUT_CASES)
 def test_wrong_output_derivatives_are_refused(
-    unit: Unit, references: list[int], orders: list[int], words: str
+    loaded: LoadedFmu, references: list[int], orders: list[int], words: str
 ) -> None:
     count = len(references)
     result = (fmi2Real * count)(*range(7, 7 + count))
     arrays = (fmi2ValueReference * count)(*references), count, (fmi2Integer * count)(*orders)
-    with between_steps(unit, 0) as instance:
+    with between_steps(loaded, 0) as instance:
         call, component = instance.fmi.fmi2GetRealOutputDerivatives, instance.fmi.component
         assert_refused(instance, words, call, component, *arrays, result)
         assert list(result) == list(range(7, 7 + count))
 
 
 @pytest.mark.parametrize("missing", range(3))
-def test_missing_arrays_of_output_derivatives_are_refused(unit: Unit, missing: int) -> None:
+def test_missing_arrays_of_output_derivatives_are_refused(loaded: LoadedFmu, missing: int) -> None:
     arrays = [(fmi2ValueReference * 1)(DDQ1), (fmi2Integer * 1)(1), (fmi2Real * 1)(7.0)]
     arrays[missing] = None
     references, orders, result = arrays
-    with between_steps(unit, 0) as instance:
+    with between_steps(loaded, 0) as instance:
         call, component = instance.fmi.fmi2GetRealOutputDerivatives, instance.fmi.component
         assert status_of(call, component, None, 0, None, None) == OK
         assert_refused(instance, "NULL", call, component, references, 1, orders, result)
@@ -491,8 +501,8 @@ INPUT_CASES = {
     ("references", "orders", "values", "words"), INPUT_CASES.values(), ids=INPUT_CASES
 )
 def test_wrong_input_derivatives_are_refused(
-    unit: Unit, references: list[int], orders: list[int], values: list[float], words: str
+    loaded: LoadedFmu, references: list[int], orders: list[int], values: list[float], words: str
 ) -> None:
-    with between_steps(unit, 0) as instance:
+    with between_steps(loaded, 0) as instance:
         call = instance.fmi.setRealInputDerivatives
         assert_refused(instance, words, call, references, orders, values)

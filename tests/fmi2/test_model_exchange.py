@@ -15,7 +15,7 @@ from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.simulation import Result
 from tests.support.cosim_project import declared, load, names_of
-from tests.support.instances import ERROR, INPUTS, STATES, Instance, Unit, status_of
+from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
 
 NAMES = names_of("rp_manipulator")
 SECOND = [
@@ -28,14 +28,14 @@ START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
 
 
 @pytest.fixture(scope="module")
-def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture
-def model(unit: Unit):
+def model(loaded: LoadedFmu):
     """An instance in event mode, right after initialization."""
-    with Instance(unit, fmi2.FMU2Model) as instance:
+    with Instance(loaded, fmi2.FMU2Model) as instance:
         yield instance.initialize(**START)
 
 
@@ -73,7 +73,7 @@ def staircase(scenario: Scenario) -> np.ndarray | None:
     return np.array(rows, dtype=[("time", float), *((name, float) for name in INPUTS)])
 
 
-def simulate(unit: Unit, scenario: Scenario, expected: Reference, tolerance: float) -> float:
+def simulate(loaded: LoadedFmu, scenario: Scenario, expected: Reference, tolerance: float) -> float:
     """Largest relative error of all outputs, as for co-simulation.
 
     fmpy restarts CVode where two rows of the input have the same time, in event mode, and records
@@ -82,8 +82,8 @@ def simulate(unit: Unit, scenario: Scenario, expected: Reference, tolerance: flo
     # fmpy gives up after 500 steps of CVode on the way to an output
     interval = min(max(scenario.steps), (scenario.stop - scenario.start) / 50)
     recorded = fmpy.simulate_fmu(
-        str(unit.folder),
-        model_description=unit.description,
+        str(loaded.folder),
+        model_description=loaded.description,
         fmi_type="ModelExchange",
         solver="CVode",
         start_time=scenario.start,
@@ -105,7 +105,7 @@ def simulate(unit: Unit, scenario: Scenario, expected: Reference, tolerance: flo
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_fmpy_follows_the_reference(unit: Unit, name: str) -> None:
+def test_fmpy_follows_the_reference(loaded: LoadedFmu, name: str) -> None:
     """Within 1e-5 at tolerance 1e-8, or at 1e-11 where fmpy's solver needs it.
 
     fmpy integrates with BDF formulas, whose errors add up. It restarts them at every change of an
@@ -114,18 +114,18 @@ def test_fmpy_follows_the_reference(unit: Unit, name: str) -> None:
     """
     scenario = load(name)
     expected = reference.load(scenario, declared(scenario.model))
-    error = simulate(unit, scenario, expected, 1e-8)
+    error = simulate(loaded, scenario, expected, 1e-8)
     if error > 1e-5:
         assert error <= 2e-3
-        fine = simulate(unit, scenario, expected, 1e-11)
+        fine = simulate(loaded, scenario, expected, 1e-11)
         assert fine <= 1e-5 and fine <= error / 100
 
 
-def test_inputs_at_rest_need_no_finer_tolerance(unit: Unit) -> None:
+def test_inputs_at_rest_need_no_finer_tolerance(loaded: LoadedFmu) -> None:
     for name in ("coasting", "constant_effort", "constant_effort_single_step"):
         scenario = load(name)
         expected = reference.load(scenario, declared(scenario.model))
-        assert simulate(unit, scenario, expected, 1e-8) <= 1e-5
+        assert simulate(loaded, scenario, expected, 1e-8) <= 1e-5
 
 
 # ---- States and derivatives --------------------------------------------------------------------
@@ -143,23 +143,23 @@ def test_states_and_derivatives_are_those_of_the_variables(model: Instance) -> N
         assert read(model.fmi.getDerivatives) == model.get("dq1", "dq2", "ddq1", "ddq2")
 
 
-def test_order_of_the_states_is_that_of_the_model_description(unit: Unit) -> None:
-    derivatives = [unknown.variable for unknown in unit.description.derivatives]
+def test_order_of_the_states_is_that_of_the_model_description(loaded: LoadedFmu) -> None:
+    derivatives = [unknown.variable for unknown in loaded.description.derivatives]
     assert [(v.derivative.name, v.name) for v in derivatives] == SECOND
-    assert unit.description.numberOfContinuousStates == 4
-    assert unit.description.numberOfEventIndicators == 0
+    assert loaded.description.numberOfContinuousStates == 4
+    assert loaded.description.numberOfEventIndicators == 0
 
 
-def test_derivatives_are_those_of_co_simulation(unit: Unit, model: Instance) -> None:
+def test_derivatives_are_those_of_co_simulation(loaded: LoadedFmu, model: Instance) -> None:
     values = {**START, "tau1": 0.7, "f2": -3.0, "m2": 1.7, "a": -0.2}
-    outputs = [v.name for v in unit.description.modelVariables if v.causality == "output"]
-    with Instance(unit) as slave, Instance(unit, fmi2.FMU2Model) as other:
-        slave.initialize(**values)
+    outputs = [v.name for v in loaded.description.modelVariables if v.causality == "output"]
+    with Instance(loaded) as co_simulation, Instance(loaded, fmi2.FMU2Model) as other:
+        co_simulation.initialize(**values)
         other.initialize(**values)
-        assert slave.get(*outputs) == other.get(*outputs)
+        assert co_simulation.get(*outputs) == other.get(*outputs)
         continuous(other)
-        assert slave.get(*outputs) == other.get(*outputs)
-        assert slave.get("dq1", "dq2", "ddq1", "ddq2") == read(other.fmi.getDerivatives)
+        assert co_simulation.get(*outputs) == other.get(*outputs)
+        assert co_simulation.get("dq1", "dq2", "ddq1", "ddq2") == read(other.fmi.getDerivatives)
 
 
 def test_time_is_the_one_set(model: Instance) -> None:
@@ -244,9 +244,9 @@ def test_no_events(model: Instance) -> None:
         assert model.fmi.completedIntegratorStep(no_set_state) == (False, False)
 
 
-def test_flags_of_model_exchange(unit: Unit) -> None:
-    element = unit.description.modelExchange
-    assert element.modelIdentifier == unit.description.coSimulation.modelIdentifier
+def test_flags_of_model_exchange(loaded: LoadedFmu) -> None:
+    element = loaded.description.modelExchange
+    assert element.modelIdentifier == loaded.description.coSimulation.modelIdentifier
     assert element.providesDirectionalDerivative
     assert element.canGetAndSetFMUstate and element.canSerializeFMUstate
 
@@ -285,18 +285,18 @@ def test_modes_are_entered_in_their_order(model: Instance) -> None:
     assert status_of(model.fmi.completedIntegratorStep) == ERROR  # instantiated
 
 
-def test_functions_of_the_other_kind_are_refused(unit: Unit) -> None:
+def test_functions_of_the_other_kind_are_refused(loaded: LoadedFmu) -> None:
     """The binary has both; an instance is of one kind."""
-    library = ctypes.CDLL(str(unit.folder / "binaries" / "linux64" / "RPManipulator.so"))
-    with Instance(unit, fmi2.FMU2Model) as model, Instance(unit) as slave:
+    library = ctypes.CDLL(str(loaded.folder / "binaries" / "linux64" / "RPManipulator.so"))
+    with Instance(loaded, fmi2.FMU2Model) as model, Instance(loaded) as co_simulation:
         continuous(model.initialize(**START))
-        slave.initialize(**START)
+        co_simulation.initialize(**START)
         t = ctypes.c_double
         step = library.fmi2DoStep
         assert step(ctypes.c_void_p(model.fmi.component), t(0.0), t(0.1), 1) == ERROR
         set_time = library.fmi2SetTime
-        assert set_time(ctypes.c_void_p(slave.fmi.component), t(0.1)) == ERROR
-        for instance in (model, slave):
+        assert set_time(ctypes.c_void_p(co_simulation.fmi.component), t(0.1)) == ERROR
+        for instance in (model, co_simulation):
             assert instance.messages[-1].status == ERROR
             instance.fmi.reset()
             instance.initialize(**START)
@@ -337,15 +337,15 @@ def test_completed_integrator_step_without_answers_is_refused(model: Instance) -
     assert flag.value == 7
 
 
-def test_another_solver_gives_the_same(unit: Unit) -> None:
+def test_another_solver_gives_the_same(loaded: LoadedFmu) -> None:
     """Classical Runge-Kutta in Python, fixed steps, against a co-simulation of the same motion."""
     values = {**START, "tau1": -0.5, "f2": -8.0}
     steps, h = 400, 1.0 / 400
-    with Instance(unit) as slave:
-        slave.initialize(tolerance=1e-10, **values)
-        slave.step(0.0, 1.0)
-        expected = np.array(slave.get(*STATES))
-    with Instance(unit, fmi2.FMU2Model) as model:
+    with Instance(loaded) as co_simulation:
+        co_simulation.initialize(tolerance=1e-10, **values)
+        co_simulation.step(0.0, 1.0)
+        expected = np.array(co_simulation.get(*STATES))
+    with Instance(loaded, fmi2.FMU2Model) as model:
         continuous(model.initialize(**values))
 
         def slope(t: float, x: np.ndarray) -> np.ndarray:

@@ -30,22 +30,22 @@ from tests.fmi2.rollback_sequences import (
     times,
 )
 from tests.support.cosim_project import declared
-from tests.support.instances import ERROR, STATES, Instance, Unit, status_of
+from tests.support.instances import ERROR, STATES, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 
 SEQUENCES = 100
 
 
 @pytest.fixture(scope="module")
-def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 # ---- Same bytes
 
 
 @pytest.mark.parametrize("number", range(SEQUENCES))
-def test_random_rollback(unit: Unit, number: int) -> None:
+def test_random_rollback(loaded: LoadedFmu, number: int) -> None:
     """Snapshots and jumps back at random, within an instance and from one to another."""
     chance = random.Random(number)
     kind = KINDS[number % len(KINDS)]
@@ -55,8 +55,8 @@ def test_random_rollback(unit: Unit, number: int) -> None:
     at = times(moves)
     stop = {"stop": at[-1]} if chance.random() < 0.5 else {}
     start = (WHIRL if is_long else START) | stop
-    expected = run(unit, moves, start)
-    instance = Instance(unit)
+    expected = run(loaded, moves, start)
+    instance = Instance(loaded)
     saved: list[tuple[int, object]] = []
     packed: list[tuple[int, bytes]] = []
     try:
@@ -77,7 +77,7 @@ def test_random_rollback(unit: Unit, number: int) -> None:
                 if chance.random() < 0.5:
                     instance.fmi.freeInstance()  # with all its snapshots
                     saved.clear()
-                    instance = other(unit, chance)
+                    instance = other(loaded, chance)
                 restore(instance, content)
             elif action < 0.5 and saved:
                 state = saved.pop(chance.randrange(len(saved)))[1]
@@ -92,13 +92,13 @@ def test_random_rollback(unit: Unit, number: int) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_snapshots_leave_no_trace(unit: Unit, kind: str) -> None:
+def test_snapshots_leave_no_trace(loaded: LoadedFmu, kind: str) -> None:
     """A state saved at every step, from the initialization on: the same bytes as without."""
     moves = sequence(kind, 300, random.Random(kind))
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.fmi.getFMUstate()
         instance.initialize(**START)
-        for t, move, expected in zip(times(moves), moves, run(unit, moves), strict=False):
+        for t, move, expected in zip(times(moves), moves, run(loaded, moves), strict=False):
             state = instance.fmi.getFMUstate()
             serialized(instance)
             assert do(instance, t, move) == expected
@@ -106,15 +106,15 @@ def test_snapshots_leave_no_trace(unit: Unit, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_rollback_at_every_step_leaves_no_trace(unit: Unit, kind: str) -> None:
+def test_rollback_at_every_step_leaves_no_trace(loaded: LoadedFmu, kind: str) -> None:
     """Each step is tried in another way, undone and made: the same bytes as without."""
     chance = random.Random(kind)
     moves, tried = sequence(kind, 300, chance), sequence("mixed", 300, chance)
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(**START)
         state = instance.fmi.getFMUstate()
         for t, move, trial, expected in zip(
-            times(moves), moves, tried, run(unit, moves), strict=False
+            times(moves), moves, tried, run(loaded, moves), strict=False
         ):
             instance.fmi.fmi2GetFMUstate(instance.fmi.component, byref(state))  # same memory
             do(instance, t, trial)
@@ -123,10 +123,10 @@ def test_rollback_at_every_step_leaves_no_trace(unit: Unit, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_another_process_goes_on_the_same(unit: Unit, tmp_path: Path, kind: str) -> None:
+def test_another_process_goes_on_the_same(loaded: LoadedFmu, tmp_path: Path, kind: str) -> None:
     moves = sequence(kind, 60, random.Random(kind))
     at, cut = times(moves), 30
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(**START)
         for t, move in zip(at, moves[:cut], strict=False):
             do(instance, t, move)
@@ -135,7 +135,7 @@ def test_another_process_goes_on_the_same(unit: Unit, tmp_path: Path, kind: str)
         final = [x.hex() for x in instance.get(*STATES)]
     plan = [[t, m.length, m.values, m.derivatives] for t, m in zip(at, moves, strict=False)]
     (tmp_path / "moves").write_text(json.dumps(plan[cut:]))
-    arguments = (unit.folder, tmp_path / "state", tmp_path / "moves")
+    arguments = (loaded.folder, tmp_path / "state", tmp_path / "moves")
     command = [sys.executable, "-m", "tests.fmi2.test_rollback", *map(str, arguments)]
     output = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
     assert output.stdout.split() == [*rest, *final]
@@ -143,16 +143,16 @@ def test_another_process_goes_on_the_same(unit: Unit, tmp_path: Path, kind: str)
 
 def main(folder: str, state: str, moves: str) -> None:
     """Restore and go on; print the bytes after each step and the final state as hexadecimals."""
-    with Instance(Unit(Path(folder), Path(folder))) as instance:
+    with Instance(LoadedFmu(Path(folder), Path(folder))) as instance:
         restore(instance, Path(state).read_bytes())
         for t, *move in json.loads(Path(moves).read_text()):
             print(do(instance, t, Move(*move)).hex())
         print(*(x.hex() for x in instance.get(*STATES)))
 
 
-def test_states_of_the_initialization_are_restored(unit: Unit) -> None:
+def test_states_of_the_initialization_are_restored(loaded: LoadedFmu) -> None:
     """Before, in and after initialization, and after the end."""
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         states = [instance.fmi.getFMUstate()]
         instance.fmi.setupExperiment(startTime=2.0, stopTime=3.0, tolerance=1e-6)
         instance.set(q1=1.0)
@@ -187,7 +187,7 @@ def test_states_of_the_initialization_are_restored(unit: Unit) -> None:
 # ---- A master that needs it
 
 
-def test_master_with_step_doubling(unit: Unit) -> None:
+def test_master_with_step_doubling(loaded: LoadedFmu) -> None:
     """A step, undone, and two halves: their difference controls the step, errors go back."""
     problem = convergence.load(
         ROOT / "models/rp_manipulator/convergence/smooth_inputs.toml", declared("rp_manipulator")
@@ -202,7 +202,7 @@ def test_master_with_step_doubling(unit: Unit) -> None:
 
     accepted: list[tuple[float, float]] = []
     refused = 0
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(0.0, stop, 1e-10, **problem.scenario.initial)
         begin = instance.fmi.getFMUstate()
         t, h = 0.0, 0.5
@@ -232,7 +232,7 @@ def test_master_with_step_doubling(unit: Unit) -> None:
     assert refused > 5 and len({h for _, h in accepted}) > 3
     assert problem.error(final) < 1e-2  # inputs are linear in a step
 
-    with Instance(unit) as instance:  # the same steps, none of them undone
+    with Instance(loaded) as instance:  # the same steps, none of them undone
         instance.initialize(0.0, stop, 1e-10, **problem.scenario.initial)
         for t, h in accepted:
             tell(instance, t)
@@ -240,10 +240,10 @@ def test_master_with_step_doubling(unit: Unit) -> None:
         assert instance.everything() == everything
 
 
-def test_a_failed_step_can_be_undone(unit: Unit) -> None:
+def test_a_failed_step_can_be_undone(loaded: LoadedFmu) -> None:
     """A step that the integrator cannot finish is fmi2Discard; the state before it is as good."""
-    with Instance(unit) as instance:
-        instance.fmi.setInteger([unit.references["max_internal_steps"]], [50])
+    with Instance(loaded) as instance:
+        instance.fmi.setInteger([loaded.references["max_internal_steps"]], [50])
         instance.initialize(**START)
         instance.step(0.0, 0.01)
         state, own = instance.fmi.getFMUstate(), instance.everything()
@@ -255,8 +255,8 @@ def test_a_failed_step_can_be_undone(unit: Unit) -> None:
         assert instance.everything() == own
         instance.step(0.01, 0.01)
         after = instance.everything()
-    with Instance(unit) as instance:
-        instance.fmi.setInteger([unit.references["max_internal_steps"]], [50])
+    with Instance(loaded) as instance:
+        instance.fmi.setInteger([loaded.references["max_internal_steps"]], [50])
         instance.initialize(**START)
         instance.step(instance.step(0.0, 0.01), 0.01)
         assert instance.everything() == after

@@ -18,12 +18,12 @@ from tests.fmi2.rollback_sequences import (
     serialized,
     times,
 )
-from tests.support.instances import ERROR, Instance, Unit, status_of
+from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
 
 
 @pytest.fixture(scope="module")
-def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 # ---- What is refused
@@ -37,9 +37,9 @@ def hashed(content: bytes) -> bytes:
     return content[:-8] + value.to_bytes(8, "little")
 
 
-def with_guid(content: bytes, guid: str, unit: Unit) -> bytes:
+def with_guid(content: bytes, guid: str, loaded: LoadedFmu) -> bytes:
     """`content` as a unit with another GUID would have written it."""
-    own, new = unit.description.guid.encode(), guid.encode()
+    own, new = loaded.description.guid.encode(), guid.encode()
     begin = content.index(own)
     end = begin + len(own)
     length = len(content) - len(own) + len(new)
@@ -47,7 +47,7 @@ def with_guid(content: bytes, guid: str, unit: Unit) -> bytes:
     return hashed(head + new + content[end:])
 
 
-def damages(content: bytes, unit: Unit, chance: random.Random) -> dict[str, bytes]:
+def damages(content: bytes, loaded: LoadedFmu, chance: random.Random) -> dict[str, bytes]:
     """States that must be refused, by what is wrong."""
     found = {}
     for i in range(len(content)):
@@ -55,7 +55,7 @@ def damages(content: bytes, unit: Unit, chance: random.Random) -> dict[str, byte
         changed[i] ^= 1 << chance.randrange(8)
         found[f"byte {i} changed"] = bytes(changed)
     found |= {f"cut to {i} bytes": content[:i] for i in range(1, len(content))}
-    guid = unit.description.guid
+    guid = loaded.description.guid
     found["longer"] = content + b"\0"
     found["longer, with a checksum"] = hashed(content + b"\0")
     found["zeros"] = bytes(len(content))
@@ -63,31 +63,31 @@ def damages(content: bytes, unit: Unit, chance: random.Random) -> dict[str, byte
     found["newer"] = hashed(content[:8] + (2).to_bytes(4, "little") + content[12:])
     found["much newer"] = hashed(content[:8] + b"\xff\xff\xff\xff" + content[12:])
     found["other magic"] = hashed(b"X" + content[1:])
-    found["other GUID"] = with_guid(content, guid[:-2] + "0}" + guid[-1:], unit)[: len(content)]
+    found["other GUID"] = with_guid(content, guid[:-2] + "0}" + guid[-1:], loaded)[: len(content)]
     for name, text in (("changed", guid[::-1]), ("shorter", guid[:-1]), ("longer", guid + "x")):
-        found[f"GUID {name}"] = with_guid(content, text, unit)
+        found[f"GUID {name}"] = with_guid(content, text, loaded)
     return found
 
 
-def test_the_format_is_the_one_that_is_damaged_here(unit: Unit) -> None:
-    with Instance(unit) as instance:
+def test_the_format_is_the_one_that_is_damaged_here(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
         content = serialized(instance.initialize(**START))
     assert content[:12] == b"COSIMSTA\1\0\0\0" and hashed(content) == content
-    assert with_guid(content, unit.description.guid, unit) == content
+    assert with_guid(content, loaded.description.guid, loaded) == content
 
 
-def test_damaged_foreign_and_newer_states_are_refused(unit: Unit) -> None:
+def test_damaged_foreign_and_newer_states_are_refused(loaded: LoadedFmu) -> None:
     """With a message and fmi2Error; a state saved before brings the instance back unharmed."""
     chance = random.Random(0)
     moves = sequence("held", 40, chance)
-    expected, at = run(unit, moves), times(moves)
-    with Instance(unit) as instance:
+    expected, at = run(loaded, moves), times(moves)
+    with Instance(loaded) as instance:
         instance.initialize(**START)
         for t, move in zip(at, moves[:20], strict=False):
             do(instance, t, move)
         content, state = serialized(instance), instance.fmi.getFMUstate()
         own = instance.everything()
-        for what, wrong in damages(content, unit, chance).items():
+        for what, wrong in damages(content, loaded, chance).items():
             handle = fmi2.fmi2FMUstate()
             count = len(instance.messages)
             status = status_of(
@@ -121,15 +121,17 @@ def test_damaged_foreign_and_newer_states_are_refused(unit: Unit) -> None:
         ("other magic", "not a saved state"),
     ],
 )
-def test_refusals_say_what_is_wrong(unit: Unit, what: str, text: str) -> None:
-    with Instance(unit) as instance:
+def test_refusals_say_what_is_wrong(loaded: LoadedFmu, what: str, text: str) -> None:
+    with Instance(loaded) as instance:
         content = serialized(instance.initialize(**START))
-        assert status_of(restore, instance, damages(content, unit, random.Random(1))[what]) == ERROR
+        assert (
+            status_of(restore, instance, damages(content, loaded, random.Random(1))[what]) == ERROR
+        )
         assert text in instance.messages[-1].text
 
 
-def test_a_buffer_that_is_too_small_is_refused(unit: Unit) -> None:
-    with Instance(unit) as instance:
+def test_a_buffer_that_is_too_small_is_refused(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
         state = instance.initialize().fmi.getFMUstate()
         size = ctypes.c_size_t()
         instance.fmi.fmi2SerializedFMUstateSize(instance.fmi.component, state, byref(size))
@@ -139,9 +141,13 @@ def test_a_buffer_that_is_too_small_is_refused(unit: Unit) -> None:
         assert buffer.raw == b"\x55" * size.value
 
 
-def test_states_of_others_are_refused(unit: Unit) -> None:
+def test_states_of_others_are_refused(loaded: LoadedFmu) -> None:
     """Of another instance, and of one for Model Exchange; freed ones too."""
-    with Instance(unit) as first, Instance(unit) as second, Instance(unit, fmi2.FMU2Model) as model:
+    with (
+        Instance(loaded) as first,
+        Instance(loaded) as second,
+        Instance(loaded, fmi2.FMU2Model) as model,
+    ):
         first.initialize(**START)
         state, content = first.fmi.getFMUstate(), serialized(first)
         assert status_of(second.fmi.setFMUstate, state) == ERROR
@@ -206,8 +212,10 @@ def free_none(instance: Instance) -> None:
 
 
 @pytest.mark.parametrize("use", [free_each, use_one_again, serialize_all])
-def test_states_that_are_freed_cost_no_memory(unit: Unit, use: Callable[[Instance], None]) -> None:
-    with Instance(unit) as instance:
+def test_states_that_are_freed_cost_no_memory(
+    loaded: LoadedFmu, use: Callable[[Instance], None]
+) -> None:
+    with Instance(loaded) as instance:
         instance.initialize(**START)
         use(instance)
         before = allocated()
@@ -215,9 +223,9 @@ def test_states_that_are_freed_cost_no_memory(unit: Unit, use: Callable[[Instanc
         assert allocated() - before < 50_000  # 2000 states are 2 MB at least
 
 
-def test_states_that_nobody_frees_are_freed_with_the_instance(unit: Unit) -> None:
+def test_states_that_nobody_frees_are_freed_with_the_instance(loaded: LoadedFmu) -> None:
     def once() -> int:
-        with Instance(unit) as instance:
+        with Instance(loaded) as instance:
             instance.initialize(**START)
             before = allocated()
             free_none(instance)

@@ -15,7 +15,7 @@ import pytest
 from fmpy import fmi2
 
 from tests.support.cosim_project import declared, load
-from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, Unit, status_of
+from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
@@ -25,8 +25,8 @@ WHIRL = {"g": 0.0, "q2": 0.1, "dq1": 4.0, "f2": -5.0}
 
 
 @pytest.fixture(scope="module")
-def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +59,11 @@ def reals(instance: Instance, without: Sequence[str] = ("time",)) -> list[float]
 
 
 def master(
-    unit: Unit, start: float, h: float, count: int, without: Sequence[str] = ("time",)
+    loaded: LoadedFmu, start: float, h: float, count: int, without: Sequence[str] = ("time",)
 ) -> np.ndarray:
     """Values after every step of a run whose inputs rest, jump and move in turn."""
     rows = []
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(start, start + count * h, 1e-8, **START)
         for i in range(count):
             elapsed = i * h
@@ -80,18 +80,20 @@ def master(
 
 
 @pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
-def test_start_time_does_not_matter_where_points_are_exact(unit: Unit, start: float) -> None:
+def test_start_time_does_not_matter_where_points_are_exact(loaded: LoadedFmu, start: float) -> None:
     """Steps of 1/128 s are exact at all these times: the results are equal bit for bit."""
-    expected = master(unit, 0.0, 1 / 128, 384)
-    assert np.array_equal(master(unit, start, 1 / 128, 384), expected)
+    expected = master(loaded, 0.0, 1 / 128, 384)
+    assert np.array_equal(master(loaded, start, 1 / 128, 384), expected)
 
 
 @pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
-def test_start_time_matters_by_the_rounding_of_points_alone(unit: Unit, start: float) -> None:
+def test_start_time_matters_by_the_rounding_of_points_alone(
+    loaded: LoadedFmu, start: float
+) -> None:
     """Steps of 1 ms are rounded, at 1e6 s by up to 6e-11 s: inputs change that much off."""
     without = ("time", "solver_last_step")
-    expected = master(unit, 0.0, 1e-3, 3000, without)
-    found = master(unit, start, 1e-3, 3000, without)
+    expected = master(loaded, 0.0, 1e-3, 3000, without)
+    found = master(loaded, start, 1e-3, 3000, without)
     scale = np.maximum(np.max(np.abs(expected), axis=0), 1e-3)
     rounding = np.spacing(abs(start) + 3.0) / 2
     assert np.max(np.abs(found - expected) / scale) < 1e-12 + 30 * rounding
@@ -109,11 +111,11 @@ def conserved(instance: Instance) -> tuple[float, float]:
 
 
 def whirl(
-    unit: Unit, times: list[float], lengths: list[float], stop: float | None
+    loaded: LoadedFmu, times: list[float], lengths: list[float], stop: float | None
 ) -> tuple[list[float], float]:
     """Final states, and the largest relative change of what is conserved at every 1000th step."""
     change = 0.0
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(times[0], stop, 1e-10, **WHIRL)
         component, step = instance.fmi.component, instance.fmi.fmi2DoStep
         first = conserved(instance)
@@ -130,7 +132,7 @@ def whirl(
 
 @pytest.mark.parametrize("accumulated", [False, True])
 def test_ten_minutes_in_steps_of_a_sixtieth(
-    unit: Unit, maker: ModuleType, accumulated: bool
+    loaded: LoadedFmu, maker: ModuleType, accumulated: bool
 ) -> None:
     """Points i / 60 s, and points that a master adds up: 36 000 steps are followed."""
     h, count = 1 / 60, 36_000
@@ -140,7 +142,7 @@ def test_ten_minutes_in_steps_of_a_sixtieth(
             times[i + 1] = times[i] + h
     motion = reference(maker, WHIRL)
     motion.propagate_until(np.longdouble(times[-1]))
-    states, change = whirl(unit, times, [h] * count, 600.0)
+    states, change = whirl(loaded, times, [h] * count, 600.0)
     assert change < 1e-8
     assert np.max(np.abs(np.array(states) - motion.state.astype(float))) < 1e-5
 
@@ -153,7 +155,7 @@ def control(t: float, states: list[float]) -> tuple[float, float]:
     return tau1, f2
 
 
-def test_ten_minutes_under_control(unit: Unit, maker: ModuleType) -> None:
+def test_ten_minutes_under_control(loaded: LoadedFmu, maker: ModuleType) -> None:
     """Both inputs change at each of 36 000 steps of 1/60 s: the controller is in the master."""
     h, count = 1 / 60, 36_000
     motion = reference(maker, START)
@@ -164,11 +166,11 @@ def test_ten_minutes_under_control(unit: Unit, maker: ModuleType) -> None:
         motion.propagate_until(np.longdouble((i + 1) / 60) - np.longdouble(i / 60))
         expected[i] = motion.state
     found = np.empty_like(expected)
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(stop=600.0, tolerance=1e-8, **START)
         fmi, component = instance.fmi, instance.fmi.component
-        inputs = (fmi2.fmi2ValueReference * 2)(*(unit.references[name] for name in INPUTS))
-        states = (fmi2.fmi2ValueReference * 4)(*(unit.references[name] for name in STATES))
+        inputs = (fmi2.fmi2ValueReference * 2)(*(loaded.references[name] for name in INPUTS))
+        states = (fmi2.fmi2ValueReference * 4)(*(loaded.references[name] for name in STATES))
         u, x = (c_double * 2)(), (c_double * 4)(*START.values())
         for i in range(count):
             u[:] = control(i / 60, list(x))
@@ -181,14 +183,14 @@ def test_ten_minutes_under_control(unit: Unit, maker: ModuleType) -> None:
     assert np.max(np.abs(found - expected)) < 1e-8
 
 
-def test_stop_time_is_reached_by_600_000_steps(unit: Unit) -> None:
+def test_stop_time_is_reached_by_600_000_steps(loaded: LoadedFmu) -> None:
     """The master adds up 1 ms and ends 7e-9 s off; one more step goes past the stop time."""
     times, t, h = [], 0.0, 1e-3
     for _ in range(600_000):
         times.append(t)
         t += h
     assert 1e-9 < abs(t - 600.0) < 1e-7
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(0.0, 600.0, 1e-10, **WHIRL)
         first = conserved(instance)
         component, step = instance.fmi.component, instance.fmi.fmi2DoStep
@@ -204,9 +206,9 @@ def test_stop_time_is_reached_by_600_000_steps(unit: Unit) -> None:
 # ---- Masters that are off ----------------------------------------------------------------------
 
 
-def at_one_second(unit: Unit) -> Instance:
+def at_one_second(loaded: LoadedFmu) -> Instance:
     """An instance at t = 1 s, after steps of 10 ms."""
-    instance = Instance(unit).initialize(tolerance=1e-10, **START)
+    instance = Instance(loaded).initialize(tolerance=1e-10, **START)
     instance.set(tau1=1.0, f2=-7.0)
     for i in range(100):
         instance.step(i / 100, 0.01)
@@ -214,9 +216,9 @@ def at_one_second(unit: Unit) -> Instance:
 
 
 @pytest.mark.parametrize("off", [1e-10, -1e-10])
-def test_master_that_is_off_by_rounding_is_followed(unit: Unit, off: float) -> None:
+def test_master_that_is_off_by_rounding_is_followed(loaded: LoadedFmu, off: float) -> None:
     """The step ends where the master says, and covers the time from where the instance is."""
-    with at_one_second(unit) as instance, at_one_second(unit) as exact:
+    with at_one_second(loaded) as instance, at_one_second(loaded) as exact:
         instance.step(1.0 + off, 0.01)
         assert instance.get("time") == [1.0 + off + 0.01]
         exact.step(1.0, 1.0 + off + 0.01 - 1.0)
@@ -228,8 +230,8 @@ def test_master_that_is_off_by_rounding_is_followed(unit: Unit, off: float) -> N
 
 
 @pytest.mark.parametrize("off", [1e-3, -1e-3])
-def test_master_that_is_off_by_a_tenth_of_a_step_is_refused(unit: Unit, off: float) -> None:
-    with at_one_second(unit) as instance:
+def test_master_that_is_off_by_a_tenth_of_a_step_is_refused(loaded: LoadedFmu, off: float) -> None:
+    with at_one_second(loaded) as instance:
         before = instance.everything()
         assert status_of(instance.fmi.doStep, 1.0 + off, 0.01) == ERROR
         text = instance.messages[-1].text
@@ -254,7 +256,7 @@ CHANGES = [
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("moving", [False, True])
 def test_new_parameters_are_those_of_a_new_instance(
-    unit: Unit, change: dict[str, float], moving: bool
+    loaded: LoadedFmu, change: dict[str, float], moving: bool
 ) -> None:
     """A change between steps: as if a new instance started there, bit for bit."""
 
@@ -269,7 +271,7 @@ def test_new_parameters_are_those_of_a_new_instance(
             yield reals(instance)
 
     inputs = {"tau1": 0.8, "f2": -7.0}
-    with Instance(unit) as instance, Instance(unit) as fresh:
+    with Instance(loaded) as instance, Instance(loaded) as fresh:
         instance.initialize(tolerance=1e-9, **START)
         instance.set(**inputs)
         for i in range(64):
@@ -283,14 +285,14 @@ def test_new_parameters_are_those_of_a_new_instance(
             assert found == expected
 
 
-def test_new_parameters_at_a_time_that_is_rounded(unit: Unit) -> None:
+def test_new_parameters_at_a_time_that_is_rounded(loaded: LoadedFmu) -> None:
     """The new instance knows the time as a double, the old one what rounding left over as well.
 
     Its first step is shorter or longer by that, so that the integrator may take other internal
     steps: equal to what the integration is accurate to.
     """
     step, tolerance = 1 / 60, 1e-9
-    with Instance(unit) as instance, Instance(unit) as fresh:
+    with Instance(loaded) as instance, Instance(loaded) as fresh:
         instance.initialize(tolerance=tolerance, **START)
         for i in range(60):
             instance.step(i * step, step)
@@ -303,8 +305,8 @@ def test_new_parameters_at_a_time_that_is_rounded(unit: Unit) -> None:
             assert instance.get(*STATES) == pytest.approx(fresh.get(*STATES), rel=tolerance)
 
 
-def test_parameters_set_to_what_they_are_change_nothing(unit: Unit) -> None:
-    with Instance(unit) as instance, Instance(unit) as other:
+def test_parameters_set_to_what_they_are_change_nothing(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance, Instance(loaded) as other:
         for one in (instance, other):
             one.initialize(**START)
             one.step(0.0, 0.5)
@@ -318,10 +320,12 @@ def test_parameters_set_to_what_they_are_change_nothing(unit: Unit) -> None:
 # ---- Logging -----------------------------------------------------------------------------------
 
 
-def debug_run(unit: Unit, prepare: Callable[[Instance], object], **options: object) -> Instance:
+def debug_run(
+    loaded: LoadedFmu, prepare: Callable[[Instance], object], **options: object
+) -> Instance:
     """The scenario hanging_swing, from SetupExperiment to Terminate; the instance is freed."""
     scenario = load("hanging_swing")
-    with Instance(unit, **options) as instance:
+    with Instance(loaded, **options) as instance:
         prepare(instance)
         values = scenario.parameters | scenario.initial
         instance.initialize(scenario.start, scenario.stop, scenario.tolerance, **values)
@@ -335,7 +339,7 @@ def debug_run(unit: Unit, prepare: Callable[[Instance], object], **options: obje
 
 
 @pytest.mark.parametrize("how", ["instantiate", "all", "logAll"])
-def test_debug_run_shows_every_call(unit: Unit, how: str) -> None:
+def test_debug_run_shows_every_call(loaded: LoadedFmu, how: str) -> None:
     calls: list[str] = []
 
     def prepare(instance: Instance) -> None:
@@ -344,7 +348,7 @@ def test_debug_run_shows_every_call(unit: Unit, how: str) -> None:
             instance.messages.clear()
             calls.clear()
 
-    instance = debug_run(unit, prepare, logging_on=how == "instantiate", calls=calls.append)
+    instance = debug_run(loaded, prepare, logging_on=how == "instantiate", calls=calls.append)
     made = [re.match(r"fmi2\w+", call).group() for call in calls]
     assert made[-1] == "fmi2FreeInstance"
     assert (made[0] == "fmi2Instantiate") == (how == "instantiate")
@@ -355,19 +359,19 @@ def test_debug_run_shows_every_call(unit: Unit, how: str) -> None:
 
 
 @pytest.mark.parametrize("how", ["default", "off again"])
-def test_nothing_is_logged_when_off(unit: Unit, how: str) -> None:
+def test_nothing_is_logged_when_off(loaded: LoadedFmu, how: str) -> None:
     def prepare(instance: Instance) -> None:
         if how == "off again":
             instance.fmi.setDebugLogging(False, [])
             instance.messages.clear()
 
-    assert debug_run(unit, prepare, logging_on=how == "off again").messages == []
+    assert debug_run(loaded, prepare, logging_on=how == "off again").messages == []
 
 
-def test_categories_are_those_declared(unit: Unit) -> None:
-    declared = [category.name for category in unit.description.logCategories]
+def test_categories_are_those_declared(loaded: LoadedFmu) -> None:
+    declared = [category.name for category in loaded.description.logCategories]
     assert "logAll" in declared
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         for category in declared:
             instance.fmi.setDebugLogging(True, [category])
         assert status_of(instance.fmi.setDebugLogging, True, ["logNothing"]) == ERROR
@@ -383,15 +387,17 @@ def counters(instance: Instance) -> dict[str, int]:
     return {name: instance.count(name) for name in (*COUNTERS, "solver_last_order")}
 
 
-def test_solver_variables_are_declared(unit: Unit) -> None:
-    declared = {v.name: v for v in unit.description.modelVariables if v.name.startswith("solver_")}
+def test_solver_variables_are_declared(loaded: LoadedFmu) -> None:
+    declared = {
+        v.name: v for v in loaded.description.modelVariables if v.name.startswith("solver_")
+    }
     assert [v.valueReference for v in declared.values()] == [80, 81, 85, 86, 87, 88, 90]
     for name in (*COUNTERS, "solver_last_step", "solver_last_order"):
         assert declared[name].causality == "local" and declared[name].variability == "discrete"
 
 
-def test_before_the_first_step_nothing_is_counted(unit: Unit) -> None:
-    with Instance(unit) as instance:
+def test_before_the_first_step_nothing_is_counted(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
         for _ in range(2):
             instance.initialize(**START)
             assert set(counters(instance).values()) == {0}
@@ -401,9 +407,9 @@ def test_before_the_first_step_nothing_is_counted(unit: Unit) -> None:
             instance.fmi.reset()
 
 
-def test_restarts_are_those_that_changes_ask_for(unit: Unit) -> None:
+def test_restarts_are_those_that_changes_ask_for(loaded: LoadedFmu) -> None:
     """One at the start, one for each change of an input or a parameter, one for each polynomial."""
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(**START, tau1=0.5)
         t, expected = 0.0, 1
         for i in range(60):
@@ -425,8 +431,8 @@ def test_restarts_are_those_that_changes_ask_for(unit: Unit) -> None:
             assert instance.count("solver_restarts") == expected
 
 
-def test_numbers_of_the_solver_are_plausible(unit: Unit) -> None:
-    with Instance(unit) as instance:
+def test_numbers_of_the_solver_are_plausible(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
         instance.initialize(tolerance=1e-10, **WHIRL)
         before, t = counters(instance), 0.0
         highest = 0
@@ -446,18 +452,18 @@ def test_numbers_of_the_solver_are_plausible(unit: Unit) -> None:
         assert 1 <= now["solver_restarts"] <= 1 + now["solver_steps"] / 500
 
 
-def test_steps_follow_the_tolerance(unit: Unit) -> None:
+def test_steps_follow_the_tolerance(loaded: LoadedFmu) -> None:
     steps = []
     for tolerance in (1e-4, 1e-7, 1e-10):
-        with Instance(unit) as instance:
+        with Instance(loaded) as instance:
             instance.initialize(tolerance=tolerance, **WHIRL)
             instance.step(0.0, 10.0)
             steps.append(instance.count("solver_steps"))
     assert steps[0] < steps[1] < steps[2]
 
 
-def test_model_exchange_counts_nothing(unit: Unit) -> None:
-    with Instance(unit, fmi2.FMU2Model) as model:
+def test_model_exchange_counts_nothing(loaded: LoadedFmu) -> None:
+    with Instance(loaded, fmi2.FMU2Model) as model:
         model.initialize(**START)
         model.fmi.newDiscreteStates()
         model.fmi.enterContinuousTimeMode()

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from tests.support.instances import STATES, Instance, Unit
+from tests.support.instances import STATES, Instance, LoadedFmu
 from tests.support.paths import ROOT
 
 SCRIPTS = ROOT / "tests" / "importers"
@@ -96,11 +96,11 @@ def complaints(output: str, false_alarm: str | None = None) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def unit(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(fmu, tmp_path_factory.mktemp("unit"))
+def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
-def make_plan(unit: Unit, initial: bool = True) -> dict[str, Any]:
+def make_plan(loaded: LoadedFmu, initial: bool = True) -> dict[str, Any]:
     """Inputs that change at every step, parameters and states that are not the start values."""
     steps = 200
     return {
@@ -113,7 +113,7 @@ def make_plan(unit: Unit, initial: bool = True) -> dict[str, Any]:
             "tau1": [3.0 * math.sin(0.7 * i + 0.3) for i in range(steps + 1)],
             "f2": [8.0 + 2.0 * math.cos(1.3 * i) for i in range(steps + 1)],
         },
-        "outputs": [v.name for v in unit.description.modelVariables if v.causality == "output"],
+        "outputs": [v.name for v in loaded.description.modelVariables if v.causality == "output"],
     }
 
 
@@ -121,10 +121,10 @@ def inputs_at(plan: dict[str, Any], i: int) -> dict[str, float]:
     return {name: values[i] for name, values in plan["inputs"].items()}
 
 
-def co_simulation(unit: Unit, plan: dict[str, Any], inputs: str) -> np.ndarray:
+def co_simulation(loaded: LoadedFmu, plan: dict[str, Any], inputs: str) -> np.ndarray:
     """Outputs (steps + 1, outputs), with the inputs of the steps' beginning or of their end."""
     later = {"beginning": 0, "end": 1}[inputs]
-    with Instance(unit) as arm:
+    with Instance(loaded) as arm:
         arm.initialize(**plan["parameters"], **plan["initial"], **inputs_at(plan, 0))
         rows = [arm.get(*plan["outputs"])]
         for i in range(plan["steps"]):
@@ -134,11 +134,11 @@ def co_simulation(unit: Unit, plan: dict[str, Any], inputs: str) -> np.ndarray:
     return np.array(rows)
 
 
-def euler(unit: Unit, plan: dict[str, Any]) -> np.ndarray:
+def euler(loaded: LoadedFmu, plan: dict[str, Any]) -> np.ndarray:
     """Outputs (steps + 1, outputs) of Model Exchange by Euler's method, inputs as they are."""
     x, dx = (c_double * len(STATES))(), (c_double * len(STATES))()
     times = [plan["start"] + i * plan["step"] for i in range(plan["steps"] + 1)]
-    with Instance(unit, fmi2.FMU2Model) as arm:
+    with Instance(loaded, fmi2.FMU2Model) as arm:
         arm.initialize(**plan["parameters"], **plan["initial"], **inputs_at(plan, 0))
         arm.fmi.newDiscreteStates()
         arm.fmi.enterContinuousTimeMode()
@@ -188,26 +188,28 @@ def report(tool: str, plan: dict[str, Any], differences: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("tool", IMPORTERS)
-def test_co_simulation_is_that_of_fmpy(tool: str, fmu: Path, unit: Unit, tmp_path: Path) -> None:
+def test_co_simulation_is_that_of_fmpy(
+    tool: str, fmu: Path, loaded: LoadedFmu, tmp_path: Path
+) -> None:
     importer = IMPORTERS[tool]
-    plan = make_plan(unit, importer.sets_states)
+    plan = make_plan(loaded, importer.sets_states)
     values = run(tool, "co-simulation", fmu, plan, tmp_path)
-    differences = difference(values, co_simulation(unit, plan, importer.inputs))
+    differences = difference(values, co_simulation(loaded, plan, importer.inputs))
     report(tool, plan, differences)
     assert differences.max() <= BOUND
 
 
-def test_model_exchange_is_that_of_fmpy(fmu: Path, unit: Unit, tmp_path: Path) -> None:
-    plan = make_plan(unit)
+def test_model_exchange_is_that_of_fmpy(fmu: Path, loaded: LoadedFmu, tmp_path: Path) -> None:
+    plan = make_plan(loaded)
     values = run("fmi-sim", "model-exchange", fmu, plan, tmp_path)
-    differences = difference(values, euler(unit, plan))
+    differences = difference(values, euler(loaded, plan))
     report("fmi-sim", plan, differences)
     assert differences.max() <= BOUND
 
 
-def test_the_plan_tells_one_order_of_inputs_from_the_other(unit: Unit) -> None:
-    plan = make_plan(unit)
-    beginning, end = (co_simulation(unit, plan, inputs) for inputs in ("beginning", "end"))
+def test_the_plan_tells_one_order_of_inputs_from_the_other(loaded: LoadedFmu) -> None:
+    plan = make_plan(loaded)
+    beginning, end = (co_simulation(loaded, plan, inputs) for inputs in ("beginning", "end"))
     assert difference(end, beginning).min() > 1e6 * BOUND
 
 

@@ -23,7 +23,7 @@ from cosim import reference
 from cosim.comparison import Runs
 from cosim.fmu_file import Fmu
 from tests.support.cosim_project import declared, load, names_of
-from tests.support.instances import DISCARD, ERROR, OK, Instance, Unit, status_of
+from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 from tests.support.rp_symbolic import PARAMETERS as ARM
 from tests.support.rp_symbolic import TERMS, Model
@@ -140,8 +140,8 @@ def path(fmu: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def unit(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(path, tmp_path_factory.mktemp("controller"))
+def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(path, tmp_path_factory.mktemp("controller"))
 
 
 def random_point(source: random.Random) -> Values:
@@ -182,11 +182,11 @@ def generic_point(mode: str, sides: tuple[int, int], seed: int) -> Values:
 
 
 @contextmanager
-def in_initialization_mode(unit: Unit, mode: str, point: Values) -> Iterator[Instance]:
-    with Instance(unit) as instance:
+def in_initialization_mode(loaded: LoadedFmu, mode: str, point: Values) -> Iterator[Instance]:
+    with Instance(loaded) as instance:
         instance.fmi.setupExperiment()
         instance.set(**point)
-        instance.fmi.setInteger([unit.references["mode"]], [MODES[mode]])
+        instance.fmi.setInteger([loaded.references["mode"]], [MODES[mode]])
         instance.fmi.enterInitializationMode()
         yield instance
 
@@ -195,25 +195,25 @@ def in_initialization_mode(unit: Unit, mode: str, point: Values) -> Iterator[Ins
 
 
 @pytest.mark.parametrize(("mode", "sides"), CASES)
-def test_values_are_those_of_the_law(unit: Unit, mode: str, sides: tuple[int, int]) -> None:
+def test_values_are_those_of_the_law(loaded: LoadedFmu, mode: str, sides: tuple[int, int]) -> None:
     for seed in range(5):
         point = generic_point(mode, sides, seed)
-        with in_initialization_mode(unit, mode, point) as instance:
+        with in_initialization_mode(loaded, mode, point) as instance:
             rows = terms_of_values(mode, sides)(*numbers(point, KNOWNS))
             for name, actual, row in zip(UNKNOWNS, instance.get(*UNKNOWNS), rows, strict=True):
                 assert_close(actual, row, 1e-12, (name, seed))
 
 
 @pytest.mark.parametrize(("mode", "sides"), CASES)
-def test_directional_derivatives(unit: Unit, mode: str, sides: tuple[int, int]) -> None:
+def test_directional_derivatives(loaded: LoadedFmu, mode: str, sides: tuple[int, int]) -> None:
     for seed in range(3):
         point = generic_point(mode, sides, seed)
         rows = jacobian(mode, sides)(*numbers(point, KNOWNS))
-        with in_initialization_mode(unit, mode, point) as instance:
-            unknowns = [unit.references[name] for name in UNKNOWNS]
+        with in_initialization_mode(loaded, mode, point) as instance:
+            unknowns = [loaded.references[name] for name in UNKNOWNS]
             for k, known in enumerate(KNOWNS):
                 column = instance.fmi.getDirectionalDerivative(
-                    unknowns, [unit.references[known]], [1.0]
+                    unknowns, [loaded.references[known]], [1.0]
                 )
                 for name, actual, row in zip(UNKNOWNS, column, rows, strict=True):
                     scale = max(abs(entry) for entry in row)
@@ -222,16 +222,16 @@ def test_directional_derivatives(unit: Unit, mode: str, sides: tuple[int, int]) 
 
 
 @pytest.mark.parametrize(("mode", "sides"), CASES)
-def test_output_derivatives(unit: Unit, mode: str, sides: tuple[int, int]) -> None:
+def test_output_derivatives(loaded: LoadedFmu, mode: str, sides: tuple[int, int]) -> None:
     outputs = (*EFFORTS, *ERRORS)
-    references = [unit.references[name] for name in outputs]
+    references = [loaded.references[name] for name in outputs]
     for seed in range(3):
         point = generic_point(mode, sides, seed)
         source = random.Random(seed)
         rates = {name: (source.uniform(-3, 3), source.uniform(-9, 9)) for name in INPUTS}
         moving = [mpmath.mpf(rates[name][order]) for order in (0, 1) for name in INPUTS]
         rows = iter(along_time(mode, sides)(*numbers(point, KNOWNS), *moving))
-        with in_initialization_mode(unit, mode, point) as instance:
+        with in_initialization_mode(loaded, mode, point) as instance:
             instance.fmi.exitInitializationMode()
             instance.set_input_derivatives(**rates)
             for name, reference in zip(outputs, references, strict=True):
@@ -240,7 +240,7 @@ def test_output_derivatives(unit: Unit, mode: str, sides: tuple[int, int]) -> No
                     assert_close(actual, next(rows), 1e-10, (name, order, seed))
 
 
-def test_dependencies_are_those_of_the_laws(unit: Unit) -> None:
+def test_dependencies_are_those_of_the_laws(loaded: LoadedFmu) -> None:
     depends: dict[str, set[str]] = {name: set() for name in UNKNOWNS}
     for mode, sides in CASES:
         rows = jacobian(mode, sides)(*numbers(generic_point(mode, sides, 0), KNOWNS))
@@ -251,7 +251,7 @@ def test_dependencies_are_those_of_the_laws(unit: Unit) -> None:
         if len({law(mode, FREE)[name] for mode in MODES}) > 1 or name in RATES:
             depends[name].add("mode")
 
-    structure = unit.description
+    structure = loaded.description
     listed = {u.variable.name: u for u in (*structure.outputs, *structure.derivatives)}
     assert set(listed) == {*EFFORTS, *ERRORS, *RATES}
     for name, unknown in listed.items():
@@ -265,11 +265,13 @@ def test_dependencies_are_those_of_the_laws(unit: Unit) -> None:
 # ---- With the arm --------------------------------------------------------------------------------
 
 
-def test_gravity_compensation_holds_the_arm_in_place(fmu: Path, unit: Unit, tmp_path: Path) -> None:
-    arm_unit = Unit(fmu, tmp_path)
+def test_gravity_compensation_holds_the_arm_in_place(
+    fmu: Path, loaded: LoadedFmu, tmp_path: Path
+) -> None:
+    arm_unit = LoadedFmu(fmu, tmp_path)
     measured = ("q1", "q2", "dq1", "dq2")
-    with Instance(arm_unit) as arm, Instance(unit) as controller:
-        controller.fmi.setInteger([unit.references["mode"]], [MODES["pd_gravity"]])
+    with Instance(arm_unit) as arm, Instance(loaded) as controller:
+        controller.fmi.setInteger([loaded.references["mode"]], [MODES["pd_gravity"]])
         controller.initialize(q1=0.7, q2=0.2, q1_ref=0.7, q2_ref=0.2, Ki1=50.0, Ki2=50.0)
         arm.initialize(q1=0.7, q2=0.2, **dict(zip(EFFORTS, controller.get(*EFFORTS), strict=True)))
         for i in range(500):
@@ -283,8 +285,8 @@ def test_gravity_compensation_holds_the_arm_in_place(fmu: Path, unit: Unit, tmp_
 # ---- As a unit -----------------------------------------------------------------------------------
 
 
-def test_parameters_that_leave_no_inertia_are_refused(unit: Unit) -> None:
-    with Instance(unit) as instance:
+def test_parameters_that_leave_no_inertia_are_refused(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
         instance.fmi.setupExperiment()
         instance.set(m1=0.0, I1z=0.0, I2z=0.0)
         instance.fmi.enterInitializationMode()
@@ -296,32 +298,32 @@ def test_parameters_that_leave_no_inertia_are_refused(unit: Unit) -> None:
     ("name", "value"),
     [("Kp1", -1.0), ("Ki2", -1e-9), ("inertia1", 0.0), ("tracking_time", 0.0), ("f2_max", -1.0)],
 )
-def test_values_out_of_range_are_refused(unit: Unit, name: str, value: float) -> None:
-    with Instance(unit) as instance:
+def test_values_out_of_range_are_refused(loaded: LoadedFmu, name: str, value: float) -> None:
+    with Instance(loaded) as instance:
         assert status_of(lambda: instance.set(**{name: value})) == DISCARD
         assert name in instance.messages[-1].text
 
 
-def test_unknown_modes_are_refused(unit: Unit) -> None:
-    with Instance(unit) as instance:
+def test_unknown_modes_are_refused(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
         for mode in (0, 4):
-            status = status_of(instance.fmi.setInteger, [unit.references["mode"]], [mode])
+            status = status_of(instance.fmi.setInteger, [loaded.references["mode"]], [mode])
             assert status == DISCARD and "mode" in instance.messages[-1].text
 
 
-def test_mode_changes_between_steps(unit: Unit) -> None:
+def test_mode_changes_between_steps(loaded: LoadedFmu) -> None:
     point = generic_point("pd", FREE, 1) | dict.fromkeys(LIMITS, 1e9) | {"Ki1": 0.0, "Ki2": 0.0}
-    with in_initialization_mode(unit, "pd", point) as instance:
+    with in_initialization_mode(loaded, "pd", point) as instance:
         instance.fmi.exitInitializationMode()
         for i, (mode, number) in enumerate(MODES.items()):
-            instance.fmi.setInteger([unit.references["mode"]], [number])
+            instance.fmi.setInteger([loaded.references["mode"]], [number])
             rows = terms_of_values(mode, FREE)(*numbers(point, KNOWNS))
             for name, actual in zip(EFFORTS, instance.get(*EFFORTS), strict=True):
                 assert_close(actual, rows[UNKNOWNS.index(name)], 1e-12, (mode, name))
             instance.step(0.1 * i, 0.1)
 
 
-def test_rollback_in_saturation_is_exact(unit: Unit) -> None:
+def test_rollback_in_saturation_is_exact(loaded: LoadedFmu) -> None:
     # only what acts on the integral parts, so that the limit is met, held and left again
     values = dict(
         q1_ref=0.3, q2_ref=-0.2, Kp1=20.0, Ki1=900.0, Ki2=900.0, tau1_max=12.0, f2_max=9.0
@@ -336,7 +338,7 @@ def test_rollback_in_saturation_is_exact(unit: Unit) -> None:
             seen.append(instance.everything())
         return seen
 
-    with Instance(unit) as instance:
+    with Instance(loaded) as instance:
         instance.initialize(tolerance=1e-11, **values)
         run(instance, 0, 30)
         assert instance.get("tau1") == [12.0]
@@ -353,10 +355,10 @@ def test_fmpy_finds_nothing_wrong(path: Path) -> None:
 
 
 def test_references_and_units_of_the_arm_are_the_arms(
-    fmu: Path, unit: Unit, tmp_path: Path
+    fmu: Path, loaded: LoadedFmu, tmp_path: Path
 ) -> None:
-    arm = {v.name: v for v in Unit(fmu, tmp_path).description.modelVariables}
-    own = {v.name: v for v in unit.description.modelVariables}
+    arm = {v.name: v for v in LoadedFmu(fmu, tmp_path).description.modelVariables}
+    own = {v.name: v for v in loaded.description.modelVariables}
     for name in ARM:
         for key in ("valueReference", "unit", "start", "min"):
             assert getattr(own[name], key) == getattr(arm[name], key), (name, key)

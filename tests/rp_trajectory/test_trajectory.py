@@ -19,7 +19,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 from tests.support.cosim_project import declared, load, names_of
-from tests.support.instances import ERROR, Instance, Unit
+from tests.support.instances import ERROR, Instance, LoadedFmu
 from tests.support.paths import ROOT
 
 MODEL = ROOT / "models" / "rp_trajectory"
@@ -55,8 +55,8 @@ def path() -> Path:
 
 
 @pytest.fixture(scope="module")
-def unit(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Unit:
-    return Unit(path, tmp_path_factory.mktemp("unit"))
+def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(path, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture(scope="module")
@@ -94,10 +94,13 @@ def give(instance: Instance, parameters: dict[str, object]) -> None:
 
 @contextmanager
 def running(
-    unit: Unit, parameters: dict[str, object], start: float = 0.0, kind: type = fmi2.FMU2Slave
+    loaded: LoadedFmu,
+    parameters: dict[str, object],
+    start: float = 0.0,
+    kind: type = fmi2.FMU2Slave,
 ) -> Iterator[Instance]:
     """An instance with `parameters`, initialized at `start` (s)."""
-    with Instance(unit, kind) as instance:
+    with Instance(loaded, kind) as instance:
         give(instance, parameters)
         yield instance.initialize(start=start)
 
@@ -143,14 +146,14 @@ def assert_close(got: np.ndarray, expected: np.ndarray, bound: float) -> None:
 
 
 @each_motion
-def test_outputs_and_their_derivatives(unit: Unit, maker: ModuleType, motion: str) -> None:
+def test_outputs_and_their_derivatives(loaded: LoadedFmu, maker: ModuleType, motion: str) -> None:
     """At random times of each segment, against derivatives of the same motion in 40 digits."""
     parameters = MOTIONS[motion]
     times = random_times(parameters)
     exact = maker.Motion(START | numbered(parameters))
     assert list(maker.OUTPUTS) == OUTPUTS
     got, expected = {0: [], 1: [], 2: []}, {0: [], 1: [], 2: []}
-    with running(unit, parameters, start=times[0] - 0.01) as instance:
+    with running(loaded, parameters, start=times[0] - 0.01) as instance:
         t = times[0] - 0.01
         for target in times:
             instance.step(t, target - t)
@@ -174,7 +177,7 @@ def test_outputs_and_their_derivatives(unit: Unit, maker: ModuleType, motion: st
 
 
 @each_motion
-def test_derivatives_by_parameters(unit: Unit, maker: ModuleType, motion: str) -> None:
+def test_derivatives_by_parameters(loaded: LoadedFmu, maker: ModuleType, motion: str) -> None:
     """Directional derivatives in initialization mode, against differences in 40 digits."""
     parameters = START | numbered(MOTIONS[motion])
     names = [name for name in START if DECLARED[name].type == "Real"]
@@ -186,14 +189,14 @@ def test_derivatives_by_parameters(unit: Unit, maker: ModuleType, motion: str) -
         rows = [[follow(moved, t) for t in times] for moved in sides]
         difference = (np.array(rows[1]) - np.array(rows[0])) / (2 * h)
         expected[:, k] = difference.astype(float)
-    outputs = [unit.references[output] for output in OUTPUTS]
+    outputs = [loaded.references[output] for output in OUTPUTS]
     for i, t in enumerate(times):
-        with Instance(unit) as instance:
+        with Instance(loaded) as instance:
             give(instance, MOTIONS[motion])
             instance.fmi.setupExperiment(startTime=t)
             instance.fmi.enterInitializationMode()
             got = [
-                instance.fmi.getDirectionalDerivative(outputs, [unit.references[name]], [1.0])
+                instance.fmi.getDirectionalDerivative(outputs, [loaded.references[name]], [1.0])
                 for name in names
             ]
         assert_close(np.array(got).T, expected[i].T, 1e-11)
@@ -211,11 +214,11 @@ def follow(exact: object, t: float) -> list[mp.mpf]:
 
 
 @pytest.mark.parametrize("start", [-1e4, 1e5])
-def test_the_motion_does_not_depend_on_when_it_starts(unit: Unit, start: float) -> None:
+def test_the_motion_does_not_depend_on_when_it_starts(loaded: LoadedFmu, start: float) -> None:
     elapsed = np.arange(1, 48) / 8  # exact at both times
     with (
-        running(unit, {"start_time": 0.5}) as first,
-        running(unit, {"start_time": start + 0.5}, start=start) as second,
+        running(loaded, {"start_time": 0.5}) as first,
+        running(loaded, {"start_time": start + 0.5}, start=start) as second,
     ):
         for t in elapsed:
             first.step(t - 0.125, 0.125)
@@ -259,9 +262,9 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_parameters_that_do_not_go_together(unit: Unit, case: str) -> None:
+def test_parameters_that_do_not_go_together(loaded: LoadedFmu, case: str) -> None:
     parameters, words = REFUSED[case]
-    with Instance(unit, logging_on=True) as instance:
+    with Instance(loaded, logging_on=True) as instance:
         give(instance, parameters)
         instance.fmi.setupExperiment()
         instance.fmi.enterInitializationMode()
@@ -280,8 +283,8 @@ def test_parameters_that_do_not_go_together(unit: Unit, case: str) -> None:
         ({"duration": 0.0}, "duration"),
     ],
 )
-def test_values_out_of_range(unit: Unit, parameters: dict[str, float], words: str) -> None:
-    with Instance(unit, logging_on=True) as instance:
+def test_values_out_of_range(loaded: LoadedFmu, parameters: dict[str, float], words: str) -> None:
+    with Instance(loaded, logging_on=True) as instance:
         with pytest.raises(FMICallException):
             instance.set(**parameters)
         assert any(words in message.text for message in instance.messages)
@@ -289,19 +292,19 @@ def test_values_out_of_range(unit: Unit, parameters: dict[str, float], words: st
 
 @pytest.mark.parametrize("name", ENUMERATIONS)
 @pytest.mark.parametrize("beyond", [False, True])
-def test_numbers_that_are_no_items(unit: Unit, name: str, beyond: bool) -> None:
+def test_numbers_that_are_no_items(loaded: LoadedFmu, name: str, beyond: bool) -> None:
     value = len(ENUMERATIONS[name]) + 1 if beyond else 0
-    with Instance(unit, logging_on=True) as instance:
+    with Instance(loaded, logging_on=True) as instance:
         with pytest.raises(FMICallException):
-            instance.fmi.setInteger([unit.references[name]], [value])
+            instance.fmi.setInteger([loaded.references[name]], [value])
         assert any(name in message.text for message in instance.messages)
 
 
-def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(unit: Unit) -> None:
+def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(loaded: LoadedFmu) -> None:
     near = {"x_center": 0.3, "y_center": 0.0, "radius": 0.35, "start_angle": -1.5, "turns": 0.45}
-    with running(unit, near | {"frequency": 0.4}) as instance:
+    with running(loaded, near | {"frequency": 0.4}) as instance:
         instance.step(0.0, 1.0)
-    with pytest.raises(FMICallException), running(unit, near | {"frequency": -0.4}):
+    with pytest.raises(FMICallException), running(loaded, near | {"frequency": -0.4}):
         pass
 
 
@@ -329,8 +332,8 @@ def test_fmpy_simulates_it(path: Path, maker: ModuleType, kind: str) -> None:
     assert_close(got, expected, 1e-13)
 
 
-def test_states_are_saved_and_restored(unit: Unit) -> None:
-    with running(unit, MOTIONS["around"]) as instance, running(unit, {}) as other:
+def test_states_are_saved_and_restored(loaded: LoadedFmu) -> None:
+    with running(loaded, MOTIONS["around"]) as instance, running(loaded, {}) as other:
         fmi = instance.fmi
         instance.step(0.0, 1.3)
         state = fmi.getFMUstate()
@@ -347,9 +350,9 @@ def test_states_are_saved_and_restored(unit: Unit) -> None:
         other.step(1.3, 0.5)
 
 
-def test_model_exchange_without_states(unit: Unit) -> None:
-    assert unit.description.numberOfContinuousStates == 0
-    with running(unit, {}, kind=fmi2.FMU2Model) as model:
+def test_model_exchange_without_states(loaded: LoadedFmu) -> None:
+    assert loaded.description.numberOfContinuousStates == 0
+    with running(loaded, {}, kind=fmi2.FMU2Model) as model:
         model.fmi.newDiscreteStates()
         model.fmi.enterContinuousTimeMode()
         nothing = (ctypes.c_double * 0)()
@@ -364,8 +367,8 @@ def test_model_exchange_without_states(unit: Unit) -> None:
         assert values[1.25][0] == values[1.25][1] != values[3.0][0]
 
 
-def test_only_the_start_is_settable(unit: Unit) -> None:
-    with running(unit, {}) as instance, pytest.raises(FMICallException):
+def test_only_the_start_is_settable(loaded: LoadedFmu) -> None:
+    with running(loaded, {}) as instance, pytest.raises(FMICallException):
         instance.set(radius=0.05)
 
 

@@ -22,7 +22,7 @@ class Message(NamedTuple):
     text: str
 
 
-class Unit:
+class LoadedFmu:
     """An unpacked FMU."""
 
     def __init__(self, path: Path, folder: Path) -> None:
@@ -41,18 +41,18 @@ class Instance:
 
     def __init__(
         self,
-        unit: Unit,
+        loaded: LoadedFmu,
         kind: type = fmi2.FMU2Slave,
         logging_on: bool = False,
         calls: Callable[[str], object] | None = None,
     ) -> None:
-        self.unit = unit
+        self.unit = loaded
         self.messages: list[Message] = []
-        element = unit.description.coSimulation or unit.description.modelExchange
+        element = loaded.description.coSimulation or loaded.description.modelExchange
         self.fmi = kind(
-            guid=unit.description.guid,
+            guid=loaded.description.guid,
             modelIdentifier=element.modelIdentifier,
-            unzipDirectory=str(unit.folder),
+            unzipDirectory=str(loaded.folder),
             instanceName="arm",
             fmiCallLogger=calls,
         )
