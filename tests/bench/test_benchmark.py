@@ -33,11 +33,13 @@ def result() -> dict:
 
 
 @pytest.fixture(scope="module")
-def units(tmp_path_factory: pytest.TempPathFactory) -> tuple[peers.Unit, peers.Unit]:
+def loaded_fmus(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[peers.LoadedFmu, peers.LoadedFmu]:
     """The FMU and that of pythonfmu."""
-    folder = tmp_path_factory.mktemp("units")
+    folder = tmp_path_factory.mktemp("loaded_fmus")
     plant = peers.build_python_plant(folder)
-    return peers.Unit(FMU, folder / "own"), peers.Unit(plant, folder / "plant")
+    return peers.LoadedFmu(FMU, folder / "own"), peers.LoadedFmu(plant, folder / "plant")
 
 
 def test_bench_writes_every_group(result: dict) -> None:
@@ -91,8 +93,10 @@ def test_program_refuses_nonsense() -> None:
             compare.run_bench(BENCH, *options)
 
 
-def test_python_peers_do_the_same_work(units: tuple[peers.Unit, peers.Unit]) -> None:
-    own, plant = units
+def test_python_peers_do_the_same_work(
+    loaded_fmus: tuple[peers.LoadedFmu, peers.LoadedFmu],
+) -> None:
+    own, plant = loaded_fmus
     # tolerance 1e-8: errors as measured, times five or more
     bounds = [
         (lambda work: peers.run_heyoka(work, 1e-10), 1e-10, 1e-8),

@@ -46,7 +46,7 @@ class Instance:
         logging_on: bool = False,
         calls: Callable[[str], object] | None = None,
     ) -> None:
-        self.unit = loaded
+        self.loaded = loaded
         self.messages: list[Message] = []
         element = loaded.description.coSimulation or loaded.description.modelExchange
         self.fmi = kind(
@@ -91,12 +91,12 @@ class Instance:
     def set(self, **values: float) -> None:
         """Set Real variables."""
         if values:
-            self.fmi.setReal([self.unit.references[name] for name in values], values.values())
+            self.fmi.setReal([self.loaded.references[name] for name in values], values.values())
 
     def set_input_derivatives(self, **values: Iterable[float]) -> None:
         """Set derivatives of inputs, each from order 1 on."""
         rows = [
-            (self.unit.references[name], order, value)
+            (self.loaded.references[name], order, value)
             for name, derivatives in values.items()
             for order, value in enumerate(derivatives, start=1)
         ]
@@ -105,16 +105,16 @@ class Instance:
 
     def get(self, *names: str) -> list[float]:
         """Values of Real variables."""
-        return self.fmi.getReal([self.unit.references[name] for name in names])
+        return self.fmi.getReal([self.loaded.references[name] for name in names])
 
     def count(self, name: str) -> int:
         """Value of an Integer variable."""
-        return self.fmi.getInteger([self.unit.references[name]])[0]
+        return self.fmi.getInteger([self.loaded.references[name]])[0]
 
     def everything(self) -> bytes:
         """All Real and all Integer variables, bit for bit."""
-        reals = self.fmi.getReal(self.unit.reals)
-        integers = self.fmi.getInteger(self.unit.integers)
+        reals = self.fmi.getReal(self.loaded.reals)
+        integers = self.fmi.getInteger(self.loaded.integers)
         return struct.pack(f"<{len(reals)}d{len(integers)}i", *reals, *integers)
 
     def step(self, t: float, h: float) -> float:
