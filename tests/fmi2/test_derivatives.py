@@ -122,7 +122,7 @@ def point_of(instance: Instance) -> Values:
 
 def directional(instance: Instance, unknowns: tuple[str, ...], seed: Values) -> Values:
     """Derivatives of `unknowns` in the direction of `seed`, in one call."""
-    references = instance.unit.references
+    references = instance.loaded.references
     result = instance.fmi.getDirectionalDerivative(
         [references[name] for name in unknowns], [references[name] for name in seed], seed.values()
     )
@@ -289,7 +289,7 @@ def test_linearization(loaded: LoadedFmu, model: Model, enter: Callable) -> None
 def output_derivatives(instance: Instance, names: tuple[str, ...]) -> dict[tuple[str, int], float]:
     """Derivatives of orders 1 and 2, in one call."""
     wanted = list(itertools.product(names, (1, 2)))
-    references = [instance.unit.references[name] for name, _ in wanted]
+    references = [instance.loaded.references[name] for name, _ in wanted]
     values = instance.fmi.getRealOutputDerivatives(references, [order for _, order in wanted])
     return dict(zip(wanted, values, strict=True))
 

@@ -315,7 +315,7 @@ def test_rollback(model: Instance) -> None:
     assert model.everything() != everything
     model.fmi.setFMUstate(state)
     assert model.everything() == everything
-    with Instance(model.unit, fmi2.FMU2Model) as other:
+    with Instance(model.loaded, fmi2.FMU2Model) as other:
         other.fmi.setFMUstate(other.fmi.deSerializeFMUstate(content))
         assert other.everything() == everything
         write(other, list(START.values()))  # in continuous time

@@ -51,8 +51,8 @@ def reference(maker: ModuleType, values: dict[str, float]) -> hy.taylor_adaptive
 
 def reals(instance: Instance, without: Sequence[str] = ("time",)) -> list[float]:
     """Values of all Real variables but those."""
-    left_out = {instance.unit.references[name] for name in without}
-    return instance.fmi.getReal([r for r in instance.unit.reals if r not in left_out])
+    left_out = {instance.loaded.references[name] for name in without}
+    return instance.fmi.getReal([r for r in instance.loaded.reals if r not in left_out])
 
 
 # ---- Start times -------------------------------------------------------------------------------

@@ -87,7 +87,7 @@ def give(instance: Instance, parameters: dict[str, object]) -> None:
     """Set parameters, items by their names."""
     for name, value in numbered(parameters).items():
         if name in ENUMERATIONS:
-            instance.fmi.setInteger([instance.unit.references[name]], [value])
+            instance.fmi.setInteger([instance.loaded.references[name]], [value])
         else:
             instance.set(**{name: value})
 
@@ -126,7 +126,7 @@ def random_times(parameters: dict[str, object], count: int = 4) -> np.ndarray:
 
 
 def derivatives(instance: Instance, order: int) -> list[float]:
-    references = [instance.unit.references[name] for name in OUTPUTS]
+    references = [instance.loaded.references[name] for name in OUTPUTS]
     refs = (ctypes.c_uint32 * len(references))(*references)
     orders = (ctypes.c_int * len(references))(*[order] * len(references))
     values = (ctypes.c_double * len(references))()
