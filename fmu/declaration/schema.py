@@ -257,7 +257,7 @@ class Enumeration(Discrete):
 
     @property
     def interface(self) -> dict[str, Any]:
-        """What users depend on: of the items their names and order."""
+        """What users depend on: also the names and the order of the items."""
         return super().interface | {"items": [*self.items]}
 
 

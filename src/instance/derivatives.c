@@ -118,7 +118,7 @@ static enum status derive_by_time(struct instance *instance) {
     return propagate(instance, 1.0, instance->second_derivatives);
 }
 
-static double value_in(const char *structure, const struct variable *variable) {
+static double double_in(const char *structure, const struct variable *variable) {
     return *(const double *)(const void *)(structure + variable->offset);
 }
 
@@ -142,9 +142,9 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < count; i++) {
             const struct variable *variable = variable_of(instance->description, references[i]);
-            const double value = value_in(orders[i] == 1 ? instance->first_derivatives
-                                                         : instance->second_derivatives,
-                                          variable);
+            const double value = double_in(orders[i] == 1 ? instance->first_derivatives
+                                                          : instance->second_derivatives,
+                                           variable);
             if (!isfinite(value)) {
                 return instance_not_finite(instance, variable->name);
             }
@@ -207,7 +207,7 @@ enum status instance_get_directional_derivative(struct instance *instance,
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < unknown_count; i++) {
             const struct variable *variable = variable_of(instance->description, unknowns[i]);
-            const double value = value_in(instance->first_derivatives, variable);
+            const double value = double_in(instance->first_derivatives, variable);
             if (!isfinite(value)) {
                 return instance_not_finite(instance, variable->name);
             }

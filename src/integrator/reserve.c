@@ -25,7 +25,7 @@ enum { SLOTS = 256 };
 static struct slot slots[SLOTS];
 static atomic_size_t used_slots; /* all from this one on were always free */
 
-/* Each thread has its own errno. */
+/* The address of errno differs between threads: it identifies a thread. */
 static const void *this_thread(void) {
     return &errno;
 }
