@@ -299,3 +299,17 @@ static void test_an_impossible_history_is_named(void) {
     fmu_assert_logged(&messages, "latest_time = 0.1875");
     fmu_bytes_free(&bytes);
 }
+
+/* Continuous time belongs to Model Exchange: no state of Co-Simulation fits that phase. */
+static void test_a_phase_of_the_other_kind_is_refused(void) {
+    enum { CONTINUOUS_TIME = 3 }; // enum phase, the second field
+    const fmi2Component c = fmu_instantiate(&messages, false);
+    struct fmu_bytes bytes = fmu_save_bytes(c);
+    fmi2FMUstate made = NULL;
+    bytes.data[GUID_AT + strlen(RP_MANIPULATOR_GUID) + 8] = CONTINUOUS_TIME;
+    set_checksum(&bytes);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
+    TEST_ASSERT_NULL(made);
+    fmu_assert_logged(&messages, "Co-Simulation");
+    fmu_bytes_free(&bytes);
+}

@@ -51,3 +51,11 @@ static void test_slack_covers_the_rounding_of_a_communication_point(void) {
     const double spacing = nextafter(1e6, INFINITY) - 1e6;
     TEST_ASSERT_TRUE(clock_slack(1e6, 2.0 * spacing) >= spacing);
 }
+
+/* Of two times that are the same double, the difference is that of what rounding left over. */
+static void test_rests_count_with_their_signs(void) {
+    const struct clock_time later = {.s = 1.0, .rest = 3e-17};
+    const struct clock_time earlier = {.s = 1.0, .rest = -2e-17};
+    TEST_ASSERT_DOUBLE_WITHIN(1e-30, 5e-17, clock_difference(later, earlier));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-30, -5e-17, clock_difference(earlier, later));
+}

@@ -201,6 +201,15 @@ static void test_a_field_of_another_kind_is_refused(void) {
     TEST_ASSERT_NULL(none);
 }
 
+/* The texts of one call, one after the other. */
+static char texts[1000];
+
+static void collect(void *context, enum status status, const char *text) {
+    (void)context;
+    (void)status;
+    (void)strncat(texts, text, sizeof texts - strlen(texts) - 1);
+}
+
 /* The first row is checked as all others. */
 static void test_a_wrong_field_in_the_first_row_is_refused(void) {
     struct variable variable = oscillator_description.variables[1]; // omega, a parameter
@@ -209,8 +218,11 @@ static void test_a_wrong_field_in_the_first_row_is_refused(void) {
     variable.offset = offsetof(struct oscillator_values, energy);
     wrong.variables = &variable;
     wrong.variable_count = 1;
-    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
+    const struct message_sink sink = {.write = collect};
+    texts[0] = '\0';
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &sink, &none));
     TEST_ASSERT_NULL(none);
+    TEST_ASSERT_NOT_NULL(strstr(texts, "omega is bound to a field"));
 }
 
 /* Nominal values are found wherever in the table a state stands. */
