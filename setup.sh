@@ -38,12 +38,13 @@ need cmake command -v cmake
 need make command -v make
 need gcc command -v gcc
 need libc6-dev test -e /usr/include/math.h
-need libsundials-dev test -e /usr/include/cvode/cvode.h
 need python3-venv has_venv
 # Ecos links to the first and unpacks FMUs by the command of the second
 need libtbb12 has_libtbb
 need unzip command -v unzip
 if [ "$dev" = yes ]; then
+  # what a user's own loop of CVODE links, to compare with: for the benchmark only
+  need libsundials-dev test -e /usr/include/cvode/cvode.h
   need clang command -v clang
   need libclang-rt-dev has_clang_runtime
   need clang-tidy-14 command -v clang-tidy-14
@@ -81,20 +82,21 @@ for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxy
 done
 [ "$dev" = no ] || install_requirements requirements-dev.txt
 
-# ---- Unity: Debian 13 has it in a package; before, that package is unpacked here, not installed
+# ---- sources, by an apt of this folder's own: nothing of them is installed
 
-get_unity() (
-  root="$PWD/build/deps/apt"
-  mkdir -p "$root"/{parts,lists/partial,cache/archives/partial,unpacked}
-  # the machine's own mirror of Debian, with the suite that has the package
+# use_apt TYPE SUITE: makes build/deps/apt, with the packages of this type from the machine's own
+# mirror of Debian
+use_apt() {
+  local root="$PWD/build/deps/apt" mirror
+  rm -rf "$root"
+  mkdir -p "$root"/{parts,lists/partial,cache/archives/partial,got}
   mirror=$(apt-get indextargets 'Created-By: Packages' \
              --format '$(LABEL) $(COMPONENT) $(REPO_URI)' | awk '/^Debian main / { print $3; exit }')
   [ -n "$mirror" ] || return 1
-  cat >"$root/parts/unity.sources" <<SOURCES
-Types: deb
-Targets: Packages
+  cat >"$root/parts/debian.sources" <<SOURCES
+Types: $1
 URIs: $mirror
-Suites: trixie
+Suites: $2
 Components: main
 Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg
 SOURCES
@@ -104,19 +106,45 @@ Dir::Etc::sourceparts "$root/parts";
 Dir::State::lists "$root/lists";
 Dir::Cache "$root/cache";
 APT::Sandbox::User "";
+Acquire::Languages "none";
 #clear APT::Update::Pre-Invoke;
 #clear APT::Update::Post-Invoke;
 #clear APT::Update::Post-Invoke-Success;
 CONF
-  apt-get -c "$root/apt.conf" update -qq || return 1
-  cd "$root/unpacked" && apt-get -c "$root/apt.conf" download -qq cmock || return 1
+  apt-get -c "$root/apt.conf" update -qq
+}
+
+# get_sources NAME PACKAGE ARCHIVE SHA256 FOLDER PART ...: parts of a source package, which unpacks
+# to FOLDER, become build/deps/NAME
+get_sources() (
+  cd build/deps/apt/got
+  apt-get -c ../apt.conf source -qq --download-only --tar-only "$2" || return 1
+  echo "$4  $3" | sha256sum --check --status || { echo "setup.sh: $3 is not the known one" >&2; return 1; }
+  cmake -E tar xf "$3" -- "${@:6}" || return 1
+  rm -rf "../../$1"
+  mv "$5" "../../$1"
+)
+
+# Debian 13 has Unity in a package; before, that package is unpacked here
+get_unity() (
+  cd build/deps/apt/got
+  apt-get -c ../apt.conf download -qq cmock || return 1
   dpkg-deb -x cmock_*.deb . || return 1
   mkdir -p ../../unity && cp -r usr/share/cmock/vendor/unity/src ../../unity/
 )
 
+if [ ! -e build/deps/sundials/src/cvode/cvode.c ]; then
+  echo "setup.sh: fetching the sources of SUNDIALS"
+  { use_apt deb-src bookworm && get_sources sundials sundials \
+      sundials_6.4.1+dfsg1.orig.tar.xz \
+      c61157f1d4be06c704bea40cb131eb63ba2dada161989071604d0a0959cdf04a \
+      sundials-6.4.1 sundials-6.4.1/{CMakeLists.txt,LICENSE,include,src}
+  } || echo "setup.sh: no package with them here, CMake will fetch them from upstream"
+fi
 if [ "$dev" = yes ] && [ ! -e build/deps/unity/src/unity.c ] &&
    [ ! -e /usr/share/cmock/vendor/unity/src/unity.c ]; then
   echo "setup.sh: fetching the Unity test framework"
-  get_unity || echo "setup.sh: no package with Unity here, CMake will fetch it from upstream"
-  rm -rf build/deps/apt
+  { use_apt deb trixie && get_unity; } ||
+    echo "setup.sh: no package with Unity here, CMake will fetch it from upstream"
 fi
+rm -rf build/deps/apt

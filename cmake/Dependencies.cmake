@@ -1,30 +1,32 @@
-# Finds SUNDIALS, Python, the FMI headers and, for tests, Unity. setup.sh installs all of them.
+# Finds Python, the FMI headers, the sources that are compiled into the FMUs and, for tests, Unity. setup.sh
+# gets all of them.
 
-find_package(SUNDIALS REQUIRED COMPONENTS arkode cvode)
-if(NOT TARGET SUNDIALS::cvode_static OR NOT TARGET SUNDIALS::arkode_static)
-  message(FATAL_ERROR "SUNDIALS has no static CVODE or ARKODE: the FMU must not need a SUNDIALS library where "
-                      "it runs. Install libsundials-dev, or build SUNDIALS with "
-                      "-DBUILD_STATIC_LIBS=ON and position independent code.")
+include(FetchContent)
+if(POLICY CMP0135)
+  cmake_policy(SET CMP0135 NEW) # files get the time at which they are unpacked
 endif()
-find_file(sundials_config sundials/sundials_config.h NO_CACHE
-          HINTS ${SUNDIALS_INCLUDE_DIR} ${SUNDIALS_DIR}/../../../../include)
-if(sundials_config)
-  file(STRINGS ${sundials_config} with_mpi REGEX "^#define SUNDIALS_MPI_ENABLED +1")
-  file(STRINGS ${sundials_config} before_7 REGEX "^#define SUNDIALS_VERSION_MAJOR +[456]$")
-  if(with_mpi AND NOT before_7)
-    message(FATAL_ERROR "SUNDIALS at ${SUNDIALS_DIR} is built with MPI (Debian 13's is), which from version 7 on the FMU "
-                        "would need where it runs. Build SUNDIALS with -DENABLE_MPI=OFF and give its "
-                        "place with -DSUNDIALS_DIR=")
+
+# find_sources(NAME FILE f URL url SHA256 hash): the folder of foreign sources with the file f, as
+# NAME_SOURCE_DIR: one that is given, build/deps/name, or what lies at the URL.
+function(find_sources name)
+  cmake_parse_arguments(ARG "" "FILE;URL;SHA256" "" ${ARGN})
+  string(TOLOWER ${name} folder)
+  find_path(${name}_SOURCE_DIR NAMES ${ARG_FILE} PATHS ${PROJECT_SOURCE_DIR}/build/deps/${folder}
+            NO_DEFAULT_PATH DOC "Folder of the sources of ${name}, with ${ARG_FILE}")
+  if(NOT ${name}_SOURCE_DIR)
+    FetchContent_Declare(${folder}_sources URL ${ARG_URL} URL_HASH SHA256=${ARG_SHA256})
+    FetchContent_GetProperties(${folder}_sources)
+    if(NOT ${folder}_sources_POPULATED)
+      FetchContent_Populate(${folder}_sources)
+    endif()
+    set(${name}_SOURCE_DIR ${${folder}_sources_SOURCE_DIR} PARENT_SCOPE)
   endif()
-endif()
-find_file(SUNDIALS_LICENSE NAMES copyright LICENSE NO_DEFAULT_PATH
-          PATHS /usr/share/doc/libsundials-dev ${SUNDIALS_DIR}/../../.. ${SUNDIALS_DIR}/../../../..
-                ${SUNDIALS_DIR}/../../../include/sundials
-          DOC "License text of SUNDIALS, which is part of the FMU")
-if(NOT SUNDIALS_LICENSE)
-  message(FATAL_ERROR "The license of SUNDIALS, which the FMU has to carry, was not found: give its "
-                      "path with -DSUNDIALS_LICENSE=")
-endif()
+endfunction()
+
+find_sources(SUNDIALS FILE src/cvode/cvode.c
+  URL https://github.com/LLNL/sundials/releases/download/v6.4.1/sundials-6.4.1.tar.gz
+  SHA256 7bf10a8d2920591af3fba2db92548e91ad60eb7241ab23350a9b1bc51e05e8d0)
+include(Sundials)
 
 # The environment that setup.sh makes, or any Python that has what requirements.txt lists.
 if(NOT Python3_EXECUTABLE AND EXISTS ${PROJECT_SOURCE_DIR}/build/venv/bin/python)
@@ -50,7 +52,6 @@ if(BUILD_TESTING)
             PATHS ${PROJECT_SOURCE_DIR}/build/deps/unity /usr/share/cmock/vendor/unity
             NO_DEFAULT_PATH DOC "Folder of the Unity test framework, with src/unity.c")
   if(NOT UNITY_DIR)
-    include(FetchContent)
     FetchContent_Declare(unity_source
       GIT_REPOSITORY https://github.com/ThrowTheSwitch/Unity.git
       GIT_TAG cf949f45ca6d172a177b00da21310607b97bc7a7) # v2.5.2

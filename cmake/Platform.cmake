@@ -16,7 +16,11 @@ set(hardening_options
   $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
 
 # Of the shared object: it exports what fmi2Functions.h marks and nothing of the libraries inside it,
-# names all it needs, and is read-only where it can be.
+# leaves out what is not used of them, names all it needs, and is read-only where it can be.
 set(FMU_LINK_OPTIONS
-  -Wl,--exclude-libs,ALL -Wl,--no-undefined -Wl,--as-needed
+  -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--no-undefined -Wl,--as-needed
   -Wl,-z,relro,-z,now,-z,noexecstack,-z,text)
+
+# Of sources that are not the project's own: they are taken as they are, and not all of
+# them is used.
+set(foreign_options -w -ffunction-sections -fdata-sections $<$<C_COMPILER_ID:GNU>:-fno-analyzer>)

@@ -20,7 +20,7 @@ function(add_fmu_library target version description folder)
   set_target_properties(${target} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
                         LIBRARY_OUTPUT_DIRECTORY ${folder})
   target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
-  target_link_libraries(${target} PRIVATE ${description} reserved_allocation)
+  target_link_libraries(${target} PRIVATE ${description})
   target_link_options(${target} PRIVATE ${FMU_LINK_OPTIONS})
 endfunction()
 

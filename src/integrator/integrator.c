@@ -79,9 +79,7 @@ void integrator_destroy(struct integrator *integrator) {
     if (integrator == NULL) {
         return;
     }
-    reserve_enter(&integrator->reserve);
     destroy_method(integrator);
-    reserve_leave(&integrator->reserve);
     reserve_destroy(&integrator->reserve);
     free(integrator);
 }
@@ -91,7 +89,9 @@ static enum status configure(struct integrator *integrator, enum integrator_meth
     const struct method *method = methods[wanted];
     if (integrator->method != method) {
         destroy_method(integrator);
+        reserve_enter(&integrator->reserve);
         const enum status status = method->create(&integrator->problem, &integrator->memory);
+        reserve_leave(&integrator->reserve);
         if (status != STATUS_OK) {
             reserve_cut(&integrator->reserve, 0);
             return status;
@@ -113,9 +113,7 @@ enum status integrator_configure(struct integrator *integrator,
     problem->settings = *settings;
     problem->settings.absolute_tolerances = integrator->absolute_tolerances;
 
-    reserve_enter(&integrator->reserve);
     const enum status status = configure(integrator, settings->method);
-    reserve_leave(&integrator->reserve);
     problem->evaluation_count = 0;
     integrator->statistics = (struct integrator_statistics){0};
     return status;

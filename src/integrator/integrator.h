@@ -64,8 +64,8 @@ MUST_CHECK NONNULL enum status integrator_create(const struct ode *ode,
 void integrator_destroy(struct integrator *integrator);
 
 /* Sets method, tolerances and limits and clears the statistics. Allocates all that the method
- * needs, where it is not the one before (in an FMU from the reserve of the handle, which cannot
- * fail); nothing is allocated later. A restart must follow. On failure it must be called again. */
+ * needs, where it is not the one before, from the reserve of the handle, which cannot fail; nothing
+ * is allocated later. A restart must follow. On failure it must be called again. */
 MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrator,
                                                     const struct integrator_settings *settings);
 

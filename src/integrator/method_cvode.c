@@ -1,6 +1,7 @@
 /* The multistep methods of CVODE. */
 #include "sundials.h"
 
+#include <cvode/cvode.h>
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <string.h>
@@ -97,10 +98,10 @@ static bool create_solver(struct cvode *cvode, int multistep_method) {
     struct sundials *base = &cvode->base;
     cvode->solver = CVodeCreate(multistep_method, base->context);
     return cvode->solver != NULL &&
-           sundials_redirect_cvode(base->context, cvode->solver, &base->texts) == 0 &&
+           CVodeSetErrHandlerFn(cvode->solver, sundials_text, base) == CV_SUCCESS &&
            CVodeInit(cvode->solver, sundials_rhs, 0.0, base->x) == CV_SUCCESS &&
            CVodeSetUserData(cvode->solver, base) == CV_SUCCESS &&
-           // warnings of steps too short to change the time: SUNDIALS 7 prints them
+           // no warnings of steps too short to change the time
            CVodeSetMaxHnilWarns(cvode->solver, -1) == CV_SUCCESS;
 }
 

@@ -2,6 +2,7 @@
  * next step connects one advance with the next. */
 #include "sundials.h"
 
+#include <arkode/arkode_erkstep.h>
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -55,7 +56,7 @@ static enum status status_of_flag(const struct problem *problem, int flag) {
 static void destroy(void *memory) {
     struct erk *erk = memory;
     if (erk->solver != NULL) {
-        ERK(Free)(&erk->solver);
+        ERKStepFree(&erk->solver);
     }
     sundials_destroy(erk);
 }
@@ -64,14 +65,14 @@ static bool create_solver(struct erk *erk) {
     struct sundials *base = &erk->base;
     erk->solver = ERKStepCreate(sundials_rhs, 0.0, base->x, base->context);
     return erk->solver != NULL &&
-           sundials_redirect_erk(base->context, erk->solver, &base->texts) == 0 &&
-           ERK(SetUserData)(erk->solver, base) == ARK_SUCCESS &&
+           ERKStepSetErrHandlerFn(erk->solver, sundials_text, base) == ARK_SUCCESS &&
+           ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
            // steps end at the points asked for: no polynomial is needed, which saves an evaluation
            // each
-           ERK(SetInterpolantType)(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
-           ERK(SetInterpolantDegree)(erk->solver, 0) == ARK_SUCCESS &&
-           ERK(SetMaxHnilWarns)(erk->solver, -1) == ARK_SUCCESS;
+           ERKStepSetInterpolantType(erk->solver, ARK_INTERP_LAGRANGE) == ARK_SUCCESS &&
+           ERKStepSetInterpolantDegree(erk->solver, 0) == ARK_SUCCESS &&
+           ERKStepSetMaxHnilWarns(erk->solver, -1) == ARK_SUCCESS;
 }
 
 static enum status create(struct problem *problem, void **memory) {
@@ -96,9 +97,9 @@ static enum status configure(void *memory) {
     memcpy(small_vector_data(base->absolute_tolerances), settings->absolute_tolerances,
            base->problem->ode.state_count * sizeof(double));
     int flag =
-        ERK(SVtolerances)(erk->solver, settings->relative_tolerance, base->absolute_tolerances);
+        ERKStepSVtolerances(erk->solver, settings->relative_tolerance, base->absolute_tolerances);
     if (flag == ARK_SUCCESS) {
-        flag = ERK(SetMaxStep)(erk->solver, settings->max_step);
+        flag = ERKStepSetMaxStep(erk->solver, settings->max_step);
     }
     return status_of_flag(base->problem, flag);
 }
@@ -116,9 +117,9 @@ static enum status restart(void *memory, const double x[]) {
 static int start(struct erk *erk, double begin, double end, double first_step) {
     int flag = ERKStepReInit(erk->solver, sundials_rhs, begin, erk->base.x);
     if (flag == ARK_SUCCESS) {
-        flag = ERK(SetInitStep)(erk->solver, first_step);
+        flag = ERKStepSetInitStep(erk->solver, first_step);
     }
-    return flag == ARK_SUCCESS ? ERK(SetStopTime)(erk->solver, end) : flag;
+    return flag == ARK_SUCCESS ? ERKStepSetStopTime(erk->solver, end) : flag;
 }
 
 /* ERKStep counts from its last start on. */
@@ -126,13 +127,13 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     long steps = 0;
     long failed_steps = 0;
     // these calls fail only without ARKODE's memory
-    (void)ERK(GetNumSteps)(erk->solver, &steps);
-    (void)ERK(GetNumErrTestFails)(erk->solver, &failed_steps);
-    (void)ERK(GetCurrentTime)(erk->solver, &work->internal);
+    (void)ERKStepGetNumSteps(erk->solver, &steps);
+    (void)ERKStepGetNumErrTestFails(erk->solver, &failed_steps);
+    (void)ERKStepGetCurrentTime(erk->solver, &work->internal);
     work->steps += steps;
     work->failed_steps += failed_steps;
     if (steps > 0) {
-        (void)ERK(GetLastStep)(erk->solver, &work->last_step);
+        (void)ERKStepGetLastStep(erk->solver, &work->last_step);
         work->last_order = order;
     }
 }
@@ -154,11 +155,11 @@ static int advance_carefully(struct erk *erk, double begin, double end, long max
             flag = ARK_TOO_MUCH_WORK;
             break;
         }
-        flag = ERK(Evolve)(erk->solver, end, erk->base.x, stopped_at, ARK_ONE_STEP);
+        flag = ERKStepEvolve(erk->solver, end, erk->base.x, stopped_at, ARK_ONE_STEP);
         if (flag >= 0) {
             good = *stopped_at;
             sundials_get_state(&erk->base, x);
-            (void)ERK(GetCurrentStep)(erk->solver, &step);
+            (void)ERKStepGetCurrentStep(erk->solver, &step);
             continue;
         }
         step = 0.5 * fmin(step, end - good);
@@ -182,10 +183,10 @@ static int integrate(struct erk *erk, double t, long max_steps, const double beg
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
-        flag = ERK(SetMaxNumSteps)(erk->solver, max_steps);
+        flag = ERKStepSetMaxNumSteps(erk->solver, max_steps);
     }
     if (flag == ARK_SUCCESS) {
-        flag = ERK(Evolve)(erk->solver, t, erk->base.x, stopped_at, ARK_NORMAL);
+        flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_NORMAL);
     }
     if (flag < 0 && flag != ARK_TOO_MUCH_WORK) {
         add_work(erk, work);
@@ -209,7 +210,7 @@ static enum status advance(void *memory, double t, long max_steps, const double 
         return status_of_flag(problem, ARK_TOO_CLOSE);
     }
     const int flag = integrate(erk, t, max_steps, begin_x, stopped_at, x, work);
-    if (flag < 0 || ERK(GetCurrentStep)(erk->solver, &erk->next_step) < 0 ||
+    if (flag < 0 || ERKStepGetCurrentStep(erk->solver, &erk->next_step) < 0 ||
         !isfinite(erk->next_step)) {
         erk->next_step = 0.0;
     }

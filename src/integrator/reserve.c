@@ -1,7 +1,6 @@
 #include "reserve.h"
 
 #include <errno.h>
-#include <sched.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -48,7 +47,7 @@ static struct slot *claim_slot(void) {
         nobody = NULL;
         i = (i + 1) % SLOTS;
         if (i == 0) {
-            sched_yield();
+            YIELD_THREAD();
         }
     }
     size_t count = atomic_load(&used_slots);
@@ -86,18 +85,19 @@ void reserve_leave(struct reserve *reserve) {
     }
 }
 
-/* The reserve that this thread entered last, or NULL. */
-static struct reserve *entered(void) {
-    const struct slot *slot = own_slot();
-    return slot != NULL ? slot->reserve : NULL;
+void reserve_cut(struct reserve *reserve, size_t used) {
+    reserve->used = used;
 }
 
-void *reserve_take(size_t size) {
+/* ---- Allocator ------------------------------------------------------------------------------ */
+
+void *reserve_malloc(size_t size) {
     const size_t alignment = _Alignof(max_align_t);
-    struct reserve *reserve = entered();
-    if (reserve == NULL) {
+    const struct slot *slot = own_slot();
+    if (slot == NULL) {
         return NULL;
     }
+    struct reserve *reserve = slot->reserve;
     const size_t left = reserve->size - reserve->used;
     if (size >= left) { // even a block of no bytes must lie inside
         return NULL;
@@ -108,16 +108,20 @@ void *reserve_take(size_t size) {
     return memset(taken, 0, size);
 }
 
-size_t reserve_rest(const void *memory) {
-    for (const struct reserve *reserve = entered(); reserve != NULL; reserve = reserve->outer) {
-        const uintptr_t from_start = (uintptr_t)memory - (uintptr_t)reserve->block;
-        if (from_start < reserve->size) {
-            return reserve->size - from_start;
-        }
-    }
-    return 0;
+void *reserve_calloc(size_t items, size_t size) {
+    return size == 0 || items <= SIZE_MAX / size ? reserve_malloc(items * size) : NULL;
 }
 
-void reserve_cut(struct reserve *reserve, size_t used) {
-    reserve->used = used;
+void *reserve_realloc(void *memory, size_t size) {
+    char *taken = reserve_malloc(size);
+    if (taken != NULL && memory != NULL) {
+        // the old block was not longer than what lies between
+        const size_t between = (size_t)(taken - (char *)memory);
+        memcpy(taken, memory, size < between ? size : between);
+    }
+    return taken;
+}
+
+void reserve_free(void *memory) {
+    (void)memory;
 }

@@ -2,8 +2,8 @@
  * cannot fail. Where they do, SUNDIALS 6 dereferences many of the null pointers, loses other blocks
  * and prints to stderr.
  *
- * It works in what is linked with the library reserved_allocation, as every FMU is; elsewhere a
- * reserve is never asked, and SUNDIALS allocates as usual. */
+ * SUNDIALS is compiled with the four functions of the allocator below in place of the standard
+ * ones (sundials_allocation.h); nothing else in the program is. */
 #ifndef RESERVE_H
 #define RESERVE_H
 
@@ -26,21 +26,22 @@ MUST_CHECK NONNULL bool reserve_create(struct reserve *reserve, size_t size);
 /* Frees all that was given out. Empty is allowed. */
 NONNULL void reserve_destroy(struct reserve *reserve);
 
-/* Between the two, which the same thread calls, its allocations are served from the reserve. Pairs
- * of different reserves may be nested; within a pair of an empty one, allocations are the program's
- * own again. */
+/* Between the two, which the same thread calls, the functions below serve it from the reserve.
+ * Pairs of different reserves may be nested: the one entered last serves. */
 NONNULL void reserve_enter(struct reserve *reserve);
 NONNULL void reserve_leave(struct reserve *reserve);
 
-/* Zeroed memory for any type from the reserve that this thread entered last. NULL where none is
- * entered, or there is not enough left. */
-void *reserve_take(size_t size);
-
-/* Bytes from memory to the end of the reserve that it lies in, of those that this thread has
- * entered; 0 where it lies elsewhere. A block that a reserve gave out is never freed by itself. */
-size_t reserve_rest(const void *memory);
-
 /* Takes back all that was given out since used was as much. */
 NONNULL void reserve_cut(struct reserve *reserve, size_t used);
+
+/* Zeroed memory for any type. NULL where no reserve is entered, or there is not enough left. */
+MUST_CHECK void *reserve_malloc(size_t size);
+MUST_CHECK void *reserve_calloc(size_t items, size_t size);
+
+/* As reserve_malloc, with what is in memory, which comes from the same reserve or is NULL. */
+MUST_CHECK void *reserve_realloc(void *memory, size_t size);
+
+/* Does nothing: memory comes back with the whole reserve. */
+void reserve_free(void *memory);
 
 #endif

@@ -1,10 +1,10 @@
 #include "small_vector.h"
 
 #include "platform.h"
+#include "reserve.h"
 
 #include <math.h>
 #include <stddef.h>
-#include <stdlib.h>
 
 _Static_assert(sizeof(sunrealtype) == sizeof(double), "SUNDIALS must be built for doubles");
 
@@ -23,7 +23,8 @@ static sunindextype length_of(N_Vector x) {
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static N_Vector create_like(const struct _generic_N_Vector *base, sunindextype length) {
-    struct small_vector *created = calloc(1, sizeof *created + (size_t)length * sizeof(double));
+    struct small_vector *created =
+        reserve_calloc(1, sizeof *created + (size_t)length * sizeof(double));
     if (created == NULL) {
         return NULL;
     }
@@ -38,7 +39,7 @@ static N_Vector clone(N_Vector x) {
 }
 
 static void destroy(N_Vector x) {
-    free(x);
+    reserve_free(x);
 }
 
 static void space(N_Vector x, sunindextype *reals, sunindextype *integers) {

@@ -4,14 +4,14 @@
 
 #include "method.h"
 #include "small_vector.h"
-#include "sundials_compat.h"
+
+#include <sundials/sundials_context.h>
 
 /* The first member of each method's memory, and the user data of its solver. */
 struct sundials {
     struct problem *problem;
     const struct method *method;
     enum status (*status_of_flag)(const struct problem *problem, int flag);
-    struct sundials_texts texts;
     SUNContext context;
     N_Vector x;
     N_Vector absolute_tolerances;
@@ -29,6 +29,10 @@ sundials_create(size_t size, struct problem *problem, const struct method *metho
 
 /* Frees the memory itself too; the solver must be freed before. Half-built is allowed. */
 NONNULL void sundials_destroy(void *memory);
+
+/* Receives the texts of a solver; user data: struct sundials. */
+void sundials_text(int error_code, const char *module, const char *function, char *text,
+                   void *sundials_pointer);
 
 /* The right-hand side as SUNDIALS calls it; user data: struct sundials. */
 int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data);

@@ -39,4 +39,13 @@
 
 #endif
 
+/* Lets another thread run. */
+#if defined(_WIN32)
+__declspec(dllimport) int __stdcall SwitchToThread(void);
+#define YIELD_THREAD() ((void)SwitchToThread())
+#else
+#include <sched.h>
+#define YIELD_THREAD() ((void)sched_yield())
+#endif
+
 #endif

@@ -6,14 +6,7 @@
 #include <nvector/nvector_serial.h>
 #include <string.h>
 #include <sundials/sundials_context.h>
-#include <sundials/sundials_version.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
-
-#if SUNDIALS_VERSION_MAJOR >= 7
-#define NO_COMMUNICATOR SUN_COMM_NULL
-#else
-#define NO_COMMUNICATOR NULL
-#endif
 
 static int rhs(sunrealtype t, N_Vector x, N_Vector dx, void *u) {
     (void)t;
@@ -24,7 +17,7 @@ static int rhs(sunrealtype t, N_Vector x, N_Vector dx, void *u) {
 double plain_loop_run(const struct problem *problem, double tolerance, double states[][4]) {
     double u[2];
     SUNContext context;
-    require(SUNContext_Create(NO_COMMUNICATOR, &context) == 0, "no context");
+    require(SUNContext_Create(NULL, &context) == 0, "no context");
     N_Vector x = N_VNew_Serial(4, context);
     N_Vector absolute = N_VNew_Serial(4, context);
     N_VConst(1e-2 * tolerance, absolute);

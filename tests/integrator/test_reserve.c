@@ -1,7 +1,7 @@
 #include "reserve.h"
 
 #include "allocator.h"
-#include "integrator.h"
+#include "method.h"
 
 #include <pthread.h>
 #include <sched.h>
@@ -22,8 +22,8 @@ void tearDown(void) {
     reserve_destroy(&reserve);
 }
 
-static bool is_inside(const void *memory) {
-    return reserve_rest(memory) > 0;
+static bool is_inside(const void *memory, const struct reserve *of) {
+    return (uintptr_t)memory - (uintptr_t)of->block < of->size;
 }
 
 static void test_blocks_are_zeroed_aligned_and_apart(void) {
@@ -32,9 +32,9 @@ static void test_blocks_are_zeroed_aligned_and_apart(void) {
     memset(reserve.block, 0xa5, reserve.size);
     reserve_enter(&reserve);
     for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; i++) {
-        unsigned char *taken = reserve_take(sizes[i]);
+        unsigned char *taken = reserve_malloc(sizes[i]);
         TEST_ASSERT_NOT_NULL(taken);
-        TEST_ASSERT_TRUE(is_inside(taken));
+        TEST_ASSERT_TRUE(is_inside(taken, &reserve));
         TEST_ASSERT_EQUAL_UINT(0, (uintptr_t)taken % _Alignof(max_align_t));
         TEST_ASSERT_TRUE(taken >= last_end);
         for (size_t k = 0; k < sizes[i]; k++) {
@@ -59,33 +59,96 @@ static void test_a_destroyed_reserve_is_empty(void) {
 
 static void test_no_more_than_there_is_is_given_out(void) {
     reserve_enter(&reserve);
-    TEST_ASSERT_NULL(reserve_take(1025));
-    TEST_ASSERT_NULL(reserve_take(SIZE_MAX));
-    TEST_ASSERT_NOT_NULL(reserve_take(1000));
+    TEST_ASSERT_NULL(reserve_malloc(1025));
+    TEST_ASSERT_NULL(reserve_malloc(SIZE_MAX));
+    TEST_ASSERT_NOT_NULL(reserve_malloc(1000));
     const size_t used = reserve.used;
-    TEST_ASSERT_NOT_NULL(reserve_take(15));
-    TEST_ASSERT_NULL(reserve_take(1));
-    TEST_ASSERT_NULL(reserve_take(0));
+    TEST_ASSERT_NOT_NULL(reserve_malloc(15));
+    TEST_ASSERT_NULL(reserve_malloc(1));
+    TEST_ASSERT_NULL(reserve_malloc(0));
     reserve_cut(&reserve, used);
-    TEST_ASSERT_NOT_NULL(reserve_take(15));
+    TEST_ASSERT_NOT_NULL(reserve_malloc(15));
     reserve_leave(&reserve);
 }
 
-static void test_the_reserve_entered_last_gives(void) {
+static void test_only_the_reserve_entered_last_gives(void) {
     struct reserve inner;
     TEST_ASSERT_TRUE(reserve_create(&inner, 64));
-    TEST_ASSERT_NULL(reserve_take(1));
-    TEST_ASSERT_FALSE(is_inside(reserve.block));
+    TEST_ASSERT_NULL(reserve_malloc(1));
     reserve_enter(&reserve);
-    void *outside = reserve_take(1);
+    TEST_ASSERT_EQUAL_PTR(reserve.block, reserve_malloc(1));
     reserve_enter(&inner);
-    TEST_ASSERT_TRUE(is_inside(outside));
-    TEST_ASSERT_EQUAL_PTR(inner.block, reserve_take(1));
+    TEST_ASSERT_EQUAL_PTR(inner.block, reserve_malloc(1));
+    TEST_ASSERT_NULL(reserve_malloc(64));
     reserve_leave(&inner);
-    TEST_ASSERT_TRUE(is_inside(outside));
+    TEST_ASSERT_TRUE(is_inside(reserve_malloc(1), &reserve));
     reserve_leave(&reserve);
-    TEST_ASSERT_FALSE(is_inside(outside));
+    TEST_ASSERT_NULL(reserve_malloc(1));
+    TEST_ASSERT_EQUAL_UINT(inner.size, 64);
     reserve_destroy(&inner);
+}
+
+static void test_the_program_s_own_allocations_stay_its_own(void) {
+    reserve_enter(&reserve);
+    const long before = allocator_calls();
+    void *volatile own = malloc(10);
+    TEST_ASSERT_NOT_NULL(own);
+    TEST_ASSERT_FALSE(is_inside(own, &reserve));
+    free(own);
+    TEST_ASSERT_EQUAL_INT(before + 1, allocator_calls());
+    TEST_ASSERT_EQUAL_UINT(0, reserve.used);
+    reserve_leave(&reserve);
+}
+
+static void test_what_was_given_out_comes_back_only_as_a_whole(void) {
+    reserve_enter(&reserve);
+    const long calls = allocator_calls();
+    const long outstanding = allocator_outstanding();
+    void *taken = reserve_malloc(500);
+    const size_t used = reserve.used;
+    reserve_free(taken);
+    reserve_free(NULL);
+    TEST_ASSERT_EQUAL_UINT(used, reserve.used);
+    TEST_ASSERT_NULL(reserve_malloc(600));
+    TEST_ASSERT_EQUAL_INT(calls, allocator_calls());
+    TEST_ASSERT_EQUAL_INT(outstanding, allocator_outstanding());
+    reserve_cut(&reserve, 0);
+    TEST_ASSERT_EQUAL_PTR(taken, reserve_malloc(600));
+    reserve_leave(&reserve);
+}
+
+static void test_an_array_is_zeroed_and_inside(void) {
+    memset(reserve.block, 0xa5, reserve.size);
+    reserve_enter(&reserve);
+    const unsigned char *taken = reserve_calloc(10, 40);
+    TEST_ASSERT_TRUE(is_inside(taken, &reserve));
+    TEST_ASSERT_EACH_EQUAL_UINT8(0, taken, 400);
+    TEST_ASSERT_NULL(reserve_calloc(10, 80));
+    TEST_ASSERT_TRUE(is_inside(reserve_calloc(10, 0), &reserve));
+    reserve_leave(&reserve);
+}
+
+static void test_a_product_that_overflows_is_no_small_block(void) {
+    reserve_enter(&reserve);
+    TEST_ASSERT_NULL(reserve_calloc(SIZE_MAX / 2 + 2, 2));
+    TEST_ASSERT_NULL(reserve_calloc(2, SIZE_MAX / 2 + 2));
+    TEST_ASSERT_EQUAL_UINT(0, reserve.used);
+    reserve_leave(&reserve);
+}
+
+static void test_a_block_that_grows_keeps_what_is_in_it(void) {
+    reserve_enter(&reserve);
+    char *grown = reserve_realloc(NULL, 4);
+    memcpy(grown, "xyz", 4);
+    memset(reserve_malloc(40), 'a', 40);
+    grown = reserve_realloc(grown, 500);
+    TEST_ASSERT_TRUE(is_inside(grown, &reserve));
+    TEST_ASSERT_EQUAL_STRING("xyz", grown);
+    grown = reserve_realloc(grown, 2);
+    TEST_ASSERT_EQUAL_MEMORY("xy", grown, 2);
+    TEST_ASSERT_NULL(reserve_realloc(grown, 5000));
+    TEST_ASSERT_EQUAL_MEMORY("xy", grown, 2);
+    reserve_leave(&reserve);
 }
 
 /* As many threads as there is room for hold their reserves until all of them have entered; the
@@ -102,11 +165,11 @@ static atomic_int left_to_enter;
 
 static void *hold(void *holder_pointer) {
     struct holder *holder = holder_pointer;
-    holder->mistakes += reserve_take(1) != NULL;
+    holder->mistakes += reserve_malloc(1) != NULL;
     reserve_enter(&holder->reserve);
     for (size_t i = 0; i < 100; i++) {
-        char *taken = reserve_take(16);
-        holder->mistakes += taken != holder->reserve.block + 16 * i || is_inside(reserve.block);
+        char *taken = reserve_malloc(16);
+        holder->mistakes += taken != holder->reserve.block + 16 * i;
     }
     if (atomic_fetch_sub(&left_to_enter, 1) > 0) {
         while (atomic_load(&left_to_enter) > 0) {
@@ -114,7 +177,7 @@ static void *hold(void *holder_pointer) {
         }
     }
     reserve_leave(&holder->reserve);
-    holder->mistakes += reserve_take(1) != NULL;
+    holder->mistakes += reserve_malloc(1) != NULL;
     return NULL;
 }
 
@@ -139,83 +202,10 @@ static void test_without_memory_the_reserve_is_empty(void) {
     TEST_ASSERT_EQUAL_INT(1, allocator_stop());
     TEST_ASSERT_FALSE(is_created);
     reserve_enter(&empty);
-    TEST_ASSERT_NULL(reserve_take(1));
-    TEST_ASSERT_FALSE(is_inside(&empty));
+    TEST_ASSERT_NULL(reserve_malloc(0));
+    TEST_ASSERT_NULL(reserve_malloc(1));
     reserve_leave(&empty);
     reserve_destroy(&empty);
-}
-
-/* ---- As the allocator of a program ---------------------------------------------------------- */
-
-static void test_allocations_come_from_the_reserve_while_there_is_room(void) {
-    void *volatile before = malloc(10);
-    reserve_enter(&reserve);
-    void *volatile taken = malloc(500);
-    void *volatile cleared = calloc(10, 40);
-    void *volatile beyond = malloc(500);
-    void *volatile cleared_beyond = calloc(10, 50);
-    TEST_ASSERT_TRUE(is_inside(taken));
-    TEST_ASSERT_TRUE(is_inside(cleared));
-    TEST_ASSERT_NOT_NULL(beyond);
-    TEST_ASSERT_FALSE(is_inside(beyond));
-    TEST_ASSERT_NOT_NULL(cleared_beyond);
-    TEST_ASSERT_FALSE(is_inside(cleared_beyond));
-    const long outstanding = allocator_outstanding();
-    free(taken);
-    free(cleared);
-    TEST_ASSERT_EQUAL_INT(outstanding, allocator_outstanding());
-    free(beyond);
-    free(cleared_beyond);
-    free(before);
-    TEST_ASSERT_EQUAL_INT(outstanding - 3, allocator_outstanding());
-    reserve_leave(&reserve);
-}
-
-static void test_within_an_empty_one_allocations_are_the_program_s_own(void) {
-    struct reserve none = {0};
-    reserve_enter(&reserve);
-    void *volatile taken = malloc(10);
-    reserve_enter(&none);
-    void *volatile own = malloc(10);
-    TEST_ASSERT_TRUE(is_inside(taken));
-    TEST_ASSERT_FALSE(is_inside(own));
-    const long outstanding = allocator_outstanding();
-    free(taken); // from the outer one: nothing happens
-    TEST_ASSERT_EQUAL_INT(outstanding, allocator_outstanding());
-    reserve_leave(&none);
-    reserve_leave(&reserve);
-    free(own);
-}
-
-static void test_a_block_that_grows_keeps_what_is_in_it(void) {
-    char *volatile outside = realloc(NULL, 4);
-    memcpy(outside, "abc", 4);
-    reserve_enter(&reserve);
-    char *volatile inside = realloc(NULL, 4);
-    TEST_ASSERT_TRUE(is_inside(inside));
-    memcpy(inside, "xyz", 4);
-    inside = realloc(inside, 500);
-    TEST_ASSERT_TRUE(is_inside(inside));
-    TEST_ASSERT_EQUAL_STRING("xyz", inside);
-    inside = realloc(inside, 5000);
-    TEST_ASSERT_FALSE(is_inside(inside));
-    TEST_ASSERT_EQUAL_STRING("xyz", inside);
-    outside = realloc(outside, 5000);
-    TEST_ASSERT_FALSE(is_inside(outside));
-    TEST_ASSERT_EQUAL_STRING("abc", outside);
-    reserve_leave(&reserve);
-    free(inside);
-    free(outside);
-}
-
-static void test_a_product_that_overflows_is_no_small_block(void) {
-    volatile size_t half = SIZE_MAX / 2 + 2;
-    reserve_enter(&reserve);
-    allocator_fail(1, ALLOCATOR_ALL); // a sanitizer would stop the program
-    void *volatile none = calloc(half, 2);
-    TEST_ASSERT_EQUAL_INT(1, allocator_stop());
-    TEST_ASSERT_NULL(none);
-    reserve_leave(&reserve);
 }
 
 /* ---- As the integrator has it --------------------------------------------------------------- */
@@ -269,5 +259,41 @@ static void test_the_reserve_of_an_integrator_is_enough(void) {
         }
         TEST_ASSERT_EQUAL_INT(before + 2, allocator_calls()); // the handle and its reserve
         integrator_destroy(integrator);
+    }
+}
+
+static const struct method *const all_methods[] = {
+#define METHOD_ENTRY(code, symbol) &(symbol),
+    INTEGRATOR_METHOD_LIST(METHOD_ENTRY)
+#undef METHOD_ENTRY
+};
+
+static size_t bytes_taken(const struct method *method, const struct ode *ode) {
+    struct problem problem = {.ode = *ode};
+    struct reserve whole;
+    void *memory = NULL;
+    TEST_ASSERT_TRUE(reserve_create(&whole, method->memory_size(ode->state_count)));
+    reserve_enter(&whole);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, method->create(&problem, &memory));
+    reserve_leave(&whole);
+    method->destroy(memory);
+    const size_t used = whole.used;
+    reserve_destroy(&whole);
+    return used;
+}
+
+static void test_the_reserve_of_an_integrator_is_no_larger_than_needed(void) {
+    for (size_t n = 1; n <= 100; n++) {
+        const struct ode ode = {n, decay, decay_jacobian, &n};
+        size_t size = 0;
+        size_t most = 0;
+        for (size_t i = 0; i < sizeof all_methods / sizeof all_methods[0]; i++) {
+            const size_t taken = bytes_taken(all_methods[i], &ode);
+            const size_t wanted = all_methods[i]->memory_size(n);
+            most = taken > most ? taken : most;
+            size = wanted > size ? wanted : size;
+        }
+        TEST_ASSERT_TRUE(most <= size);
+        TEST_ASSERT_TRUE(size <= most + 320);
     }
 }

@@ -7,16 +7,9 @@
 #include <math.h>
 #include <nvector/nvector_serial.h>
 #include <sundials/sundials_context.h>
-#include <sundials/sundials_version.h>
 #include <unity.h>
 
 enum { LONGEST = 9, COUNT = 5 };
-
-#if SUNDIALS_VERSION_MAJOR >= 7
-#define NO_COMMUNICATOR SUN_COMM_NULL
-#else
-#define NO_COMMUNICATOR NULL
-#endif
 
 static SUNContext context;
 static sunindextype length;
@@ -93,7 +86,7 @@ static void at_every_length(void (*test)(void)) {
 }
 
 void setUp(void) {
-    TEST_ASSERT_EQUAL_INT(0, SUNContext_Create(NO_COMMUNICATOR, &context));
+    TEST_ASSERT_EQUAL_INT(0, SUNContext_Create(NULL, &context));
 }
 
 void tearDown(void) {
