@@ -133,13 +133,20 @@ get_unity() (
   mkdir -p ../../unity && cp -r usr/share/cmock/vendor/unity/src ../../unity/
 )
 
-if [ ! -e build/deps/sundials/src/cvode/cvode.c ]; then
-  echo "setup.sh: fetching the sources of SUNDIALS"
-  { use_apt deb-src bookworm && get_sources sundials sundials \
-      sundials_6.4.1+dfsg1.orig.tar.xz \
-      c61157f1d4be06c704bea40cb131eb63ba2dada161989071604d0a0959cdf04a \
-      sundials-6.4.1 sundials-6.4.1/{CMakeLists.txt,LICENSE,include,src}
-  } || echo "setup.sh: no package with them here, CMake will fetch them from upstream"
+get_all_sources() {
+  use_apt deb-src bookworm || return 1
+  get_sources sundials sundials sundials_6.4.1+dfsg1.orig.tar.xz \
+    c61157f1d4be06c704bea40cb131eb63ba2dada161989071604d0a0959cdf04a \
+    sundials-6.4.1 sundials-6.4.1/{CMakeLists.txt,LICENSE,include,src} || return 1
+  get_sources musl musl musl_1.2.3.orig.tar.gz \
+    7d5b0b6062521e4627e099e4c9dc8248d32a30285e959b7eecaa780cf8cfd4a4 \
+    musl-1.2.3 musl-1.2.3/{COPYRIGHT,VERSION,arch/generic,src/internal,src/math}
+}
+
+if [ ! -e build/deps/sundials/LICENSE ] || [ ! -e build/deps/musl/COPYRIGHT ]; then
+  echo "setup.sh: fetching the sources of SUNDIALS and musl"
+  get_all_sources ||
+    echo "setup.sh: no packages with them here, CMake will fetch them from upstream"
 fi
 if [ "$dev" = yes ] && [ ! -e build/deps/unity/src/unity.c ] &&
    [ ! -e /usr/share/cmock/vendor/unity/src/unity.c ]; then

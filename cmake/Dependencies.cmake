@@ -26,6 +26,10 @@ endfunction()
 find_sources(SUNDIALS FILE src/cvode/cvode.c
   URL https://github.com/LLNL/sundials/releases/download/v6.4.1/sundials-6.4.1.tar.gz
   SHA256 7bf10a8d2920591af3fba2db92548e91ad60eb7241ab23350a9b1bc51e05e8d0)
+find_sources(MUSL FILE src/math/sincos.c
+  URL https://musl.libc.org/releases/musl-1.2.3.tar.gz
+  SHA256 7d5b0b6062521e4627e099e4c9dc8248d32a30285e959b7eecaa780cf8cfd4a4)
+include(ElementaryFunctions)
 include(Sundials)
 
 # The environment that setup.sh makes, or any Python that has what requirements.txt lists.

@@ -33,7 +33,7 @@ add_library(sundials STATIC ${files})
 target_include_directories(sundials
   SYSTEM PUBLIC ${sundials_include} ${SUNDIALS_SOURCE_DIR}/include
   PRIVATE ${SUNDIALS_SOURCE_DIR}/src/sundials)
-target_link_libraries(sundials PUBLIC reserve m)
+target_link_libraries(sundials PUBLIC reserve elementary_functions)
 target_compile_options(sundials PRIVATE
   ${foreign_options} -ffile-prefix-map=${SUNDIALS_SOURCE_DIR}=sundials
   "SHELL:-include \"${PROJECT_SOURCE_DIR}/src/integrator/sundials_allocation.h\"")

@@ -85,6 +85,7 @@ function(add_fmu name)
             documentation=${out}/documentation
             documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
             documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
+            $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>
     DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
             ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
             ${FMU_SOURCE_DIR}/atomic_write.py

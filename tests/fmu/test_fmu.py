@@ -42,6 +42,7 @@ def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
         "documentation/index.html",
         "documentation/model.svg",
         "documentation/licenses/license.txt",
+        "documentation/licenses/musl.txt",
         "documentation/licenses/sundials.txt",
         "model.png",
         "modelDescription.xml",

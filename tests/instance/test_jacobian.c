@@ -191,14 +191,16 @@ static enum status no_jacobian(const void *values, double t, const double x[], c
     return STATUS_OK;
 }
 
-/* Evaluations in a second of a stiff motion. */
+/* Evaluations in a second of a stiff motion. With a wrong one, the last bits of the sine decide
+ * whether the steps allowed are enough: those that are not are many evaluations, too. */
 static int evaluations(enum status with(const void *values, double t, const double x[],
                                         const double u[], double J[])) {
     instance_destroy(instance);
     model.jacobian = with;
     begin(INTEGRATOR_CVODE_BDF, 100.0, 2000.0);
     set(OSCILLATOR_U, 1.0);
-    ASSERT_OK(instance_do_step(instance, start, 1.0));
+    const enum status status = instance_do_step(instance, start, 1.0);
+    TEST_ASSERT_TRUE(status == STATUS_OK || (with != jacobian && status == STATUS_TOO_MANY_STEPS));
     return count(OSCILLATOR_EVALUATIONS);
 }
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from tests.support.paths import ROOT
 
 SETTINGS = (
-    "CMAKE_C_COMPILER:", "FMI_HEADERS_DIR:", "_Python3_EXECUTABLE:", "SUNDIALS_SOURCE_DIR:",
-    "UNITY_DIR:",
+    "CMAKE_C_COMPILER:", "FMI_HEADERS_DIR:", "_Python3_EXECUTABLE:", "MUSL_SOURCE_DIR:",
+    "OWN_LIBM:", "SUNDIALS_SOURCE_DIR:", "UNITY_DIR:",
 )  # fmt: skip
 
 
