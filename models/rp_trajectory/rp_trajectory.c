@@ -1,5 +1,7 @@
 #include "rp_trajectory.h"
 
+#include <stddef.h>
+
 static const double two_pi = 6.28318530717958647693;
 
 static struct taylor constant(double value) {
@@ -8,7 +10,7 @@ static struct taylor constant(double value) {
 
 /* A parameter on the curve, by its address in curve->value. */
 static struct taylor of(const struct rp_trajectory_curve *curve, const double *parameter) {
-    const long offset = (const char *)parameter - (const char *)curve->value;
+    const ptrdiff_t offset = (const char *)parameter - (const char *)curve->value;
     return (struct taylor){
         .value = *parameter,
         .first = *(const double *)(const void *)((const char *)curve->first + offset),

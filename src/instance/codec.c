@@ -124,22 +124,23 @@ void codec_real(struct codec *codec, double *value) {
     memcpy(value, &bits, sizeof bits);
 }
 
-/* Two's complement. A value outside the bounds leaves the old one and is noted. */
+/* Two's complement. */
+void codec_int64(struct codec *codec, int64_t *value) {
+    uint64_t bits = (uint64_t)*value;
+    transfer_number(codec, &bits, 8);
+    memcpy(value, &bits, sizeof bits);
+}
+
+/* A value outside the bounds leaves the old one and is noted. */
 static int64_t transfer_integer(struct codec *codec, const char *name, int64_t value,
                                 int64_t smallest, int64_t largest) {
-    uint64_t bits = (uint64_t)value;
-    transfer_number(codec, &bits, 8);
-    int64_t read;
-    memcpy(&read, &bits, sizeof read);
+    int64_t read = value;
+    codec_int64(codec, &read);
     if (read < smallest || read > largest) {
         codec->bad_field = codec->bad_field != NULL ? codec->bad_field : name;
         return value;
     }
     return read;
-}
-
-void codec_long(struct codec *codec, const char *name, long *value) {
-    *value = (long)transfer_integer(codec, name, *value, LONG_MIN, LONG_MAX);
 }
 
 void codec_int(struct codec *codec, const char *name, int *value) {

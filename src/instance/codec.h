@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 struct codec {
     enum { CODEC_COUNTING, CODEC_WRITING, CODEC_READING } mode;
@@ -28,9 +29,9 @@ void codec_end(struct codec *codec);
  * length: bytes expected in all. */
 const char *codec_check(struct codec *codec, const char *guid, size_t length);
 
-/* One field, 8 bytes. The name is static text. */
+/* One field, 8 bytes. The name is static text, of a field whose type does not have all values. */
 void codec_real(struct codec *codec, double *value);
-void codec_long(struct codec *codec, const char *name, long *value);
+void codec_int64(struct codec *codec, int64_t *value);
 void codec_int(struct codec *codec, const char *name, int *value);
 void codec_unsigned(struct codec *codec, const char *name, unsigned *value);
 void codec_bool(struct codec *codec, const char *name, bool *value);

@@ -95,7 +95,7 @@ static enum status restart(struct instance *instance, struct clock_time end) {
 static enum status replay(struct instance *instance) {
     const struct instance_state *state = &instance->state;
     const struct span states = instance->model->states;
-    const long steps = state->statistics.steps - state->steps_before_restart;
+    const int64_t steps = state->statistics.steps - state->steps_before_restart;
     double *x = doubles_of(instance->first_derivatives, states);
     double reached;
     instance_prepare_inputs(instance);

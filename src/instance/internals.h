@@ -37,7 +37,7 @@ struct instance_state {
     double first_time;  /* s since the restart */
     double latest_time; /* s since the restart */
     struct integrator_statistics statistics;
-    long steps_before_restart; /* internal steps */
+    int64_t steps_before_restart; /* internal steps */
     double restart_step; /* s: first internal step of the last restart; 0: the method found one */
     double next_step;    /* s: the same, for a restart now */
 };

@@ -27,8 +27,8 @@ static bool are_possible(const struct instance *instance, const struct named_val
 
 #define COUNT(array) (sizeof(array) / sizeof(array)[0])
 
-static bool is_count(long value) {
-    return value >= 0 && value <= LONG_MAX / 2; // can be counted on from without overflow
+static bool is_count(int64_t value) {
+    return value >= 0 && value <= INT64_MAX / 2; // can be counted on from without overflow
 }
 
 static bool is_step(double value) {
@@ -80,8 +80,8 @@ static bool has_possible_statistics(const struct instance *instance,
 /* What a replay of the integrator's history needs. */
 static bool has_possible_history(const struct instance *instance,
                                  const struct instance_state *state) {
-    const long steps = state->statistics.steps - state->steps_before_restart;
-    const long most_steps = INSTANCE_LONGEST_HISTORY + (long)state->own.max_internal_steps;
+    const int64_t steps = state->statistics.steps - state->steps_before_restart;
+    const int64_t most_steps = INSTANCE_LONGEST_HISTORY + (int64_t)state->own.max_internal_steps;
     const bool exists = state->has_history;
     const struct named_value values[] = {
         {"restart_time", state->restart_time.s, isfinite(state->restart_time.s)},

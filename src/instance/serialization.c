@@ -28,10 +28,10 @@ static void transfer_own(struct codec *codec, struct instance_values *own) {
 }
 
 static void transfer_statistics(struct codec *codec, struct integrator_statistics *statistics) {
-    codec_long(codec, "steps", &statistics->steps);
-    codec_long(codec, "rhs_evaluations", &statistics->rhs_evaluations);
-    codec_long(codec, "failed_steps", &statistics->failed_steps);
-    codec_long(codec, "restarts", &statistics->restarts);
+    codec_int64(codec, &statistics->steps);
+    codec_int64(codec, &statistics->rhs_evaluations);
+    codec_int64(codec, &statistics->failed_steps);
+    codec_int64(codec, &statistics->restarts);
     codec_real(codec, &statistics->last_step);
     codec_int(codec, "last_order", &statistics->last_order);
 }
@@ -83,7 +83,7 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_real(codec, &state->first_time);
     codec_real(codec, &state->latest_time);
     transfer_statistics(codec, &state->statistics);
-    codec_long(codec, "steps_before_restart", &state->steps_before_restart);
+    codec_int64(codec, &state->steps_before_restart);
     codec_real(codec, &state->restart_step);
     codec_real(codec, &state->next_step);
     transfer_values(codec, instance->description, block + (memory->values - memory->block));

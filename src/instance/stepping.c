@@ -39,7 +39,7 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
     return STATUS_OK;
 }
 
-static int saturated(long count) {
+static int saturated(int64_t count) {
     return count > INT_MAX ? INT_MAX : (int)count;
 }
 

@@ -179,7 +179,7 @@ static void accept(struct integrator *integrator, double t) {
     integrator->problem.reached = t;
 }
 
-static enum status advance(struct integrator *integrator, double t, long max_steps) {
+static enum status advance(struct integrator *integrator, double t, int64_t max_steps) {
     struct problem *problem = &integrator->problem;
     struct method_work work = {0};
     double stopped_at = problem->reached;
@@ -197,7 +197,7 @@ static enum status advance(struct integrator *integrator, double t, long max_ste
     return status;
 }
 
-enum status integrator_advance(struct integrator *integrator, double t, long max_steps,
+enum status integrator_advance(struct integrator *integrator, double t, int64_t max_steps,
                                double *reached, double x[]) {
     enum status status = STATUS_OK;
     if (can_interpolate(integrator, t)) {

@@ -14,6 +14,7 @@
 #include "platform.h"
 
 #include <stdbool.h>
+#include <stdint.h>
 
 struct integrator;
 
@@ -46,10 +47,10 @@ struct integrator_settings {
 
 /* Totals since integrator_configure, and the last internal step. */
 struct integrator_statistics {
-    long steps;           /* internal steps */
-    long rhs_evaluations; /* calls of the right-hand side */
-    long failed_steps;    /* attempts that the error test or the iteration refused */
-    long restarts;
+    int64_t steps;           /* internal steps */
+    int64_t rhs_evaluations; /* calls of the right-hand side */
+    int64_t failed_steps;    /* attempts that the error test or the iteration refused */
+    int64_t restarts;
     double last_step; /* s: length of the last internal step */
     int last_order;   /* its order */
 };
@@ -90,7 +91,7 @@ NONNULL double integrator_next_step(const struct integrator *integrator);
  * Deterministic: after a restart, results depend only on its arguments and the first t, which
  * bounds the first internal step. With a history, stops at further times do not matter. */
 MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
-                                                  long max_steps, double *reached, double x[]);
+                                                  int64_t max_steps, double *reached, double x[]);
 
 NONNULL void integrator_get_statistics(const struct integrator *integrator,
                                        struct integrator_statistics *statistics);

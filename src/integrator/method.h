@@ -43,7 +43,7 @@ struct method {
      * steps at most. Writes the last valid time to *stopped_at, also on failure, and the state
      * there to x.
      */
-    enum status (*advance)(void *memory, double t, long max_steps, const double begin_x[],
+    enum status (*advance)(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work);
 
     /* Writes the state at t, which the last internal step has passed, to x; false: it cannot, an

@@ -205,10 +205,10 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
-static int integrate(struct cvode *cvode, double t, long max_steps, double *stopped_at,
+static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
                      double x[]) {
     const struct problem *problem = cvode->base.problem;
-    int flag = CVodeSetMaxNumSteps(cvode->solver, max_steps);
+    int flag = CVodeSetMaxNumSteps(cvode->solver, sundials_steps(max_steps));
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
         flag = CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
     }
@@ -255,7 +255,7 @@ static void measure_work(struct cvode *cvode, struct method_work *work) {
     cvode->counted = now;
 }
 
-static enum status advance(void *memory, double t, long max_steps, const double begin_x[],
+static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work) {
     struct cvode *cvode = memory;
     (void)begin_x; // CVODE has it

@@ -141,7 +141,7 @@ static void add_work(const struct erk *erk, struct method_work *work) {
 /* Step by step, after ERKStep has failed: it gives up at the first right-hand side that cannot be
  * evaluated, and then reports the time of that evaluation, not the one of its last state. Here ever
  * shorter steps are tried. x: the last valid state. */
-static int advance_carefully(struct erk *erk, double begin, double end, long max_steps,
+static int advance_carefully(struct erk *erk, double begin, double end, int64_t max_steps,
                              const double begin_x[], double *stopped_at, double x[],
                              struct method_work *work) {
     const struct problem *problem = erk->base.problem;
@@ -150,7 +150,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, long max
     sundials_set_state(&erk->base, begin_x);
     sundials_get_state(&erk->base, x);
     int flag = start(erk, begin, end, erk->next_step);
-    for (long steps = 0; flag >= 0 && good < end; steps++) {
+    for (int64_t steps = 0; flag >= 0 && good < end; steps++) {
         if (steps == max_steps) {
             flag = ARK_TOO_MUCH_WORK;
             break;
@@ -174,7 +174,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, long max
     return flag;
 }
 
-static int integrate(struct erk *erk, double t, long max_steps, const double begin_x[],
+static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
                      double *stopped_at, double x[], struct method_work *work) {
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
@@ -183,7 +183,7 @@ static int integrate(struct erk *erk, double t, long max_steps, const double beg
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
-        flag = ERKStepSetMaxNumSteps(erk->solver, max_steps);
+        flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
     }
     if (flag == ARK_SUCCESS) {
         flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_NORMAL);
@@ -198,7 +198,7 @@ static int integrate(struct erk *erk, double t, long max_steps, const double beg
     return flag;
 }
 
-static enum status advance(void *memory, double t, long max_steps, const double begin_x[],
+static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work) {
     struct erk *erk = memory;
     const struct problem *problem = erk->base.problem;

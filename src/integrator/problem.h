@@ -10,11 +10,11 @@ struct problem {
     struct ode ode;
     struct message_sink sink;
     struct integrator_settings settings;
-    double span;           /* the right-hand side is not evaluated beyond */
-    double first_step;     /* length of the first internal step, s; 0: the method finds one */
-    double reached;        /* where the last advance ended; 0 after a restart */
-    double failed_at;      /* last time at which the right-hand side failed; -INFINITY: none */
-    long evaluation_count; /* calls of the right-hand side */
+    double span;              /* the right-hand side is not evaluated beyond */
+    double first_step;        /* length of the first internal step, s; 0: the method finds one */
+    double reached;           /* where the last advance ended; 0 after a restart */
+    double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
+    int64_t evaluation_count; /* calls of the right-hand side */
 };
 
 /* All values are finite: 0 x is 0 for finite values only. */

@@ -9,17 +9,17 @@ static const char guid[] = "{guid}";
 
 struct fields {
     double real;
-    long number;
+    int64_t number;
     int small;
     unsigned natural;
     bool flag;
 };
 
-static const struct fields some = {-0.1, LONG_MIN, INT_MAX, UINT_MAX, true};
+static const struct fields some = {-0.1, INT64_MIN, INT_MAX, UINT_MAX, true};
 
 static void transfer(struct codec *codec, struct fields *fields) {
     codec_real(codec, &fields->real);
-    codec_long(codec, "number", &fields->number);
+    codec_int64(codec, &fields->number);
     codec_int(codec, "small", &fields->small);
     codec_unsigned(codec, "natural", &fields->natural);
     codec_bool(codec, "flag", &fields->flag);

@@ -58,8 +58,8 @@ static void check_real(double *value, const char *name, const double good[2], co
     TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
 }
 
-static void check_count(long *value, const char *name, long good, const long bad[2]) {
-    const long kept = *value;
+static void check_count(int64_t *value, const char *name, int64_t good, const int64_t bad[2]) {
+    const int64_t kept = *value;
     *value = good;
     TEST_ASSERT_TRUE_MESSAGE(is_plausible(), name);
     for (int i = 0; i < 2; i++) {
@@ -103,13 +103,13 @@ static void test_steps_and_tolerances_are_not_negative(void) {
 
 static void test_counts_can_be_counted_on_from(void) {
     struct integrator_statistics *totals = &state.statistics;
-    const long bad[2] = {-1, LONG_MAX / 2 + 1};
+    const int64_t bad[2] = {-1, INT64_MAX / 2 + 1};
     check_count(&totals->rhs_evaluations, "solver_rhs_evaluations", 0, bad);
-    check_count(&totals->rhs_evaluations, "solver_rhs_evaluations", LONG_MAX / 2, bad);
+    check_count(&totals->rhs_evaluations, "solver_rhs_evaluations", INT64_MAX / 2, bad);
     check_count(&totals->failed_steps, "solver_failed_steps", 0, bad);
     check_count(&totals->restarts, "solver_restarts", 0, bad);
     check_count(&totals->steps, "solver_steps", totals->steps, bad);
-    const long before[2] = {-1, totals->steps + 1};
+    const int64_t before[2] = {-1, totals->steps + 1};
     check_count(&state.steps_before_restart, "steps before the restart", 0, before);
 }
 
@@ -154,7 +154,7 @@ static void test_a_history_does_not_contradict_itself(void) {
     check_real(&state.span, "span", span, not_span);
 
     // internal steps since the restart: at least one, and no more than restart and step allow
-    const long most = INSTANCE_LONGEST_HISTORY + (long)state.own.max_internal_steps;
+    const int64_t most = INSTANCE_LONGEST_HISTORY + (int64_t)state.own.max_internal_steps;
     state.statistics.steps = state.steps_before_restart + most;
     TEST_ASSERT_TRUE(is_plausible());
     state.statistics.steps++;

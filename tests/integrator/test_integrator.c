@@ -365,7 +365,7 @@ EACH_METHOD static void test_advances_need_no_second_attempt(void) {
     restart(INFINITY);
     advance(t, x);
     integrator_get_statistics(integrator, &statistics);
-    const long failed = statistics.failed_steps;
+    const int64_t failed = statistics.failed_steps;
     for (int i = 0; i < 50; i++) {
         t += 2.3 * (integrator_has_history(integrator) ? statistics.last_step
                                                        : integrator_next_step(integrator));
@@ -413,7 +413,7 @@ EACH_METHOD static void test_a_vanishing_step_ends_in_the_same_way_each_time(voi
     static const double lengths[] = {5e-324, 1e-300, 1e-200};
     for (size_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
         enum status statuses[2];
-        long evaluations[2];
+        int64_t evaluations[2];
         for (int k = 0; k < 2; k++) {
             struct integrator_statistics statistics;
             double x[2];
