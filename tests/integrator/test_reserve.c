@@ -47,7 +47,7 @@ static void test_blocks_are_zeroed_aligned_and_apart(void) {
 
 static void test_a_destroyed_reserve_is_empty(void) {
     reserve_enter(&reserve);
-    TEST_ASSERT_NOT_NULL(reserve_take(100));
+    TEST_ASSERT_NOT_NULL(reserve_malloc(100));
     reserve_leave(&reserve);
     for (int i = 0; i < 2; i++) {
         reserve_destroy(&reserve);
