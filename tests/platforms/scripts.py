@@ -134,7 +134,7 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "solver_method": [1, 2, 3],
     },
     "RPController": {
-        "Ki1": 20.0, "Ki2": 10.0, "tau1_max": 8.0, "f2_max": 9.0, "integral1": 0.01,
+        "Ki1": 20.0, "Ki2": 10.0, "tau1_max": 300.0, "f2_max": 200.0, "integral1": 0.01,
         "mode": [1, 2, 3], "solver_method": [1, 2, 3],
     },
     "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3]},

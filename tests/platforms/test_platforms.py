@@ -54,7 +54,7 @@ def test_all_values_states_and_messages_are_the_same(
     (expected,) = native.run(script)
     (actual,) = other.run(script)
     difference = first_difference(script, expected, actual)
-    assert difference is None, f"native and {row.name} differ at\n{difference}"
+    assert difference is None, f"native and {row.name} differ in {difference}"
 
 
 # ---- States --------------------------------------------------------------------------------------

@@ -20,7 +20,9 @@ class Answer:
 
     @property
     def reals(self) -> list[float]:
-        return [struct.unpack(">d", bytes.fromhex(word))[0] for word in self.words]
+        """Of all words that are the bits of a double."""
+        words = (word for word in self.words if len(word) == 16)
+        return [struct.unpack(">d", bytes.fromhex(word))[0] for word in words]
 
 
 def read(script: Script, transcript: bytes) -> list[Answer]:
@@ -43,12 +45,19 @@ def read(script: Script, transcript: bytes) -> list[Answer]:
 
 
 def first_difference(script: Script, expected: bytes, actual: bytes) -> str | None:
-    """A text about the first line that differs, with the call; None if all bytes are equal."""
+    """A text about the first line that differs: the call, and what differs in its answer; None if
+    all bytes are equal."""
     if expected == actual:
         return None
-    pairs = zip(expected.splitlines(), actual.splitlines(), strict=False)
-    for one, other in pairs:
-        if one != other:
-            number = int(one.split(b" ")[0])
-            return f"{script.lines[number - 1]}\n- {one.decode()}\n+ {other.decode()}"
-    return f"one transcript ends before the other: {len(expected)} and {len(actual)} bytes"
+    lines = list(zip(expected.splitlines(), actual.splitlines(), strict=False))
+    different = [(one, other) for one, other in lines if one != other]
+    if not different:
+        return f"one transcript ends before the other: {len(expected)} and {len(actual)} bytes"
+    first = [line.decode().split(" ") for line in different[0]]
+    call = script.lines[int(first[0][0]) - 1]
+    words = [
+        f"word {i}: {one} and {other}"
+        for i, (one, other) in enumerate(zip(*first, strict=False))
+        if one != other
+    ]
+    return f"{len(different)} of {len(lines)} lines; the first: {call}\n" + "\n".join(words)

@@ -1,0 +1,406 @@
+#include "calls.h"
+
+#include <string.h>
+
+/* ---- Life ------------------------------------------------------------------------------------ */
+
+static void call_GetTypesPlatform(struct run *run) {
+    run_write_line(run, run->fmi->GetTypesPlatform());
+}
+
+static void call_GetVersion(struct run *run) {
+    run_write_line(run, run->fmi->GetVersion());
+}
+
+/* place, kind, GUID, logging on, name */
+static void call_Instantiate(struct run *run) {
+    const size_t place = run_read_place(run);
+    const fmi2Type kind = (fmi2Type)run_read_integer(run);
+    const char *guid = run_read_text(run);
+    const fmi2Boolean logging_on = run_read_integer(run);
+    const char *name = run_read_text(run);
+    run->instances[place] =
+        run->fmi->Instantiate(name, kind, guid, "", &run->callbacks, fmi2False, logging_on);
+    run_write_line(run, run->instances[place] != NULL ? "OK" : "NULL");
+}
+
+static void call_FreeInstance(struct run *run) {
+    const size_t place = run_read_place(run);
+    run->fmi->FreeInstance(run->instances[place]);
+    run->instances[place] = NULL;
+    run_write_status(run, fmi2OK);
+}
+
+static void call_SetDebugLogging(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2Boolean on = run_read_integer(run);
+    size_t count = 0;
+    while (run_words_left(run) > 0 && count < MOST_VALUES) {
+        run->strings[count++] = run_read_text(run);
+    }
+    run_write_status(run, run->fmi->SetDebugLogging(c, on, count, run->strings));
+}
+
+/* tolerance or "-", start time, stop time or "-" */
+static void call_SetupExperiment(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2Boolean has_tolerance = !run_skip(run, "-");
+    const double tolerance = has_tolerance ? run_read_real(run) : 0.0;
+    const double start = run_read_real(run);
+    const fmi2Boolean has_stop = !run_skip(run, "-");
+    const double stop = has_stop ? run_read_real(run) : 0.0;
+    run_write_status(run,
+                     run->fmi->SetupExperiment(c, has_tolerance, tolerance, start, has_stop, stop));
+}
+
+/* Functions with an instance and nothing else. */
+#define CALL_WITH_INSTANCE(name)                                                                   \
+    static void call_##name(struct run *run) {                                                     \
+        run_write_status(run, run->fmi->name(run_read_instance(run)));                             \
+    }
+CALL_WITH_INSTANCE(EnterInitializationMode)
+CALL_WITH_INSTANCE(ExitInitializationMode)
+CALL_WITH_INSTANCE(Terminate)
+CALL_WITH_INSTANCE(Reset)
+CALL_WITH_INSTANCE(EnterEventMode)
+CALL_WITH_INSTANCE(EnterContinuousTimeMode)
+CALL_WITH_INSTANCE(CancelStep)
+
+/* ---- Values ---------------------------------------------------------------------------------- */
+
+static void call_GetReal(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = run_read_references(run, run->references);
+    run_write_status(run, run->fmi->GetReal(c, run->references, count, run->results));
+    run_write_reals(run, run->results, count);
+}
+
+static void call_GetInteger(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = run_read_references(run, run->references);
+    run_write_status(run, run->fmi->GetInteger(c, run->references, count, run->integers));
+    run_write_integers(run, run->integers, count);
+}
+
+static void call_GetBoolean(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = run_read_references(run, run->references);
+    run_write_status(run, run->fmi->GetBoolean(c, run->references, count, run->integers));
+}
+
+static void call_GetString(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = run_read_references(run, run->references);
+    run_write_status(run, run->fmi->GetString(c, run->references, count, run->strings));
+}
+
+/* Value references, each with a value. */
+static void call_SetReal(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    size_t count = 0;
+    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
+        run->references[count] = (fmi2ValueReference)run_read_integer(run);
+        run->reals[count] = run_read_real(run);
+    }
+    run_write_status(run, run->fmi->SetReal(c, run->references, count, run->reals));
+}
+
+static size_t read_integers(struct run *run) {
+    size_t count = 0;
+    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
+        run->references[count] = (fmi2ValueReference)run_read_integer(run);
+        run->integers[count] = run_read_integer(run);
+    }
+    return count;
+}
+
+static void call_SetInteger(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = read_integers(run);
+    run_write_status(run, run->fmi->SetInteger(c, run->references, count, run->integers));
+}
+
+static void call_SetBoolean(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = read_integers(run);
+    run_write_status(run, run->fmi->SetBoolean(c, run->references, count, run->integers));
+}
+
+static void call_SetString(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    size_t count = 0;
+    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
+        run->references[count] = (fmi2ValueReference)run_read_integer(run);
+        run->strings[count] = run_read_text(run);
+    }
+    run_write_status(run, run->fmi->SetString(c, run->references, count, run->strings));
+}
+
+/* ---- FMU states ------------------------------------------------------------------------------ */
+
+static void call_GetFMUstate(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    run_write_status(run, run->fmi->GetFMUstate(c, run_read_state(run)));
+}
+
+static void call_SetFMUstate(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2FMUstate *state = run_read_state(run);
+    run_write_status(run, run->fmi->SetFMUstate(c, state != NULL ? *state : NULL));
+}
+
+static void call_FreeFMUstate(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    run_write_status(run, run->fmi->FreeFMUstate(c, run_read_state(run)));
+}
+
+static void call_SerializedFMUstateSize(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2FMUstate state = run->states[run_read_place(run)];
+    size_t size = 0;
+    run_write_status(run, run->fmi->SerializedFMUstateSize(c, state, &size));
+    run_write_hex(run, size, 8);
+}
+
+/* instance, state, bytes, and where it is wrong, a size */
+static void call_SerializeFMUstate(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2FMUstate state = run->states[run_read_place(run)];
+    struct bytes *to = run_read_bytes(run);
+    if (run_words_left(run) > 0) {
+        to->size = (size_t)run_read_integer(run) % sizeof to->data;
+    } else if (run->fmi->SerializedFMUstateSize(c, state, &to->size) != fmi2OK ||
+               to->size > sizeof to->data) {
+        run_mistake(run, "the state has no size, or too large a one");
+        return;
+    }
+    memset(to->data, 0, sizeof to->data);
+    run_write_status(run, run->fmi->SerializeFMUstate(c, state, to->data, to->size));
+    fputc(' ', run->transcript);
+    for (size_t i = 0; i < to->size; i++) {
+        fprintf(run->transcript, "%02x", (unsigned)(unsigned char)to->data[i]);
+    }
+}
+
+/* instance, bytes, state */
+static void call_DeSerializeFMUstate(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const struct bytes *from = run_read_bytes(run);
+    run_write_status(run,
+                     run->fmi->DeSerializeFMUstate(c, from->data, from->size, run_read_state(run)));
+}
+
+static void set_byte(struct run *run, struct bytes *bytes, size_t place, const char *digits) {
+    bytes->data[place] = (char)(unsigned char)run_read_hex(run, digits, 2);
+}
+
+static void call_bytes(struct run *run) {
+    struct bytes *to = run_read_bytes(run);
+    const char *digits = run_read_word(run);
+    to->size = strlen(digits) / 2;
+    if (to->size > sizeof to->data) {
+        run_mistake(run, "too many bytes");
+        return;
+    }
+    for (size_t i = 0; i < to->size; i++) {
+        set_byte(run, to, i, digits + 2 * i);
+    }
+    run_write_status(run, fmi2OK);
+}
+
+static void call_poke(struct run *run) {
+    struct bytes *bytes = run_read_bytes(run);
+    const int place = run_read_integer(run);
+    if (place < 0 || (size_t)place >= bytes->size) {
+        run_mistake(run, "there is no such byte");
+        return;
+    }
+    set_byte(run, bytes, (size_t)place, run_read_word(run));
+    run_write_status(run, fmi2OK);
+}
+
+static void call_cut(struct run *run) {
+    struct bytes *bytes = run_read_bytes(run);
+    bytes->size = (size_t)run_read_integer(run) % sizeof bytes->data;
+    run_write_status(run, fmi2OK);
+}
+
+/* ---- Derivatives ----------------------------------------------------------------------------- */
+
+/* Unknowns, "/", knowns, each with a value. */
+static void call_GetDirectionalDerivative(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t unknowns = run_read_references(run, run->references);
+    size_t knowns = 0;
+    for (; run_words_left(run) > 0 && knowns < MOST_VALUES; knowns++) {
+        run->others[knowns] = (fmi2ValueReference)run_read_integer(run);
+        run->reals[knowns] = run_read_real(run);
+    }
+    run_write_status(run,
+                     run->fmi->GetDirectionalDerivative(c, run->references, unknowns, run->others,
+                                                        knowns, run->reals, run->results));
+    run_write_reals(run, run->results, unknowns);
+}
+
+/* Value references, each with an order and a value. */
+static void call_SetRealInputDerivatives(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    size_t count = 0;
+    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
+        run->references[count] = (fmi2ValueReference)run_read_integer(run);
+        run->orders[count] = run_read_integer(run);
+        run->reals[count] = run_read_real(run);
+    }
+    run_write_status(
+        run, run->fmi->SetRealInputDerivatives(c, run->references, count, run->orders, run->reals));
+}
+
+/* Value references, each with an order. */
+static void call_GetRealOutputDerivatives(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    size_t count = 0;
+    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
+        run->references[count] = (fmi2ValueReference)run_read_integer(run);
+        run->orders[count] = run_read_integer(run);
+    }
+    run_write_status(run, run->fmi->GetRealOutputDerivatives(c, run->references, count, run->orders,
+                                                             run->results));
+    run_write_reals(run, run->results, count);
+}
+
+/* ---- Co-Simulation --------------------------------------------------------------------------- */
+
+static void call_DoStep(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const double time = run_read_real(run);
+    const double step = run_read_real(run);
+    run_write_status(run, run->fmi->DoStep(c, time, step, fmi2False));
+}
+
+static void call_GetStatus(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    fmi2Status value = fmi2Pending;
+    run_write_status(run, run->fmi->GetStatus(c, (fmi2StatusKind)run_read_integer(run), &value));
+}
+
+static void call_GetRealStatus(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
+    run_write_status(run, run->fmi->GetRealStatus(c, kind, run->results));
+    run_write_reals(run, run->results, 1);
+}
+
+static void call_GetIntegerStatus(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
+    run_write_status(run, run->fmi->GetIntegerStatus(c, kind, run->integers));
+}
+
+static void call_GetBooleanStatus(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
+    run_write_status(run, run->fmi->GetBooleanStatus(c, kind, run->integers));
+    run_write_integers(run, run->integers, 1);
+}
+
+static void call_GetStringStatus(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
+    run_write_status(run, run->fmi->GetStringStatus(c, kind, run->strings));
+}
+
+/* ---- Model Exchange -------------------------------------------------------------------------- */
+
+static void call_NewDiscreteStates(struct run *run) {
+    fmi2EventInfo info = {0};
+    run_write_status(run, run->fmi->NewDiscreteStates(run_read_instance(run), &info));
+    const fmi2Integer flags[] = {
+        info.newDiscreteStatesNeeded,
+        info.terminateSimulation,
+        info.nominalsOfContinuousStatesChanged,
+        info.valuesOfContinuousStatesChanged,
+        info.nextEventTimeDefined,
+    };
+    run_write_integers(run, flags, sizeof flags / sizeof flags[0]);
+}
+
+static void call_CompletedIntegratorStep(struct run *run) {
+    fmi2Boolean flags[2] = {fmi2True, fmi2True};
+    run_write_status(run, run->fmi->CompletedIntegratorStep(run_read_instance(run), fmi2True,
+                                                            &flags[0], &flags[1]));
+    run_write_integers(run, flags, 2);
+}
+
+static void call_SetTime(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    run_write_status(run, run->fmi->SetTime(c, run_read_real(run)));
+}
+
+static void call_SetContinuousStates(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    size_t count = 0;
+    while (run_words_left(run) > 0 && count < MOST_VALUES) {
+        run->reals[count++] = run_read_real(run);
+    }
+    run_write_status(run, run->fmi->SetContinuousStates(c, run->reals, count));
+}
+
+/* Functions that write a given number of values. */
+#define CALL_WITH_COUNT(name)                                                                      \
+    static void call_##name(struct run *run) {                                                     \
+        const fmi2Component c = run_read_instance(run);                                            \
+        const size_t count = (size_t)run_read_integer(run) % MOST_VALUES;                          \
+        run_write_status(run, run->fmi->name(c, run->results, count));                             \
+        run_write_reals(run, run->results, count);                                                 \
+    }
+CALL_WITH_COUNT(GetDerivatives)
+CALL_WITH_COUNT(GetEventIndicators)
+CALL_WITH_COUNT(GetContinuousStates)
+CALL_WITH_COUNT(GetNominalsOfContinuousStates)
+
+static fmi2Status worse(fmi2Status a, fmi2Status b) {
+    return a > b ? a : b;
+}
+
+/* A step of Euler's method; its length is a power of two, so that a fused multiply-add of the host
+ * gives the same bits. */
+static void call_Euler(struct run *run) {
+    const fmi2Component c = run_read_instance(run);
+    const size_t count = (size_t)run_read_integer(run) % MOST_VALUES;
+    const double step = run_read_real(run);
+    fmi2Boolean flags[2] = {fmi2True, fmi2True};
+    fmi2Status status = run->fmi->GetContinuousStates(c, run->reals, count);
+    status = worse(status, run->fmi->GetDerivatives(c, run->results, count));
+    for (size_t i = 0; i < count; i++) {
+        run->reals[i] += step * run->results[i];
+    }
+    status = worse(status, run->fmi->SetContinuousStates(c, run->reals, count));
+    status = worse(status, run->fmi->CompletedIntegratorStep(c, fmi2True, &flags[0], &flags[1]));
+    run_write_status(run, status);
+    run_write_reals(run, run->reals, count);
+    run_write_integers(run, flags, 2);
+}
+
+/* ---- All of them ----------------------------------------------------------------------------- */
+
+static const struct {
+    const char *name;
+    call_function *call;
+} all[] = {
+#define COMMAND(name) {#name, call_##name},
+    FMI2_FUNCTION_LIST(COMMAND)
+#undef COMMAND
+        {"bytes", call_bytes},
+    {"poke", call_poke},
+    {"cut", call_cut},
+    {"Euler", call_Euler},
+};
+
+call_function *call_find(const char *name) {
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        if (strcmp(name, all[i].name) == 0) {
+            return all[i].call;
+        }
+    }
+    return NULL;
+}

@@ -1,0 +1,339 @@
+"""What the native transcripts say is right, so that others are not compared with nonsense.
+
+Statuses are those of the standard, values those of physics; no number was stored here before.
+"""
+
+import math
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tests.platforms import refusals, scripts
+from tests.platforms.platforms import FMUS, Runner, runner
+from tests.platforms.scripts import METHODS, Model, Script, bits, joined
+from tests.platforms.transcript import NOT_WRITTEN, Answer, first_difference, read
+
+each_fmu = pytest.mark.parametrize("name", FMUS)
+
+
+@pytest.fixture
+def native(fmu: Path, tmp_path: Path, name: str) -> Runner:
+    return runner(None, name, fmu, tmp_path)
+
+
+@pytest.fixture
+def arm(fmu: Path, tmp_path: Path) -> Runner:
+    return runner(None, "RPManipulator", fmu, tmp_path)
+
+
+def answers_of(native: Runner, script: Script) -> list[Answer]:
+    (transcript,) = native.run(script)
+    return read(script, transcript)
+
+
+def rows(model: Model, answers: list[Answer], place: int) -> list[dict[str, float]]:
+    """Values by name, for every time that all of one instance were read."""
+    call = " ".join(["GetReal", str(place), *map(str, model.reals())])
+    names = {v.reference: v.name for v in reversed(model.variables) if v.kind == "Real"}
+    return [
+        dict(zip((names[r] for r in model.reals()), a.reals, strict=True))
+        for a in answers
+        if a.call == call
+    ]
+
+
+def held_rows(model: Model, answers: list[Answer]) -> list[dict[str, float]]:
+    """As rows, of instance 0, without those after a step with derivatives of inputs: outputs are
+    those of the input then, which moved, and the input reads as it was set."""
+    found = []
+    is_moved = False
+    for answer in answers:
+        if answer.call.startswith("SetRealInputDerivatives 0"):
+            is_moved = True
+        elif answer.call.startswith("SetReal 0"):
+            is_moved = False
+        elif not is_moved:
+            found += rows(model, [answer], 0)
+    return found
+
+
+# ---- Statuses and messages -----------------------------------------------------------------------
+
+
+def whole(model: Model) -> Script:
+    return joined(
+        *(scripts.co_simulation(model, variant) for variant in (1, 2, 3)),
+        scripts.model_exchange(model),
+        refusals.refusals(model),
+        refusals.logging(model),
+    )
+
+
+@each_fmu
+def test_every_status_is_that_of_the_standard(native: Runner, name: str) -> None:
+    script = whole(native.model)
+    for answer, expected in zip(answers_of(native, script), script.statuses, strict=True):
+        assert answer.status == expected, answer.call
+
+
+@each_fmu
+def test_every_refusal_says_why_and_writes_nothing(native: Runner, name: str) -> None:
+    script = refusals.refusals(native.model)
+    refused = Counter()
+    for answer in answers_of(native, script):
+        function, place = answer.call.split()[:2]
+        reasons = [(status, category) for _, status, category, _ in answer.log]
+        if answer.status == "OK":
+            assert {status for status, _ in reasons} <= {"OK"}, answer.call
+        elif place != "-":
+            status = "Error" if answer.status == "NULL" else answer.status
+            assert (status, f"logStatus{status}") in reasons, answer.call
+            refused[function, answer.status] += 1
+        if answer.status != "OK" and function.startswith("GetReal"):
+            assert set(answer.words) <= {NOT_WRITTEN}, answer.call
+    states = native.model.states
+    assert refused["Instantiate", "NULL"] == 4
+    assert refused["DoStep", "Error"] > 30 and (refused["DoStep", "Discard"] == 3) == bool(states)
+    assert refused["SetReal", "Discard"] >= len(refusals.NOT_FINITE)
+    assert refused["DeSerializeFMUstate", "Error"] == 11
+    assert len(refused) >= 25
+
+
+@each_fmu
+def test_messages_have_the_values_that_were_refused(native: Runner, name: str) -> None:
+    texts = [
+        text
+        for answer in answers_of(native, refusals.refusals(native.model))
+        for *_, text in answer.log
+    ]
+    found = Counter(
+        word for text in texts for word in ("nan", "inf", "-inf") if f" {word} " in text
+    )
+    assert found["nan"] > 10 and found["inf"] > 5 and found["-inf"] > 5
+    assert not [text for text in texts if "-nan" in text or "nan(" in text]
+    # six digits and seventeen
+    assert any("-1e+300 s from t = 1.0000000000000001e+300" in text for text in texts)
+    assert any("-0.333333 s from t = 0.33333333333333331" in text for text in texts)
+
+
+@each_fmu
+def test_categories_are_logged_one_by_one(native: Runner, name: str) -> None:
+    script = refusals.logging(native.model)
+    answers = answers_of(native, script)
+    names = {instance for a in answers for instance, *_ in a.log}
+    assert names == {"plain", "ünïcödé", "100%d#r1#", "logger"}
+    seen: dict[str, set[str]] = {}
+    for answer in answers:
+        if answer.call.startswith("SetDebugLogging 0"):
+            chosen = " ".join(answer.call.split()[2:])
+            seen.setdefault(chosen, set())
+        elif seen:
+            seen[chosen] |= {category for _, _, category, _ in answer.log}
+    sent = {"logEvents", "logStatusDiscard", "logStatusError", "logAll"}
+    if native.model.states:
+        sent.add("logStatusWarning")  # of a coarse tolerance
+    assert seen.pop("1") == sent
+    assert seen.pop("1 logAll") == sent
+    assert seen.pop("0") == seen.pop("0 logAll") == set()
+    seen.pop("1 logN%sthing#r1#", None)
+    for chosen, categories in seen.items():
+        assert categories == sent & {chosen.split()[1]}, chosen
+
+
+# ---- Values --------------------------------------------------------------------------------------
+
+
+@each_fmu
+def test_how_much_is_compared(native: Runner, name: str) -> None:
+    """Values by their bits, of which many differ, and bytes of states that all differ."""
+    answers = answers_of(native, whole(native.model))
+    reals = [word for a in answers for word in a.words if len(word) == 16]
+    assert len(reals) > 25_000 and len(set(reals)) > 4_000
+    states = [a.words[0] for a in answers if a.call.startswith("SerializeFMUstate") and a.words]
+    saved = [state for state in states if state.startswith(b"COSIMSTA".hex())]
+    assert native.model.guid.encode().hex() in saved[0]
+    assert len(set(saved)) >= 3 * 3 + 1 and min(map(len, saved)) > 2 * 300
+
+
+def test_methods_agree_and_have_other_bits(arm: Runner) -> None:
+    ends = []
+    for method in METHODS:
+        script = scripts.co_simulation(arm.model, method)
+        ends.append(rows(arm.model, answers_of(arm, script), 0)[-1])
+    for state in ("q1", "q2", "dq1", "dq2"):
+        values = [end[state] for end in ends]
+        assert len(set(values)) == len(METHODS)
+        assert max(values) - min(values) < 1e-4 * max(map(abs, values))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_arm_obeys_its_equations(arm: Runner, method: int) -> None:
+    script = scripts.co_simulation(arm.model, method)
+    answers = answers_of(arm, script)
+    points = rows(arm.model, answers, 0)
+    held = held_rows(arm.model, answers)
+    assert len(points) > scripts.STEPS and len(held) > scripts.STEPS / 2
+    for p in held:
+        moved = (
+            p["D11"] * p["ddq1"] + p["D12"] * p["ddq2"] + p["coriolis1"] + p["gravity1"],
+            p["D12"] * p["ddq1"] + p["D22"] * p["ddq2"] + p["coriolis2"] + p["gravity2"],
+        )
+        scale = 1.0 + max(abs(p[name]) for name in ("coriolis1", "coriolis2", "gravity1", "tau1"))
+        assert moved == pytest.approx((p["tau1"], p["f2"]), abs=1e-12 * scale)
+        assert math.hypot(p["ee_x"], p["ee_y"]) == pytest.approx(
+            math.hypot(p["l1"] + p["q2"], p["a"]), rel=1e-12
+        )
+        assert p["total_energy"] == pytest.approx(p["kinetic_energy"] + p["potential_energy"])
+    # speed is the slope of the position, over steps without a jump of an input
+    slopes = 0
+    for before, after in pairwise(points):
+        length = after["time"] - before["time"]
+        if 0.0 < length < 0.011:
+            mean = (before["dq1"] + after["dq1"]) / 2
+            bend = length * (abs(before["ddq1"]) + abs(after["ddq1"]))
+            assert after["q1"] - before["q1"] == pytest.approx(length * mean, abs=length * bend)
+            slopes += 1
+    assert slopes > scripts.STEPS / 3
+
+
+def test_derivatives_of_outputs_are_those_of_the_motion(arm: Runner) -> None:
+    model = arm.model
+    script = scripts.co_simulation(model, 1)
+    answers = answers_of(arm, script)
+    asked = 0
+    point: dict[str, float] = {}
+    for answer in answers:
+        found = rows(model, [answer], 0)
+        point = found[0] if found else point
+        if answer.call.startswith("GetRealOutputDerivatives 0"):
+            first = dict(zip(model.outputs, answer.reals[0::2], strict=True))
+            second = dict(zip(model.outputs, answer.reals[1::2], strict=True))
+            for joint in ("1", "2"):
+                position = model[f"q{joint}"].reference
+                assert first[position] == point[f"dq{joint}"]
+                assert second[position] == point[f"ddq{joint}"]
+            asked += 1
+        if answer.call.startswith("GetDirectionalDerivative 0") and asked:
+            moved = dict(zip(model.outputs, answer.reals, strict=True))
+            ddq1, ddq2 = (moved[model[name].reference] for name in ("ddq1", "ddq2"))
+            # the seeds of scripts.derivatives
+            assert point["D11"] * ddq1 + point["D12"] * ddq2 == pytest.approx(0.25, rel=1e-12)
+            assert point["D12"] * ddq1 + point["D22"] * ddq2 == pytest.approx(1.0, rel=1e-12)
+    assert asked == scripts.STEPS / 10
+
+
+@pytest.mark.parametrize("name", ["RPTrajectory"])
+def test_the_trajectory_moves_as_its_speeds_say(native: Runner) -> None:
+    for motion in (1, 2, 3):
+        script = scripts.co_simulation(native.model, motion)
+        points = rows(native.model, answers_of(native, script), 0)
+        moved = 0
+        for before, after in pairwise(points):
+            length = after["time"] - before["time"]
+            for joint in ("q1", "q2"):
+                mean = (before[f"d{joint}_ref"] + after[f"d{joint}_ref"]) / 2
+                difference = after[f"{joint}_ref"] - before[f"{joint}_ref"]
+                assert difference == pytest.approx(length * mean, abs=50 * abs(length) ** 3)
+                moved += difference != 0.0
+        assert moved > scripts.STEPS / 2
+
+
+@pytest.mark.parametrize("name", ["RPController"])
+def test_the_controller_sees_its_errors(native: Runner) -> None:
+    laws = set()
+    for variant in (1, 2, 3):
+        script = scripts.co_simulation(native.model, variant)
+        points = held_rows(native.model, answers_of(native, script))
+        for p in points:
+            for joint in ("q1", "q2", "dq1", "dq2"):
+                assert p[f"{joint}_error"] == p[f"{joint}_ref"] - p[joint]
+            assert abs(p["tau1"]) <= p["tau1_max"] and abs(p["f2"]) <= p["f2_max"]
+        assert {abs(p["tau1"]) == p["tau1_max"] for p in points} == {True, False}
+        laws.add(points[-1]["tau1_unlimited"])
+    assert len(laws) == 3
+
+
+# ---- Rollback ------------------------------------------------------------------------------------
+
+
+@each_fmu
+def test_undone_steps_are_undone_and_repeated_elsewhere(native: Runner, name: str) -> None:
+    model = native.model
+    for variant in (1, 2, 3):
+        script = scripts.co_simulation(model, variant)
+        answers = answers_of(native, script)
+        undone = 0
+        for i, answer in enumerate(answers):
+            if answer.call.startswith("SetFMUstate 1"):
+                first, second = (
+                    [a.words for a in answers[i:] if a.call.startswith(f"GetReal {place}")][:3]
+                    for place in (0, 1)
+                )
+                assert first == second
+            if answer.call.startswith("SetFMUstate 0"):
+                before = [a.words for a in answers[:i] if a.call.startswith("GetReal 0")]
+                assert answers[i + 1].words == before[-4] != before[-1]
+                undone += 1
+        assert undone == scripts.STEPS // 60
+
+
+@each_fmu
+def test_euler_steps_add_the_derivatives(native: Runner, name: str) -> None:
+    """x + h x' as Python adds it: h is a power of two, so that there is one rounding."""
+    script = scripts.model_exchange(native.model)
+    answers = answers_of(native, script)
+    steps = 0
+    x: list[float] | None = None
+    for before, answer in pairwise(answers):
+        if answer.call.startswith("Euler"):
+            stepped = answer.reals
+            if x is not None:
+                expected = [a + b / 256 for a, b in zip(x, before.reals, strict=True)]
+                assert stepped == expected
+                steps += 1
+            x = stepped
+    assert steps == scripts.STEPS - 1
+
+
+# ---- The tools -----------------------------------------------------------------------------------
+
+
+def test_a_single_bit_is_found(arm: Runner) -> None:
+    script = scripts.model_exchange(arm.model)
+    (transcript,) = arm.run(script)
+    assert first_difference(script, transcript, transcript) is None
+    last = transcript.rindex(b" GetReal ") + 20
+    digit = b"1" if transcript[last : last + 1] == b"0" else b"0"
+    other = transcript[:last] + digit + transcript[last + 1 :]
+    assert first_difference(script, transcript, other).startswith("1 of ")
+    shorter = transcript[: transcript.rindex(b"\n", 0, -1) + 1]
+    assert "ends before" in first_difference(script, transcript, shorter)
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("Step 0", "there is no such command"),
+        ("DoStep 0 3ff0000000000000", "a word is missing"),
+        ("DoStep 0 1.0 2.0", "hex digits are expected"),
+        ("FreeInstance 8", "places are 0 to 7"),
+        ("FreeInstance x", "an integer is expected"),
+        ("FreeInstance 0 1", "a word too many"),
+        ("poke 0 3 ff", "there is no such byte"),
+        ("fail 1 one", "a command is expected"),
+        ("fail 1 GetVersion", "a command is expected"),
+        ("SetReal 0 " + "1 " * 520, "too many words"),
+    ],
+)
+def test_a_mistake_in_a_script_is_no_answer(arm: Runner, line: str, text: str) -> None:
+    script = Script()
+    script.call("GetVersion")
+    script.call(line)
+    with pytest.raises(AssertionError, match=f"line 2: {text}"):
+        arm.run(script)
+
+
+def test_bits_are_those_of_the_number() -> None:
+    assert bits(1.0) == "3ff0000000000000" and bits(-0.0) == "8000000000000000"
