@@ -6,6 +6,7 @@
 # references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
+include(${FMU_SOURCE_DIR}/release.cmake)
 # An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
 set(FMI_VERSIONS fmi2)
 
@@ -14,14 +15,23 @@ foreach(version IN LISTS FMI_VERSIONS)
   file(GLOB ${version}_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/${version}/*.c)
 endforeach()
 
+# All shared objects, without their archives.
+add_custom_target(libraries)
+
 # The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS.
 function(add_fmu_library target version description folder)
-  add_library(${target} MODULE ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
-  set_target_properties(${target} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
-                        LIBRARY_OUTPUT_DIRECTORY ${folder})
+  add_library(${target} SHARED ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
+  if(OWN_LIBM)
+    # as objects: from an archive, not every linker prefers them to those of the system
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:elementary_functions>)
+  endif()
+  set_target_properties(${target} PROPERTIES
+    PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX} NO_SONAME ON
+    LIBRARY_OUTPUT_DIRECTORY ${folder} RUNTIME_OUTPUT_DIRECTORY ${folder})
   target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${target} PRIVATE ${description})
   target_link_options(${target} PRIVATE ${FMU_LINK_OPTIONS})
+  add_dependencies(libraries ${target})
 endfunction()
 
 function(add_fmu name)
@@ -76,49 +86,23 @@ function(add_fmu name)
 
   # the archive
   set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${name}.fmu)
+  set(entries
+      $<$<BOOL:${icon}>:model.png=${icon}>
+      documentation=${out}/documentation
+      documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
+      documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
+      $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>)
+  set(files ${out}/documentation/index.html ${icon} ${PROJECT_SOURCE_DIR}/LICENSE
+            ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py)
   add_custom_command(
     OUTPUT ${fmu}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
             modelDescription.xml=${out}/modelDescription.xml
-            $<$<BOOL:${icon}>:model.png=${icon}>
             binaries/${FMI2_PLATFORM}/${name}${FMU_LIBRARY_SUFFIX}=$<TARGET_FILE:${name}>
-            documentation=${out}/documentation
-            documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
-            documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
-            $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>
-    DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
-            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
-            ${FMU_SOURCE_DIR}/atomic_write.py
+            ${entries}
+    DEPENDS ${name} ${out}/modelDescription.xml ${files}
     COMMENT "Packing ${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
-endfunction()
-
-# add_ssp(NAME FOLDER models/... FMUS name ...)
-#
-# Builds NAME.ssp in the current build folder from the system's folder (SystemStructure.ssd and its
-# parameter sets, resources/*.ssv) and the FMUs of add_fmu. Target: NAME_ssp.
-function(add_ssp name)
-  cmake_parse_arguments(ARG "" "FOLDER" "FMUS" ${ARGN})
-  set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
-  set(ssp ${CMAKE_CURRENT_BINARY_DIR}/${name}.ssp)
-  set(files ${folder}/SystemStructure.ssd)
-  set(entries SystemStructure.ssd=${folder}/SystemStructure.ssd)
-  file(GLOB parameter_sets CONFIGURE_DEPENDS ${folder}/resources/*.ssv)
-  foreach(file ${parameter_sets})
-    cmake_path(GET file FILENAME file_name)
-    list(APPEND files ${file})
-    list(APPEND entries resources/${file_name}=${file})
-  endforeach()
-  foreach(fmu ${ARG_FMUS})
-    list(APPEND files ${fmu}_fmu ${CMAKE_CURRENT_BINARY_DIR}/${fmu}.fmu)
-    list(APPEND entries resources/${fmu}.fmu=${CMAKE_CURRENT_BINARY_DIR}/${fmu}.fmu)
-  endforeach()
-  add_custom_command(
-    OUTPUT ${ssp}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${ssp} ${entries}
-    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py
-    COMMENT "Packing ${name}.ssp"
-    VERBATIM)
-  add_custom_target(${name}_ssp ALL DEPENDS ${ssp})
+  add_release_fmu(${name} ENTRIES ${entries} DEPENDS ${files})
 endfunction()
