@@ -7,6 +7,7 @@
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 include(${FMU_SOURCE_DIR}/release.cmake)
+include(${FMU_SOURCE_DIR}/source_code.cmake)
 # An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
 set(FMI_VERSIONS fmi2)
 
@@ -45,11 +46,13 @@ function(add_fmu name)
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
                         ${FMU_SOURCE_DIR}/atomic_write.py)
+  set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
+               --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
+  set(declaration ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
   add_custom_command(
     OUTPUT ${generated}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
-            --output ${out} --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE
-    DEPENDS ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE
+    COMMAND ${generate} --output ${out}
+    DEPENDS ${declaration}
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})
@@ -69,6 +72,11 @@ function(add_fmu name)
       add_fmu_library(${name}_${version} ${version} ${name}_description ${out}/${version})
     endif()
   endforeach()
+
+  if(OWN_LIBM)
+    add_source_code(${name}_sources LIBRARY ${name} FOLDER ${out}/release
+                    GENERATE ${generate} DEPENDS ${declaration} ${generated})
+  endif()
 
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
