@@ -26,12 +26,6 @@ endif()
 # ---- Flags of all that is compiled
 
 set(CMAKE_C_VISIBILITY_PRESET hidden)
-if(MSVC)
-  set(language_options /fp:precise /experimental:c11atomics)
-  set(warning_options /W4)
-  set(foreign_options /w)
-  return()
-endif()
 
 # Fused multiply-adds would give other bits from one compiler to the next, and break the exact sums of
 # src/instance/clock.c.
@@ -52,22 +46,23 @@ set(hardening_options
   $<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
   $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
 
-# ---- Flags of the shared object in an FMU: it leaves out what is not used, names all that it needs, and is
-# read-only where it can be. What it exports is marked in the FMI header.
+# ---- The shared object in an FMU: it leaves out what is not used, names all that it needs, and is read-only
+# where it can be. What it exports is marked in the FMI header.
 
 list(APPEND language_options -ffunction-sections -fdata-sections)
+set(FMU_LIBRARY_NAME NO_SONAME ON)
 if(WIN32)
   # printf of C99; the libraries that would check stacks and buffers are not on every Windows
   list(APPEND language_options -D__USE_MINGW_ANSI_STDIO=1)
   # its isfinite is a choice between float and double
   list(APPEND warning_options $<$<C_COMPILER_ID:GNU>:-Wno-float-conversion>)
   set(hardening_options)
-  set(FMU_LINK_OPTIONS
-    -static -Wl,--gc-sections $<$<CONFIG:Release>:-s>)
+  set(FMU_LINK_OPTIONS -static -Wl,--gc-sections $<$<CONFIG:Release>:-s>)
 elseif(APPLE)
+  set(FMU_LIBRARY_NAME INSTALL_NAME_DIR @rpath BUILD_WITH_INSTALL_NAME_DIR ON) # not its path
   # clang would make one call of libSystem of them
   list(APPEND language_options -fno-builtin-sin -fno-builtin-cos)
-  set(FMU_LINK_OPTIONS -Wl,-dead_strip)
+  set(FMU_LINK_OPTIONS -Wl,-dead_strip $<$<CONFIG:Release>:-s>)
 else()
   set(FMU_LINK_OPTIONS
     -Wl,--gc-sections -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now,-z,noexecstack

@@ -27,7 +27,7 @@ function(add_fmu_library target version description folder)
     target_sources(${target} PRIVATE $<TARGET_OBJECTS:elementary_functions>)
   endif()
   set_target_properties(${target} PROPERTIES
-    PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX} NO_SONAME ON
+    PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX} ${FMU_LIBRARY_NAME}
     LIBRARY_OUTPUT_DIRECTORY ${folder} RUNTIME_OUTPUT_DIRECTORY ${folder})
   target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${target} PRIVATE ${description})

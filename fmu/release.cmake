@@ -13,7 +13,7 @@ if(ZIG AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
   execute_process(COMMAND ${ZIG} version OUTPUT_VARIABLE zig_version OUTPUT_STRIP_TRAILING_WHITESPACE)
   file(STRINGS ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h mingw_version
        REGEX "define __MINGW64_VERSION_(MAJOR|MINOR|BUGFIX)")
-  string(REGEX MATCHALL "[0-9]+;|[0-9]+$" mingw_version "${mingw_version}")
+  list(TRANSFORM mingw_version REPLACE ".* " "")
   list(JOIN mingw_version . mingw_version)
 endif()
 
@@ -59,10 +59,11 @@ function(add_release_fmu name)
   endforeach()
 
   # one library for both processors of macOS
-  set(universal ${release_folder}/darwin64/${name}.dylib)
+  set(folder ${PROJECT_BINARY_DIR}/platforms/universal-darwin)
+  set(universal ${folder}/${name}.dylib)
   add_custom_command(
     OUTPUT ${universal}
-    COMMAND ${CMAKE_COMMAND} -E make_directory ${release_folder}/darwin64
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
     COMMAND ${LIPO} -create ${x86_64-darwin} ${aarch64-darwin} -output ${universal}
     DEPENDS ${platform_targets} ${x86_64-darwin} ${aarch64-darwin}
     VERBATIM)
