@@ -3,7 +3,7 @@
 # Builds NAME.fmu in the current build folder from the model's folder (variables.toml, README.md; model.png
 # and pictures of the README where there are any) and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
 # archive), NAME_description (struct model_description as a library), NAME_interface (the generated header with value
-# references and GUID).
+# references and GUID), NAME_sources (of the release: source_code.cmake; with OWN_LIBM).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 include(${FMU_SOURCE_DIR}/release.cmake)
