@@ -1,0 +1,208 @@
+"""The platforms of a release FMU: where their libraries lie, how the host for each is compiled, and
+what runs it here."""
+
+import functools
+import importlib.util
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.platforms.scripts import Model, Script, read_model
+from tests.support.paths import ROOT
+
+FMUS = ("RPManipulator", "RPTrajectory", "RPController")
+BUILD = ROOT / "build"
+# what the hosts are compiled with, and where wine keeps its files
+SCRATCH = BUILD / "platforms"
+HOST_SOURCES = ("platform_host.c", "script.c", "system.c")
+TIME_LIMIT = 900.0  # s; zig makes its C library for Windows when it is asked for the first time
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A row of the table."""
+
+    name: str
+    folder: str  # of the library in an FMU of FMI 2.0
+    suffix: str  # of the library
+    system: str  # platform.system() and platform.machine() where it runs without an emulator
+    machine: str
+    target: str  # for zig
+    compiler: str  # where zig is not installed
+    emulator: tuple[str, ...]
+
+
+# macOS is not in the table: nothing here runs its binaries.
+PLATFORMS = (
+    Platform(
+        name="linux64", folder="linux64", suffix=".so", system="Linux", machine="x86_64",
+        target="x86_64-linux-gnu.2.17", compiler="x86_64-linux-gnu-gcc",
+        emulator=("qemu-x86_64-static", "-L", "/usr/x86_64-linux-gnu"),
+    ),
+    Platform(
+        name="win64", folder="win64", suffix=".dll", system="Windows", machine="AMD64",
+        target="x86_64-windows-gnu", compiler="x86_64-w64-mingw32-gcc",
+        emulator=("wine",),
+    ),
+    Platform(
+        name="aarch64-linux", folder="aarch64-linux", suffix=".so",
+        system="Linux", machine="aarch64",
+        target="aarch64-linux-gnu.2.17", compiler="aarch64-linux-gnu-gcc",
+        emulator=("qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"),
+    ),
+)  # fmt: skip
+
+
+class Missing(Exception):
+    """Something that a platform needs is not here."""
+
+
+# ---- What is there -------------------------------------------------------------------------------
+
+
+def archive_with(row: Platform, name: str) -> Path:
+    """The FMU with the library of this platform: a release, or a build for this platform only."""
+    places = (BUILD / "release" / f"{name}.fmu", SCRATCH / row.name / f"{name}.fmu")
+    for place in places:
+        if place.is_file():
+            with zipfile.ZipFile(place) as archive:
+                if f"binaries/{row.folder}/{name}{row.suffix}" in archive.namelist():
+                    refuse_older(place)
+                    return place
+    raise Missing(f"no FMU with a library for {row.name}: ./release.sh builds them")
+
+
+@functools.cache
+def newest_source() -> float:
+    """When a source of the FMUs was changed last."""
+    return max(
+        path.stat().st_mtime
+        for folder in ("src", "fmu", "models")
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in {".c", ".h"} or path.name == "variables.toml"
+    )
+
+
+def refuse_older(fmu: Path) -> None:
+    if fmu.stat().st_mtime < newest_source():
+        raise Missing(f"{fmu.relative_to(ROOT)} is older than the sources: ./release.sh")
+
+
+def emulator_of(row: Platform) -> tuple[str, ...]:
+    if (platform.system(), platform.machine()) == (row.system, row.machine):
+        return ()
+    if shutil.which(row.emulator[0]) is None:
+        raise Missing(f"{row.emulator[0]}, which runs {row.name}: ./setup.sh --platforms")
+    return row.emulator
+
+
+def compiler_of(row: Platform) -> list[str]:
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", row.target]
+    if shutil.which(row.compiler) is not None:
+        return [row.compiler]
+    raise Missing(f"zig or {row.compiler}, for the host of {row.name}: ./setup.sh --platforms")
+
+
+@functools.cache
+def host_of(row: Platform) -> Path:
+    """The host for a platform, compiled if it is older than its sources."""
+    sources = Path(__file__).parent
+    host = SCRATCH / "hosts" / row.name / "platform_host.exe"
+    command = compiler_of(row)
+    changed = max(path.stat().st_mtime for path in sources.glob("*.[ch]"))
+    if host.is_file() and host.stat().st_mtime > changed:
+        return host
+    host.parent.mkdir(parents=True, exist_ok=True)
+    fmpy = importlib.util.find_spec("fmpy")
+    headers = Path(fmpy.origin).parent / "c-code"
+    command += ["-std=c17", "-O2", "-isystem", str(headers), "-o", str(host)]
+    command += [str(sources / name) for name in HOST_SOURCES]
+    if row.system == "Linux":
+        command += ["-rdynamic", "-pthread", "-ldl"]  # -rdynamic: its malloc for the FMU
+    finish(command, host.parent)
+    return host
+
+
+# ---- Running it ----------------------------------------------------------------------------------
+
+
+def finish(command: list[str], folder: Path) -> None:
+    """Run a program that must succeed."""
+    environment = os.environ | {
+        "WINEPREFIX": str(SCRATCH / "wine"),
+        "WINEDEBUG": "-all",
+        "WINEDLLOVERRIDES": "mscoree,mshtml=",  # asks for nothing to be installed
+    }
+    for kind in ("GLOBAL", "LOCAL"):
+        environment.setdefault(f"ZIG_{kind}_CACHE_DIR", str(SCRATCH / "zig"))
+    environment.pop("DISPLAY", None)
+    # into a file: what wine leaves running for a while would keep a pipe open
+    log = folder / "output.txt"
+    with log.open("w") as output:
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            timeout=TIME_LIMIT,
+            check=False,
+        )
+    assert done.returncode == 0, f"{' '.join(command)}\n{log.read_text(errors='replace')}"
+
+
+class Runner:
+    """The library of one FMU on one platform; the native one if there is no row."""
+
+    def __init__(self, row: Platform | None, name: str, fmu: Path, folder: Path) -> None:
+        """`fmu` is the native one; `folder` takes libraries, scripts and transcripts."""
+        self.name = row.name if row else "native"
+        self.model: Model = read_model(fmu)
+        self.folder = folder / self.name / name
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if row is None:
+            self.command = [str(fmu.parent / "tests" / "platform_host")]
+            archive, member = fmu, native_member(fmu)
+        else:
+            self.command = [*emulator_of(row), str(host_of(row))]
+            archive = archive_with(row, name)
+            member = f"binaries/{row.folder}/{name}{row.suffix}"
+        self.library = f"./{Path(member).name}"  # dlopen searches for names without a folder
+        with zipfile.ZipFile(archive) as opened:
+            (self.folder / self.library).write_bytes(opened.read(member))
+
+    def run(self, *scripts: Script) -> list[bytes]:
+        """Transcripts of scripts, each in a thread of its own."""
+        arguments = []
+        for i, script in enumerate(scripts):
+            (self.folder / f"{i}.script").write_bytes(script.text.encode())
+            arguments += [f"{i}.script", f"{i}.transcript"]
+        finish([*self.command, self.library, *arguments], self.folder)
+        return [(self.folder / f"{i}.transcript").read_bytes() for i in range(len(scripts))]
+
+
+def native_member(fmu: Path) -> str:
+    with zipfile.ZipFile(fmu) as archive:
+        (member,) = (
+            name for name in archive.namelist() if name.startswith("binaries/") and name[-1] != "/"
+        )
+    return member
+
+
+def runner(row: Platform | None, name: str, fmu: Path, folder: Path) -> Runner:
+    """A Runner, or a skipped test that says what is missing; in CI nothing may be."""
+    try:
+        return Runner(row, name, fmu.with_name(f"{name}.fmu"), folder)
+    except Missing as missing:
+        if os.environ.get("CI"):
+            pytest.fail(f"missing: {missing}")
+        pytest.skip(f"missing: {missing}")

@@ -1,0 +1,141 @@
+"""The same scripts on every platform: equal transcripts, byte for byte.
+
+A transcript holds the bits of all values, the bytes of serialized states, every status and every
+message. What the transcripts say is tested in test_transcripts.py, with the native one.
+"""
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.platforms import refusals, scripts
+from tests.platforms.platforms import FMUS, PLATFORMS, Platform, Runner, runner
+from tests.platforms.scripts import Model, Script, joined
+from tests.platforms.transcript import first_difference, read
+
+VARIANTS = (1, 2, 3)
+THREADS = 8
+STEPS = 40  # before a state is saved, and after
+
+each_fmu = pytest.mark.parametrize("name", FMUS)
+each_platform = pytest.mark.parametrize("row", PLATFORMS, ids=lambda row: row.name)
+# and this one, whose library comes from the FMU in build/
+everywhere = pytest.mark.parametrize(
+    "row", (None, *PLATFORMS), ids=lambda row: row.name if row else "native"
+)
+
+Runners = Callable[[Platform | None, str], Runner]
+
+
+@pytest.fixture(scope="module")
+def runners(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Runners:
+    folder = tmp_path_factory.mktemp("platforms")
+    return functools.cache(lambda row, name: runner(row, name, fmu, folder))
+
+
+def everything(model: Model) -> Script:
+    """All that a platform may do differently, in one script."""
+    others = (scripts.model_exchange, refusals.refusals, refusals.logging, scripts.faults)
+    return joined(
+        *(scripts.co_simulation(model, variant) for variant in VARIANTS),
+        *(part(model) for part in others),
+    )
+
+
+@each_platform
+@each_fmu
+def test_all_values_states_and_messages_are_the_same(
+    runners: Runners, row: Platform, name: str
+) -> None:
+    native, other = runners(None, name), runners(row, name)
+    script = everything(native.model)
+    (expected,) = native.run(script)
+    (actual,) = other.run(script)
+    difference = first_difference(script, expected, actual)
+    assert difference is None, f"native and {row.name} differ at\n{difference}"
+
+
+# ---- States --------------------------------------------------------------------------------------
+
+
+# from here to another platform, from there to here, and here only
+WAYS = [(None, None), *((None, row) for row in PLATFORMS), *((row, None) for row in PLATFORMS)]
+
+
+def answers_after(script: Script, transcript: bytes, line: int) -> list[tuple[str, str, list[str]]]:
+    """All answers after a line, without the numbers of their own."""
+    return [(a.call, a.status, a.words) for a in read(script, transcript)[line:]]
+
+
+@each_fmu
+@pytest.mark.parametrize(("writer", "reader"), WAYS, ids=lambda row: row.name if row else "native")
+def test_a_run_goes_on_on_another_platform(
+    runners: Runners, writer: Platform | None, reader: Platform | None, name: str
+) -> None:
+    """From a serialized state, with the bits of the run that was not interrupted."""
+    here, there = runners(writer, name), runners(reader, name)
+    for variant in VARIANTS:
+        before, time = scripts.save(here.model, variant, STEPS)
+        after = scripts.go_on(here.model, STEPS, time)
+        whole = joined(before, after)
+        (uninterrupted,) = here.run(whole)
+        (state,) = read(whole, uninterrupted)[len(before.lines) - 1].words
+        begin = scripts.restore(here.model, state)
+        resumed = joined(begin, after)
+        (transcript,) = there.run(resumed)
+        assert answers_after(resumed, transcript, len(begin.lines)) == answers_after(
+            whole, uninterrupted, len(before.lines)
+        )
+
+
+# ---- Threads -------------------------------------------------------------------------------------
+
+
+@everywhere
+@each_fmu
+def test_threads_do_not_disturb_each_other(
+    runners: Runners, row: Platform | None, name: str
+) -> None:
+    """Each of them gets what it gets alone, on this machine."""
+    native, tested = runners(None, name), runners(row, name)
+    several = [
+        scripts.co_simulation(native.model, VARIANTS[i % len(VARIANTS)], shift=i / 1024)
+        for i in range(THREADS)
+    ]
+    expected = [native.run(script)[0] for script in several]
+    assert len(set(expected)) == THREADS
+    for script, alone, transcript in zip(several, expected, tested.run(*several), strict=True):
+        assert first_difference(script, alone, transcript) is None
+
+
+# ---- Allocations ---------------------------------------------------------------------------------
+
+
+@everywhere
+@each_fmu
+def test_allocations_that_fail(runners: Runners, row: Platform | None, name: str) -> None:
+    """An error with a message, and the next try succeeds."""
+    one = runners(row, name)
+    script = scripts.faults(one.model)
+    (transcript,) = one.run(script)
+    failed: dict[str, int] = {}
+    for line, answer, expected in zip(
+        script.lines, read(script, transcript), script.statuses, strict=True
+    ):
+        if not line.startswith("fail "):
+            assert answer.status == expected, line
+            continue
+        function = line.split()[3]
+        if answer.failed:
+            assert answer.status == ("NULL" if function == "Instantiate" else "Error"), line
+            assert any("out of memory" in text for *_, text in answer.log), line
+            failed[function] = failed.get(function, 0) + 1
+        else:
+            assert answer.status == "OK", line
+            assert f"fail {scripts.MOST_ALLOCATIONS} " in line or failed[function], line
+    # alone and with all later ones; and the last number is beyond what a call allocates
+    assert set(failed) == {"Instantiate", "GetFMUstate", "DeSerializeFMUstate"}
+    assert failed["GetFMUstate"] == failed["DeSerializeFMUstate"] == 2
+    assert 2 * 3 <= failed["Instantiate"] < 2 * scripts.MOST_ALLOCATIONS

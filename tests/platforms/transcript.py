@@ -1,0 +1,54 @@
+"""Reads transcripts of platform_host."""
+
+import struct
+from dataclasses import dataclass, field
+
+from tests.platforms.scripts import Script
+
+NOT_WRITTEN = "aa" * 8  # of a value that a call left alone
+
+
+@dataclass
+class Answer:
+    """What an FMU answered to one line of a script."""
+
+    call: str
+    status: str
+    words: list[str]
+    log: list[list[str]] = field(default_factory=list)  # instance, status, category, text
+    failed: int = 0  # allocations
+
+    @property
+    def reals(self) -> list[float]:
+        return [struct.unpack(">d", bytes.fromhex(word))[0] for word in self.words]
+
+
+def read(script: Script, transcript: bytes) -> list[Answer]:
+    """The answer to every line of the script."""
+    answers: list[Answer] = []
+    log: list[list[str]] = []
+    for line in transcript.decode().splitlines():
+        number, name, *words = line.split(" ")
+        if name == "log":
+            log.append([*words[:3], " ".join(words[3:])])
+        elif name == "failed":
+            answers[int(number) - 1].failed = int(words[0])
+        else:
+            call = script.lines[int(number) - 1]
+            assert len(answers) == int(number) - 1 and name in call
+            answers.append(Answer(call, words[0], words[1:], log))
+            log = []
+    assert len(answers) == len(script.lines)
+    return answers
+
+
+def first_difference(script: Script, expected: bytes, actual: bytes) -> str | None:
+    """A text about the first line that differs, with the call; None if all bytes are equal."""
+    if expected == actual:
+        return None
+    pairs = zip(expected.splitlines(), actual.splitlines(), strict=False)
+    for one, other in pairs:
+        if one != other:
+            number = int(one.split(b" ")[0])
+            return f"{script.lines[number - 1]}\n- {one.decode()}\n+ {other.decode()}"
+    return f"one transcript ends before the other: {len(expected)} and {len(actual)} bytes"
