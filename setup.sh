@@ -1,15 +1,22 @@
 #!/usr/bin/env bash
-# Installs what the project needs: ./setup.sh for building and ./run.sh, ./setup.sh --dev for
-# ./test.sh too. Touches nothing outside this folder but the system's packages; quick when there is
-# nothing to do.
+# Installs what the project needs. Touches nothing outside this folder but the system's packages; quick when
+# there is nothing to do.
+#
+#   ./setup.sh              for building and ./run.sh
+#   ./setup.sh --release    for ./release.sh too
+#   ./setup.sh --dev        for ./test.sh too
+#   ./setup.sh --platforms  all of it, and what runs the FMUs of other platforms in ./test.sh
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-dev=no
+release=no dev=no platforms=no
 case "${1-}" in
   "") ;;
+  --release) release=yes ;;
   --dev) dev=yes ;;
-  *) echo "usage: ./setup.sh [--dev]" >&2; exit 2 ;;
+  --platforms) release=yes dev=yes platforms=yes ;;
+  --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; exit ;;
+  *) echo "usage: ./setup.sh [--release | --dev | --platforms]" >&2; exit 2 ;;
 esac
 
 fail() { echo "setup.sh: $*" >&2; exit 1; }
@@ -51,6 +58,18 @@ if [ "$dev" = yes ]; then
   need cppcheck command -v cppcheck
   need valgrind command -v valgrind
 fi
+if [ "$release" = yes ]; then
+  need llvm-14 command -v llvm-lipo-14
+  need llvm command -v llvm-ar
+fi
+if [ "$platforms" = yes ]; then
+  need wine64 test -e /usr/lib/wine/wine64
+  need wine command -v wine
+  need qemu-user-static command -v qemu-aarch64-static
+  need gcc-aarch64-linux-gnu command -v aarch64-linux-gnu-gcc
+  need libc6-dev-arm64-cross test -e /usr/aarch64-linux-gnu/include/math.h
+  need gcc-mingw-w64-x86-64 command -v x86_64-w64-mingw32-gcc
+fi
 
 if [ "${#missing[@]}" -gt 0 ]; then
   install="apt-get install -y --no-install-recommends ${missing[*]}"
@@ -80,6 +99,7 @@ install_requirements requirements.txt
 for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu}; do
   [ -x "$program" ] || chmod +x "$program"
 done
+[ "$release" = no ] || install_requirements requirements-release.txt
 [ "$dev" = no ] || install_requirements requirements-dev.txt
 
 # ---- sources, by an apt of this folder's own: nothing of them is installed

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest.
+# Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest. What
+# ./setup.sh --platforms installs is used where it is installed.
 #   ./test.sh [--long] [ARGUMENTS]
 # --long: then also the long campaigns (an hour and a half), with a table of their figures at the end.
 # ARGUMENTS go to the ctest that runs everything: ./test.sh -R instance
@@ -39,12 +40,25 @@ step "libFuzzer, ten seconds a target"
 build fuzz
 ctest --preset fuzz --progress -j 2
 
+if command -v qemu-aarch64-static aarch64-linux-gnu-gcc >/dev/null; then
+  step "64-bit Arm in qemu; C tests of src and models"
+  build qemu
+  ctest --preset qemu --progress -j 2
+else
+  step "64-bit Arm: skipped, ./setup.sh --platforms installs what it needs"
+fi
+
 step "other importers, each in its own environment"
 # without network the tests of those that are missing are skipped; CI must have them
 tests/importers/install.sh || [ -z "${CI-}" ]
 
 step "gcc, optimized; all tests"
 build default
+if build/venv/bin/python -c 'import ziglang' 2>/dev/null; then
+  cmake --build --preset default --target release >build/release.log || { cat build/release.log; exit 1; }
+else
+  echo "release: skipped, ./setup.sh --platforms installs what it needs"
+fi
 ctest --preset default -j 2 "$@"
 
 if [ "$long" = yes ]; then

@@ -35,12 +35,8 @@ target_compile_options(elementary_functions PRIVATE
   ${foreign_options} -fno-builtin -ffile-prefix-map=${MUSL_SOURCE_DIR}=musl
   "SHELL:-include \"${CMAKE_CURRENT_LIST_DIR}/musl.h\"")
 
-# headers that musl has and not every system
-include(CheckIncludeFile)
+# headers that musl includes and not every system has: empty ones, where the system's are not found
 foreach(header features endian)
-  check_include_file(${header}.h HAS_${header})
-  if(NOT HAS_${header})
-    file(TOUCH ${PROJECT_BINARY_DIR}/musl/${header}.h)
-    target_include_directories(elementary_functions PRIVATE ${PROJECT_BINARY_DIR}/musl)
-  endif()
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/musl/${header}.h CONTENT "")
 endforeach()
+target_compile_options(elementary_functions PRIVATE "SHELL:-idirafter \"${PROJECT_BINARY_DIR}/musl\"")

@@ -1,8 +1,39 @@
-# What differs between platforms, in one place: names in an FMU, and flags that harden what is delivered.
+# What differs between platforms and compilers: names in an FMU, and flags.
 
-# folder of the binary in an FMI 2.0 archive, and how the file is called there
-set(FMI2_PLATFORM linux64)
-set(FMU_LIBRARY_SUFFIX .so)
+# ---- Names
+
+string(TOLOWER "${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR}" system)
+if(system MATCHES "^linux-(x86_64|amd64)$")
+  set(FMI2_PLATFORM linux64) # folder of the binary in an FMI 2.0 archive
+elseif(system MATCHES "^windows-(x86_64|amd64)$")
+  set(FMI2_PLATFORM win64)
+elseif(system MATCHES "^darwin-(x86_64|arm64)$")
+  set(FMI2_PLATFORM darwin64)
+elseif(system MATCHES "^linux-(aarch64|arm64)$")
+  set(FMI2_PLATFORM aarch64-linux) # the name in FMI 3.0: 2.0 has none
+else()
+  message(FATAL_ERROR "FMUs have no name for the platform ${CMAKE_SYSTEM_NAME} ${CMAKE_SYSTEM_PROCESSOR}")
+endif()
+
+if(WIN32)
+  set(FMU_LIBRARY_SUFFIX .dll)
+elseif(APPLE)
+  set(FMU_LIBRARY_SUFFIX .dylib)
+else()
+  set(FMU_LIBRARY_SUFFIX .so)
+endif()
+
+# ---- Flags of all that is compiled
+
+set(CMAKE_C_VISIBILITY_PRESET hidden)
+
+# Fused multiply-adds would give other bits from one compiler to the next, and break the exact sums of
+# src/instance/clock.c.
+set(language_options -ffp-contract=off)
+set(warning_options -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wmissing-prototypes -Werror)
+
+# Of sources that are not the project's own: they are taken as they are, and not all of them is used.
+set(foreign_options -w $<$<C_COMPILER_ID:GNU>:-fno-analyzer>)
 
 # No path in what is delivered: two builds in two folders are the same.
 set(reproducible_options
@@ -15,12 +46,25 @@ set(hardening_options
   $<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
   $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
 
-# Of the shared object: it exports what fmi2Functions.h marks and nothing of the libraries inside it,
-# leaves out what is not used of them, names all it needs, and is read-only where it can be.
-set(FMU_LINK_OPTIONS
-  -Wl,--exclude-libs,ALL -Wl,--gc-sections -Wl,--no-undefined -Wl,--as-needed
-  -Wl,-z,relro,-z,now,-z,noexecstack,-z,text)
+# ---- The shared object in an FMU: it leaves out what is not used, names all that it needs, and is read-only
+# where it can be. What it exports is marked in the FMI header.
 
-# Of sources that are not the project's own: they are taken as they are, and not all of
-# them is used.
-set(foreign_options -w -ffunction-sections -fdata-sections $<$<C_COMPILER_ID:GNU>:-fno-analyzer>)
+list(APPEND language_options -ffunction-sections -fdata-sections)
+set(FMU_LIBRARY_NAME NO_SONAME ON)
+if(WIN32)
+  # printf of C99; the libraries that would check stacks and buffers are not on every Windows
+  list(APPEND language_options -D__USE_MINGW_ANSI_STDIO=1)
+  # its isfinite is a choice between float and double
+  list(APPEND warning_options $<$<C_COMPILER_ID:GNU>:-Wno-float-conversion>)
+  set(hardening_options)
+  set(FMU_LINK_OPTIONS -static -Wl,--gc-sections $<$<CONFIG:Release>:-s>)
+elseif(APPLE)
+  set(FMU_LIBRARY_NAME INSTALL_NAME_DIR @rpath BUILD_WITH_INSTALL_NAME_DIR ON) # not its path
+  # clang would make one call of libSystem of them
+  list(APPEND language_options -fno-builtin-sin -fno-builtin-cos)
+  set(FMU_LINK_OPTIONS -Wl,-dead_strip $<$<CONFIG:Release>:-s>)
+else()
+  set(FMU_LINK_OPTIONS
+    -Wl,--gc-sections -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now,-z,noexecstack
+    $<$<CONFIG:Release>:-s>)
+endif()

@@ -3,9 +3,11 @@
 # Builds NAME.fmu in the current build folder from the model's folder (variables.toml, README.md; model.png
 # and pictures of the README where there are any) and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
 # archive), NAME_description (struct model_description as a library), NAME_interface (the generated header with value
-# references and GUID).
+# references and GUID), NAME_sources (of the release: source_code.cmake; with OWN_LIBM).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
+include(${FMU_SOURCE_DIR}/release.cmake)
+include(${FMU_SOURCE_DIR}/source_code.cmake)
 # An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
 set(FMI_VERSIONS fmi2)
 
@@ -14,14 +16,23 @@ foreach(version IN LISTS FMI_VERSIONS)
   file(GLOB ${version}_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/${version}/*.c)
 endforeach()
 
+# All shared objects, without their archives.
+add_custom_target(libraries)
+
 # The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS.
 function(add_fmu_library target version description folder)
-  add_library(${target} MODULE ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
-  set_target_properties(${target} PROPERTIES PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX}
-                        LIBRARY_OUTPUT_DIRECTORY ${folder})
+  add_library(${target} SHARED ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
+  if(OWN_LIBM)
+    # as objects: from an archive, not every linker prefers them to those of the system
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:elementary_functions>)
+  endif()
+  set_target_properties(${target} PROPERTIES
+    PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX} ${FMU_LIBRARY_NAME}
+    LIBRARY_OUTPUT_DIRECTORY ${folder} RUNTIME_OUTPUT_DIRECTORY ${folder})
   target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${target} PRIVATE ${description})
   target_link_options(${target} PRIVATE ${FMU_LINK_OPTIONS})
+  add_dependencies(libraries ${target})
 endfunction()
 
 function(add_fmu name)
@@ -35,11 +46,13 @@ function(add_fmu name)
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
                         ${FMU_SOURCE_DIR}/atomic_write.py)
+  set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
+               --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
+  set(declaration ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
   add_custom_command(
     OUTPUT ${generated}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
-            --output ${out} --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE
-    DEPENDS ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE
+    COMMAND ${generate} --output ${out}
+    DEPENDS ${declaration}
     COMMENT "Generating the interface of ${name}"
     VERBATIM)
   add_custom_target(${name}_generated DEPENDS ${generated})
@@ -60,6 +73,11 @@ function(add_fmu name)
     endif()
   endforeach()
 
+  if(OWN_LIBM)
+    add_source_code(${name}_sources LIBRARY ${name} FOLDER ${out}/release
+                    GENERATE ${generate} DEPENDS ${declaration} ${generated})
+  endif()
+
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
   file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
@@ -76,49 +94,23 @@ function(add_fmu name)
 
   # the archive
   set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${name}.fmu)
+  set(entries
+      $<$<BOOL:${icon}>:model.png=${icon}>
+      documentation=${out}/documentation
+      documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
+      documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
+      $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>)
+  set(files ${out}/documentation/index.html ${icon} ${PROJECT_SOURCE_DIR}/LICENSE
+            ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py)
   add_custom_command(
     OUTPUT ${fmu}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
             modelDescription.xml=${out}/modelDescription.xml
-            $<$<BOOL:${icon}>:model.png=${icon}>
             binaries/${FMI2_PLATFORM}/${name}${FMU_LIBRARY_SUFFIX}=$<TARGET_FILE:${name}>
-            documentation=${out}/documentation
-            documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
-            documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
-            $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>
-    DEPENDS ${name} ${out}/modelDescription.xml ${out}/documentation/index.html
-            ${icon} ${PROJECT_SOURCE_DIR}/LICENSE ${FMU_SOURCE_DIR}/package.py
-            ${FMU_SOURCE_DIR}/atomic_write.py
+            ${entries}
+    DEPENDS ${name} ${out}/modelDescription.xml ${files}
     COMMENT "Packing ${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
-endfunction()
-
-# add_ssp(NAME FOLDER models/... FMUS name ...)
-#
-# Builds NAME.ssp in the current build folder from the system's folder (SystemStructure.ssd and its
-# parameter sets, resources/*.ssv) and the FMUs of add_fmu. Target: NAME_ssp.
-function(add_ssp name)
-  cmake_parse_arguments(ARG "" "FOLDER" "FMUS" ${ARGN})
-  set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
-  set(ssp ${CMAKE_CURRENT_BINARY_DIR}/${name}.ssp)
-  set(files ${folder}/SystemStructure.ssd)
-  set(entries SystemStructure.ssd=${folder}/SystemStructure.ssd)
-  file(GLOB parameter_sets CONFIGURE_DEPENDS ${folder}/resources/*.ssv)
-  foreach(file ${parameter_sets})
-    cmake_path(GET file FILENAME file_name)
-    list(APPEND files ${file})
-    list(APPEND entries resources/${file_name}=${file})
-  endforeach()
-  foreach(fmu ${ARG_FMUS})
-    list(APPEND files ${fmu}_fmu ${CMAKE_CURRENT_BINARY_DIR}/${fmu}.fmu)
-    list(APPEND entries resources/${fmu}.fmu=${CMAKE_CURRENT_BINARY_DIR}/${fmu}.fmu)
-  endforeach()
-  add_custom_command(
-    OUTPUT ${ssp}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${ssp} ${entries}
-    DEPENDS ${files} ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py
-    COMMENT "Packing ${name}.ssp"
-    VERBATIM)
-  add_custom_target(${name}_ssp ALL DEPENDS ${ssp})
+  add_release_fmu(${name} ENTRIES ${entries} DEPENDS ${files})
 endfunction()

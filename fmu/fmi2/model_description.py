@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 
 from declaration.load import Declaration, DeclarationError
 from declaration.schema import Enumeration, Float64, Unit, Variable
@@ -20,8 +21,10 @@ LOG_CATEGORIES = {
 }
 
 
-def model_description(declaration: Declaration, provenance: Provenance) -> str:
-    """Text of modelDescription.xml."""
+def model_description(
+    declaration: Declaration, provenance: Provenance, sources: Sequence[str] = ()
+) -> str:
+    """Text of modelDescription.xml; `sources`: files in the FMU's sources/ that are compiled."""
     model, experiment = declaration.model, declaration.experiment
     variables = with_aliases(declaration)
     index = {name: str(i) for i, name in enumerate(variables, start=1)}
@@ -44,7 +47,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
     )
-    add_interfaces(root, model.name)
+    add_interfaces(root, model.name, sources)
     add_units(root, declaration.units)
     add_types(root, variables)
     categories = ET.SubElement(root, "LogCategories")
@@ -92,8 +95,8 @@ def with_aliases(declaration: Declaration) -> dict[str, Variable]:
     return variables
 
 
-def add_interfaces(root: ET.Element, identifier: str) -> None:
-    """Write ModelExchange and CoSimulation with what they can do."""
+def add_interfaces(root: ET.Element, identifier: str, sources: Sequence[str]) -> None:
+    """Write ModelExchange and CoSimulation with what they can do, and their SourceFiles."""
     shared = {
         "modelIdentifier": identifier,
         "canNotUseMemoryManagementFunctions": "true",
@@ -101,15 +104,17 @@ def add_interfaces(root: ET.Element, identifier: str) -> None:
         "canSerializeFMUstate": "true",
         "providesDirectionalDerivative": "true",
     }
-    ET.SubElement(root, "ModelExchange", shared)
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        shared,
-        canHandleVariableCommunicationStepSize="true",
-        canInterpolateInputs="true",
-        maxOutputDerivativeOrder="2",
-    )
+    co_simulation = {
+        "canHandleVariableCommunicationStepSize": "true",
+        "canInterpolateInputs": "true",
+        "maxOutputDerivativeOrder": "2",
+    }
+    for kind, capabilities in (("ModelExchange", shared), ("CoSimulation", shared | co_simulation)):
+        interface = ET.SubElement(root, kind, capabilities)
+        if sources:
+            files = ET.SubElement(interface, "SourceFiles")
+            for name in sources:
+                ET.SubElement(files, "File", name=name)
 
 
 def add_units(root: ET.Element, units: dict[str, Unit]) -> None:

@@ -28,6 +28,17 @@
 #define INDEPENDENT_ITERATIONS _Pragma("GCC ivdep")
 #endif
 
+/* Of what follows no symbol leaves the shared object, unless it says so itself. */
+#define HIDE_SYMBOLS _Pragma("GCC visibility push(hidden)")
+
+/* In what follows products are rounded before they are added. gcc 12 fuses them even so where it
+ * vectorizes sums beside differences. */
+#if defined(__clang__)
+#define NO_FUSED_OPERATIONS _Pragma("STDC FP_CONTRACT OFF")
+#else
+#define NO_FUSED_OPERATIONS _Pragma("GCC optimize(\"fp-contract=off\", \"no-tree-vectorize\")")
+#endif
+
 #else
 
 #define MUST_CHECK
@@ -36,6 +47,12 @@
 #define PRINTF_FORMAT(format_, first)
 #define ALWAYS_INLINE static inline
 #define INDEPENDENT_ITERATIONS
+#define HIDE_SYMBOLS
+#if defined(_MSC_VER)
+#define NO_FUSED_OPERATIONS __pragma(fp_contract(off))
+#else
+#define NO_FUSED_OPERATIONS _Pragma("STDC FP_CONTRACT OFF")
+#endif
 
 #endif
 

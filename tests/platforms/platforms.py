@@ -143,7 +143,7 @@ def finish(command: list[str], folder: Path) -> None:
         "WINEDLLOVERRIDES": "mscoree,mshtml=",  # asks for nothing to be installed
     }
     for kind in ("GLOBAL", "LOCAL"):
-        environment.setdefault(f"ZIG_{kind}_CACHE_DIR", str(SCRATCH / "zig"))
+        environment.setdefault(f"ZIG_{kind}_CACHE_DIR", str(BUILD / "zig"))
     environment.pop("DISPLAY", None)
     # into a file: what wine leaves running for a while would keep a pipe open
     log = folder / "output.txt"

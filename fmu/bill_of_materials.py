@@ -1,0 +1,100 @@
+"""Writes what a release consists of: checksums, and a bill of materials in CycloneDX."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import sys
+import uuid
+from pathlib import Path
+
+from cyclonedx.model import ExternalReference, ExternalReferenceType, HashAlgorithm, HashType, XsUri
+from cyclonedx.model.bom import Bom
+from cyclonedx.model.component import Component, ComponentType
+from cyclonedx.model.license import DisjunctiveLicense
+from cyclonedx.output.json import JsonV1Dot6
+from cyclonedx.validation.json import JsonStrictValidator
+
+from atomic_write import atomic_write
+from provenance import ProvenanceError, license_texts
+
+CHECKSUMS = "SHA256SUMS"
+BILL = "sbom.cdx.json"
+
+
+def part(text: str) -> Component:
+    """Component of all FMUs, from NAME,VERSION,LICENSE,ADDRESS; the license by its SPDX identifier."""
+    name, version, license_id, address = text.split(",")
+    return Component(
+        type=ComponentType.LIBRARY,
+        name=name,
+        version=version,
+        bom_ref=name,
+        licenses=[DisjunctiveLicense(id=license_id)],
+        external_references=[
+            ExternalReference(type=ExternalReferenceType.WEBSITE, url=XsUri(address))
+        ],
+    )
+
+
+def bill_of_materials(
+    checksums: dict[str, str], version: str, license_id: str, parts: list[Component]
+) -> str:
+    """Text in JSON; it depends only on the arguments: checksums of the FMUs by their names."""
+    bom = Bom(components=parts)
+    for name, checksum in checksums.items():
+        component = Component(
+            type=ComponentType.FILE,
+            name=name,
+            version=version,
+            bom_ref=name,
+            licenses=[DisjunctiveLicense(id=license_id)],
+            hashes=[HashType(alg=HashAlgorithm.SHA_256, content=checksum)],
+        )
+        bom.components.add(component)
+        bom.register_dependency(component, parts)
+    # no date and no random number, so that two builds give the same bytes
+    bom.serial_number = uuid.uuid5(uuid.NAMESPACE_OID, "".join(checksums.values()))
+    bom.metadata.timestamp = None
+    text = JsonV1Dot6(bom).output_as_string(indent=2)
+    fault = JsonStrictValidator(JsonV1Dot6(bom).schema_version).validate_str(text)
+    if fault is not None:
+        raise ValueError(f"the bill of materials is not valid: {fault}")
+    return text + "\n"
+
+
+def main() -> int:
+    """Write both files; 2 with a line on standard error where one cannot be written."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("fmus", type=Path, nargs="+", help="files of the release, below the output")
+    parser.add_argument("--output", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--version", required=True, help="version of the FMUs")
+    parser.add_argument("--license", type=Path, required=True, help="LICENSE of the project")
+    parser.add_argument(
+        "--part", action="append", default=[], metavar="NAME,VERSION,LICENSE,ADDRESS",
+        help="what is compiled into all of them",
+    )  # fmt: skip
+    arguments = parser.parse_args()
+    try:
+        folder = arguments.output
+        checksums = {
+            fmu.relative_to(folder).as_posix(): hashlib.sha256(fmu.read_bytes()).hexdigest()
+            for fmu in sorted(arguments.fmus)
+        }
+        license_id = license_texts(arguments.license)["license"]
+        parts = [part(text) for text in arguments.part]
+        texts = {
+            CHECKSUMS: "".join(f"{text}  {name}\n" for name, text in checksums.items()),
+            BILL: bill_of_materials(checksums, arguments.version, license_id, parts),
+        }
+        for name, text in texts.items():
+            with atomic_write(folder / name) as temporary:
+                temporary.write_bytes(text.encode())
+    except (OSError, ValueError, ProvenanceError) as error:
+        print(f"bill_of_materials.py: {error!s:.2000}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

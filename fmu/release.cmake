@@ -1,0 +1,118 @@
+# Target release: build/release/NAME.fmu with the binaries of all platforms and the sources, checksums and a
+# bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
+
+set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin aarch64-linux)
+set(release_folder ${PROJECT_BINARY_DIR}/release)
+
+include(FindZig)
+find_program(LIPO NAMES lipo llvm-lipo llvm-lipo-14 DOC "Joins libraries for macOS")
+if(ZIG AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
+  set(CAN_RELEASE ON)
+  # what zig puts into the libraries, and under which licenses
+  cmake_path(GET ZIG PARENT_PATH zig_folder)
+  execute_process(COMMAND ${ZIG} version OUTPUT_VARIABLE zig_version OUTPUT_STRIP_TRAILING_WHITESPACE)
+  file(STRINGS ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h mingw_version
+       REGEX "define __MINGW64_VERSION_(MAJOR|MINOR|BUGFIX)")
+  list(TRANSFORM mingw_version REPLACE ".* " "")
+  list(JOIN mingw_version . mingw_version)
+endif()
+
+# Configured by hand like this build: what setup.sh finds by itself is found there too.
+set(same_settings "")
+foreach(setting Python3_EXECUTABLE FMI_HEADERS_DIR SUNDIALS_SOURCE_DIR MUSL_SOURCE_DIR OWN_LIBM)
+  list(APPEND same_settings -D${setting}=${${setting}})
+endforeach()
+
+set(platform_targets "")
+foreach(platform IN LISTS RELEASE_PLATFORMS)
+  set(folder ${PROJECT_BINARY_DIR}/platforms/${platform})
+  add_custom_target(platform_${platform}
+    COMMAND ${CMAKE_COMMAND} -S ${PROJECT_SOURCE_DIR} --preset ${platform} -B ${folder} ${same_settings}
+            --log-level=WARNING
+    COMMAND ${CMAKE_COMMAND} --build ${folder} --target libraries
+    COMMENT "Building for ${platform}"
+    VERBATIM)
+  list(APPEND platform_targets platform_${platform})
+endforeach()
+
+# library_of(platform name result): the shared object of an FMU for a platform.
+function(library_of platform name result)
+  if(platform MATCHES windows)
+    set(suffix .dll)
+  elseif(platform MATCHES darwin)
+    set(suffix .dylib)
+  else()
+    set(suffix .so)
+  endif()
+  set(${result} ${PROJECT_BINARY_DIR}/platforms/${platform}/fmu/${name}/${name}${suffix} PARENT_SCOPE)
+endfunction()
+
+# add_release_fmu(NAME ENTRIES entry ... DEPENDS file ...): build/release/NAME.fmu. Entries are those of
+# package.py for all but binaries, sources and the model description, which names the sources.
+function(add_release_fmu name)
+  cmake_parse_arguments(ARG "" "" "ENTRIES;DEPENDS" ${ARGN})
+  if(NOT CAN_RELEASE)
+    return()
+  endif()
+  foreach(platform IN LISTS RELEASE_PLATFORMS)
+    library_of(${platform} ${name} ${platform})
+  endforeach()
+
+  # one library for both processors of macOS
+  set(folder ${PROJECT_BINARY_DIR}/platforms/universal-darwin)
+  set(universal ${folder}/${name}.dylib)
+  add_custom_command(
+    OUTPUT ${universal}
+    COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
+    COMMAND ${LIPO} -create ${x86_64-darwin} ${aarch64-darwin} -output ${universal}
+    DEPENDS ${platform_targets} ${x86_64-darwin} ${aarch64-darwin}
+    VERBATIM)
+
+  set(described ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name}/release)
+  set(fmu ${release_folder}/${name}.fmu)
+  add_custom_command(
+    OUTPUT ${fmu}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
+            modelDescription.xml=${described}/modelDescription.xml
+            sources=${described}/sources
+            binaries/linux64/${name}.so=${x86_64-linux}
+            binaries/win64/${name}.dll=${x86_64-windows}
+            binaries/darwin64/${name}.dylib=${universal}
+            binaries/aarch64-linux/${name}.so=${aarch64-linux}
+            ${ARG_ENTRIES}
+            documentation/licenses/zig.txt=${zig_folder}/LICENSE
+            documentation/licenses/mingw-w64.txt=${zig_folder}/lib/libc/mingw/COPYING
+    DEPENDS ${name}_sources ${described}/modelDescription.xml ${platform_targets} ${universal}
+            ${x86_64-linux} ${x86_64-windows} ${aarch64-linux} ${ARG_DEPENDS}
+    COMMENT "Packing release/${name}.fmu"
+    COMMAND_EXPAND_LISTS VERBATIM)
+  add_custom_target(${name}_release DEPENDS ${fmu})
+  set_property(GLOBAL APPEND PROPERTY release_fmus ${fmu})
+  set_property(GLOBAL APPEND PROPERTY release_targets ${name}_release)
+endfunction()
+
+# add_release(): the target release, after all FMUs.
+function(add_release)
+  if(NOT CAN_RELEASE)
+    add_custom_target(release
+      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig and llvm-lipo (./setup.sh --release), and OWN_LIBM."
+      COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
+    return()
+  endif()
+  get_property(fmus GLOBAL PROPERTY release_fmus)
+  get_property(targets GLOBAL PROPERTY release_targets)
+  set(parts
+      --part SUNDIALS,${SUNDIALS_VERSION},BSD-3-Clause,https://computing.llnl.gov/projects/sundials
+      --part musl,${MUSL_VERSION},MIT,https://musl.libc.org
+      --part zig,${zig_version},MIT,https://ziglang.org
+      --part mingw-w64,${mingw_version},ZPL-2.1,https://www.mingw-w64.org)
+  set(bill ${release_folder}/sbom.cdx.json)
+  add_custom_command(
+    OUTPUT ${bill} ${release_folder}/SHA256SUMS
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/bill_of_materials.py ${fmus} --output ${release_folder}
+            --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE ${parts}
+    DEPENDS ${targets} ${fmus} ${FMU_SOURCE_DIR}/bill_of_materials.py
+    COMMENT "Writing checksums and the bill of materials"
+    VERBATIM)
+  add_custom_target(release DEPENDS ${bill})
+endfunction()

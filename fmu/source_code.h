@@ -1,0 +1,28 @@
+/* In front of every file of a source-code FMU (source_code.py): what options of the compiler do in
+ * the project's build. The headers of the system come first: they keep their own symbols. */
+#ifndef SOURCE_CODE_H
+#define SOURCE_CODE_H
+
+#include <errno.h>
+#include <float.h>
+#include <limits.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "platform.h"
+
+HIDE_SYMBOLS
+NO_FUSED_OPERATIONS
+
+#ifdef __FAST_MATH__
+#error "Without -ffast-math: the code relies on the order of its sums"
+#endif
+
+#endif

@@ -1,0 +1,262 @@
+"""Writes the folder sources/ of an FMU, which C compilers build without further options.
+
+The build writes a manifest (source_code.cmake): the libraries in the FMU with their files, and the
+folders that these come from. In sources/ lie the C files, in folders below it the headers that they
+need. They differ from the originals in their includes, which are relative: no folder is searched.
+
+The functions of musl get other names. Compilers know the standard ones and calculate some of them
+in their own way, and a program that links the FMU statically has them already.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import posixpath
+import re
+import shutil
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+PROJECT = Path(__file__).parents[1]
+PRELUDE = PROJECT / "fmu" / "source_code.h"
+PLATFORM = PROJECT / "src" / "model" / "platform.h"
+
+# the library whose functions get other names, and the header with these
+ELEMENTARY = "elementary_functions"
+RENAMES = "generated/elementary_functions.h"
+
+# not on every system, and nothing that they define is used
+NOT_NEEDED = {"endian.h", "features.h"}
+# behind conditions that never hold: options of SUNDIALS, and C++
+NOT_REACHED = {"caliper/cali.h", "mpi.h", "sundials/sundials_context.hpp"}
+
+COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
+
+
+class SourceCodeError(Exception):
+    """What is wrong with a file or the manifest, in one line."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """A static library of the build, or the shared object itself."""
+
+    name: str
+    sources: list[Path]
+    include: list[Path]  # folders, in the order in which they are searched
+    prelude: Path | None  # header in front of each file
+
+
+# for the header in front of all files
+COMMON = Library("", [], [PLATFORM.parent], None)
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What is in an FMU, and the folders that its files come from, by their names in sources/."""
+
+    libraries: list[Library]
+    roots: dict[str, Path]
+
+
+@dataclass(frozen=True)
+class Include:
+    """One directive, at [start, end) of a text."""
+
+    start: int
+    end: int
+    is_quoted: bool
+    name: str
+
+
+def includes(text: str) -> Iterator[Include]:
+    """Directives that are not in a comment."""
+    code = COMMENT.sub(lambda comment: re.sub(r"[^\n]", " ", comment[0]), text)
+    for line in INCLUDE.finditer(code):
+        yield Include(line.start(), line.end(), line[1] == '"', line[2])
+
+
+def read(path: Path) -> str:
+    """Text of a file in any encoding."""
+    try:
+        return path.read_bytes().decode("utf-8", "surrogateescape")
+    except OSError as error:
+        raise SourceCodeError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+class SourceFolder:
+    """The files of sources/: their texts by name."""
+
+    def __init__(self, roots: dict[str, Path]) -> None:
+        # of a folder and one inside it, the inner one comes first
+        self.roots = sorted(roots.items(), key=lambda root: -len(root[1].parts))
+        self.texts: dict[str, str] = {}
+        self.origins: dict[str, Path] = {}
+        self.system_headers = {
+            line.name for path in (PRELUDE, PLATFORM) for line in includes(read(path))
+        }
+
+    def add_library(self, library: Library) -> None:
+        """Add the files of a library, each behind its preludes."""
+        preludes = [self.add_header(PRELUDE, COMMON), RENAMES]
+        if library.prelude is not None:
+            preludes.append(self.add_header(library.prelude, library))
+        lines = "".join(f'#include "{name}"\n' for name in preludes)
+        for source in library.sources:
+            name = self.source_name(source)
+            self.claim(name, source)
+            self.texts[name] = lines + self.with_relative_includes(source, name, library)
+
+    def add_renames(self, sources: list[Path]) -> None:
+        """Add the header with the other names of the functions that these files define."""
+        lines = ["/* Functions of musl, by other names than the standard ones. */\n"]
+        for source in sources:
+            function = source.stem
+            if function.startswith("__") or function.endswith("_data"):
+                continue
+            pattern = rf"^[a-z]+ {function}(\([^)]*\))\s*\{{"
+            definition = re.search(pattern, read(source), re.MULTILINE)
+            if definition is None:
+                raise SourceCodeError(f"{source}: does not define {function}")
+            head = definition[0].rstrip("{ \t\n")
+            lines.append(f"#define {function} fmu_{function}\n{head};\n")
+        self.texts[RENAMES] = "".join(lines)
+
+    def add_header(self, header: Path, library: Library) -> str:
+        """Add a header and all that it includes; its name."""
+        root, below = self.root_of(header)
+        name = f"{root}/{below}"
+        self.claim(name, header)
+        if name not in self.texts:
+            self.texts[name] = ""  # headers may include each other
+            self.texts[name] = self.with_relative_includes(header, name, library)
+        return name
+
+    def source_name(self, source: Path) -> str:
+        """Of a foreign file with its root, which says where it is from: musl_sin.c."""
+        root, _ = self.root_of(source)
+        if root == "project" or source.name.startswith(f"{root}_"):
+            return source.name
+        return f"{root}_{source.name}"
+
+    def root_of(self, path: Path) -> tuple[str, str]:
+        """Name of the root that a file is from, and its path below."""
+        for name, folder in self.roots:
+            if path.is_relative_to(folder):
+                return name, path.relative_to(folder).as_posix()
+        raise SourceCodeError(f"{path}: is in no folder of the manifest")
+
+    def claim(self, name: str, origin: Path) -> None:
+        """Refuse two files of one name; upper and lower case are the same on some systems."""
+        other = self.origins.setdefault(name.lower(), origin)
+        if other != origin:
+            raise SourceCodeError(f"{origin}: would be sources/{name}, as {other}")
+
+    def with_relative_includes(self, path: Path, name: str, library: Library) -> str:
+        """Text of a file that is called `name` in sources/."""
+        text = read(path)
+        parts = []
+        end = 0
+        for line in includes(text):
+            parts += [text[end : line.start], self.directive(line, text, path, name, library)]
+            end = line.end
+        return "".join([*parts, text[end:]])
+
+    def directive(self, line: Include, text: str, path: Path, name: str, library: Library) -> str:
+        """What stands in sources/ instead of an include."""
+        as_it_is = text[line.start : line.end]
+        if line.name in NOT_NEEDED:
+            return ""
+        if line.name in NOT_REACHED:
+            return as_it_is
+        searched = [path.parent, *library.include] if line.is_quoted else library.include
+        for folder in searched:
+            header = Path(os.path.normpath(folder / line.name))
+            if header.is_file():
+                included = self.add_header(header, library)
+                return f'#include "{posixpath.relpath(included, posixpath.dirname(name))}"'
+        if not line.is_quoted and line.name in self.system_headers:
+            return as_it_is
+        number = text.count("\n", 0, line.start) + 1
+        raise SourceCodeError(f"{path}:{number}: header {line.name} was not found")
+
+
+def load(path: Path) -> Manifest:
+    """Manifest that the build wrote."""
+    try:
+        content = json.loads(read(path))
+        return Manifest(
+            [
+                Library(
+                    entry["name"],
+                    [Path(source) for source in entry["sources"]],
+                    [Path(folder) for folder in entry["include"] if folder],
+                    Path(entry["prelude"]) if entry["prelude"] else None,
+                )
+                for entry in content["libraries"]
+            ],
+            {name: Path(folder) for name, folder in content["roots"].items()},
+        )
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise SourceCodeError(f"{path}: is not a manifest: {error!r:.200}") from None
+
+
+def collect(manifest: Manifest) -> SourceFolder:
+    """Read all files."""
+    folder = SourceFolder(manifest.roots)
+    for library in manifest.libraries:
+        folder.add_library(library)
+        if library.name == ELEMENTARY:
+            folder.add_renames(library.sources)
+    if RENAMES not in folder.texts:
+        raise SourceCodeError(f"the manifest has no library {ELEMENTARY}")
+    return folder
+
+
+def write(texts: dict[str, str], output: Path) -> None:
+    """Write a folder that has these files and no others."""
+    temporary = output.with_name(f".{os.getpid()}.{output.name}")
+    try:
+        for name, text in texts.items():
+            path = temporary / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text.encode("utf-8", "surrogateescape"))
+        shutil.rmtree(output, ignore_errors=True)
+        temporary.replace(output)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def dependencies(target: str, files: list[Path]) -> str:
+    """Rule of make: the target is made again when one of the files has changed."""
+    names = [str(file).replace(" ", "\\ ") for file in files]
+    return f"{target}:" + "".join(f" \\\n  {name}" for name in sorted(names)) + "\n"
+
+
+def main() -> int:
+    """Write sources/; 2 with a line on standard error where a file is missing or wrong."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("manifest", type=Path, help="what the FMU is built from, as JSON")
+    parser.add_argument("--output", type=Path, required=True, help="the folder sources/")
+    parser.add_argument("--depfile", type=Path, help="file for a rule of make: what was read")
+    parser.add_argument("--target", help="target of this rule")
+    arguments = parser.parse_args()
+    try:
+        folder = collect(load(arguments.manifest))
+        write(folder.texts, arguments.output)
+        if arguments.depfile:
+            rule = dependencies(arguments.target, list(folder.origins.values()))
+            arguments.depfile.write_text(rule)
+    except (SourceCodeError, OSError) as error:
+        print(f"source_code.py: {error!s:.2000}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

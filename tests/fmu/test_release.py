@@ -1,0 +1,242 @@
+"""The FMUs of ./release.sh: what is in them, and their binaries as far as files show it."""
+
+import ctypes
+import hashlib
+import io
+import json
+import os
+import re
+import zipfile
+from collections.abc import Iterator
+from contextlib import redirect_stderr
+from pathlib import Path
+
+import fmpy.validation
+import lief
+import pytest
+
+from tests.support.paths import ROOT
+
+NAMES = ("RPManipulator", "RPTrajectory", "RPController")
+LARGEST = 2_500_000  # bytes of an FMU
+
+# what the loader of each platform has
+KERNEL = re.compile(r"KERNEL32\.dll|api-ms-win-crt-[a-z]+-l1-1-0\.dll")
+
+
+@pytest.fixture(scope="module")
+def release(fmu: Path) -> Path:
+    """Folder of the release of the built FMU."""
+    folder = fmu.parent / "release"
+    if not (folder / "SHA256SUMS").is_file():
+        reason = f"{folder} has no release: ./release.sh builds it"
+        if os.environ.get("CI"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return folder
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def archive(request: pytest.FixtureRequest, release: Path) -> Iterator[zipfile.ZipFile]:
+    with zipfile.ZipFile(release / f"{request.param}.fmu") as archive:
+        yield archive
+
+
+def name_of(archive: zipfile.ZipFile) -> str:
+    return Path(archive.filename).stem
+
+
+def binary(archive: zipfile.ZipFile, folder: str, suffix: str) -> bytes:
+    return archive.read(f"binaries/{folder}/{name_of(archive)}{suffix}")
+
+
+def fmi2_functions() -> set[str]:
+    """Names of all functions of the standard, from its header."""
+    header = Path(fmpy.__file__).parent / "c-code" / "fmi2Functions.h"
+    names = set(re.findall(r"FMI2_Export \w+ +(fmi2\w+);", header.read_text()))
+    assert len(names) == 44
+    return names
+
+
+def elementary_functions() -> set[str]:
+    """Names in the system's libm, and those that a compiler may call instead."""
+    ctypes.CDLL("libm.so.6")
+    path = re.search(r"/\S*/libm\.so\.6", Path("/proc/self/maps").read_text()).group()
+    library = lief.ELF.parse(path)  # owns its symbols
+    names = {symbol.name for symbol in library.exported_symbols}
+    assert {"sin", "sincos", "pow", "fmin"} <= names
+    return names | {"__sincos_stret", "__sincosf_stret", "__exp10"}
+
+
+# ---- The archives -------------------------------------------------------------------------------
+
+
+def test_a_release_has_checksums_of_all_its_fmus(release: Path) -> None:
+    lines = [line.split("  ") for line in (release / "SHA256SUMS").read_text().splitlines()]
+    found = {path.relative_to(release).as_posix() for path in release.rglob("*.fmu")}
+    assert {name for _, name in lines} == found >= {f"{name}.fmu" for name in NAMES}
+    for checksum, name in lines:
+        assert hashlib.sha256((release / name).read_bytes()).hexdigest() == checksum, name
+
+
+def test_the_bill_of_materials_names_what_is_compiled_in(release: Path, archive) -> None:
+    bill = json.loads((release / "sbom.cdx.json").read_text())
+    assert bill["bomFormat"] == "CycloneDX"
+    components = {component["name"]: component for component in bill["components"]}
+    used = next(d["dependsOn"] for d in bill["dependencies"] if d["ref"] == f"{name_of(archive)}.fmu")
+    assert set(used) == {"SUNDIALS", "musl", "zig", "mingw-w64"}
+    for name in used:
+        assert re.fullmatch(r"\d+(\.\d+)+", components[name]["version"])
+        license_text = archive.read(f"documentation/licenses/{name.lower()}.txt").decode()
+        words = {"BSD-3-Clause": "BSD 3-Clause", "MIT": "Permission is hereby granted",
+                 "ZPL-2.1": "Zope Public License"}  # fmt: skip
+        assert words[components[name]["licenses"][0]["license"]["id"]] in license_text
+
+
+def test_an_fmu_has_the_binaries_of_all_platforms_and_is_small(archive) -> None:
+    name = name_of(archive)
+    found = {entry for entry in archive.namelist() if entry.startswith("binaries/")}
+    assert found == {
+        f"binaries/linux64/{name}.so",
+        f"binaries/win64/{name}.dll",
+        f"binaries/darwin64/{name}.dylib",
+        f"binaries/aarch64-linux/{name}.so",
+    }
+    assert Path(archive.filename).stat().st_size < LARGEST
+
+
+def test_the_standard_finds_no_fault(archive) -> None:
+    assert fmpy.validation.validate_fmu(archive.filename) == []
+
+
+def test_the_interface_is_that_of_the_fmu_for_one_platform(archive, fmu: Path) -> None:
+    with zipfile.ZipFile(fmu.with_name(Path(archive.filename).name)) as built:
+        one = built.read("modelDescription.xml").decode()
+    every = archive.read("modelDescription.xml").decode()
+    without = re.sub(r"\s*<SourceFiles>.*?</SourceFiles>\s*</(ModelExchange|CoSimulation)>", "", every,
+                     flags=re.DOTALL)  # fmt: skip
+    assert every != without
+    assert re.search(r'guid="([^"]+)"', one)[1] == re.search(r'guid="([^"]+)"', every)[1]
+    assert one.partition("<UnitDefinitions>")[2] == every.partition("<UnitDefinitions>")[2]
+
+
+def test_no_file_names_the_machine_that_built_it(archive) -> None:
+    for entry in archive.namelist():
+        content = archive.read(entry)
+        for path in (ROOT, Path.home() / ".cache"):
+            assert os.fsencode(path) not in content, entry
+
+
+# ---- Linux --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=[("linux64", "X86_64"), ("aarch64-linux", "AARCH64")], ids=lambda p: p[0])
+def elf(request: pytest.FixtureRequest, archive) -> lief.ELF.Binary:
+    folder, machine = request.param
+    parsed = lief.ELF.parse(list(binary(archive, folder, ".so")))
+    assert parsed.header.machine_type == getattr(lief.ELF.ARCH, machine)
+    return parsed
+
+
+def test_linux_exports_the_functions_of_the_standard_only(elf: lief.ELF.Binary) -> None:
+    assert {symbol.name for symbol in elf.exported_symbols} == fmi2_functions()
+
+
+def test_linux_needs_glibc_2_17_and_no_libm(elf: lief.ELF.Binary) -> None:
+    assert list(elf.libraries) == ["libc.so.6"]
+    versions = [v.name for need in elf.symbols_version_requirement for v in need.get_auxiliary_symbols()]
+    assert versions
+    for version in versions:
+        assert tuple(map(int, version.removeprefix("GLIBC_").split("."))) <= (2, 17)
+    assert not {symbol.name for symbol in elf.imported_symbols} & elementary_functions()
+
+
+def test_linux_is_read_only_where_it_can_be(elf: lief.ELF.Binary) -> None:
+    segments = {segment.type for segment in elf.segments}
+    assert lief.ELF.Segment.TYPE.GNU_RELRO in segments
+    assert elf.get(lief.ELF.DynamicEntry.TAG.FLAGS_1).has(lief.ELF.DynamicEntryFlags.FLAG.NOW)
+    assert elf.has_nx
+    assert not elf.has(lief.ELF.DynamicEntry.TAG.TEXTREL)
+    assert not elf.has(lief.ELF.DynamicEntry.TAG.RUNPATH)
+    assert not elf.has(lief.ELF.DynamicEntry.TAG.RPATH)
+
+
+# ---- Windows ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pe(archive) -> lief.PE.Binary:
+    return lief.PE.parse(list(binary(archive, "win64", ".dll")))
+
+
+def test_windows_exports_the_functions_of_the_standard_only(pe: lief.PE.Binary) -> None:
+    assert pe.header.machine == lief.PE.Header.MACHINE_TYPES.AMD64
+    assert {entry.name for entry in pe.get_export().entries} == fmi2_functions()
+
+
+def test_windows_needs_nothing_to_be_installed(pe: lief.PE.Binary) -> None:
+    """The C runtime of all Windows since 10, without its elementary functions."""
+    needed = [library.name for library in pe.imports]
+    assert needed
+    for name in needed:
+        assert KERNEL.fullmatch(name), name
+        assert "math" not in name
+    imported = {entry.name for library in pe.imports for entry in library.entries}
+    assert not imported & elementary_functions()
+
+
+def test_windows_loads_it_anywhere_and_runs_no_data(pe: lief.PE.Binary) -> None:
+    found = set(pe.optional_header.dll_characteristics_lists)
+    kinds = lief.PE.OptionalHeader.DLL_CHARACTERISTICS
+    assert {kinds.DYNAMIC_BASE, kinds.HIGH_ENTROPY_VA, kinds.NX_COMPAT} <= found
+
+
+# ---- macOS --------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["X86_64", "ARM64"])
+def macho(request: pytest.FixtureRequest, archive) -> lief.MachO.Binary:
+    fat = lief.MachO.parse(list(binary(archive, "darwin64", ".dylib")))
+    assert fat.size == 2
+    return fat.take(getattr(lief.MachO.Header.CPU_TYPE, request.param))
+
+
+def test_macos_exports_the_functions_of_the_standard(macho: lief.MachO.Binary) -> None:
+    """And two names that its linker adds to every library."""
+    exported = {symbol.name for symbol in macho.exported_symbols}
+    expected = {f"_{name}" for name in fmi2_functions()}
+    assert exported == expected | {"___dso_handle", "__mh_dylib_header"}
+
+
+def test_macos_needs_version_11_and_its_system_library(macho: lief.MachO.Binary, archive) -> None:
+    oldest = macho.build_version.minos if macho.has_build_version else macho.version_min.version
+    assert list(oldest) == [11, 0, 0]
+    own = f"@rpath/{name_of(archive)}.dylib"
+    assert {library.name for library in macho.libraries} == {own, "/usr/lib/libSystem.B.dylib"}
+    imported = {symbol.name.removeprefix("_") for symbol in macho.imported_symbols}
+    assert "malloc" in imported
+    assert not imported & elementary_functions()
+
+
+def test_macos_on_arm_loads_signed_code_only(macho: lief.MachO.Binary) -> None:
+    if macho.header.cpu_type == lief.MachO.Header.CPU_TYPE.ARM64:
+        assert macho.has_code_signature
+
+
+# ---- The bill of materials ------------------------------------------------------------------------
+
+
+def test_a_bill_of_a_file_that_is_not_there_is_refused(tmp_path: Path, capsys) -> None:
+    import sys
+
+    sys.path.insert(0, str(ROOT / "fmu"))
+    try:
+        import bill_of_materials
+    finally:
+        sys.path.remove(str(ROOT / "fmu"))
+    arguments = ["bill", str(tmp_path / "No.fmu"), "--output", str(tmp_path), "--version", "1",
+                 "--license", str(ROOT / "LICENSE")]  # fmt: skip
+    with redirect_stderr(io.StringIO()) as error, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", arguments)
+        assert bill_of_materials.main() == 2
+    assert "No.fmu" in error.getvalue() and error.getvalue().count("\n") == 1

@@ -1,0 +1,304 @@
+"""The sources of the FMUs: built by others' tools, with the bits of the build."""
+
+import ctypes
+import os
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from tests.support.cosim_project import load
+from tests.support.instances import Instance, LoadedFmu
+from tests.support.paths import ROOT
+
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+FMUS = ("RPManipulator", "RPController", "RPTrajectory")
+SCENARIOS = {
+    "RPManipulator": ["sine_efforts", "irregular_steps", "constant_effort"],
+    "RPController": ["controller_computed_torque", "controller_limited_integral"],
+    "RPTrajectory": ["arc_near_joint", "point_to_point_joint"],
+}
+STEPS = 250  # of each scenario
+
+# of the C runtime of mingw, which is linked statically: they look at bits
+CLASSIFICATIONS = {"__fpclassify", "__isnan", "__signbit"}
+
+# of x86 and Arm: multiply and add, rounded once
+FUSED = re.compile(r"\tv?fn?m(?:add|sub)\w*|\tfml[as]\w*|\tfcm(?:la|ul)\w*")
+
+
+def run(*command: object, folder: Path | None = None, **environment: str) -> str:
+    """Standard output of a command that must succeed."""
+    arguments = [str(argument) for argument in command]
+    result = subprocess.run(
+        arguments,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        env=os.environ | environment,
+    )
+    assert result.returncode == 0, f"{arguments[:4]}\n{result.stdout}{result.stderr}"
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def releases(fmu: Path) -> dict[str, Path]:
+    """Folders with sources/ and the description of each FMU, made by the build."""
+    targets = [f"{name}_sources" for name in FMUS]
+    run("cmake", "--build", fmu.parent, "--target", *targets)
+    return {name: fmu.parent / "fmu" / name / "release" for name in FMUS}
+
+
+# ---- The same bits ------------------------------------------------------------------------------
+
+
+def trace(loaded: LoadedFmu, name: str, method: int) -> Iterator[bytes]:
+    """All values after each step of a scenario, then the serialized state and the messages."""
+    types = {variable.name: variable.type for variable in loaded.description.modelVariables}
+    scenario = load(name)
+    with Instance(loaded, logging_on=True) as instance:
+        for variable, value in (scenario.parameters | scenario.initial).items():
+            setter = "setReal" if types[variable] == "Real" else "setInteger"
+            getattr(instance.fmi, setter)([loaded.references[variable]], [value])
+        if "solver_method" in types:
+            instance.fmi.setInteger([loaded.references["solver_method"]], [method])
+        instance.initialize(start=scenario.start, tolerance=scenario.tolerance)
+        for i in range(min(STEPS, len(scenario.times) - 1)):
+            t, end = scenario.times[i : i + 2]
+            instance.set(**{name: values[i] for name, values in scenario.inputs.items()})
+            instance.step(t, end - t)
+            yield instance.everything()
+        state = instance.fmi.getFMUState()
+        yield bytes(instance.fmi.serializeFMUState(state))
+        instance.fmi.freeFMUState(state)
+        yield repr(instance.messages).encode()
+
+
+def assert_same_bits(built: LoadedFmu, rebuilt: LoadedFmu) -> None:
+    """Of every value in every scenario with every method, of states and messages."""
+    for scenario in SCENARIOS[built.description.modelName]:
+        for method in (1, 2, 3):
+            expected = list(trace(built, scenario, method))
+            assert len(set(expected)) > STEPS / 2  # it moves
+            assert list(trace(rebuilt, scenario, method)) == expected, (scenario, method)
+
+
+@pytest.fixture(scope="module")
+def built(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, LoadedFmu]:
+    """The FMUs of the build."""
+    folder = tmp_path_factory.mktemp("built")
+    return {name: LoadedFmu(fmu.with_name(f"{name}.fmu"), folder / name) for name in FMUS}
+
+
+def test_fmpy_compiles_an_fmu_without_binaries(
+    releases: dict[str, Path], built: dict[str, LoadedFmu], tmp_path: Path
+) -> None:
+    archive = tmp_path / "RPManipulator.fmu"
+    release = releases[archive.stem]
+    entries = [f"{name}={release / name}" for name in ("modelDescription.xml", "sources")]
+    run(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
+    assert archive.stat().st_size < 500_000
+    command = Path(sys.executable).parent / "fmpy"
+    assert "No problems found." in run(command, "validate", archive)
+    options = ["--configuration", "Debug"]  # compiles three times faster than Release
+    run(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
+    assert_same_bits(built[archive.stem], LoadedFmu(archive, tmp_path / "compiled"))
+
+
+# ---- Plain compilers ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Build:
+    """All C files of an FMU, each compiled by itself, and linked; nothing else is given."""
+
+    fmu: str
+    compiler: str
+    options: tuple[str, ...]
+    tools: str = ""  # prefix of nm and objdump
+
+    def __str__(self) -> str:
+        return f"{self.compiler} {' '.join(self.options)}"
+
+
+BUILDS = (
+    Build("RPController", "gcc", ("-O2", "-fPIC")),
+    Build("RPTrajectory", "clang", ("-fPIC",)),
+    Build("RPManipulator", "aarch64-linux-gnu-gcc", ("-O2", "-fPIC"), "aarch64-linux-gnu-"),
+    Build("RPManipulator", "x86_64-w64-mingw32-gcc", (), "x86_64-w64-mingw32-"),
+)
+ELF = [build for build in BUILDS if "-fPIC" in build.options]
+
+
+def compiled(compiler: str, options: tuple[str, ...], files: list[Path], folder: Path) -> None:
+    """Compile files to objects in the folder, in two processes."""
+    if not shutil.which(compiler):
+        pytest.skip(f"{compiler} is not installed")
+    command = [compiler, *options, "-c"]
+    with ThreadPoolExecutor(2) as executor:
+        halves = [executor.submit(run, *command, *files[i::2], folder=folder) for i in (0, 1)]
+        for half in halves:
+            half.result()
+
+
+@pytest.fixture(scope="module")
+def libraries() -> dict[Build, Path]:
+    """Libraries that were built, each in a folder with its objects; filled by `library`."""
+    return {}
+
+
+@pytest.fixture
+def library(
+    request: pytest.FixtureRequest,
+    releases: dict[str, Path],
+    libraries: dict[Build, Path],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Path:
+    """The library of the Build that the test is given."""
+    build: Build = request.param
+    if build not in libraries:
+        folder = tmp_path_factory.mktemp("objects")
+        files = sorted((releases[build.fmu] / "sources").glob("*.c"))
+        compiled(build.compiler, build.options, files, folder)
+        path = folder / f"{build.fmu}.library"
+        run(build.compiler, "-shared", "-o", path, *sorted(folder.glob("*.o")))
+        libraries[build] = path
+    return libraries[build]
+
+
+def each(builds: tuple[Build, ...] | list[Build]) -> pytest.MarkDecorator:
+    """Run a test on the libraries of these builds."""
+    pairs = [(build, build) for build in builds]
+    return pytest.mark.parametrize(
+        ("build", "library"), pairs, indirect=["library"], ids=[str(build) for build in builds]
+    )
+
+
+@each(BUILDS[:2])
+def test_a_plain_compiler_gives_the_same_bits(
+    build: Build, library: Path, built: dict[str, LoadedFmu], tmp_path: Path
+) -> None:
+    unpacked = Path(shutil.copytree(built[build.fmu].folder, tmp_path / "unpacked"))
+    shutil.copy(library, unpacked / "binaries" / "linux64" / f"{build.fmu}.so")
+    assert_same_bits(built[build.fmu], LoadedFmu(unpacked, unpacked))
+
+
+def symbols(text: str) -> set[str]:
+    """Names in a listing of nm without their versions, and without the names of these."""
+    lines = (line.split() for line in text.splitlines())
+    return {line[-1].partition("@")[0] for line in lines if len(line) > 1 and line[-2] != "A"}
+
+
+@pytest.fixture(scope="module")
+def libm() -> set[str]:
+    """Functions of the system's libm."""
+    ctypes.CDLL("libm.so.6")
+    path = re.search(r"/\S*/libm\.so\.6", Path("/proc/self/maps").read_text()).group()
+    names = symbols(run("nm", "--dynamic", "--defined-only", path))
+    assert {"sin", "sincos", "pow", "sqrt", "fmin"} <= names
+    return names
+
+
+@each(BUILDS)
+def test_no_function_of_libm_is_called(build: Build, library: Path, libm: set[str]) -> None:
+    objects = sorted(library.parent.glob("*.o"))
+    called = symbols(run(f"{build.tools}nm", "--undefined-only", *objects))
+    assert {"fmu_sin", "malloc", "memcpy"} <= called
+    assert called & libm <= (CLASSIFICATIONS if "mingw" in build.compiler else set())
+
+
+@pytest.fixture(scope="module")
+def standard() -> set[str]:
+    """Functions of FMI 2.0."""
+    header = (HEADERS / "fmi2Functions.h").read_text()
+    return set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
+
+
+@each(ELF)
+def test_the_functions_of_the_standard_are_exported_and_no_others(
+    build: Build, library: Path, standard: set[str]
+) -> None:
+    assert symbols(run(f"{build.tools}nm", "--dynamic", "--defined-only", library)) == standard
+
+
+@each(BUILDS[3:])
+def test_so_are_they_on_windows(build: Build, library: Path, standard: set[str]) -> None:
+    listing = run(f"{build.tools}objdump", "--private-headers", library)
+    table = listing.partition("[Ordinal/Name Pointer] Table")[2].partition("\n\n")[0]
+    assert set(re.findall(r"\[ *\d+\].* (\w+)$", table, re.MULTILINE)) == standard
+
+
+# ---- Fused operations ---------------------------------------------------------------------------
+
+
+@each(BUILDS[2:3])
+def test_nothing_is_fused_on_arm(build: Build, library: Path) -> None:
+    code = run(f"{build.tools}objdump", "--disassemble", library)
+    assert "\tfmul\t" in code
+    assert not FUSED.search(code)
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_nothing_is_fused_where_the_processor_could(
+    releases: dict[str, Path], tmp_path: Path, compiler: str
+) -> None:
+    sources = releases["RPManipulator"] / "sources"
+    patterns = ("rp_*.c", "musl_*.c", "small_vector.c", "sundials_nvector_*.c")
+    files = sorted(path for pattern in patterns for path in sources.glob(pattern))
+    compiled(compiler, ("-O3", "-march=haswell", "-fPIC"), files, tmp_path)
+    code = run("objdump", "--disassemble", *sorted(tmp_path.glob("*.o")))
+    assert "\tvmulsd " in code
+    assert not FUSED.search(code)
+
+
+def test_fast_math_is_refused(releases: dict[str, Path], tmp_path: Path) -> None:
+    source = releases["RPManipulator"] / "sources" / "clock.c"
+    command = ["gcc", "-ffast-math", "-c", source, "-o", tmp_path / "clock.o"]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode != 0
+    assert "#error" in result.stderr and "-ffast-math" in result.stderr
+
+
+# ---- The description ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", FMUS)
+def test_the_description_names_the_files_and_differs_in_nothing_else(
+    releases: dict[str, Path], fmu: Path, tmp_path: Path, name: str
+) -> None:
+    release = releases[name]
+    files = sorted(path.name for path in (release / "sources").glob("*.c"))
+    root = ET.parse(release / "modelDescription.xml").getroot()
+    for kind in ("ModelExchange", "CoSimulation"):
+        interface = root.find(kind)
+        assert [file.get("name") for file in interface.iterfind("SourceFiles/File")] == files
+        interface.remove(interface.find("SourceFiles"))
+    with zipfile.ZipFile(fmu.with_name(f"{name}.fmu")) as archive:
+        plain = archive.read("modelDescription.xml").decode()
+        assert not [entry for entry in archive.namelist() if entry.startswith("sources/")]
+    expected, found = (
+        ET.canonicalize(text, strip_text=True) for text in (plain, ET.tostring(root))
+    )
+    assert found == expected
+
+
+@pytest.mark.parametrize("name", FMUS)
+def test_no_file_names_a_path_of_the_machine(
+    releases: dict[str, Path], fmu: Path, name: str
+) -> None:
+    for path in (releases[name] / "sources").rglob("*"):
+        if path.is_file():
+            content = path.read_bytes()
+            assert not re.search(rb'# *include *[<"]/', content), path
+            for folder in (ROOT, fmu.parent):
+                assert os.fsencode(folder) not in content, path

@@ -1,0 +1,240 @@
+"""The program that writes an FMU's sources, on a small project."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.generator import VARIABLES, generate
+from tests.support.paths import ROOT
+
+PROGRAM = ROOT / "fmu" / "source_code.py"
+SINE = "#include <features.h>\n#include <math.h>\n\ndouble sin(double x)\n{\n\treturn x;\n}\n"
+FILES = {
+    "toy/src/toy.c": '/* #include "nowhere.h" */\n#include "deep/toy.h"\n#include <stdio.h>\n',
+    "toy/include/deep/toy.h": '#  include "../plain.h" // twice\n#include <plain.h>\n',
+    "toy/include/plain.h": '#include "deep/toy.h"\nint caf\udce9;\n',
+    "toy/include/unused.h": "",
+    "math/sin.c": SINE,
+    "math/__sin.c": "",
+    "math/sin_data.c": "",
+    "math/front.h": "",
+}
+
+
+class Toy:
+    """A project of two libraries, and the program run on it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.output = folder / "out" / "sources"
+        for name, text in FILES.items():
+            self.write(name, text)
+        self.libraries: list[dict[str, Any]] = [
+            self.library("toy", ["toy/src/toy.c"], include=["toy/include"]),
+            self.library(
+                "elementary_functions",
+                ["math/sin.c", "math/__sin.c", "math/sin_data.c"],
+                prelude=str(folder / "math/front.h"),
+            ),
+        ]
+        self.roots = {
+            "project": str(ROOT),
+            "toy": str(folder / "toy"),
+            "math": str(folder / "math"),
+        }
+
+    def write(self, name: str, text: str) -> None:
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(text.encode("utf-8", "surrogateescape"))
+
+    def library(
+        self, name: str, sources: list[str], include: list[str] | None = None, prelude: str = ""
+    ) -> dict[str, Any]:
+        return {
+            "name": name,
+            "sources": [str(self.folder / source) for source in sources],
+            "include": [str(self.folder / below) for below in include or []],
+            "prelude": prelude,
+        }
+
+    def run(self, *options: object) -> subprocess.CompletedProcess[str]:
+        manifest = self.folder / "manifest.json"
+        if not manifest.exists():
+            manifest.write_text(json.dumps({"libraries": self.libraries, "roots": self.roots}))
+        command = [sys.executable, PROGRAM, manifest, "--output", self.output, *options]
+        return subprocess.run(
+            [str(part) for part in command], capture_output=True, text=True, check=False
+        )
+
+    def contents(self) -> dict[str, str]:
+        """Files of sources/ that are not the project's."""
+        files = (path for path in self.output.rglob("*") if path.is_file())
+        texts = {
+            path.relative_to(self.output).as_posix(): path.read_bytes().decode(
+                "utf-8", "surrogateescape"
+            )
+            for path in files
+        }
+        return {name: text for name, text in texts.items() if not name.startswith("project/")}
+
+
+@pytest.fixture
+def toy(tmp_path: Path) -> Toy:
+    return Toy(tmp_path)
+
+
+def test_only_includes_are_changed(toy: Toy) -> None:
+    result = toy.run()
+    assert result.returncode == 0, result.stderr
+    front = '#include "project/fmu/source_code.h"\n#include "generated/elementary_functions.h"\n'
+    math_front = front + '#include "math/front.h"\n'
+    assert toy.contents() == {
+        "toy_toy.c": front
+        + '/* #include "nowhere.h" */\n#include "toy/include/deep/toy.h"\n#include <stdio.h>\n',
+        "toy/include/deep/toy.h": '#include "../plain.h" // twice\n#include "../plain.h"\n',
+        "toy/include/plain.h": '#include "deep/toy.h"\nint caf\udce9;\n',
+        "math_sin.c": math_front + SINE.replace("#include <features.h>", ""),
+        "math___sin.c": math_front,
+        "math_sin_data.c": math_front,
+        "math/front.h": "",
+        "generated/elementary_functions.h": (
+            "/* Functions of musl, by other names than the standard ones. */\n"
+            "#define sin fmu_sin\ndouble sin(double x);\n"
+        ),
+    }
+
+
+def test_headers_of_the_project_come_with_what_they_include(toy: Toy) -> None:
+    toy.run()
+    prelude = toy.output / "project" / "fmu" / "source_code.h"
+    assert '#include "../src/model/platform.h"' in prelude.read_text()
+    assert (toy.output / "project" / "src" / "model" / "platform.h").is_file()
+
+
+def test_two_folders_give_the_same_bytes(tmp_path: Path) -> None:
+    toys = [Toy(tmp_path / name) for name in ("a", "a folder with a longer name")]
+    for toy in toys:
+        assert toy.run().returncode == 0
+    assert toys[0].contents() == toys[1].contents()
+
+
+def test_files_that_are_gone_do_not_stay(toy: Toy) -> None:
+    toy.run()
+    stale = toy.output / "stale" / "stale.c"
+    stale.parent.mkdir()
+    stale.touch()
+    assert toy.run().returncode == 0
+    assert not stale.parent.exists()
+    assert [path.name for path in toy.output.parent.iterdir()] == ["sources"]
+
+
+def test_make_is_given_all_that_was_read(tmp_path: Path) -> None:
+    toy = Toy(tmp_path / "a folder")
+    rule = tmp_path / "sources.d"
+    assert toy.run("--depfile", rule, "--target", "description.xml").returncode == 0
+    target, _, files = rule.read_text().replace("\\\n", "").partition(":")
+    assert target == "description.xml"
+    read = set(files.replace("\\ ", "?").split())
+    own = {str(tmp_path / "a?folder" / name) for name in FILES if name != "toy/include/unused.h"}
+    prelude = {str(ROOT / "fmu" / "source_code.h"), str(ROOT / "src" / "model" / "platform.h")}
+    assert read == own | prelude
+
+
+# ---- Mistakes -----------------------------------------------------------------------------------
+
+
+def missing_source(toy: Toy) -> str:
+    toy.libraries[0]["sources"].append(str(toy.folder / "toy/missing.c"))
+    return "toy/missing.c: cannot be read: No such file or directory"
+
+
+def missing_header(toy: Toy) -> str:
+    toy.write("toy/src/toy.c", '\n\n#include "missing.h"\n')
+    return "toy/src/toy.c:3: header missing.h was not found"
+
+
+def missing_header_of_a_header(toy: Toy) -> str:
+    toy.write("toy/include/plain.h", "#include <deep/missing.h>\n")
+    return "toy/include/plain.h:1: header deep/missing.h was not found"
+
+
+def header_that_the_prelude_lacks(toy: Toy) -> str:
+    toy.write("toy/src/toy.c", "#include <complex.h>\n")
+    return "toy/src/toy.c:1: header complex.h was not found"
+
+
+def same_name(toy: Toy) -> str:
+    toy.write("toy/other/TOY.c", "")
+    toy.libraries[0]["sources"].append(str(toy.folder / "toy/other/TOY.c"))
+    return f"toy/other/TOY.c: would be sources/toy_TOY.c, as {toy.folder}/toy/src/toy.c"
+
+
+def file_from_elsewhere(toy: Toy) -> str:
+    toy.write("elsewhere.c", "")
+    toy.libraries[0]["sources"].append(str(toy.folder / "elsewhere.c"))
+    return "elsewhere.c: is in no folder of the manifest"
+
+
+def function_that_is_not_there(toy: Toy) -> str:
+    toy.write("math/sin.c", "double cos(double x)\n{\n}\n")
+    return "math/sin.c: does not define sin"
+
+
+def no_elementary_functions(toy: Toy) -> str:
+    toy.libraries.pop()
+    return "the manifest has no library elementary_functions"
+
+
+def no_manifest(toy: Toy) -> str:
+    toy.write("manifest.json", '{"libraries": 5}')
+    return "manifest.json: is not a manifest: "
+
+
+def damaged_manifest(toy: Toy) -> str:
+    toy.write("manifest.json", '{"libraries": ')
+    return "manifest.json: is not a manifest: "
+
+
+@pytest.mark.parametrize(
+    "mistake",
+    [
+        missing_source,
+        missing_header,
+        missing_header_of_a_header,
+        header_that_the_prelude_lacks,
+        same_name,
+        file_from_elsewhere,
+        function_that_is_not_there,
+        no_elementary_functions,
+        no_manifest,
+        damaged_manifest,
+    ],
+)
+def test_a_mistake_is_refused_in_one_line(toy: Toy, mistake: Callable[[Toy], str]) -> None:
+    expected = mistake(toy)
+    result = toy.run()
+    assert result.returncode == 2
+    assert result.stderr.startswith("source_code.py: ") and result.stderr.count("\n") == 1
+    assert expected in result.stderr
+    assert not toy.output.exists()
+
+
+def test_what_was_written_before_stays_after_a_mistake(toy: Toy) -> None:
+    toy.run()
+    before = toy.contents()
+    toy.write("toy/src/toy.c", "#include <missing.h>\n")
+    assert toy.run().returncode == 2
+    assert toy.contents() == before
+
+
+def test_a_description_of_no_files_is_refused(tmp_path: Path) -> None:
+    result = generate(VARIABLES, tmp_path / "out", "--sources", tmp_path)
+    assert result.returncode == 2
+    assert result.stderr == f"generate.py: {tmp_path}: has no C files\n"
+    assert not (tmp_path / "out" / "modelDescription.xml").exists()
