@@ -166,6 +166,7 @@ class Runner:
 
     def __init__(self, row: Platform | None, name: str, fmu: Path, folder: Path) -> None:
         """`fmu` is the native one; `folder` takes libraries, scripts and transcripts."""
+        self.row = row
         self.name = row.name if row else "native"
         self.model: Model = read_model(fmu)
         self.folder = folder / self.name / name
@@ -180,6 +181,26 @@ class Runner:
         self.library = f"./{Path(member).name}"  # dlopen searches for names without a folder
         with zipfile.ZipFile(archive) as opened:
             (self.folder / self.library).write_bytes(opened.read(member))
+
+    def recompile(self) -> None:
+        """Replace the library by one that the row's gcc makes of the sources in the release.
+
+        As a foreign build does it: every file by itself, with no options but -fPIC on Linux.
+        """
+        row = self.row
+        assert row is not None
+        if shutil.which(row.compiler) is None:
+            raise Missing(f"{row.compiler}: ./setup.sh --platforms")
+        with zipfile.ZipFile(archive_with(row, self.model.name)) as opened:
+            names = [name for name in opened.namelist() if name.startswith("sources/")]
+            opened.extractall(self.folder, names)
+        sources = self.folder / "sources"
+        files = sorted(path.name for path in sources.glob("*.c"))
+        position = [] if row.system == "Windows" else ["-fPIC"]
+        finish([row.compiler, *position, "-c", *files], sources)
+        objects = [path.name for path in sorted(sources.glob("*.o"))]
+        (self.folder / self.library).unlink()
+        finish([row.compiler, "-shared", "-o", f"../{self.library}", *objects], sources)
 
     def run(self, *scripts: Script) -> list[bytes]:
         """Transcripts of scripts, each in a thread of its own."""
@@ -199,10 +220,15 @@ def native_member(fmu: Path) -> str:
     return member
 
 
-def runner(row: Platform | None, name: str, fmu: Path, folder: Path) -> Runner:
+def runner(
+    row: Platform | None, name: str, fmu: Path, folder: Path, *, recompiled: bool = False
+) -> Runner:
     """A Runner, or a skipped test that says what is missing; in CI nothing may be."""
     try:
-        return Runner(row, name, fmu.with_name(f"{name}.fmu"), folder)
+        made = Runner(row, name, fmu.with_name(f"{name}.fmu"), folder)
+        if recompiled:
+            made.recompile()
+        return made
     except Missing as missing:
         if os.environ.get("CI"):
             pytest.fail(f"missing: {missing}")

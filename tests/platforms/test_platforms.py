@@ -57,6 +57,19 @@ def test_all_values_states_and_messages_are_the_same(
     assert difference is None, f"native and {row.name} differ in {difference}"
 
 
+@each_platform
+@each_fmu
+def test_the_sources_give_the_same_when_they_are_compiled_again(
+    runners: Runners, row: Platform, name: str, fmu: Path, tmp_path: Path
+) -> None:
+    native, other = runners(None, name), runner(row, name, fmu, tmp_path, recompiled=True)
+    script = everything(native.model)
+    (expected,) = native.run(script)
+    (actual,) = other.run(script)
+    difference = first_difference(script, expected, actual)
+    assert difference is None, f"native and {row.name} differ in {difference}"
+
+
 # ---- States --------------------------------------------------------------------------------------
 
 
