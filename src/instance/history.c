@@ -46,6 +46,11 @@ static bool can_go_on(const struct instance *instance, double target) {
            parameters_are_held(instance) && inputs_are_held(memory, input_count);
 }
 
+bool instance_goes_on(const struct instance *instance, struct clock_time end) {
+    return !instance->history_is_lost &&
+           can_go_on(instance, clock_difference(end, instance->state.restart_time));
+}
+
 void instance_update_next_step(struct instance *instance) {
     if (instance->state.has_history && !instance->history_is_lost) {
         instance->state.next_step = integrator_next_step(instance->integrator);

@@ -5,6 +5,9 @@
 
 #include "internals.h"
 
+/* The integrator goes on to the time end from where it is, without a restart or a replay. */
+MUST_CHECK NONNULL bool instance_goes_on(const struct instance *instance, struct clock_time end);
+
 /* Prepares the integrator for an advance to the time end: it goes on from its history, gets it back
  * after a restore, or restarts because an input or a parameter has changed. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,
