@@ -1,7 +1,8 @@
 # What differs between platforms, in one place: names in an FMU, and flags that harden what is delivered.
 
-# folder of the binary in an FMI 2.0 archive, and how the file is called there
+# folders of the binary in an archive of FMI 2.0 and of FMI 3.0, and how the file is called there
 set(FMI2_PLATFORM linux64)
+set(FMI3_PLATFORM x86_64-linux)
 set(FMU_LIBRARY_SUFFIX .so)
 
 # No path in what is delivered: two builds in two folders are the same.

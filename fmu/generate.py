@@ -13,7 +13,8 @@ from pathlib import Path
 from atomic_write import atomic_write
 from declaration.c_tables import value_references, variable_table
 from declaration.load import DeclarationError, load
-from fmi2.model_description import model_description
+from fmi2.model_description import model_description as fmi2_description
+from fmi3.model_description import model_description as fmi3_description
 from provenance import Provenance, ProvenanceError, build_date, license_texts
 
 
@@ -37,12 +38,13 @@ def main() -> int:
         texts = license_texts(arguments.license) if arguments.license else {}
         provenance = Provenance(arguments.version, **texts, date=build_date(os.environ))
         files = {
-            "modelDescription.xml": model_description(declaration, provenance),
+            "modelDescription.xml": fmi2_description(declaration, provenance),
+            "fmi3/modelDescription.xml": fmi3_description(declaration, provenance),
             "value_references.h": value_references(declaration),
             "variables.c": variable_table(declaration),
         }
-        arguments.output.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
+            (arguments.output / name).parent.mkdir(parents=True, exist_ok=True)
             write_if_changed(arguments.output / name, text)
     except (DeclarationError, ProvenanceError, OSError) as error:
         print(f"generate.py: {error!s:.2000}", file=sys.stderr)

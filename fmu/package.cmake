@@ -1,13 +1,16 @@
-# add_fmu(NAME FOLDER models/... LIBRARY target)
+# add_fmu(NAME FOLDER models/... LIBRARY target [VERSIONS fmi2 fmi3])
 #
-# Builds NAME.fmu in the current build folder from the model's folder (variables.toml, README.md; model.png
+# Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or one of them,
+# from the model's folder (variables.toml, README.md; model.png
 # and pictures of the README where there are any) and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
 # archive), NAME_description (struct model_description as a library), NAME_interface (the generated header with value
 # references and GUID).
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
-# An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
-set(FMI_VERSIONS fmi2)
+# An adapter of FMI is a folder beside this file, and a word here.
+set(FMI_VERSIONS fmi2 fmi3)
+
+include(${FMU_SOURCE_DIR}/fmi3/archive.cmake)
 
 file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/*.c)
 foreach(version IN LISTS FMI_VERSIONS)
@@ -25,16 +28,20 @@ function(add_fmu_library target version description folder)
 endfunction()
 
 function(add_fmu name)
-  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
+  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "VERSIONS" ${ARGN})
+  if(NOT ARG_VERSIONS)
+    set(ARG_VERSIONS ${FMI_VERSIONS})
+  endif()
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
   set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
-  set(generated ${out}/modelDescription.xml ${out}/variables.c ${out}/value_references.h)
+  set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/variables.c
+                ${out}/value_references.h)
 
   # tables and model description, again whenever a declaration changes
   file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi*/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
-                        ${FMU_SOURCE_DIR}/atomic_write.py)
+                        ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/atomic_write.py)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
@@ -52,11 +59,12 @@ function(add_fmu name)
   target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR})
   target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
-  foreach(version IN LISTS FMI_VERSIONS)
+  foreach(version IN LISTS ARG_VERSIONS)
     if(version STREQUAL "fmi2")
       add_fmu_library(${name} fmi2 ${name}_description ${out})
     else()
       add_fmu_library(${name}_${version} ${version} ${name}_description ${out}/${version})
+      set_target_properties(${name}_${version} PROPERTIES OUTPUT_NAME ${name})
     endif()
   endforeach()
 
@@ -73,6 +81,13 @@ function(add_fmu name)
             ${folder}/README.md ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
+
+  if("fmi3" IN_LIST ARG_VERSIONS)
+    add_fmi3_archive(${name} ${out})
+  endif()
+  if(NOT "fmi2" IN_LIST ARG_VERSIONS)
+    return()
+  endif()
 
   # the archive
   set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${name}.fmu)
