@@ -124,7 +124,7 @@ static void note_error(struct component *component) {
     }
 }
 
-enum component_status component_result(struct component *component, enum status status) {
+enum component_status component_failure(struct component *component, enum status status) {
     const enum component_status result = of_severity[status_severity(status)].status;
     if (result == COMPONENT_ERROR) {
         note_error(component);
@@ -203,14 +203,10 @@ bool component_enter(struct component *component, unsigned call) {
     return true;
 }
 
-bool component_has_arrays(struct component *component, unsigned call, size_t count,
-                          const void *references, const void *values) {
-    if (count > 0 && (references == NULL || values == NULL)) {
-        component_fail(component, "%s: an array is NULL, %zu values are expected",
-                       component->adapter->rules[call].name, count);
-        return false;
-    }
-    return true;
+bool component_refuse_arrays(struct component *component, unsigned call, size_t count) {
+    component_fail(component, "%s: an array is NULL, %zu values are expected",
+                   component->adapter->rules[call].name, count);
+    return false;
 }
 
 /* ---- Life ----------------------------------------------------------------------------------- */

@@ -78,16 +78,28 @@ NONNULL void component_end(struct component *component);
  * rule allows. Otherwise it fails as component_fail. */
 MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
+/* Fails as component_fail, for the reason that component_has_arrays finds; false. */
+NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
+
 /* True if count values may be accessed: neither array is NULL, unless count is 0. Otherwise it
  * fails as component_fail. */
-MUST_CHECK NONNULL_ARGUMENTS(1) bool component_has_arrays(struct component *component,
-                                                          unsigned call, size_t count,
-                                                          const void *references,
-                                                          const void *values);
+MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_has_arrays(struct component *component,
+                                                                        unsigned call, size_t count,
+                                                                        const void *references,
+                                                                        const void *values) {
+    return count == 0 || (references != NULL && values != NULL) ||
+           component_refuse_arrays(component, call, count);
+}
+
+/* Of a status other than STATUS_OK, as component_result. */
+NONNULL enum component_status component_failure(struct component *component, enum status status);
 
 /* Converts a status of the instance, which has sent its message. An error leads to the state after
  * errors; in intermediate update mode it is noted. */
-NONNULL enum component_status component_result(struct component *component, enum status status);
+NONNULL static inline enum component_status component_result(struct component *component,
+                                                             enum status status) {
+    return status == STATUS_OK ? COMPONENT_OK : component_failure(component, status);
+}
 
 /* An error that the adapter finds: logs it, leads to where component_result does, returns
  * COMPONENT_ERROR. */

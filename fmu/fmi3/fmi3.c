@@ -4,7 +4,6 @@
 #include "fmu_state.h"
 #include "model_description.h"
 #include "modes.h"
-#include "snapshot.h"
 #include "variable_access.h"
 
 #include <stdarg.h>
@@ -173,10 +172,9 @@ fmi3Instance fmi3InstantiateCoSimulation(
     }
     created->update = intermediateUpdate;
     created->early_return_allowed = earlyReturnAllowed;
-    // the memory of a step that has to be undone is there before the first one
     if (!note_intermediate(created, requiredIntermediateVariables,
                            nRequiredIntermediateVariables) ||
-        instance_save(created->base.instance, 0, &created->undo) != STATUS_OK) {
+        fmi3_prepare_steps(created) != STATUS_OK) {
         free_component(created);
         return NULL;
     }

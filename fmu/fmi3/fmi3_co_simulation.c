@@ -67,6 +67,15 @@ static enum status accept(void *component_pointer, double time, double *end) {
     return status;
 }
 
+enum status fmi3_prepare_steps(struct fmi3_component *component) {
+    component->options.context = component;
+    if (component->update != NULL) {
+        component->options.ask_inputs = component->asks_inputs ? ask_inputs : NULL;
+        component->options.accept = accept;
+    }
+    return instance_save(component->base.instance, 0, &component->options.undo);
+}
+
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
@@ -82,15 +91,9 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         !component_has_arrays(base, call, 1, earlyReturn, lastSuccessfulTime)) {
         return fmi3Error;
     }
-    struct fmi3_component *component = instance;
-    const struct step_options options = {
-        .undo = component->undo,
-        .ask_inputs = component->update != NULL && component->asks_inputs ? ask_inputs : NULL,
-        .accept = component->update != NULL ? accept : NULL,
-        .context = component,
-    };
+    const struct fmi3_component *component = instance;
     const enum status status = instance_do_step_with(base->instance, currentCommunicationPoint,
-                                                     communicationStepSize, &options);
+                                                     communicationStepSize, &component->options);
     if (status == STATUS_OK) {
         *eventHandlingNeeded = fmi3False;
         *terminateSimulation = fmi3False;

@@ -4,6 +4,7 @@
 
 #include "component.h"
 #include "fmi3_calls.h"
+#include "stepping.h"
 
 #include "fmi3Functions.h"
 
@@ -17,12 +18,12 @@ struct fmi3_component {
     /* Co-Simulation */
     fmi3IntermediateUpdateCallback update; /* NULL: no intermediate updates */
     bool early_return_allowed;
-    bool asks_inputs;               /* inputs are among the variables of intermediate updates */
-    bool can_set;                   /* in intermediate update mode: inputs */
-    bool can_get;                   /* in intermediate update mode */
-    struct instance_snapshot *undo; /* the instance before a step */
-    bool is_intermediate[]; /* by row of the table of variables: it was named for intermediate
-                               updates */
+    bool asks_inputs;            /* inputs are among the variables of intermediate updates */
+    bool can_set;                /* in intermediate update mode: inputs */
+    bool can_get;                /* in intermediate update mode */
+    struct step_options options; /* of every step */
+    bool is_intermediate[];      /* by row of the table of variables: it was named for intermediate
+                                    updates */
 };
 
 _Static_assert((int)COMPONENT_OK == fmi3OK && (int)COMPONENT_WARNING == fmi3Warning &&
@@ -46,6 +47,10 @@ bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t cou
  * component_fail. In other modes nothing is checked here. */
 bool fmi3_may_access(struct component *component, enum fmi3_call call, bool setting,
                      const fmi3ValueReference references[], size_t count);
+
+/* Prepares steps with the rest of what stands above; the memory of a step that has to be undone is
+ * there before the first one. */
+MUST_CHECK enum status fmi3_prepare_steps(struct fmi3_component *component);
 
 /* Intermediate update mode knows no discard (section 4.2.2). */
 fmi3Status fmi3_access_status(struct component *component, enum component_status status);

@@ -4,6 +4,7 @@
 #include "history.h"
 #include "right_hand_side.h"
 #include "settings.h"
+#include "snapshot_contents.h"
 
 #include <limits.h>
 #include <math.h>
@@ -61,11 +62,11 @@ struct step {
     struct instance *instance;
     const struct step_options *options;
     struct clock_time begin;
-    struct clock_time end; /* where it is to end; it may come forward */
-    bool is_early;         /* it has come forward */
-    bool is_over;          /* the step is to end where it is */
-    bool is_saved;         /* in options->undo */
-    enum status answer;    /* of options->accept */
+    struct clock_time end;          /* where it is to end; it may come forward */
+    bool is_early;                  /* it has come forward */
+    bool is_over;                   /* the step is to end where it is */
+    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
+    enum status answer;             /* of options->accept */
 };
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
@@ -147,13 +148,11 @@ static enum status ask_inputs(const struct step *step, double t, double h) {
 
 /* ---- Integration ---------------------------------------------------------------------------- */
 
-static enum status save(struct step *step) {
-    struct instance_snapshot *undo = step->options->undo;
-    if (undo == NULL || step->is_saved) {
-        return STATUS_OK;
+static void keep(struct step *step) {
+    if (step->options->undo != NULL && step->kept == NULL) {
+        step->kept = step->options->undo;
+        instance_keep(step->instance, step->kept);
     }
-    step->is_saved = true;
-    return instance_save(step->instance, 0, &undo);
 }
 
 /* Reports the time of the instance; true: the step is to end there, or before the end so far. */
@@ -211,27 +210,39 @@ static enum status advance(struct step *step) {
     return status;
 }
 
+/* The instance is at the time where the step has ended. */
+static void arrive(const struct step *step, struct clock_time time) {
+    instance_set_clock(step->instance, time);
+    end_inputs(step->instance, clock_difference(time, step->begin));
+}
+
+/* To a point that an internal step may have passed already: then nothing can fail, and nothing is
+ * counted. Otherwise false. */
+static bool interpolate(const struct step *step, double target) {
+    struct instance *instance = step->instance;
+    if (!integrator_interpolate(instance->integrator, target,
+                                doubles_of(instance->memory.values, instance->model->states))) {
+        return false;
+    }
+    instance->state.latest_time = target;
+    arrive(step, step->end);
+    return true;
+}
+
 static enum status integrate(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    double *x = doubles_of(instance->memory.values, instance->model->states);
-    enum status status = STATUS_OK;
-
-    // a point that an internal step has passed already cannot fail
     const double target = clock_difference(step->end, state->restart_time);
-    if (instance_goes_on(instance, step->end) &&
-        integrator_interpolate(instance->integrator, target, x)) {
-        state->latest_time = target;
-    } else {
-        status = save(step);
-        if (status == STATUS_OK) {
-            status = instance_prepare_history(instance, step->end);
-        }
-        if (status != STATUS_OK) {
-            return status;
-        }
-        status = advance(step);
+    const enum continuation continuation = instance_continuation(instance, target);
+    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
+        return STATUS_OK;
     }
+    keep(step);
+    enum status status = instance_prepare_history(instance, step->end, continuation);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    status = advance(step);
 
     // a step that ended early cannot be replayed: its end was not known when it began
     state->has_history =
@@ -239,10 +250,8 @@ static enum status integrate(struct step *step) {
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
     }
-    instance_set_clock(instance, status == STATUS_OK
-                                     ? step->end
-                                     : clock_add(state->restart_time, state->latest_time));
-    end_inputs(instance, clock_difference(state->time, step->begin));
+    arrive(step,
+           status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
     update_statistics(instance);
     return status;
 }
@@ -253,19 +262,16 @@ static enum status do_step(struct step *step, double communication_point, double
     struct instance *instance = step->instance;
     enum status status = STATUS_OK;
     if (step->options->ask_inputs != NULL) {
-        status = save(step);
-        if (status == STATUS_OK) {
-            status = ask_inputs(step, communication_point, h);
-        }
+        keep(step);
+        status = ask_inputs(step, communication_point, h);
         if (status != STATUS_OK) {
             return status;
         }
     }
-    if (instance->integrator != NULL) {
-        status = integrate(step);
+    if (instance->integrator == NULL) {
+        arrive(step, step->end);
     } else {
-        instance_set_clock(instance, step->end);
-        end_inputs(instance, clock_difference(step->end, step->begin));
+        status = integrate(step);
     }
     if (status != STATUS_OK) {
         message_write(
@@ -299,8 +305,8 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
         .answer = STATUS_OK,
     };
     status = do_step(&step, communication_point, step_size);
-    if (status_severity(status) == SEVERITY_DISCARD && step.is_saved) {
-        const enum status restored = instance_restore(instance, options->undo);
+    if (step.kept != NULL && status_severity(status) == SEVERITY_DISCARD) {
+        const enum status restored = instance_undo(instance, step.kept);
         return restored == STATUS_OK ? status : restored;
     }
     return status;

@@ -18,7 +18,7 @@ enum array { ARRAY_OF_DOUBLES, ARRAY_OF_INTS, ARRAY_OF_INT32, ARRAY_OF_ENUMERATI
 
 /* Element i. Every int is exact as a double; an int64_t that is not is no item of an enumeration.
  */
-static double element(enum array array, const void *values, size_t i) {
+ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
     switch (array) {
     case ARRAY_OF_DOUBLES:
         return ((const double *)values)[i];
@@ -30,8 +30,8 @@ static double element(enum array array, const void *values, size_t i) {
 }
 
 /* The type that a variable must have; with ARRAY_OF_INTS either of the two that are kept as int. */
-static enum variable_type type_for(const struct instance *instance, enum array array,
-                                   unsigned reference) {
+ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum array array,
+                                          unsigned reference) {
     if (array == ARRAY_OF_DOUBLES) {
         return VARIABLE_FLOAT64;
     }
@@ -50,8 +50,8 @@ static bool is_settable(const struct instance *instance, const struct variable *
             from_states < instance->model->states.size);
 }
 
-static const struct variable *find_settable(const struct instance *instance, unsigned reference,
-                                            enum variable_type type) {
+ALWAYS_INLINE const struct variable *find_settable(const struct instance *instance,
+                                                   unsigned reference, enum variable_type type) {
     static const char *const when[PHASE_COUNT] = {
         [PHASE_INSTANTIATED] = "at all: only start values and inputs can",
         [PHASE_INITIALIZATION] = "at all: only start values and inputs can",
@@ -68,8 +68,8 @@ static const struct variable *find_settable(const struct instance *instance, uns
     return variable;
 }
 
-static enum status set(struct instance *instance, enum array array, const unsigned references[],
-                       size_t count, const void *values) {
+ALWAYS_INLINE enum status set(struct instance *instance, enum array array,
+                              const unsigned references[], size_t count, const void *values) {
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable =
             find_settable(instance, references[i], type_for(instance, array, references[i]));
