@@ -2,18 +2,25 @@
 
 # ---- Names
 
+# PLATFORM: folder of the binary in an archive of FMI 3.0
 string(TOLOWER "${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR}" system)
-if(system MATCHES "^linux-(x86_64|amd64)$")
-  set(FMI2_PLATFORM linux64) # folder of the binary in an FMI 2.0 archive
-elseif(system MATCHES "^windows-(x86_64|amd64)$")
-  set(FMI2_PLATFORM win64)
-elseif(system MATCHES "^darwin-(x86_64|arm64)$")
-  set(FMI2_PLATFORM darwin64)
-elseif(system MATCHES "^linux-(aarch64|arm64)$")
-  set(FMI2_PLATFORM aarch64-linux) # the name in FMI 3.0: 2.0 has none
-else()
+if(NOT system MATCHES "^(linux|windows|darwin)-(x86_64|amd64|aarch64|arm64)$")
   message(FATAL_ERROR "FMUs have no name for the platform ${CMAKE_SYSTEM_NAME} ${CMAKE_SYSTEM_PROCESSOR}")
 endif()
+set(PLATFORM ${CMAKE_MATCH_2}-${CMAKE_MATCH_1})
+string(REPLACE amd64 x86_64 PLATFORM ${PLATFORM})
+string(REPLACE arm64 aarch64 PLATFORM ${PLATFORM})
+
+# folder_in_fmu(version platform result): folder of the binary in an archive. FMI 2.0 has no name for Arm.
+function(folder_in_fmu version platform result)
+  set(folder ${platform})
+  if(version STREQUAL "fmi2")
+    string(REGEX REPLACE ".*-darwin$" darwin64 folder ${folder}) # one library for both processors
+    string(REPLACE x86_64-linux linux64 folder ${folder})
+    string(REPLACE x86_64-windows win64 folder ${folder})
+  endif()
+  set(${result} ${folder} PARENT_SCOPE)
+endfunction()
 
 if(WIN32)
   set(FMU_LIBRARY_SUFFIX .dll)

@@ -12,12 +12,19 @@ enum fmi_state {
     // Co-Simulation
     STATE_STEP_COMPLETE = 1 << 4,
     STATE_STEP_FAILED = 1 << 5,
-    // Model Exchange
+    // Model Exchange, and Co-Simulation with event mode
     STATE_EVENT = 1 << 6,
+    // Model Exchange
     STATE_CONTINUOUS_TIME = 1 << 7,
+    // Co-Simulation, inside a step
+    STATE_INTERMEDIATE_UPDATE = 1 << 8,
 };
 
-enum fmi_kind { KIND_MODEL_EXCHANGE = 1 << 0, KIND_CO_SIMULATION = 1 << 1 };
+enum fmi_kind {
+    KIND_MODEL_EXCHANGE = 1 << 0,
+    KIND_CO_SIMULATION = 1 << 1,
+    KIND_CO_SIMULATION_WITH_EVENTS = 1 << 2, /* the importer handles events, in event mode */
+};
 
 struct call_rule {
     const char *name;

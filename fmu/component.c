@@ -71,6 +71,12 @@ static bool set_logged(struct component *component, const char *name, bool on) {
     return found;
 }
 
+static void log_always(struct component *component, unsigned categories) {
+    for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
+        component->is_logged[i] |= (categories & 1u << i) != 0;
+    }
+}
+
 enum component_status component_set_logging(struct component *component, bool on, size_t count,
                                             const char *const names[]) {
     bool before[LOG_CATEGORY_COUNT];
@@ -89,6 +95,7 @@ enum component_status component_set_logging(struct component *component, bool on
                                   names[i] != NULL ? names[i] : "");
         }
     }
+    log_always(component, component->adapter->never_silent);
     return COMPONENT_OK;
 }
 
@@ -109,10 +116,18 @@ static void log_instance_text(void *component, enum status status, const char *t
     send_text(component, of_severity[severity].status, of_severity[severity].category, text);
 }
 
-enum component_status component_result(struct component *component, enum status status) {
+static void note_error(struct component *component) {
+    if (component->state == STATE_INTERMEDIATE_UPDATE) {
+        component->has_failed_inside = true;
+    } else {
+        component->state = component->adapter->after_error;
+    }
+}
+
+enum component_status component_failure(struct component *component, enum status status) {
     const enum component_status result = of_severity[status_severity(status)].status;
     if (result == COMPONENT_ERROR) {
-        component->state = STATE_ERROR;
+        note_error(component);
     }
     return result;
 }
@@ -124,7 +139,7 @@ enum component_status component_fail(struct component *component, const char *fo
     (void)vsnprintf(raw, sizeof raw, format, arguments);
     va_end(arguments);
     send_text(component, COMPONENT_ERROR, LOG_STATUS_ERROR, raw);
-    component->state = STATE_ERROR;
+    note_error(component);
     return COMPONENT_ERROR;
 }
 
@@ -148,12 +163,23 @@ static const char *state_name(enum fmi_state state) {
         return "in event mode";
     case STATE_CONTINUOUS_TIME:
         return "in continuous-time mode";
+    case STATE_INTERMEDIATE_UPDATE:
+        return "in intermediate update mode";
     }
     return "in no known state";
 }
 
-const char *component_kind_name(enum fmi_kind kind) {
-    return kind == KIND_CO_SIMULATION ? "Co-Simulation" : "Model Exchange";
+const char *component_kind_name(unsigned kinds) {
+    switch (kinds) {
+    case KIND_MODEL_EXCHANGE:
+        return "Model Exchange";
+    case KIND_CO_SIMULATION_WITH_EVENTS:
+        return "Co-Simulation with event mode";
+    case KIND_MODEL_EXCHANGE | KIND_CO_SIMULATION_WITH_EVENTS:
+        return "Model Exchange and to Co-Simulation with event mode";
+    default:
+        return "Co-Simulation";
+    }
 }
 
 bool component_enter(struct component *component, unsigned call) {
@@ -166,8 +192,7 @@ bool component_enter(struct component *component, unsigned call) {
     }
     if ((component->kind & rule->kinds) == 0) {
         component_fail(component, "%s belongs to %s: the instance is one for %s", rule->name,
-                       component_kind_name((enum fmi_kind)rule->kinds),
-                       component_kind_name(component->kind));
+                       component_kind_name(rule->kinds), component_kind_name(component->kind));
         return false;
     }
     if ((component->state & rule->states) == 0) {
@@ -178,26 +203,37 @@ bool component_enter(struct component *component, unsigned call) {
     return true;
 }
 
-bool component_has_arrays(struct component *component, unsigned call, size_t count,
-                          const void *references, const void *values) {
-    if (count > 0 && (references == NULL || values == NULL)) {
-        component_fail(component, "%s: an array is NULL, %zu values are expected",
-                       component->adapter->rules[call].name, count);
+bool component_refuse_arrays(struct component *component, unsigned call, size_t count) {
+    component_fail(component, "%s: an array is NULL, %zu values are expected",
+                   component->adapter->rules[call].name, count);
+    return false;
+}
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+bool component_may_begin(const char *name, const char *token_name, const char *token,
+                         const char *expected, char text[LOG_TEXT_SIZE]) {
+    if (name == NULL || name[0] == '\0') {
+        (void)snprintf(text, LOG_TEXT_SIZE,
+                       "the instance name is missing: a name that is not empty is expected");
+        return false;
+    }
+    if (token == NULL || strcmp(token, expected) != 0) {
+        (void)snprintf(text, LOG_TEXT_SIZE,
+                       "the %s '%.100s' is refused: '%s' is expected, the model description "
+                       "belongs to another build",
+                       token_name, token != NULL ? token : "", expected);
         return false;
     }
     return true;
 }
-
-/* ---- Life ----------------------------------------------------------------------------------- */
 
 enum component_status component_begin(struct component *component, const struct adapter *adapter,
                                       enum fmi_kind kind, bool logging_on) {
     component->adapter = adapter;
     component->state = STATE_INSTANTIATED;
     component->kind = kind;
-    for (int i = 0; i < LOG_CATEGORY_COUNT; i++) {
-        component->is_logged[i] = logging_on || (adapter->always_logged & 1u << i) != 0;
-    }
+    log_always(component, logging_on ? ~0u : adapter->always_logged);
     const struct message_sink sink = {.write = log_instance_text, .context = component};
     return instance_create(&model_description, &sink, &component->instance) == STATUS_OK
                ? COMPONENT_OK

@@ -31,10 +31,14 @@ enum { LOG_TEXT_SIZE = 1024 };
 
 struct component;
 
-/* What a version of FMI decides. */
+/* What a version of FMI decides. Categories are bits of 1 << enum log_category. */
 struct adapter {
+    unsigned version;              /* 2 for FMI 2.0 */
     const struct call_rule *rules; /* by the version's own numbers of calls */
-    unsigned always_logged;        /* bits of 1 << enum log_category: sent with logging off, too */
+    unsigned states;               /* bits of enum fmi_state: those that the version has */
+    enum fmi_state after_error;    /* the state that an error leads to */
+    unsigned always_logged;        /* categories sent by an instance made with logging off, too */
+    unsigned never_silent;         /* categories that component_set_logging cannot switch off */
 
     /* Sends a finished text to the importer. */
     void (*send)(const struct component *component, enum component_status status,
@@ -46,10 +50,19 @@ struct component {
     struct instance *instance;
     enum fmi_state state;
     enum fmi_kind kind;
+    bool has_failed_inside; /* an error in intermediate update mode, which leads to the state after
+                               errors when the step returns: until then nothing may free it */
     bool is_logged[LOG_CATEGORY_COUNT];
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
+
+/* True if there may be an instance with this name and this token (that of the model description:
+ * expected), which the version calls token_name. Otherwise text says why not. */
+MUST_CHECK NONNULL_ARGUMENTS(2, 4,
+                             5) bool component_may_begin(const char *name, const char *token_name,
+                                                         const char *token, const char *expected,
+                                                         char text[LOG_TEXT_SIZE]);
 
 /* component: zeroed; adapter must outlive it. On failure nothing has to be freed. */
 MUST_CHECK NONNULL enum component_status component_begin(struct component *component,
@@ -65,22 +78,36 @@ NONNULL void component_end(struct component *component);
  * rule allows. Otherwise it fails as component_fail. */
 MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
+/* Fails as component_fail, for the reason that component_has_arrays finds; false. */
+NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
+
 /* True if count values may be accessed: neither array is NULL, unless count is 0. Otherwise it
  * fails as component_fail. */
-MUST_CHECK NONNULL_ARGUMENTS(1) bool component_has_arrays(struct component *component,
-                                                          unsigned call, size_t count,
-                                                          const void *references,
-                                                          const void *values);
+MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_has_arrays(struct component *component,
+                                                                        unsigned call, size_t count,
+                                                                        const void *references,
+                                                                        const void *values) {
+    return count == 0 || (references != NULL && values != NULL) ||
+           component_refuse_arrays(component, call, count);
+}
 
-/* Converts a status of the instance, which has sent its message. An error leads to STATE_ERROR. */
-NONNULL enum component_status component_result(struct component *component, enum status status);
+/* Of a status other than STATUS_OK, as component_result. */
+NONNULL enum component_status component_failure(struct component *component, enum status status);
 
-/* An error that the adapter finds: logs it, leads to STATE_ERROR, returns COMPONENT_ERROR. */
+/* Converts a status of the instance, which has sent its message. An error leads to the state after
+ * errors; in intermediate update mode it is noted. */
+NONNULL static inline enum component_status component_result(struct component *component,
+                                                             enum status status) {
+    return status == STATUS_OK ? COMPONENT_OK : component_failure(component, status);
+}
+
+/* An error that the adapter finds: logs it, leads to where component_result does, returns
+ * COMPONENT_ERROR. */
 NONNULL PRINTF_FORMAT(2, 3) enum component_status
     component_fail(struct component *component, const char *format, ...);
 
-/* "Co-Simulation" or "Model Exchange" */
-const char *component_kind_name(enum fmi_kind kind);
+/* "Co-Simulation" or "Model Exchange"; kinds: bits of enum fmi_kind. */
+const char *component_kind_name(unsigned kinds);
 
 /* ---- Log ------------------------------------------------------------------------------------ */
 

@@ -3,41 +3,63 @@
 #include "serialization.h"
 #include "snapshot.h"
 
-/* A saved state carries the FMI state and the kind of its instance. */
-enum { TAG_KIND_SHIFT = 16, TAG_STATE_MASK = 0xffff };
+/* A saved state carries the FMI state and the kind of its instance, and its version of FMI. */
+enum {
+    TAG_STATE_MASK = 0xffff,
+    TAG_KIND_SHIFT = 16,
+    TAG_KIND_MASK = 0xff,
+    TAG_VERSION_SHIFT = 24,
+    TAG_VERSION_0 = 2, /* the version whose number in a tag is 0 */
+};
 
 static unsigned tag_of(const struct component *component) {
-    return (unsigned)component->state | (unsigned)component->kind << TAG_KIND_SHIFT;
+    return (unsigned)component->state | (unsigned)component->kind << TAG_KIND_SHIFT |
+           (component->adapter->version - TAG_VERSION_0) << TAG_VERSION_SHIFT;
 }
 
-/* FMI states that a component can be in while its instance is in a phase. */
+static unsigned version_in(unsigned tag) {
+    return (tag >> TAG_VERSION_SHIFT) + TAG_VERSION_0;
+}
+
+/* FMI states that a component of this kind can be in while its instance is in a phase; each of them
+ * may also be after an error. */
 static unsigned states_of(enum fmi_kind kind, enum phase phase) {
-    const bool steps = kind == KIND_CO_SIMULATION;
+    const bool steps = kind != KIND_MODEL_EXCHANGE;
     switch (phase) {
     case PHASE_INSTANTIATED:
-        return STATE_INSTANTIATED | STATE_ERROR;
+        return STATE_INSTANTIATED;
     case PHASE_INITIALIZATION:
-        return STATE_INITIALIZATION | STATE_ERROR;
+        return STATE_INITIALIZATION;
     case PHASE_STEPPING:
-        return STATE_TERMINATED | STATE_ERROR |
-               (steps ? STATE_STEP_COMPLETE | STATE_STEP_FAILED : STATE_EVENT);
+        return STATE_TERMINATED | (steps ? STATE_STEP_COMPLETE | STATE_STEP_FAILED : 0) |
+               (kind != KIND_CO_SIMULATION ? STATE_EVENT : 0);
     case PHASE_CONTINUOUS_TIME:
-        return steps ? 0 : STATE_CONTINUOUS_TIME | STATE_TERMINATED | STATE_ERROR;
+        return steps ? 0 : STATE_CONTINUOUS_TIME | STATE_TERMINATED;
     case PHASE_COUNT:
         break;
     }
     return 0;
 }
 
-/* The FMI state of a snapshot, if a component of this kind can be in it; otherwise 0. */
+/* The FMI state of a snapshot, if a component like this one can be in it; otherwise 0. */
 static unsigned state_in(const struct component *component, unsigned tag, enum phase phase) {
+    const struct adapter *adapter = component->adapter;
     const unsigned state = tag & TAG_STATE_MASK;
+    const unsigned states = states_of(component->kind, phase) & adapter->states;
     const bool is_one_bit = state != 0 && (state & (state - 1)) == 0;
-    const bool is_same_kind = tag >> TAG_KIND_SHIFT == (unsigned)component->kind;
-    return is_one_bit && is_same_kind ? state & states_of(component->kind, phase) : 0;
+    const bool is_same_kind =
+        (tag >> TAG_KIND_SHIFT & TAG_KIND_MASK) == (unsigned)component->kind &&
+        version_in(tag) == adapter->version;
+    return is_one_bit && is_same_kind && states != 0 ? state & (states | adapter->after_error) : 0;
 }
 
-static enum component_status refuse_kind(struct component *component, unsigned call) {
+static enum component_status refuse_kind(struct component *component, unsigned call, unsigned tag) {
+    if (version_in(tag) != component->adapter->version) {
+        return component_fail(
+            component,
+            "%s: the saved state is refused: it is one of FMI %u, the instance of FMI %u",
+            component->adapter->rules[call].name, version_in(tag), component->adapter->version);
+    }
     return component_fail(
         component, "%s: the saved state is refused: an instance for %s cannot be in it",
         component->adapter->rules[call].name, component_kind_name(component->kind));
@@ -68,7 +90,7 @@ enum component_status fmu_state_restore(struct component *component, unsigned ca
     }
     const unsigned state = state_in(component, tag, phase);
     if (state == 0) {
-        return refuse_kind(component, call);
+        return refuse_kind(component, call, tag);
     }
     status = instance_restore(component->instance, fmu_state);
     if (status == STATUS_OK) {
@@ -132,7 +154,7 @@ enum component_status fmu_state_deserialize(struct component *component, unsigne
     status = instance_snapshot_tag(component->instance, snapshot, &tag, &phase);
     if (status != STATUS_OK || state_in(component, tag, phase) == 0) {
         instance_forget(component->instance, &snapshot);
-        return refuse_kind(component, call);
+        return refuse_kind(component, call, tag);
     }
     *fmu_state = snapshot;
     return COMPONENT_OK;

@@ -12,8 +12,10 @@ from pathlib import Path
 
 from atomic_write import atomic_write
 from declaration.c_tables import value_references, variable_table
-from declaration.load import DeclarationError, load
-from fmi2.model_description import model_description
+from declaration.load import Declaration, DeclarationError, load
+from fmi2.model_description import model_description as fmi2_description
+from fmi3.build_description import build_description
+from fmi3.model_description import model_description as fmi3_description
 from provenance import Provenance, ProvenanceError, build_date, license_texts
 
 
@@ -32,6 +34,19 @@ def source_files(folder: Path) -> list[str]:
     return names
 
 
+def release_files(
+    version: str, declaration: Declaration, provenance: Provenance, folder: Path
+) -> dict[str, str]:
+    """Texts by name for an FMU with sources, which are in the folder."""
+    sources = source_files(folder)
+    if version == "fmi2":
+        return {"modelDescription.xml": fmi2_description(declaration, provenance, sources)}
+    return {
+        "modelDescription.xml": fmi3_description(declaration, provenance),
+        "sources/buildDescription.xml": build_description(declaration.model.name, sources),
+    }
+
+
 def main() -> int:
     """Generate; 2 with a line on standard error where the declaration is wrong."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -44,22 +59,25 @@ def main() -> int:
         type=Path,
         help="folder of the FMU's C files: write only a description that names them",
     )
+    parser.add_argument(
+        "--fmi", choices=["fmi2", "fmi3"], default="fmi2", help="its version, with --sources"
+    )
     arguments = parser.parse_args()
     try:
         declaration = load(arguments.variables)
         texts = license_texts(arguments.license) if arguments.license else {}
         provenance = Provenance(arguments.version, **texts, date=build_date(os.environ))
         if arguments.sources:
-            sources = source_files(arguments.sources)
-            files = {"modelDescription.xml": model_description(declaration, provenance, sources)}
+            files = release_files(arguments.fmi, declaration, provenance, arguments.sources)
         else:
             files = {
-                "modelDescription.xml": model_description(declaration, provenance),
+                "modelDescription.xml": fmi2_description(declaration, provenance),
+                "fmi3/modelDescription.xml": fmi3_description(declaration, provenance),
                 "value_references.h": value_references(declaration),
                 "variables.c": variable_table(declaration),
             }
-        arguments.output.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
+            (arguments.output / name).parent.mkdir(parents=True, exist_ok=True)
             write_if_changed(arguments.output / name, text)
     except (DeclarationError, ProvenanceError, OSError) as error:
         print(f"generate.py: {error!s:.2000}", file=sys.stderr)

@@ -6,4 +6,7 @@
 
 extern const struct model_description model_description;
 
+/* The instantiation token of FMI 3.0; FMI 2.0 has the GUID of the description. */
+extern const char model_token_fmi3[];
+
 #endif

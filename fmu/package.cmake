@@ -1,15 +1,27 @@
-# add_fmu(NAME FOLDER models/... LIBRARY target)
+# add_fmu(NAME FOLDER models/... LIBRARY target [VERSIONS fmi2 fmi3])
 #
-# Builds NAME.fmu in the current build folder from the model's folder (variables.toml, README.md; model.png
-# and pictures of the README where there are any) and the library that defines its struct model. Targets: NAME (the shared object), NAME_fmu (the
-# archive), NAME_description (struct model_description as a library), NAME_interface (the generated header with value
-# references and GUID), NAME_sources (of the release: source_code.cmake; with OWN_LIBM).
+# Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
+# VERSIONS names, from the model's folder (variables.toml, README.md; model.png and pictures of the README
+# where there are any) and the library that defines its struct model. Targets:
+#   NAME, NAME_fmi3            the shared objects
+#   NAME_fmu, NAME_fmi3_fmu    the archives
+#   NAME_description           struct model_description as a library
+#   NAME_interface             the generated header with value references and GUID
+#   NAME_sources, ..._release  for the release: source_code.cmake, release.cmake
 
 set(FMU_SOURCE_DIR ${CMAKE_CURRENT_LIST_DIR})
 include(${FMU_SOURCE_DIR}/release.cmake)
 include(${FMU_SOURCE_DIR}/source_code.cmake)
-# An adapter of FMI is a folder beside this file, and a word here; the first one gives build/NAME.fmu.
-set(FMI_VERSIONS fmi2)
+
+# An adapter of FMI is a folder beside this file and a word here, with the suffix of its targets, the part of
+# paths in the build that tells its files from those of others, and the name of the icon in the archive.
+set(FMI_VERSIONS fmi2 fmi3)
+set(fmi2_suffix "")
+set(fmi2_below "")
+set(fmi2_icon model.png)
+set(fmi3_suffix _fmi3)
+set(fmi3_below fmi3/)
+set(fmi3_icon terminalsAndIcons/icon.png)
 
 file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/*.c)
 foreach(version IN LISTS FMI_VERSIONS)
@@ -20,15 +32,15 @@ endforeach()
 add_custom_target(libraries)
 
 # The shared object of one version: exports what its FMI header marks, and hides all of SUNDIALS.
-function(add_fmu_library target version description folder)
+function(add_fmu_library name target version description folder)
   add_library(${target} SHARED ${FMU_SHARED_SOURCES} ${${version}_SOURCES})
   if(OWN_LIBM)
     # as objects: from an archive, not every linker prefers them to those of the system
     target_sources(${target} PRIVATE $<TARGET_OBJECTS:elementary_functions>)
   endif()
   set_target_properties(${target} PROPERTIES
-    PREFIX "" SUFFIX ${FMU_LIBRARY_SUFFIX} ${FMU_LIBRARY_NAME}
-    LIBRARY_OUTPUT_DIRECTORY ${folder} RUNTIME_OUTPUT_DIRECTORY ${folder})
+    PREFIX "" OUTPUT_NAME ${name} SUFFIX ${FMU_LIBRARY_SUFFIX} ${FMU_LIBRARY_NAME}
+    LIBRARY_OUTPUT_DIRECTORY ${folder} RUNTIME_OUTPUT_DIRECTORY ${folder} ARCHIVE_OUTPUT_DIRECTORY ${folder})
   target_include_directories(${target} SYSTEM PRIVATE ${FMI_HEADERS_DIR})
   target_link_libraries(${target} PRIVATE ${description})
   target_link_options(${target} PRIVATE ${FMU_LINK_OPTIONS})
@@ -36,16 +48,20 @@ function(add_fmu_library target version description folder)
 endfunction()
 
 function(add_fmu name)
-  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "" ${ARGN})
+  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "VERSIONS" ${ARGN})
+  if(NOT ARG_VERSIONS)
+    set(ARG_VERSIONS ${FMI_VERSIONS})
+  endif()
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
   set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
-  set(generated ${out}/modelDescription.xml ${out}/variables.c ${out}/value_references.h)
+  set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/variables.c
+                ${out}/value_references.h)
 
-  # tables and model description, again whenever a declaration changes
+  # tables and model descriptions, again whenever a declaration changes
   file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi2/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi*/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
-                        ${FMU_SOURCE_DIR}/atomic_write.py)
+                        ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/atomic_write.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
   set(declaration ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
@@ -65,22 +81,8 @@ function(add_fmu name)
   target_include_directories(${name}_description PUBLIC ${FMU_SOURCE_DIR})
   target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
-  foreach(version IN LISTS FMI_VERSIONS)
-    if(version STREQUAL "fmi2")
-      add_fmu_library(${name} fmi2 ${name}_description ${out})
-    else()
-      add_fmu_library(${name}_${version} ${version} ${name}_description ${out}/${version})
-    endif()
-  endforeach()
-
-  if(OWN_LIBM)
-    add_source_code(${name}_sources LIBRARY ${name} FOLDER ${out}/release
-                    GENERATE ${generate} DEPENDS ${declaration} ${generated})
-  endif()
-
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
-  file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
   add_custom_command(
     OUTPUT ${out}/documentation/index.html
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
@@ -92,25 +94,40 @@ function(add_fmu name)
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
-  # the archive
-  set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${name}.fmu)
+  # what the archives of all versions and platforms have in common
+  file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
   set(entries
-      $<$<BOOL:${icon}>:model.png=${icon}>
       documentation=${out}/documentation
       documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
       documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
       $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>)
   set(files ${out}/documentation/index.html ${icon} ${PROJECT_SOURCE_DIR}/LICENSE
             ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py)
-  add_custom_command(
-    OUTPUT ${fmu}
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
-            modelDescription.xml=${out}/modelDescription.xml
-            binaries/${FMI2_PLATFORM}/${name}${FMU_LIBRARY_SUFFIX}=$<TARGET_FILE:${name}>
-            ${entries}
-    DEPENDS ${name} ${out}/modelDescription.xml ${files}
-    COMMENT "Packing ${name}.fmu"
-    COMMAND_EXPAND_LISTS VERBATIM)
-  add_custom_target(${name}_fmu ALL DEPENDS ${fmu})
-  add_release_fmu(${name} ENTRIES ${entries} DEPENDS ${files})
+
+  foreach(version IN LISTS ARG_VERSIONS)
+    set(target ${name}${${version}_suffix})
+    set(below ${${version}_below})
+    add_fmu_library(${name} ${target} ${version} ${name}_description ${out}/${below})
+    set(own_entries ${entries} $<$<BOOL:${icon}>:${${version}_icon}=${icon}>)
+
+    set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${below}${name}.fmu)
+    set(description ${out}/${below}modelDescription.xml)
+    folder_in_fmu(${version} ${PLATFORM} binaries)
+    add_custom_command(
+      OUTPUT ${fmu}
+      COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
+              modelDescription.xml=${description}
+              binaries/${binaries}/${name}${FMU_LIBRARY_SUFFIX}=$<TARGET_FILE:${target}>
+              ${own_entries}
+      DEPENDS ${target} ${description} ${files}
+      COMMENT "Packing ${below}${name}.fmu"
+      COMMAND_EXPAND_LISTS VERBATIM)
+    add_custom_target(${target}_fmu ALL DEPENDS ${fmu})
+
+    if(OWN_LIBM)
+      add_source_code(${target}_sources LIBRARY ${target} FOLDER ${out}/${below}release
+                      GENERATE ${generate} --fmi ${version} DEPENDS ${declaration} ${generated})
+      add_release_fmu(${name} ${version} ENTRIES ${own_entries} DEPENDS ${files})
+    endif()
+  endforeach()
 endfunction()

@@ -1,4 +1,4 @@
-# Target release: build/release/NAME.fmu with the binaries of all platforms and the sources, checksums and a
+# Target release: build/release/NAME.fmu and fmi3/NAME.fmu with the binaries of all platforms and the sources, checksums and a
 # bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
 
 set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin aarch64-linux)
@@ -35,8 +35,8 @@ foreach(platform IN LISTS RELEASE_PLATFORMS)
   list(APPEND platform_targets platform_${platform})
 endforeach()
 
-# library_of(platform name result): the shared object of an FMU for a platform.
-function(library_of platform name result)
+# library_of(platform below name result): the shared object of an FMU for a platform.
+function(library_of platform below name result)
   if(platform MATCHES windows)
     set(suffix .dll)
   elseif(platform MATCHES darwin)
@@ -44,51 +44,63 @@ function(library_of platform name result)
   else()
     set(suffix .so)
   endif()
-  set(${result} ${PROJECT_BINARY_DIR}/platforms/${platform}/fmu/${name}/${name}${suffix} PARENT_SCOPE)
+  set(${result} ${PROJECT_BINARY_DIR}/platforms/${platform}/fmu/${name}/${below}${name}${suffix} PARENT_SCOPE)
 endfunction()
 
-# add_release_fmu(NAME ENTRIES entry ... DEPENDS file ...): build/release/NAME.fmu. Entries are those of
-# package.py for all but binaries, sources and the model description, which names the sources.
-function(add_release_fmu name)
+# add_release_fmu(NAME version ENTRIES entry ... DEPENDS file ...): build/release/NAME.fmu, or fmi3/NAME.fmu.
+# Entries are those of package.py for all but binaries, sources and the model description.
+function(add_release_fmu name version)
   cmake_parse_arguments(ARG "" "" "ENTRIES;DEPENDS" ${ARGN})
   if(NOT CAN_RELEASE)
     return()
   endif()
+  set(target ${name}${${version}_suffix})
+  set(below ${${version}_below})
+
+  # a library for each folder in the archive; the one for two platforms is made of theirs
+  set(libraries "")
+  set(binaries "")
   foreach(platform IN LISTS RELEASE_PLATFORMS)
-    library_of(${platform} ${name} ${platform})
+    folder_in_fmu(${version} ${platform} folder)
+    library_of(${platform} "${below}" ${name} library)
+    list(APPEND libraries ${library})
+    if(folder STREQUAL "darwin64")
+      list(APPEND darwin_libraries ${library})
+      set(library ${PROJECT_BINARY_DIR}/platforms/universal-darwin/${name}.dylib)
+    endif()
+    cmake_path(GET library EXTENSION suffix)
+    list(APPEND binaries binaries/${folder}/${name}${suffix}=${library})
   endforeach()
+  list(REMOVE_DUPLICATES binaries)
+  if(darwin_libraries)
+    set(universal ${PROJECT_BINARY_DIR}/platforms/universal-darwin/${name}.dylib)
+    cmake_path(GET universal PARENT_PATH universal_folder)
+    add_custom_command(
+      OUTPUT ${universal}
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${universal_folder}
+      COMMAND ${LIPO} -create ${darwin_libraries} -output ${universal}
+      DEPENDS ${platform_targets} ${darwin_libraries}
+      VERBATIM)
+    list(APPEND libraries ${universal})
+  endif()
 
-  # one library for both processors of macOS
-  set(folder ${PROJECT_BINARY_DIR}/platforms/universal-darwin)
-  set(universal ${folder}/${name}.dylib)
-  add_custom_command(
-    OUTPUT ${universal}
-    COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
-    COMMAND ${LIPO} -create ${x86_64-darwin} ${aarch64-darwin} -output ${universal}
-    DEPENDS ${platform_targets} ${x86_64-darwin} ${aarch64-darwin}
-    VERBATIM)
-
-  set(described ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name}/release)
-  set(fmu ${release_folder}/${name}.fmu)
+  set(described ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name}/${below}release)
+  set(fmu ${release_folder}/${below}${name}.fmu)
   add_custom_command(
     OUTPUT ${fmu}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
             modelDescription.xml=${described}/modelDescription.xml
             sources=${described}/sources
-            binaries/linux64/${name}.so=${x86_64-linux}
-            binaries/win64/${name}.dll=${x86_64-windows}
-            binaries/darwin64/${name}.dylib=${universal}
-            binaries/aarch64-linux/${name}.so=${aarch64-linux}
+            ${binaries}
             ${ARG_ENTRIES}
             documentation/licenses/zig.txt=${zig_folder}/LICENSE
             documentation/licenses/mingw-w64.txt=${zig_folder}/lib/libc/mingw/COPYING
-    DEPENDS ${name}_sources ${described}/modelDescription.xml ${platform_targets} ${universal}
-            ${x86_64-linux} ${x86_64-windows} ${aarch64-linux} ${ARG_DEPENDS}
-    COMMENT "Packing release/${name}.fmu"
+    DEPENDS ${target}_sources ${described}/modelDescription.xml ${platform_targets} ${libraries} ${ARG_DEPENDS}
+    COMMENT "Packing release/${below}${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
-  add_custom_target(${name}_release DEPENDS ${fmu})
+  add_custom_target(${target}_release DEPENDS ${fmu})
   set_property(GLOBAL APPEND PROPERTY release_fmus ${fmu})
-  set_property(GLOBAL APPEND PROPERTY release_targets ${name}_release)
+  set_property(GLOBAL APPEND PROPERTY release_targets ${target}_release)
 endfunction()
 
 # add_release(): the target release, after all FMUs.

@@ -6,7 +6,7 @@ from declaration.load import Declaration
 from declaration.schema import Enumeration, Variable
 
 C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int"}
-TABLE_TYPES = {"float64": "FLOAT64", "int32": "INT32", "enumeration": "INT32"}
+TABLE_TYPES = {"float64": "FLOAT64", "int32": "INT32", "enumeration": "ENUMERATION"}
 
 
 def value_references(declaration: Declaration) -> str:
@@ -20,6 +20,7 @@ def value_references(declaration: Declaration) -> str:
         "",
         f'#define {prefix}_NAME "{name}"',
         f'#define {prefix}_GUID "{declaration.guid}"',
+        f'#define {prefix}_TOKEN_FMI3 "{declaration.token("fmi3")}"',
         "",
         "enum {",
         *(f"    {prefix}_{n} = {v.reference}," for n, v in declaration.variables.items()),
@@ -78,6 +79,8 @@ def variable_table(declaration: Declaration) -> str:
         "    .row_of_reference = row_of_reference,",
         "    .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],",
         "};",
+        "",
+        f'const char model_token_fmi3[] = "{declaration.token("fmi3")}";',
     ]
     return "\n".join(lines) + "\n"
 

@@ -42,12 +42,17 @@ class Declaration:
     @property
     def guid(self) -> str:
         """Hash of what defines the interface: all but texts, C names and default experiment."""
+        return self.token()
+
+    def token(self, *versions: str) -> str:
+        """Hash of the interface, and of the names of versions that do not share the GUID."""
         interface = {
             "model": self.model.name,
             "units": {name: unit.model_dump() for name, unit in self.units.items()},
             "variables": {name: v.interface for name, v in self.variables.items()},
         }
-        digest = hashlib.sha256(json.dumps(interface, sort_keys=True).encode()).hexdigest()
+        text = json.dumps(interface, sort_keys=True) + "".join(versions)
+        digest = hashlib.sha256(text.encode()).hexdigest()
         parts = (digest[0:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])
         return "{" + "-".join(parts) + "}"
 

@@ -65,7 +65,7 @@ def identifier(text: str) -> str:
 
 def variable_name(text: str) -> str:
     """Refuse names that the generated header, where they get a prefix, needs for its macros."""
-    if text in ("GUID", "NAME"):
+    if text in ("GUID", "NAME", "TOKEN_FMI3"):
         raise ValueError("is reserved for the generated header")
     return identifier(text)
 

@@ -1,10 +1,10 @@
 /* The functions that Model Exchange and Co-Simulation share (FMI 2.0, section 2.1): checks of
  * arguments that only FMI has, conversion of types and status, and nothing else. */
-#include "derivatives.h"
 #include "fmi2_component.h"
 #include "fmu_state.h"
 #include "model_description.h"
-#include "values.h"
+#include "modes.h"
+#include "variable_access.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -31,7 +31,10 @@ static void send_text(const struct component *component, enum component_status s
 
 /* Warnings, discards and errors are sent with logging off, too; only events and calls are not. */
 static const struct adapter adapter = {
+    .version = 2,
     .rules = fmi2_call_rules,
+    .states = ~(unsigned)STATE_INTERMEDIATE_UPDATE,
+    .after_error = STATE_ERROR,
     .always_logged = ~(1u << LOG_EVENTS | 1u << LOG_ALL),
     .send = send_text,
 };
@@ -56,9 +59,9 @@ static void refuse_instance(const fmi2CallbackFunctions *functions, fmi2String n
 
 static bool may_instantiate(fmi2String name, fmi2Type type, fmi2String guid,
                             const fmi2CallbackFunctions *functions) {
-    if (name == NULL || name[0] == '\0') {
-        refuse_instance(functions, name,
-                        "the instance name is missing: a name that is not empty is expected");
+    char text[LOG_TEXT_SIZE];
+    if (!component_may_begin(name, "GUID", guid, model_description.guid, text)) {
+        refuse_instance(functions, name, "%s", text);
         return false;
     }
     if (type != fmi2CoSimulation && type != fmi2ModelExchange) {
@@ -66,13 +69,6 @@ static bool may_instantiate(fmi2String name, fmi2Type type, fmi2String guid,
                         "FMU type %d is refused: %d for Model Exchange or %d for Co-Simulation is "
                         "expected",
                         (int)type, (int)fmi2ModelExchange, (int)fmi2CoSimulation);
-        return false;
-    }
-    if (guid == NULL || strcmp(guid, model_description.guid) != 0) {
-        refuse_instance(functions, name,
-                        "the GUID '%.100s' is refused: '%s' is expected, the model description "
-                        "belongs to another build",
-                        guid != NULL ? guid : "", model_description.guid);
         return false;
     }
     return functions != NULL;
@@ -128,10 +124,6 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2SetupExperiment)) {
-        return fmi2Error;
-    }
     const struct instance_experiment experiment = {
         .start_time = startTime,
         .stop_time_defined = stopTimeDefined != fmi2False,
@@ -139,136 +131,65 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
         .tolerance_defined = toleranceDefined != fmi2False,
         .tolerance = tolerance,
     };
-    return fmi2_result(component, instance_setup_experiment(component->instance, &experiment));
+    return fmi2_status(mode_setup_experiment(c, CALL_fmi2SetupExperiment, &experiment));
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2EnterInitializationMode)) {
-        return fmi2Error;
-    }
-    const enum status status = instance_enter_initialization(component->instance);
-    if (status == STATUS_OK) {
-        component->state = STATE_INITIALIZATION;
-    }
-    return fmi2_result(component, status);
+    return fmi2_status(mode_enter_initialization(c, CALL_fmi2EnterInitializationMode, NULL));
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2ExitInitializationMode)) {
-        return fmi2Error;
-    }
-    const enum status status = instance_exit_initialization(component->instance);
-    if (status == STATUS_OK) {
-        component->state =
-            component->kind == KIND_CO_SIMULATION ? STATE_STEP_COMPLETE : STATE_EVENT;
-        component_log(component, COMPONENT_OK, LOG_EVENTS, "initialized at t = %.17g",
-                      instance_time(component->instance));
-    }
-    return fmi2_result(component, status);
+    return fmi2_status(mode_exit_initialization(c, CALL_fmi2ExitInitializationMode));
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2Terminate)) {
-        return fmi2Error;
-    }
-    component->state = STATE_TERMINATED;
-    component_log(component, COMPONENT_OK, LOG_EVENTS, "terminated at t = %.17g",
-                  instance_time(component->instance));
-    return fmi2OK;
+    return fmi2_status(mode_terminate(c, CALL_fmi2Terminate));
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2Reset)) {
-        return fmi2Error;
-    }
-    instance_reset(component->instance);
-    component->state = STATE_INSTANTIATED;
-    component_log(component, COMPONENT_OK, LOG_EVENTS, "reset to the start values");
-    return fmi2OK;
+    return fmi2_status(mode_reset(c, CALL_fmi2Reset));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        fmi2Real value[]) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetReal) ||
-        !component_has_arrays(component, CALL_fmi2GetReal, nvr, vr, value)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_get_real(component->instance, vr, nvr, value));
+    return fmi2_status(access_get_real(c, CALL_fmi2GetReal, vr, nvr, value));
 }
 
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Integer value[]) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetInteger) ||
-        !component_has_arrays(component, CALL_fmi2GetInteger, nvr, vr, value)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_get_integer(component->instance, vr, nvr, value));
+    return fmi2_status(access_get_integer(c, CALL_fmi2GetInteger, vr, nvr, value));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                        const fmi2Real value[]) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2SetReal) ||
-        !component_has_arrays(component, CALL_fmi2SetReal, nvr, vr, value)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_set_real(component->instance, vr, nvr, value));
+    return fmi2_status(access_set_real(c, CALL_fmi2SetReal, vr, nvr, value));
 }
 
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           const fmi2Integer value[]) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2SetInteger) ||
-        !component_has_arrays(component, CALL_fmi2SetInteger, nvr, vr, value)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_set_integer(component->instance, vr, nvr, value));
-}
-
-/* Units have no Boolean and no String variables: only an access to none of them succeeds. */
-static fmi2Status access_none(fmi2Component c, enum fmi2_call call, const char *type,
-                              const fmi2ValueReference vr[], size_t nvr, const void *value) {
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nvr, vr, value)) {
-        return fmi2Error;
-    }
-    if (nvr > 0) {
-        return fmi2_status(
-            component_fail(component,
-                           "value reference %u is accessed as %s: %s has no variable "
-                           "of that type",
-                           vr[0], type, model_description.name));
-    }
-    return fmi2OK;
+    return fmi2_status(access_set_integer(c, CALL_fmi2SetInteger, vr, nvr, value));
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Boolean value[]) {
-    return access_none(c, CALL_fmi2GetBoolean, "Boolean", vr, nvr, value);
+    return fmi2_status(access_none(c, CALL_fmi2GetBoolean, "Boolean", vr, nvr, value));
 }
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
-    return access_none(c, CALL_fmi2GetString, "String", vr, nvr, value);
+    return fmi2_status(access_none(c, CALL_fmi2GetString, "String", vr, nvr, value));
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           const fmi2Boolean value[]) {
-    return access_none(c, CALL_fmi2SetBoolean, "Boolean", vr, nvr, value);
+    return fmi2_status(access_none(c, CALL_fmi2SetBoolean, "Boolean", vr, nvr, value));
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          const fmi2String value[]) {
-    return access_none(c, CALL_fmi2SetString, "String", vr, nvr, value);
+    return fmi2_status(access_none(c, CALL_fmi2SetString, "String", vr, nvr, value));
 }
 
 /* ---- FMU state ------------------------------------------------------------------------------ */
@@ -307,14 +228,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         size_t nUnknown, const fmi2ValueReference vKnown_ref[],
                                         size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-    const enum fmi2_call call = CALL_fmi2GetDirectionalDerivative;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nUnknown, vUnknown_ref, dvUnknown) ||
-        !component_has_arrays(component, call, nKnown, vKnown_ref, dvKnown)) {
-        return fmi2Error;
-    }
-    return fmi2_result(
-        component, instance_get_directional_derivative(component->instance, vUnknown_ref, nUnknown,
-                                                       vKnown_ref, nKnown, dvKnown, dvUnknown));
+    return fmi2_status(access_get_directional_derivative(c, CALL_fmi2GetDirectionalDerivative,
+                                                         vUnknown_ref, nUnknown, vKnown_ref, nKnown,
+                                                         dvKnown, dvUnknown));
 }

@@ -1,34 +1,20 @@
 /* The functions of FMI 2.0 for Co-Simulation only (section 4.2). */
-#include "derivatives.h"
 #include "fmi2_component.h"
 #include "stepping.h"
+#include "variable_access.h"
 
 /* ---- Derivatives of inputs and outputs ------------------------------------------------------- */
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-    const enum fmi2_call call = CALL_fmi2SetRealInputDerivatives;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nvr, vr, value) ||
-        !component_has_arrays(component, call, nvr, order, order)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component,
-                       instance_set_input_derivatives(component->instance, vr, nvr, order, value));
+    return fmi2_status(
+        access_set_input_derivatives(c, CALL_fmi2SetRealInputDerivatives, vr, nvr, order, value));
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-    const enum fmi2_call call = CALL_fmi2GetRealOutputDerivatives;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nvr, vr, value) ||
-        !component_has_arrays(component, call, nvr, order, order)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component,
-                       instance_get_output_derivatives(component->instance, vr, nvr, order, value));
+    return fmi2_status(
+        access_get_output_derivatives(c, CALL_fmi2GetRealOutputDerivatives, vr, nvr, order, value));
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */

@@ -1,17 +1,12 @@
 /* The functions of FMI 2.0 for Model Exchange only (section 3.2). Models have no events so far. */
-#include "continuous_states.h"
+#include "continuous_time.h"
 #include "fmi2_component.h"
+#include "modes.h"
 
 /* ---- Modes ---------------------------------------------------------------------------------- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2EnterEventMode)) {
-        return fmi2Error;
-    }
-    instance_enter_event_mode(component->instance);
-    component->state = STATE_EVENT;
-    return fmi2OK;
+    return fmi2_status(mode_enter_event(c, CALL_fmi2EnterEventMode));
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) {
@@ -32,15 +27,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2EnterContinuousTimeMode)) {
-        return fmi2Error;
-    }
-    const enum status status = instance_enter_continuous_time(component->instance);
-    if (status == STATUS_OK) {
-        component->state = STATE_CONTINUOUS_TIME;
-    }
-    return fmi2_result(component, status);
+    return fmi2_status(mode_enter_continuous_time(c, CALL_fmi2EnterContinuousTimeMode));
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
@@ -62,59 +49,27 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
 /* ---- Time and states ------------------------------------------------------------------------ */
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2SetTime)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_set_time(component->instance, time));
+    return fmi2_status(continuous_set_time(c, CALL_fmi2SetTime, time));
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2SetContinuousStates) ||
-        !component_has_arrays(component, CALL_fmi2SetContinuousStates, nx, x, x)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_set_states(component->instance, x, nx));
+    return fmi2_status(continuous_set_states(c, CALL_fmi2SetContinuousStates, x, nx));
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetDerivatives) ||
-        !component_has_arrays(component, CALL_fmi2GetDerivatives, nx, derivatives, derivatives)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_get_derivatives(component->instance, derivatives, nx));
+    return fmi2_status(continuous_get_derivatives(c, CALL_fmi2GetDerivatives, derivatives, nx));
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    (void)eventIndicators;
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetEventIndicators)) {
-        return fmi2Error;
-    }
-    if (ni > 0) {
-        return fmi2_status(
-            component_fail(component, "%zu event indicators are accessed: there are none", ni));
-    }
-    return fmi2OK;
+    return fmi2_status(
+        continuous_get_indicators(c, CALL_fmi2GetEventIndicators, eventIndicators, ni));
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetContinuousStates) ||
-        !component_has_arrays(component, CALL_fmi2GetContinuousStates, nx, x, x)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_get_states(component->instance, x, nx));
+    return fmi2_status(continuous_get_states(c, CALL_fmi2GetContinuousStates, x, nx));
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    const enum fmi2_call call = CALL_fmi2GetNominalsOfContinuousStates;
-    struct component *component = c;
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, nx, x_nominal, x_nominal)) {
-        return fmi2Error;
-    }
-    return fmi2_result(component, instance_get_nominals(component->instance, x_nominal, nx));
+    return fmi2_status(
+        continuous_get_nominals(c, CALL_fmi2GetNominalsOfContinuousStates, x_nominal, nx));
 }

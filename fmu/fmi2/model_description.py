@@ -7,66 +7,45 @@ from collections.abc import Sequence
 
 from declaration.load import Declaration, DeclarationError
 from declaration.schema import Enumeration, Float64, Unit, Variable
+from description_parts import (
+    add_experiment,
+    add_log_categories,
+    add_units,
+    document,
+    texts_of,
+    type_name,
+)
 from provenance import Provenance
 
 TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration"}
-
-LOG_CATEGORIES = {
-    "logEvents": "Events, for example initialization and reset",
-    "logStatusWarning": "Something to know about a call that succeeded",
-    "logStatusDiscard": "Why a function returns fmi2Discard",
-    "logStatusError": "Why a function returns fmi2Error",
-    "logStatusFatal": "Why a function returns fmi2Fatal",
-    "logAll": "All messages, and every call",
-}
 
 
 def model_description(
     declaration: Declaration, provenance: Provenance, sources: Sequence[str] = ()
 ) -> str:
     """Text of modelDescription.xml; `sources`: files in the FMU's sources/ that are compiled."""
-    model, experiment = declaration.model, declaration.experiment
+    model = declaration.model
     variables = with_aliases(declaration)
     index = {name: str(i) for i, name in enumerate(variables, start=1)}
-
-    texts = {
-        "author": provenance.author,
-        "version": provenance.version,
-        "copyright": provenance.copyright,
-        "license": provenance.license,
-        "generationTool": f"{model.name} {provenance.version}",
-        "generationDateAndTime": provenance.date,
-    }
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
         modelName=model.name,
         guid=declaration.guid,
-        description=model.description,
-        **{key: text for key, text in texts.items() if text is not None},
+        **texts_of(declaration, provenance),
         variableNamingConvention="flat",
         numberOfEventIndicators="0",
     )
     add_interfaces(root, model.name, sources)
     add_units(root, declaration.units)
     add_types(root, variables)
-    categories = ET.SubElement(root, "LogCategories")
-    for name, description in LOG_CATEGORIES.items():
-        ET.SubElement(categories, "Category", name=name, description=description)
-    ET.SubElement(
-        root,
-        "DefaultExperiment",
-        startTime=repr(experiment.start),
-        stopTime=repr(experiment.stop),
-        tolerance=repr(experiment.tolerance),
-        stepSize=repr(experiment.step),
-    )
+    add_log_categories(root, "fmi2")
+    add_experiment(root, declaration.experiment)
     scalars = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(scalars, name, variable, index, declaration.units)
     add_structure(root, variables, index)
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+    return document(root)
 
 
 def with_aliases(declaration: Declaration) -> dict[str, Variable]:
@@ -117,17 +96,6 @@ def add_interfaces(root: ET.Element, identifier: str, sources: Sequence[str]) ->
                 ET.SubElement(files, "File", name=name)
 
 
-def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
-    """Write UnitDefinitions: SI base exponents, and the display units."""
-    definitions = ET.SubElement(root, "UnitDefinitions")
-    for name, unit in sorted(units.items()):
-        element = ET.SubElement(definitions, "Unit", name=name)
-        exponents = {base: str(exponent) for base, exponent in unit.exponents.items()}
-        ET.SubElement(element, "BaseUnit", exponents)
-        for display, factor in unit.display.items():
-            ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
-
-
 def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
     """Write TypeDefinitions: one type for each enumeration."""
     enumerations = {n: v for n, v in variables.items() if isinstance(v, Enumeration)}
@@ -141,11 +109,6 @@ def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
             ET.SubElement(
                 enumeration, "Item", name=item, value=str(value), description=keys.description
             )
-
-
-def type_name(variable: str) -> str:
-    """Name of the type of an enumeration, for example SolverMethodType for solver_method."""
-    return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
 
 
 def add_variable(

@@ -174,10 +174,8 @@ static bool is_known(const struct instance *instance, const struct variable *var
             instance->state.phase == PHASE_INITIALIZATION);
 }
 
-enum status instance_get_directional_derivative(struct instance *instance,
-                                                const unsigned unknowns[], size_t unknown_count,
-                                                const unsigned knowns[], size_t known_count,
-                                                const double v[], double result[]) {
+static enum status check_matrix(const struct instance *instance, const unsigned unknowns[],
+                                size_t unknown_count, const unsigned knowns[], size_t known_count) {
     for (size_t i = 0; i < unknown_count; i++) {
         if (find_as(instance, unknowns[i], is_unknown, "an output, a local or a derivative") ==
             NULL) {
@@ -190,7 +188,21 @@ enum status instance_get_directional_derivative(struct instance *instance,
             return STATUS_INVALID_ARGUMENT;
         }
     }
-    enum status status = instance_update_outputs(instance);
+    return STATUS_OK;
+}
+
+static double *place_in(char *structure, const struct variable *variable) {
+    return (double *)(void *)(structure + variable->offset);
+}
+
+enum status instance_get_directional_derivative(struct instance *instance,
+                                                const unsigned unknowns[], size_t unknown_count,
+                                                const unsigned knowns[], size_t known_count,
+                                                const double v[], double result[]) {
+    enum status status = check_matrix(instance, unknowns, unknown_count, knowns, known_count);
+    if (status == STATUS_OK) {
+        status = instance_update_outputs(instance);
+    }
     if (status != STATUS_OK) {
         return status;
     }
@@ -198,7 +210,7 @@ enum status instance_get_directional_derivative(struct instance *instance,
     memset(instance->first_derivatives, 0, instance->model->values_size);
     for (size_t i = 0; i < known_count; i++) {
         const struct variable *variable = variable_of(instance->description, knowns[i]);
-        *(double *)(void *)(instance->first_derivatives + variable->offset) += v[i];
+        *place_in(instance->first_derivatives, variable) += v[i];
     }
     status = propagate(instance, 0.0, NULL);
     if (status != STATUS_OK) {
@@ -217,4 +229,42 @@ enum status instance_get_directional_derivative(struct instance *instance,
         }
     }
     return STATUS_OK;
+}
+
+/* v^T times the column of J that belongs to a known. */
+static enum status multiply_column(struct instance *instance, const unsigned unknowns[],
+                                   size_t unknown_count, const struct variable *known,
+                                   const double v[], double *product) {
+    memset(instance->first_derivatives, 0, instance->model->values_size);
+    *place_in(instance->first_derivatives, known) = 1.0;
+    const enum status status = propagate(instance, 0.0, NULL);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    *product = 0.0;
+    for (size_t i = 0; i < unknown_count; i++) {
+        const struct variable *unknown = variable_of(instance->description, unknowns[i]);
+        *product += v[i] * double_in(instance->first_derivatives, unknown);
+    }
+    return isfinite(*product) ? STATUS_OK : instance_not_finite(instance, known->name);
+}
+
+enum status instance_get_adjoint_derivative(struct instance *instance, const unsigned unknowns[],
+                                            size_t unknown_count, const unsigned knowns[],
+                                            size_t known_count, const double v[], double result[]) {
+    enum status status = check_matrix(instance, unknowns, unknown_count, knowns, known_count);
+    if (status == STATUS_OK) {
+        status = instance_update_outputs(instance);
+    }
+    // all of them before the first one is written: each waits at the place of its known
+    for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
+        const struct variable *known = variable_of(instance->description, knowns[i]);
+        status = multiply_column(instance, unknowns, unknown_count, known, v,
+                                 place_in(instance->second_derivatives, known));
+    }
+    for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
+        const struct variable *known = variable_of(instance->description, knowns[i]);
+        result[i] = double_in(instance->second_derivatives, known);
+    }
+    return status;
 }

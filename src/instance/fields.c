@@ -17,7 +17,7 @@ const struct variable *instance_refuse_reference(const struct instance *instance
 
 void instance_write_field(struct instance *instance, const struct variable *variable,
                           double value) {
-    if (variable->type == VARIABLE_INT32) {
+    if (variable->type != VARIABLE_FLOAT64) {
         *(int *)instance_field(instance, variable) = (int)value;
         return;
     }

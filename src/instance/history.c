@@ -46,6 +46,13 @@ static bool can_go_on(const struct instance *instance, double target) {
            parameters_are_held(instance) && inputs_are_held(memory, input_count);
 }
 
+enum continuation instance_continuation(const struct instance *instance, double target) {
+    if (!can_go_on(instance, target)) {
+        return CONTINUE_AFTER_RESTART;
+    }
+    return instance->history_is_lost ? CONTINUE_AFTER_REPLAY : CONTINUE_NOW;
+}
+
 void instance_update_next_step(struct instance *instance) {
     if (instance->state.has_history && !instance->history_is_lost) {
         instance->state.next_step = integrator_next_step(instance->integrator);
@@ -90,9 +97,8 @@ static enum status restart(struct instance *instance, struct clock_time end) {
                               state->restart_step);
 }
 
-/* Replays the integrator to the time of the restored state, in the number of internal steps that
- * the state gives. A forged state fails here. */
-static enum status replay(struct instance *instance) {
+/* In the number of internal steps that the state gives. A forged state fails here. */
+enum status instance_replay_history(struct instance *instance) {
     const struct instance_state *state = &instance->state;
     const struct span states = instance->model->states;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
@@ -118,9 +124,15 @@ static enum status replay(struct instance *instance) {
     return STATUS_OK;
 }
 
-enum status instance_prepare_history(struct instance *instance, struct clock_time end) {
-    if (!can_go_on(instance, clock_difference(end, instance->state.restart_time))) {
+enum status instance_prepare_history(struct instance *instance, struct clock_time end,
+                                     enum continuation continuation) {
+    switch (continuation) {
+    case CONTINUE_NOW:
+        break;
+    case CONTINUE_AFTER_REPLAY:
+        return instance_replay_history(instance);
+    case CONTINUE_AFTER_RESTART:
         return restart(instance, end);
     }
-    return instance->history_is_lost ? replay(instance) : STATUS_OK;
+    return STATUS_OK;
 }

@@ -5,10 +5,22 @@
 
 #include "internals.h"
 
-/* Prepares the integrator for an advance to the time end: it goes on from its history, gets it back
- * after a restore, or restarts because an input or a parameter has changed. */
+/* How the integrator gets to a time: it goes on from its history, gets that back first, after a
+ * restore, or restarts because an input or a parameter has changed. */
+enum continuation { CONTINUE_NOW, CONTINUE_AFTER_REPLAY, CONTINUE_AFTER_RESTART };
+
+/* target: s since the restart. */
+MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
+                                                           double target);
+
+/* Prepares the integrator for an advance to the time end by this continuation. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,
-                                                        struct clock_time end);
+                                                        struct clock_time end,
+                                                        enum continuation continuation);
+
+/* Brings the integrator back to where state says, with what it has kept of its internal steps: a
+ * restored instance does so at its next step, if that goes on from there. */
+MUST_CHECK NONNULL enum status instance_replay_history(struct instance *instance);
 
 /* Brings state.next_step up to date, which costs too much to be done after each step. */
 NONNULL void instance_update_next_step(struct instance *instance);

@@ -53,11 +53,12 @@ static enum status setup(struct instance *instance) {
     memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial);
     memory->block = calloc(1, memory->size);
     instance->first_derivatives = calloc(2, values_size);
-    instance->u = calloc(input_count + 1, sizeof(double));
+    instance->u = calloc((POLYNOMIAL_NODES + 1) * input_count + 1, sizeof(double));
     if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
+    instance->nodes = instance->u + input_count;
     memory->values = memory->block;
     memory->held = memory->values + values_size;
     memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
@@ -161,6 +162,10 @@ enum status instance_exit_initialization(struct instance *instance) {
         instance->state.phase = PHASE_STEPPING;
     }
     return status;
+}
+
+void instance_allow_setting_states(struct instance *instance) {
+    instance->states_are_settable = true;
 }
 
 double instance_time(const struct instance *instance) {

@@ -62,6 +62,7 @@ struct instance {
     struct instance_state state;
     struct instance_memory memory;
 
+    bool states_are_settable;      /* after initialization, too */
     bool outputs_are_valid;        /* the calculated values belong to the others */
     bool history_is_lost;          /* the integrator is not where state says: replay first */
     struct integrator *integrator; /* NULL: the model has no states */
@@ -69,6 +70,7 @@ struct instance {
                                               tolerances of the states */
     bool inputs_move;        /* since the last restart; otherwise u holds their values */
     double *u;               /* one value per input, as the right-hand side sees them */
+    double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;
     struct instance_snapshot *newest; /* snapshots that belong to the instance, a list */

@@ -14,3 +14,17 @@ struct polynomial polynomial_shifted(const struct polynomial *polynomial, double
         d[3],
     }};
 }
+
+struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double h) {
+    // Newton's forward differences, and their series for the derivatives at the first node
+    const double s = h / (POLYNOMIAL_NODES - 1);
+    const double first[] = {values[1] - values[0], values[2] - values[1], values[3] - values[2]};
+    const double second[] = {first[1] - first[0], first[2] - first[1]};
+    const double third = second[1] - second[0];
+    return (struct polynomial){{
+        values[0],
+        (first[0] - second[0] / 2.0 + third / 3.0) / s,
+        (second[0] - third) / s / s,
+        third / s / s / s,
+    }};
+}

@@ -12,6 +12,11 @@ struct polynomial {
 /* Value at time t (s) after the origin. */
 double polynomial_value(const struct polynomial *polynomial, double t);
 
+/* The polynomial with values[k] at k h / (POLYNOMIAL_NODES - 1), h > 0 (s). With equal values, all
+ * its derivatives are 0. */
+enum { POLYNOMIAL_NODES = POLYNOMIAL_DEGREE + 1 };
+struct polynomial polynomial_through(const double values[POLYNOMIAL_NODES], double h);
+
 /* The same polynomial with its origin moved by t (s). */
 struct polynomial polynomial_shifted(const struct polynomial *polynomial, double t);
 

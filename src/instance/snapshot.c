@@ -49,6 +49,13 @@ static struct instance_snapshot *new_snapshot(struct instance *instance) {
     return created;
 }
 
+static void copy_from(const struct instance *instance, unsigned tag,
+                      struct instance_snapshot *snapshot) {
+    snapshot->tag = tag;
+    snapshot->state = instance->state;
+    memcpy(snapshot->memory, instance->memory.block, instance->memory.size);
+}
+
 enum status instance_save(struct instance *instance, unsigned tag,
                           struct instance_snapshot **snapshot) {
     if (*snapshot == NULL) {
@@ -61,9 +68,7 @@ enum status instance_save(struct instance *instance, unsigned tag,
         return STATUS_INVALID_ARGUMENT;
     }
     instance_update_next_step(instance);
-    (*snapshot)->tag = tag;
-    (*snapshot)->state = instance->state;
-    memcpy((*snapshot)->memory, instance->memory.block, instance->memory.size);
+    copy_from(instance, tag, *snapshot);
     return STATUS_OK;
 }
 
@@ -90,6 +95,19 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     instance->state = snapshot->state;
     memcpy(instance->memory.block, snapshot->memory, instance->memory.size);
     return resume(instance);
+}
+
+void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {
+    copy_from(instance, 0, snapshot);
+    snapshot->history_is_lost = instance->history_is_lost;
+}
+
+enum status instance_undo(struct instance *instance, const struct instance_snapshot *snapshot) {
+    const enum status status = instance_restore(instance, snapshot);
+    // next_step, which instance_keep has not brought up to date, follows from the integrator
+    return status == STATUS_OK && snapshot->state.has_history && !snapshot->history_is_lost
+               ? instance_replay_history(instance)
+               : status;
 }
 
 enum status instance_forget(struct instance *instance, struct instance_snapshot **snapshot) {

@@ -4,9 +4,11 @@
 #include "history.h"
 #include "right_hand_side.h"
 #include "settings.h"
+#include "snapshot_contents.h"
 
 #include <limits.h>
 #include <math.h>
+#include <string.h>
 
 static enum status refuse_times(const struct instance *instance, double t, double h) {
     const struct instance_experiment *experiment = &instance->state.experiment;
@@ -55,6 +57,30 @@ static void update_statistics(struct instance *instance) {
     own->solver_last_order = statistics->last_order;
 }
 
+/* A step that is being done. */
+struct step {
+    struct instance *instance;
+    const struct step_options *options;
+    struct clock_time begin;
+    struct clock_time end;          /* where it is to end; it may come forward */
+    bool is_early;                  /* it has come forward */
+    bool is_over;                   /* the step is to end where it is */
+    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
+    enum status answer;             /* of options->accept */
+};
+
+/* ---- Inputs --------------------------------------------------------------------------------- */
+
+/* Those at the time of the instance, elapsed s after the beginning of the step. */
+static void place_inputs(struct instance *instance, double elapsed) {
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
+        u[i] = memory->current[i].d[0];
+    }
+}
+
 /* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
 static void end_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
@@ -67,57 +93,226 @@ static void end_inputs(struct instance *instance, double elapsed) {
         }
         return;
     }
+    place_inputs(instance, elapsed);
     for (size_t i = 0; i < input_count; i++) {
-        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
         memory->pending[i] = (struct polynomial){{memory->pending[i].d[0]}};
-        u[i] = memory->current[i].d[0];
     }
 }
 
-static enum status integrate_to(struct instance *instance, struct clock_time end) {
+/* From now on the last value of an input is the one that was set for the end of the step; where the
+ * step ended earlier, the value that the input has there. */
+static void hold_last_nodes(const struct step *step) {
+    const struct instance *instance = step->instance;
+    const struct instance_memory *memory = &instance->memory;
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
+        memory->pending[i].d[0] =
+            step->is_early ? memory->current[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
+    }
+}
+
+static enum status set_polynomials(struct instance *instance, double h) {
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial input =
+            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
+        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+            if (!isfinite(input.d[k])) {
+                return instance_not_finite(instance, "a derivative of an input");
+            }
+        }
+        memory->pending[i] = input;
+        memory->current[i] = input;
+        u[i] = input.d[0];
+    }
+    instance->outputs_are_valid = false;
+    return STATUS_OK;
+}
+
+static enum status ask_inputs(const struct step *step, double t, double h) {
+    struct instance *instance = step->instance;
+    for (int k = 0; k < POLYNOMIAL_NODES; k++) {
+        const double time =
+            k == POLYNOMIAL_NODES - 1 ? step->end.s : t + k * (h / (POLYNOMIAL_NODES - 1));
+        const enum status status = step->options->ask_inputs(step->options->context, time);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] = instance->memory.pending[i].d[0];
+        }
+    }
+    return set_polynomials(instance, clock_difference(step->end, step->begin));
+}
+
+/* ---- Integration ---------------------------------------------------------------------------- */
+
+static void keep(struct step *step) {
+    if (step->options->undo != NULL && step->kept == NULL) {
+        step->kept = step->options->undo;
+        instance_keep(step->instance, step->kept);
+    }
+}
+
+/* Reports the time of the instance; true: the step is to end there, or before the end so far. */
+static bool report(struct step *step) {
+    const double now = step->instance->state.time.s;
+    double end = step->end.s;
+    step->answer = step->options->accept(step->options->context, now, &end);
+    if (step->answer != STATUS_OK || end < step->end.s) {
+        step->is_over = step->answer != STATUS_OK || !(end - now > clock_slack(now, end - now));
+        step->end = step->is_over ? step->instance->state.time : (struct clock_time){.s = end};
+        step->is_early = true;
+        return true;
+    }
+    return false;
+}
+
+/* An integrator_observer. */
+static bool observe(void *step_pointer, double t, const double x[]) {
+    struct step *step = step_pointer;
+    struct instance *instance = step->instance;
+    memcpy(doubles_of(instance->memory.values, instance->model->states), x,
+           instance->model->states.size);
+    instance_set_clock(instance, clock_add(instance->state.restart_time, t));
+    place_inputs(instance, clock_difference(instance->state.time, step->begin));
+    return report(step);
+}
+
+/* To step->end, which may come forward on the way. */
+static enum status advance(struct step *step) {
+    struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    const struct clock_time begin = state->time;
-    enum status status = instance_prepare_history(instance, end);
+    double *x = doubles_of(instance->memory.values, instance->model->states);
+    const int64_t steps_before = state->statistics.steps;
+    int64_t steps = state->own.max_internal_steps;
+    if (step->options->accept != NULL) {
+        integrator_set_observer(instance->integrator, observe, step);
+    }
+    enum status status;
+    for (;;) {
+        status = integrator_advance(instance->integrator,
+                                    clock_difference(step->end, state->restart_time), steps,
+                                    &state->latest_time, x);
+        if (status != STATUS_OK || step->is_over ||
+            !(state->latest_time < clock_difference(step->end, state->restart_time))) {
+            break;
+        }
+        // to the new end; the step that the observer cut short counts
+        integrator_get_statistics(instance->integrator, &state->statistics);
+        steps = state->own.max_internal_steps - (state->statistics.steps - steps_before);
+        steps = steps > 1 ? steps : 1;
+    }
+    if (step->options->accept != NULL) {
+        integrator_set_observer(instance->integrator, NULL, NULL);
+    }
+    return status;
+}
+
+/* The instance is at the time where the step has ended. */
+static void arrive(const struct step *step, struct clock_time time) {
+    instance_set_clock(step->instance, time);
+    end_inputs(step->instance, clock_difference(time, step->begin));
+}
+
+/* To a point that an internal step may have passed already: then nothing can fail, and nothing is
+ * counted. Otherwise false. */
+static bool interpolate(const struct step *step, double target) {
+    struct instance *instance = step->instance;
+    if (!integrator_interpolate(instance->integrator, target,
+                                doubles_of(instance->memory.values, instance->model->states))) {
+        return false;
+    }
+    instance->state.latest_time = target;
+    arrive(step, step->end);
+    return true;
+}
+
+static enum status integrate(struct step *step) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const double target = clock_difference(step->end, state->restart_time);
+    const enum continuation continuation = instance_continuation(instance, target);
+    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
+        return STATUS_OK;
+    }
+    keep(step);
+    enum status status = instance_prepare_history(instance, step->end, continuation);
     if (status != STATUS_OK) {
         return status;
     }
+    status = advance(step);
 
-    const double target = clock_difference(end, state->restart_time);
-    status = integrator_advance(instance->integrator, target, state->own.max_internal_steps,
-                                &state->latest_time,
-                                doubles_of(instance->memory.values, instance->model->states));
-    state->has_history = status == STATUS_OK && integrator_has_history(instance->integrator);
+    // a step that ended early cannot be replayed: its end was not known when it began
+    state->has_history =
+        status == STATUS_OK && !step->is_early && integrator_has_history(instance->integrator);
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
     }
-    instance_set_clock(
-        instance, status == STATUS_OK ? end : clock_add(state->restart_time, state->latest_time));
-    end_inputs(instance, clock_difference(state->time, begin));
+    arrive(step,
+           status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
     update_statistics(instance);
     return status;
 }
 
-enum status instance_do_step(struct instance *instance, double communication_point, double step) {
-    enum status status = refuse_times(instance, communication_point, step);
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static enum status do_step(struct step *step, double communication_point, double h) {
+    struct instance *instance = step->instance;
+    enum status status = STATUS_OK;
+    if (step->options->ask_inputs != NULL) {
+        keep(step);
+        status = ask_inputs(step, communication_point, h);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    }
+    if (instance->integrator == NULL) {
+        arrive(step, step->end);
+    } else {
+        status = integrate(step);
+    }
+    if (status != STATUS_OK) {
+        message_write(
+            &instance->sink, status, "the step from t = %.17g to t = %.17g ended at %.17g: %s",
+            communication_point, step->end.s, instance->state.time.s, status_text(status));
+        return status;
+    }
+    if (step->options->ask_inputs != NULL) {
+        hold_last_nodes(step);
+    }
+    if (step->options->accept != NULL && !step->is_early) {
+        (void)report(step);
+    }
+    return step->answer;
+}
+
+enum status instance_do_step_with(struct instance *instance, double communication_point,
+                                  double step_size, const struct step_options *options) {
+    enum status status = refuse_times(instance, communication_point, step_size);
     if (status == STATUS_OK) {
         status = instance_check_parameters(instance);
     }
     if (status != STATUS_OK) {
         return status;
     }
-
-    const struct clock_time end = clock_add((struct clock_time){.s = communication_point}, step);
-    if (instance->integrator == NULL) {
-        const double elapsed = clock_difference(end, instance->state.time);
-        instance_set_clock(instance, end);
-        end_inputs(instance, elapsed);
-        return STATUS_OK;
-    }
-    status = integrate_to(instance, end);
-    if (status != STATUS_OK) {
-        message_write(&instance->sink, status,
-                      "the step from t = %.17g to t = %.17g ended at %.17g: %s",
-                      communication_point, end.s, instance->state.time.s, status_text(status));
+    struct step step = {
+        .instance = instance,
+        .options = options,
+        .begin = instance->state.time,
+        .end = clock_add((struct clock_time){.s = communication_point}, step_size),
+        .answer = STATUS_OK,
+    };
+    status = do_step(&step, communication_point, step_size);
+    if (step.kept != NULL && status_severity(status) == SEVERITY_DISCARD) {
+        const enum status restored = instance_undo(instance, step.kept);
+        return restored == STATUS_OK ? status : restored;
     }
     return status;
+}
+
+enum status instance_do_step(struct instance *instance, double communication_point, double step) {
+    static const struct step_options none = {0};
+    return instance_do_step_with(instance, communication_point, step, &none);
 }

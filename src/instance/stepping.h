@@ -2,7 +2,7 @@
 #ifndef INSTANCE_STEPPING_H
 #define INSTANCE_STEPPING_H
 
-#include "instance.h"
+#include "snapshot.h"
 
 /* Steps from communication_point to communication_point + step (s) with the inputs held, or as
  * polynomials where derivatives were set.
@@ -11,5 +11,29 @@
  * the time it reached, and the states are those of that time. */
 MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
                                                 double communication_point, double step);
+
+/* What a step does on its way; what is NULL is left out. The functions may read values of the
+ * instance and return STATUS_OK, or a status that ends the step and is returned by it. */
+struct step_options {
+    /* A snapshot of the instance, which the step overwrites: a step that fails (severity discard)
+     * leaves the instance as it was before. */
+    struct instance_snapshot *undo;
+
+    /* Called before anything else at POLYNOMIAL_NODES times (s) from the beginning to the end of
+     * the step, to set inputs by instance_set_real: over the step they are the polynomials through
+     * these values, of order 4. */
+    enum status (*ask_inputs)(void *context, double time);
+
+    /* Called at the end of each internal step that ends within the step, and at the end, with the
+     * values of that time (s). *end (s): where the step will end; it may be brought forward. */
+    enum status (*accept)(void *context, double time, double *end);
+
+    void *context; /* of these functions */
+};
+
+/* As instance_do_step; instance_time says where the step has ended. */
+MUST_CHECK NONNULL enum status instance_do_step_with(struct instance *instance,
+                                                     double communication_point, double step,
+                                                     const struct step_options *options);
 
 #endif

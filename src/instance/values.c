@@ -13,13 +13,45 @@ static double read_field(struct instance *instance, const struct variable *varia
     return *(const double *)instance_field(instance, variable);
 }
 
-/* Element i of an array of the C type that belongs to type; every int is exact as a double. */
-static double element(enum variable_type type, const void *values, size_t i) {
-    return type == VARIABLE_FLOAT64 ? ((const double *)values)[i] : ((const int *)values)[i];
+/* What an array is made of, and which variables it is for. */
+enum array { ARRAY_OF_DOUBLES, ARRAY_OF_INTS, ARRAY_OF_INT32, ARRAY_OF_ENUMERATIONS };
+
+/* Element i. Every int is exact as a double; an int64_t that is not is no item of an enumeration.
+ */
+ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
+    switch (array) {
+    case ARRAY_OF_DOUBLES:
+        return ((const double *)values)[i];
+    case ARRAY_OF_ENUMERATIONS:
+        return (double)((const int64_t *)values)[i];
+    default:
+        return ((const int *)values)[i];
+    }
 }
 
-static const struct variable *find_settable(const struct instance *instance, unsigned reference,
-                                            enum variable_type type) {
+/* The type that a variable must have; with ARRAY_OF_INTS either of the two that are kept as int. */
+ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum array array,
+                                          unsigned reference) {
+    if (array == ARRAY_OF_DOUBLES) {
+        return VARIABLE_FLOAT64;
+    }
+    if (array == ARRAY_OF_INTS) {
+        const struct variable *variable = variable_find(instance->description, reference);
+        return variable != NULL && variable->type == VARIABLE_ENUMERATION ? VARIABLE_ENUMERATION
+                                                                          : VARIABLE_INT32;
+    }
+    return array == ARRAY_OF_INT32 ? VARIABLE_INT32 : VARIABLE_ENUMERATION;
+}
+
+static bool is_settable(const struct instance *instance, const struct variable *variable) {
+    const size_t from_states = variable->offset - instance->model->states.offset;
+    return variable_is_settable(variable, instance->state.phase) ||
+           (instance->states_are_settable && variable->owner == VARIABLE_OF_MODEL &&
+            from_states < instance->model->states.size);
+}
+
+ALWAYS_INLINE const struct variable *find_settable(const struct instance *instance,
+                                                   unsigned reference, enum variable_type type) {
     static const char *const when[PHASE_COUNT] = {
         [PHASE_INSTANTIATED] = "at all: only start values and inputs can",
         [PHASE_INITIALIZATION] = "at all: only start values and inputs can",
@@ -27,7 +59,7 @@ static const struct variable *find_settable(const struct instance *instance, uns
         [PHASE_CONTINUOUS_TIME] = "while the time is continuous: only continuous inputs can",
     };
     const struct variable *variable = instance_find(instance, reference, type);
-    if (variable != NULL && !variable_is_settable(variable, instance->state.phase)) {
+    if (variable != NULL && !is_settable(instance, variable)) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
                       "%s (value reference %u) cannot be set %s", variable->name, reference,
                       when[instance->state.phase]);
@@ -36,15 +68,16 @@ static const struct variable *find_settable(const struct instance *instance, uns
     return variable;
 }
 
-static enum status set(struct instance *instance, enum variable_type type,
-                       const unsigned references[], size_t count, const void *values) {
+ALWAYS_INLINE enum status set(struct instance *instance, enum array array,
+                              const unsigned references[], size_t count, const void *values) {
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = find_settable(instance, references[i], type);
+        const struct variable *variable =
+            find_settable(instance, references[i], type_for(instance, array, references[i]));
         if (variable == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
         const enum status status =
-            variable_check_value(variable, element(type, values, i), &instance->sink);
+            variable_check_value(variable, element(array, values, i), &instance->sink);
         if (status != STATUS_OK) {
             return status;
         }
@@ -52,7 +85,7 @@ static enum status set(struct instance *instance, enum variable_type type,
     bool is_setting = false;
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable = variable_of(instance->description, references[i]);
-        instance_write_field(instance, variable, element(type, values, i));
+        instance_write_field(instance, variable, element(array, values, i));
         is_setting |= variable->owner == VARIABLE_OF_INSTANCE;
     }
     instance->outputs_are_valid = false;
@@ -64,12 +97,22 @@ static enum status set(struct instance *instance, enum variable_type type,
 
 enum status instance_set_real(struct instance *instance, const unsigned references[], size_t count,
                               const double values[]) {
-    return set(instance, VARIABLE_FLOAT64, references, count, values);
+    return set(instance, ARRAY_OF_DOUBLES, references, count, values);
 }
 
 enum status instance_set_integer(struct instance *instance, const unsigned references[],
                                  size_t count, const int values[]) {
-    return set(instance, VARIABLE_INT32, references, count, values);
+    return set(instance, ARRAY_OF_INTS, references, count, values);
+}
+
+enum status instance_set_int32(struct instance *instance, const unsigned references[], size_t count,
+                               const int values[]) {
+    return set(instance, ARRAY_OF_INT32, references, count, values);
+}
+
+enum status instance_set_enumeration(struct instance *instance, const unsigned references[],
+                                     size_t count, const int64_t values[]) {
+    return set(instance, ARRAY_OF_ENUMERATIONS, references, count, values);
 }
 
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
@@ -95,16 +138,46 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
     return STATUS_OK;
 }
 
-enum status instance_get_integer(struct instance *instance, const unsigned references[],
-                                 size_t count, int values[]) {
+static enum status find_integers(const struct instance *instance, enum array array,
+                                 const unsigned references[], size_t count) {
     for (size_t i = 0; i < count; i++) {
-        if (instance_find(instance, references[i], VARIABLE_INT32) == NULL) {
+        if (instance_find(instance, references[i], type_for(instance, array, references[i])) ==
+            NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
     }
-    for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = variable_of(instance->description, references[i]);
-        values[i] = *(const int *)instance_field(instance, variable);
-    }
     return STATUS_OK;
+}
+
+static int read_integer(struct instance *instance, unsigned reference) {
+    const struct variable *variable = variable_of(instance->description, reference);
+    return *(const int *)instance_field(instance, variable);
+}
+
+static enum status get_ints(struct instance *instance, enum array array,
+                            const unsigned references[], size_t count, int values[]) {
+    const enum status status = find_integers(instance, array, references, count);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        values[i] = read_integer(instance, references[i]);
+    }
+    return status;
+}
+
+enum status instance_get_integer(struct instance *instance, const unsigned references[],
+                                 size_t count, int values[]) {
+    return get_ints(instance, ARRAY_OF_INTS, references, count, values);
+}
+
+enum status instance_get_int32(struct instance *instance, const unsigned references[], size_t count,
+                               int values[]) {
+    return get_ints(instance, ARRAY_OF_INT32, references, count, values);
+}
+
+enum status instance_get_enumeration(struct instance *instance, const unsigned references[],
+                                     size_t count, int64_t values[]) {
+    const enum status status = find_integers(instance, ARRAY_OF_ENUMERATIONS, references, count);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        values[i] = read_integer(instance, references[i]);
+    }
+    return status;
 }

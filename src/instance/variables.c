@@ -36,5 +36,13 @@ enum status variable_check_value(const struct variable *variable, double value,
 }
 
 const char *variable_type_name(enum variable_type type) {
-    return type == VARIABLE_FLOAT64 ? "float64" : "int32";
+    switch (type) {
+    case VARIABLE_FLOAT64:
+        return "float64";
+    case VARIABLE_INT32:
+        return "int32";
+    case VARIABLE_ENUMERATION:
+        break;
+    }
+    return "enumeration";
 }

@@ -9,7 +9,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32 };
+/* An enumeration is kept as an int: 1 for its first item. */
+enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32, VARIABLE_ENUMERATION };
 
 /* The structure that holds the value: the model's own or struct instance_values. */
 enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_INSTANCE };

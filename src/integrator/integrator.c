@@ -186,7 +186,7 @@ static enum status advance(struct integrator *integrator, double t, int64_t max_
     enum status status = integrator->method->advance(
         integrator->memory, t, max_steps, integrator->reached_x, &stopped_at, integrator->x, &work);
     add_work(integrator, &work);
-    if (status == STATUS_OK) {
+    if (status == STATUS_OK && !work.is_cut_short) {
         stopped_at = t;
     }
     if (has_reached(integrator, stopped_at)) {
@@ -197,17 +197,34 @@ static enum status advance(struct integrator *integrator, double t, int64_t max_
     return status;
 }
 
+static void copy_state(const struct integrator *integrator, double x[]) {
+    memcpy(x, integrator->reached_x, integrator->problem.ode.state_count * sizeof(double));
+}
+
+bool integrator_interpolate(struct integrator *integrator, double t, double x[]) {
+    if (!can_interpolate(integrator, t)) {
+        return false;
+    }
+    accept(integrator, t);
+    copy_state(integrator, x);
+    return true;
+}
+
 enum status integrator_advance(struct integrator *integrator, double t, int64_t max_steps,
                                double *reached, double x[]) {
     enum status status = STATUS_OK;
-    if (can_interpolate(integrator, t)) {
-        accept(integrator, t);
-    } else {
+    if (!integrator_interpolate(integrator, t, x)) {
         status = advance(integrator, t, max_steps);
+        copy_state(integrator, x);
     }
     *reached = integrator->problem.reached;
-    memcpy(x, integrator->reached_x, integrator->problem.ode.state_count * sizeof(double));
     return status;
+}
+
+void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,
+                             void *context) {
+    integrator->problem.observer = observer;
+    integrator->problem.observer_context = context;
 }
 
 /* ---- Statistics ----------------------------------------------------------------------------- */

@@ -83,10 +83,24 @@ MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator,
 /* After an advance: how long a first internal step can be after a restart here, s; 0: unknown. */
 NONNULL double integrator_next_step(const struct integrator *integrator);
 
+/* Called after each internal step that ends before the t of an advance, with the state x there
+ * (t, s since the last restart). True: the advance ends there. */
+typedef bool integrator_observer(void *context, double t, const double x[]);
+
+/* Of the next advances; NULL: none. Watching does not change results. */
+NONNULL_ARGUMENTS(1)
+void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,
+                             void *context);
+
+/* As integrator_advance where an internal step has passed t already. Otherwise false, with nothing
+ * done. */
+MUST_CHECK NONNULL bool integrator_interpolate(struct integrator *integrator, double t, double x[]);
+
 /* Integrates to the time t, not before the one of the last call, in max_steps (>= 1) internal steps
  * at most, and writes the state there to x.
  * Where that fails (STATUS_TOO_MANY_STEPS, STATUS_NO_CONVERGENCE, STATUS_NOT_FINITE), *reached <= t
- * is the last time with a valid state and x that state; on success *reached is t.
+ * is the last time with a valid state and x that state; on success *reached is t, or where the
+ * observer ended the advance.
  *
  * Deterministic: after a restart, results depend only on its arguments and the first t, which
  * bounds the first internal step. With a history, stops at further times do not matter. */

@@ -205,8 +205,33 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
+/* Takes the internal steps to t, which CVode in normal mode would take, one by one and asks the
+ * observer about each. */
+static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
+                             double x[], bool *is_cut_short) {
+    const struct problem *problem = cvode->base.problem;
+    long begin = 0;
+    long steps = 0;
+    double internal = 0.0;
+    (void)CVodeGetNumSteps(cvode->solver, &begin);
+    (void)CVodeGetCurrentTime(cvode->solver, &internal);
+    int flag = CV_SUCCESS;
+    while (flag >= 0 && internal < t && !*is_cut_short) {
+        (void)CVodeGetNumSteps(cvode->solver, &steps);
+        if (steps - begin == max_steps) {
+            return CV_TOO_MUCH_WORK;
+        }
+        // the first one may have been taken by the advance before, which has not returned its end
+        flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_ONE_STEP);
+        sundials_get_state(&cvode->base, x);
+        internal = *stopped_at;
+        *is_cut_short = flag >= 0 && internal < t && problem_ends_at(problem, internal, x);
+    }
+    return flag;
+}
+
 static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
-                     double x[]) {
+                     double x[], bool *is_cut_short) {
     const struct problem *problem = cvode->base.problem;
     int flag = CVodeSetMaxNumSteps(cvode->solver, sundials_steps(max_steps));
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
@@ -216,11 +241,14 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
         // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
         flag = CVodeSetStopTime(cvode->solver, problem->span);
     }
-    if (flag != CV_SUCCESS) {
+    cvode->columns.count = 0;
+    if (flag == CV_SUCCESS && problem->observer != NULL) {
+        flag = integrate_watched(cvode, t, max_steps, stopped_at, x, is_cut_short);
+    }
+    if (flag < 0 || *is_cut_short) {
         sundials_get_state(&cvode->base, x);
         return flag;
     }
-    cvode->columns.count = 0;
     small_vector_note_terms(cvode->base.x, &cvode->columns);
     flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_NORMAL);
     small_vector_note_terms(cvode->base.x, NULL);
@@ -259,8 +287,10 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
                            double *stopped_at, double x[], struct method_work *work) {
     struct cvode *cvode = memory;
     (void)begin_x; // CVODE has it
-    const int flag = integrate(cvode, t, max_steps, stopped_at, x);
+    bool is_cut_short = false;
+    const int flag = integrate(cvode, t, max_steps, stopped_at, x, &is_cut_short);
     measure_work(cvode, work);
+    work->is_cut_short = is_cut_short;
     return status_of_flag(cvode->base.problem, flag);
 }
 

@@ -21,6 +21,7 @@ struct erk {
     struct sundials base; /* first */
     void *solver;
     double next_step; /* s: first internal step of the next advance; 0: ARKODE finds one */
+    double watched;   /* s since the restart: the last time that the observer was asked about */
 };
 
 static enum status status_of_flag(const struct problem *problem, int flag) {
@@ -138,6 +139,33 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
+/* Asks the observer about a time that comes after the others, as times may come again; the state
+ * there is x. */
+static bool is_ended_at(struct erk *erk, double t, const double x[]) {
+    const struct problem *problem = erk->base.problem;
+    if (problem->observer == NULL || t <= erk->watched) {
+        return false;
+    }
+    erk->watched = t;
+    return problem_ends_at(problem, t, x);
+}
+
+/* The internal steps of ERKStep in normal mode, one by one. */
+static int advance_watched(struct erk *erk, double t, int64_t max_steps, double *stopped_at,
+                           double x[], struct method_work *work) {
+    int flag = ARK_SUCCESS;
+    *stopped_at = erk->base.problem->reached;
+    for (int64_t steps = 0; flag >= 0 && *stopped_at < t && !work->is_cut_short; steps++) {
+        if (steps == max_steps) {
+            return ARK_TOO_MUCH_WORK;
+        }
+        flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_ONE_STEP);
+        sundials_get_state(&erk->base, x);
+        work->is_cut_short = flag >= 0 && *stopped_at < t && is_ended_at(erk, *stopped_at, x);
+    }
+    return flag;
+}
+
 /* Step by step, after ERKStep has failed: it gives up at the first right-hand side that cannot be
  * evaluated, and then reports the time of that evaluation, not the one of its last state. Here ever
  * shorter steps are tried. x: the last valid state. */
@@ -150,7 +178,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     sundials_set_state(&erk->base, begin_x);
     sundials_get_state(&erk->base, x);
     int flag = start(erk, begin, end, erk->next_step);
-    for (int64_t steps = 0; flag >= 0 && good < end; steps++) {
+    for (int64_t steps = 0; flag >= 0 && good < end && !work->is_cut_short; steps++) {
         if (steps == max_steps) {
             flag = ARK_TOO_MUCH_WORK;
             break;
@@ -160,6 +188,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
             good = *stopped_at;
             sundials_get_state(&erk->base, x);
             (void)ERKStepGetCurrentStep(erk->solver, &step);
+            work->is_cut_short = good < end && is_ended_at(erk, good, x);
             continue;
         }
         step = 0.5 * fmin(step, end - good);
@@ -179,13 +208,16 @@ static int integrate(struct erk *erk, double t, int64_t max_steps, const double 
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
+    erk->watched = begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
     }
-    if (flag == ARK_SUCCESS) {
+    if (flag == ARK_SUCCESS && erk->base.problem->observer != NULL) {
+        flag = advance_watched(erk, t, max_steps, stopped_at, x, work);
+    } else if (flag == ARK_SUCCESS) {
         flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_NORMAL);
     }
     if (flag < 0 && flag != ARK_TOO_MUCH_WORK) {

@@ -15,7 +15,14 @@ struct problem {
     double reached;           /* where the last advance ended; 0 after a restart */
     double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
     int64_t evaluation_count; /* calls of the right-hand side */
+    integrator_observer *observer; /* NULL: none */
+    void *observer_context;
 };
+
+/* Whether the observer ends the advance at t, the end of an internal step, where the state is x. */
+static inline bool problem_ends_at(const struct problem *problem, double t, const double x[]) {
+    return problem->observer(problem->observer_context, t, x);
+}
 
 /* All values are finite: 0 x is 0 for finite values only. */
 static inline bool problem_are_finite(const double values[], size_t count) {

@@ -210,8 +210,11 @@ def test_a_wrong_origin_is_named(
 def test_the_same_bytes_every_time(tmp_path: Path) -> None:
     generated(VARIABLES, tmp_path / "first")
     generated(VARIABLES, tmp_path / "second")
-    for file in (tmp_path / "first").iterdir():
-        assert file.read_bytes() == (tmp_path / "second" / file.name).read_bytes()
+    files = [path for path in (tmp_path / "first").rglob("*") if path.is_file()]
+    assert len(files) == 4
+    for file in files:
+        name = file.relative_to(tmp_path / "first")
+        assert file.read_bytes() == (tmp_path / "second" / name).read_bytes()
 
 
 def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> None:
@@ -221,7 +224,8 @@ def test_generated_files_in_the_build_are_fresh(fmu: Path, tmp_path: Path) -> No
     epoch = str(int(datetime.fromisoformat(date).timestamp())) if date else ""
     options = ("--version", root.get("version", ""), "--license", ROOT / "LICENSE")
     generated(VARIABLES, tmp_path, *options, SOURCE_DATE_EPOCH=epoch)
-    for name in ("modelDescription.xml", "variables.c", "value_references.h"):
+    descriptions = ("modelDescription.xml", "fmi3/modelDescription.xml")
+    for name in (*descriptions, "variables.c", "value_references.h"):
         assert (built / name).read_text() == (tmp_path / name).read_text()
 
 
@@ -303,11 +307,11 @@ def test_an_enumeration_in_the_model_description(trajectory: Path, tmp_path: Pat
     ]
 
 
-def test_an_enumeration_is_an_integer_in_the_table(trajectory: Path, tmp_path: Path) -> None:
+def test_an_enumeration_in_the_table(trajectory: Path, tmp_path: Path) -> None:
     generated(trajectory, tmp_path / "out")
     table = (tmp_path / "out" / "variables.c").read_text()
     row = table.partition('{1, "motion", ')[2].partition("}")[0]
-    assert row.startswith("VARIABLE_INT32, VARIABLE_OF_MODEL, ")
+    assert row.startswith("VARIABLE_ENUMERATION, VARIABLE_OF_MODEL, ")
     assert "3.0, 1.0, 3.0, 1.0" in row  # start, min, max, nominal
     compile_table(tmp_path / "out", "rp_trajectory")
 

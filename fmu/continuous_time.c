@@ -1,0 +1,57 @@
+#include "continuous_time.h"
+
+#include "continuous_states.h"
+
+enum component_status continuous_set_time(struct component *component, unsigned call, double time) {
+    if (!component_enter(component, call)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component, instance_set_time(component->instance, time));
+}
+
+enum component_status continuous_set_states(struct component *component, unsigned call,
+                                            const double x[], size_t count) {
+    if (!component_enter(component, call) || !component_has_arrays(component, call, count, x, x)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component, instance_set_states(component->instance, x, count));
+}
+
+enum component_status continuous_get_states(struct component *component, unsigned call, double x[],
+                                            size_t count) {
+    if (!component_enter(component, call) || !component_has_arrays(component, call, count, x, x)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component, instance_get_states(component->instance, x, count));
+}
+
+enum component_status continuous_get_derivatives(struct component *component, unsigned call,
+                                                 double dx[], size_t count) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, dx, dx)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component, instance_get_derivatives(component->instance, dx, count));
+}
+
+enum component_status continuous_get_nominals(struct component *component, unsigned call,
+                                              double nominals[], size_t count) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, nominals, nominals)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component, instance_get_nominals(component->instance, nominals, count));
+}
+
+enum component_status continuous_get_indicators(struct component *component, unsigned call,
+                                                double indicators[], size_t count) {
+    (void)indicators;
+    if (!component_enter(component, call)) {
+        return COMPONENT_ERROR;
+    }
+    if (count > 0) {
+        return component_fail(component, "%zu event indicators are accessed: there are none",
+                              count);
+    }
+    return COMPONENT_OK;
+}

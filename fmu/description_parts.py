@@ -1,0 +1,75 @@
+"""What the model descriptions of all versions of FMI have in common."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from declaration.load import Declaration
+from declaration.schema import Experiment, Unit
+from provenance import Provenance
+
+LOG_CATEGORIES = {
+    "logEvents": "Events, for example initialization and reset",
+    "logStatusWarning": "Something to know about a call that succeeded",
+    "logStatusDiscard": "Why a function returns {prefix}Discard",
+    "logStatusError": "Why a function returns {prefix}Error",
+    "logStatusFatal": "Why a function returns {prefix}Fatal",
+    "logAll": "All messages, and every call",
+}
+
+
+def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]:
+    """Attributes of the root that say what the model is and where it comes from."""
+    model = declaration.model
+    texts = {
+        "author": provenance.author,
+        "version": provenance.version,
+        "copyright": provenance.copyright,
+        "license": provenance.license,
+        "generationTool": f"{model.name} {provenance.version}",
+        "generationDateAndTime": provenance.date,
+    }
+    given = {key: text for key, text in texts.items() if text is not None}
+    return {"description": model.description, **given}
+
+
+def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
+    """Write UnitDefinitions: SI base exponents, and the display units."""
+    definitions = ET.SubElement(root, "UnitDefinitions")
+    for name, unit in sorted(units.items()):
+        element = ET.SubElement(definitions, "Unit", name=name)
+        exponents = {base: str(exponent) for base, exponent in unit.exponents.items()}
+        ET.SubElement(element, "BaseUnit", exponents)
+        for display, factor in unit.display.items():
+            ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+
+
+def type_name(variable: str) -> str:
+    """Name of the type of an enumeration, for example SolverMethodType for solver_method."""
+    return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
+
+
+def add_log_categories(root: ET.Element, prefix: str) -> None:
+    """Write LogCategories; the prefix is that of the version's constants."""
+    categories = ET.SubElement(root, "LogCategories")
+    for name, description in LOG_CATEGORIES.items():
+        text = description.format(prefix=prefix)
+        ET.SubElement(categories, "Category", name=name, description=text)
+
+
+def add_experiment(root: ET.Element, experiment: Experiment) -> None:
+    """Write DefaultExperiment."""
+    ET.SubElement(
+        root,
+        "DefaultExperiment",
+        startTime=repr(experiment.start),
+        stopTime=repr(experiment.stop),
+        tolerance=repr(experiment.tolerance),
+        stepSize=repr(experiment.step),
+    )
+
+
+def document(root: ET.Element) -> str:
+    """Text of the file."""
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,58 @@
+/* What an fmi3Instance points to, and what the files of this adapter share. */
+#ifndef FMI3_COMPONENT_H
+#define FMI3_COMPONENT_H
+
+#include "component.h"
+#include "fmi3_calls.h"
+#include "stepping.h"
+
+#include "fmi3Functions.h"
+
+#include <stdint.h>
+
+struct fmi3_component {
+    struct component base;         /* first */
+    fmi3LogMessageCallback logger; /* NULL: no log */
+    fmi3InstanceEnvironment environment;
+
+    /* Co-Simulation */
+    fmi3IntermediateUpdateCallback update; /* NULL: no intermediate updates */
+    bool early_return_allowed;
+    bool asks_inputs;            /* inputs are among the variables of intermediate updates */
+    bool can_set;                /* in intermediate update mode: inputs */
+    bool can_get;                /* in intermediate update mode */
+    struct step_options options; /* of every step */
+    bool is_intermediate[];      /* by row of the table of variables: it was named for intermediate
+                                    updates */
+};
+
+_Static_assert((int)COMPONENT_OK == fmi3OK && (int)COMPONENT_WARNING == fmi3Warning &&
+                   (int)COMPONENT_DISCARD == fmi3Discard && (int)COMPONENT_ERROR == fmi3Error &&
+                   (int)COMPONENT_FATAL == fmi3Fatal,
+               "a component_status is converted by a cast");
+_Static_assert(sizeof(int) == sizeof(fmi3Int32), "an fmi3Int32 is an int");
+
+static inline fmi3Status fmi3_status(enum component_status status) {
+    return (fmi3Status)status;
+}
+
+/* A call of the table that this FMU does not support: an error that says why. */
+fmi3Status fmi3_unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason);
+
+/* The number of values is the one expected; otherwise it fails as component_fail. */
+bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
+                    size_t expected);
+
+/* In intermediate update mode the variables may be read or set; otherwise it fails as
+ * component_fail. In other modes nothing is checked here. */
+bool fmi3_may_access(struct component *component, enum fmi3_call call, bool setting,
+                     const fmi3ValueReference references[], size_t count);
+
+/* Prepares steps with the rest of what stands above; the memory of a step that has to be undone is
+ * there before the first one. */
+MUST_CHECK enum status fmi3_prepare_steps(struct fmi3_component *component);
+
+/* Intermediate update mode knows no discard (section 4.2.2). */
+fmi3Status fmi3_access_status(struct component *component, enum component_status status);
+
+#endif

@@ -1,0 +1,162 @@
+"""Writes modelDescription.xml of FMI 3.0 (section 2.4 of the specification)."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+
+from declaration.load import Declaration
+from declaration.schema import Enumeration, Float64, Unit, Variable
+from description_parts import (
+    add_experiment,
+    add_log_categories,
+    add_units,
+    document,
+    texts_of,
+    type_name,
+)
+from provenance import Provenance
+
+TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration"}
+
+
+def model_description(declaration: Declaration, provenance: Provenance) -> str:
+    """Text of modelDescription.xml."""
+    model, variables = declaration.model, declaration.variables
+    root = ET.Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=model.name,
+        instantiationToken=declaration.token("fmi3"),
+        **texts_of(declaration, provenance),
+        variableNamingConvention="flat",
+    )
+    add_interfaces(root, model.name)
+    add_units(root, declaration.units)
+    add_types(root, declaration)
+    add_log_categories(root, "fmi3")
+    add_experiment(root, declaration.experiment)
+    elements = ET.SubElement(root, "ModelVariables")
+    for name, variable in variables.items():
+        add_variable(elements, name, variable, declaration)
+    add_structure(root, variables)
+    return document(root)
+
+
+def add_interfaces(root: ET.Element, identifier: str) -> None:
+    """Write ModelExchange and CoSimulation with what they can do."""
+    shared = {
+        "modelIdentifier": identifier,
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    }
+    ET.SubElement(root, "ModelExchange", shared)
+    ET.SubElement(
+        root,
+        "CoSimulation",
+        shared,
+        canHandleVariableCommunicationStepSize="true",
+        maxOutputDerivativeOrder="2",
+        providesIntermediateUpdate="true",
+        canReturnEarlyAfterIntermediateUpdate="true",
+        hasEventMode="true",
+    )
+
+
+def add_types(root: ET.Element, declaration: Declaration) -> None:
+    """Write TypeDefinitions: one type for each combination of unit and nominal value in use, since
+    importers refuse these on variables, and one for each enumeration."""
+    definitions = ET.SubElement(root, "TypeDefinitions")
+    written: set[str] = set()
+    for variable in declaration.variables.values():
+        if isinstance(variable, Float64) and float_type_name(variable) not in written:
+            written.add(float_type_name(variable))
+            add_float_type(definitions, variable, declaration.units)
+    for name, variable in declaration.variables.items():
+        if isinstance(variable, Enumeration):
+            enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name(name))
+            for value, (item, keys) in enumerate(variable.items.items(), start=1):
+                ET.SubElement(
+                    enumeration, "Item", name=item, value=str(value), description=keys.description
+                )
+
+
+def float_type_name(variable: Float64) -> str:
+    """Name of the type of a floating-point number, for example "Float64 in rad/s"."""
+    nominal = "" if variable.nominal is None else f", nominal {variable.nominal!r}"
+    return f"Float64 in {variable.unit}{nominal}"
+
+
+def add_float_type(parent: ET.Element, variable: Float64, units: dict[str, Unit]) -> None:
+    """Write one Float64Type."""
+    element = ET.SubElement(
+        parent, "Float64Type", name=float_type_name(variable), unit=variable.unit
+    )
+    for display in list(units[variable.unit].display)[:1]:
+        element.set("displayUnit", display)
+    if variable.nominal is not None:
+        element.set("nominal", repr(variable.nominal))
+
+
+def has_intermediate_update(variable: Variable) -> bool:
+    """Whether the variable can be accessed inside a step, as fmi3.c has it."""
+    is_continuous = isinstance(variable, Float64) and variable.variability == "continuous"
+    return is_continuous and variable.owner == "model" and variable.causality in ("input", "output")
+
+
+def add_variable(
+    parent: ET.Element, name: str, variable: Variable, declaration: Declaration
+) -> None:
+    """Write one variable."""
+    element = ET.SubElement(
+        parent,
+        TYPES[variable.type],
+        name=name,
+        valueReference=str(variable.reference),
+        description=variable.description,
+        causality=variable.causality,
+        variability=variable.variability,
+    )
+    if variable.initial is not None:
+        element.set("initial", variable.initial)
+    if isinstance(variable, Enumeration):
+        element.set("declaredType", type_name(name))
+    if isinstance(variable, Float64):
+        element.set("declaredType", float_type_name(variable))
+    if has_intermediate_update(variable):
+        element.set("intermediateUpdate", "true")
+    if variable.derivative_of is not None:
+        state = declaration.variables[variable.derivative_of]
+        element.set("derivative", str(state.reference))
+    for key in ("start", "min", "max"):
+        value = getattr(variable, key, None)
+        if value is not None:
+            element.set(key, repr(value))
+
+
+def add_structure(root: ET.Element, variables: dict[str, Variable]) -> None:
+    """Write ModelStructure with exact dependencies (section 2.4.8): parameters are knowns, too."""
+    structure = ET.SubElement(root, "ModelStructure")
+    states = {v.derivative_of for v in variables.values() if v.derivative_of is not None}
+    derivatives = {v.derivative_of: n for n, v in variables.items() if v.derivative_of is not None}
+    for section, names in (
+        ("Output", [n for n, v in variables.items() if v.causality == "output"]),
+        ("ContinuousStateDerivative", [derivatives[n] for n in variables if n in states]),
+        (
+            "InitialUnknown",
+            [n for n, v in variables.items() if v.is_unknown and v.initial == "calculated"],
+        ),
+    ):
+        for name in names:
+            unknown = variables[name]
+            knowns = (unknown.dependencies or []) + unknown.parameters
+            ET.SubElement(
+                structure,
+                section,
+                valueReference=str(unknown.reference),
+                dependencies=" ".join(
+                    str(reference)
+                    for reference in sorted(variables[known].reference for known in knowns)
+                ),
+            )
