@@ -24,7 +24,6 @@ from cosim.fmu_file import Fmu
 from tests.support.cosim_project import (
     BUILD,
     FMUS,
-    NAMES,
     SHORT,
     assert_one_line,
     call,
@@ -215,15 +214,20 @@ def test_files_with_the_line_ends_of_windows_are_read(project: Path, fmu: Path) 
 
 
 def test_the_scenarios_are_those_of_the_given_fmus_model(
-    fmu: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    project: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Though its file is somewhere and nothing is built."""
-    copy = shutil.copy(FMUS["rp_trajectory"], tmp_path / "downloaded.fmu")
-    arguments = ("run", "--tolerance", "1e-8", "--fmu", copy, "--report", tmp_path / "report")
+    other = load(names_of("rp_trajectory")[0])
+    model = project / "models" / other.model
+    (model / "scenarios").mkdir(parents=True)
+    shutil.copy(other.path, model / "scenarios")
+    shutil.copytree(other.reference_folder, model / "references" / other.name)
+    fmu = shutil.copy(FMUS[other.model], project / "downloaded.fmu")
+    arguments = ("run", "--tolerance", "1e-8", "--fmu", fmu, "--report", project / "report")
     code, out, err = call(capsys, *arguments)
     assert (code, err) == (0, "")
     rows = [line.split()[0] for line in out.splitlines() if line.endswith("passed")]
-    assert rows == names_of("rp_trajectory") and len(rows) < len(NAMES)
+    assert rows == [other.name] and "passed: 1 scenario\n" in out
 
 
 def test_fmu_of_a_model_without_scenarios(
