@@ -31,6 +31,7 @@ def collect(entries: list[str]) -> dict[str, Path]:
 
 def pack(archive: Path, files: dict[str, Path]) -> None:
     """Write the archive to a temporary name and rename it, so that a broken one never stays."""
+    archive.parent.mkdir(parents=True, exist_ok=True)
     with (
         atomic_write(archive) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,

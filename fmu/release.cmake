@@ -2,7 +2,7 @@
 # bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
 
 set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin aarch64-linux)
-set(release_folder ${PROJECT_BINARY_DIR}/release)
+set(RELEASE_FOLDER ${PROJECT_BINARY_DIR}/release)
 
 include(FindZig)
 find_program(LIPO NAMES lipo llvm-lipo llvm-lipo-14 DOC "Joins libraries for macOS")
@@ -69,7 +69,7 @@ function(add_release_fmu name)
     VERBATIM)
 
   set(described ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name}/release)
-  set(fmu ${release_folder}/${name}.fmu)
+  set(fmu ${RELEASE_FOLDER}/${name}.fmu)
   add_custom_command(
     OUTPUT ${fmu}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
@@ -87,7 +87,7 @@ function(add_release_fmu name)
     COMMENT "Packing release/${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${name}_release DEPENDS ${fmu})
-  set_property(GLOBAL APPEND PROPERTY release_fmus ${fmu})
+  set_property(GLOBAL APPEND PROPERTY release_files ${fmu})
   set_property(GLOBAL APPEND PROPERTY release_targets ${name}_release)
 endfunction()
 
@@ -99,19 +99,19 @@ function(add_release)
       COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
     return()
   endif()
-  get_property(fmus GLOBAL PROPERTY release_fmus)
+  get_property(files GLOBAL PROPERTY release_files)
   get_property(targets GLOBAL PROPERTY release_targets)
   set(parts
       --part SUNDIALS,${SUNDIALS_VERSION},BSD-3-Clause,https://computing.llnl.gov/projects/sundials
       --part musl,${MUSL_VERSION},MIT,https://musl.libc.org
       --part zig,${zig_version},MIT,https://ziglang.org
       --part mingw-w64,${mingw_version},ZPL-2.1,https://www.mingw-w64.org)
-  set(bill ${release_folder}/sbom.cdx.json)
+  set(bill ${RELEASE_FOLDER}/sbom.cdx.json)
   add_custom_command(
-    OUTPUT ${bill} ${release_folder}/SHA256SUMS
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/bill_of_materials.py ${fmus} --output ${release_folder}
+    OUTPUT ${bill} ${RELEASE_FOLDER}/SHA256SUMS
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/bill_of_materials.py ${files} --output ${RELEASE_FOLDER}
             --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE ${parts}
-    DEPENDS ${targets} ${fmus} ${FMU_SOURCE_DIR}/bill_of_materials.py
+    DEPENDS ${targets} ${files} ${FMU_SOURCE_DIR}/bill_of_materials.py
     COMMENT "Writing checksums and the bill of materials"
     VERBATIM)
   add_custom_target(release DEPENDS ${bill})
