@@ -5,10 +5,13 @@ import functools
 import importlib.util
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +22,7 @@ from tests.support.paths import ROOT
 
 FMUS = ("RPManipulator", "RPTrajectory", "RPController")
 BUILD = ROOT / "build"
-# what the hosts are compiled with, and where wine keeps its files
+# of builds for one platform, of the hosts, and of wine
 SCRATCH = BUILD / "platforms"
 HOST_SOURCES = ("platform_host.c", "script.c", "calls.c", "run.c", "system.c")
 TIME_LIMIT = 900.0  # s; zig makes its C library for Windows when it is asked for the first time
@@ -34,7 +37,7 @@ class Platform:
     suffix: str  # of the library
     system: str  # platform.system() and platform.machine() where it runs without an emulator
     machine: str
-    target: str  # for zig
+    preset: str  # of CMakePresets.json that builds it with zig
     compiler: str  # where zig is not installed
     emulator: tuple[str, ...]
 
@@ -43,18 +46,18 @@ class Platform:
 PLATFORMS = (
     Platform(
         name="linux64", folder="linux64", suffix=".so", system="Linux", machine="x86_64",
-        target="x86_64-linux-gnu.2.17", compiler="x86_64-linux-gnu-gcc",
+        preset="x86_64-linux", compiler="x86_64-linux-gnu-gcc",
         emulator=("qemu-x86_64-static", "-L", "/usr/x86_64-linux-gnu"),
     ),
     Platform(
         name="win64", folder="win64", suffix=".dll", system="Windows", machine="AMD64",
-        target="x86_64-windows-gnu", compiler="x86_64-w64-mingw32-gcc",
+        preset="x86_64-windows", compiler="x86_64-w64-mingw32-gcc",
         emulator=("wine",),
     ),
     Platform(
         name="aarch64-linux", folder="aarch64-linux", suffix=".so",
         system="Linux", machine="aarch64",
-        target="aarch64-linux-gnu.2.17", compiler="aarch64-linux-gnu-gcc",
+        preset="aarch64-linux", compiler="aarch64-linux-gnu-gcc",
         emulator=("qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"),
     ),
 )  # fmt: skip
@@ -69,7 +72,7 @@ class Missing(Exception):
 
 def archive_with(row: Platform, name: str) -> Path:
     """The FMU with the library of this platform: a release, or a build for this platform only."""
-    places = (BUILD / "release" / f"{name}.fmu", SCRATCH / row.name / f"{name}.fmu")
+    places = (BUILD / "release" / f"{name}.fmu", SCRATCH / row.preset / f"{name}.fmu")
     for place in places:
         if place.is_file():
             with zipfile.ZipFile(place) as archive:
@@ -106,7 +109,9 @@ def emulator_of(row: Platform) -> tuple[str, ...]:
 
 def compiler_of(row: Platform) -> list[str]:
     if importlib.util.find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc", "-target", row.target]
+        toolchain = ROOT / "cmake" / "toolchains" / f"zig-{row.preset}.cmake"
+        target = re.search(r"\(ZIG_TARGET (\S+)\)", toolchain.read_text()).group(1)
+        return [sys.executable, "-m", "ziglang", "cc", "-target", target]
     if shutil.which(row.compiler) is not None:
         return [row.compiler]
     raise Missing(f"zig or {row.compiler}, for the host of {row.name}: ./setup.sh --platforms")
@@ -124,7 +129,8 @@ def host_of(row: Platform) -> Path:
     host.parent.mkdir(parents=True, exist_ok=True)
     fmpy = importlib.util.find_spec("fmpy")
     headers = Path(fmpy.origin).parent / "c-code"
-    command += ["-std=c17", "-O2", "-isystem", str(headers), "-o", str(host)]
+    # -O3 and -s as for the release: zig has the C library for these options
+    command += ["-std=c17", "-O3", "-s", "-isystem", str(headers), "-o", str(host)]
     command += [str(sources / name) for name in HOST_SOURCES]
     if row.system == "Linux":
         command += ["-rdynamic", "-pthread", "-ldl"]  # -rdynamic: its malloc for the FMU
@@ -162,24 +168,25 @@ def finish(command: list[str], folder: Path) -> None:
 
 
 class Runner:
-    """The library of one FMU on one platform; the native one if there is no row."""
+    """The library of one FMU on one platform; this one if there is no row."""
 
-    def __init__(self, row: Platform | None, name: str, fmu: Path, folder: Path) -> None:
-        """`fmu` is the native one; `folder` takes libraries, scripts and transcripts."""
-        self.name = row.name if row else "native"
+    def __init__(
+        self, row: Platform | None, fmu: Path, folder: Path, library: Path | None = None
+    ) -> None:
+        """`fmu` is that of this build, `library` one in place of that in an FMU. `folder` takes
+        libraries, scripts and transcripts."""
+        name = fmu.stem
         self.model: Model = read_model(fmu)
-        self.folder = folder / self.name / name
+        self.folder = folder / (row.name if row else "native") / name
         self.folder.mkdir(parents=True, exist_ok=True)
         if row is None:
             self.command = [str(fmu.parent / "tests" / "platform_host")]
-            archive, member = fmu, native_member(fmu)
         else:
             self.command = [*emulator_of(row), str(host_of(row))]
-            archive = archive_with(row, name)
-            member = f"binaries/{row.folder}/{name}{row.suffix}"
-        self.library = f"./{Path(member).name}"  # dlopen searches for names without a folder
-        with zipfile.ZipFile(archive) as opened:
-            (self.folder / self.library).write_bytes(opened.read(member))
+        content = library.read_bytes() if library else library_in_fmu(row, fmu)
+        # dlopen searches for names without a folder
+        self.library = f"./{name}{row.suffix if row else ''}"
+        (self.folder / self.library).write_bytes(content)
 
     def run(self, *scripts: Script) -> list[bytes]:
         """Transcripts of scripts, each in a thread of its own."""
@@ -191,18 +198,43 @@ class Runner:
         return [(self.folder / f"{i}.transcript").read_bytes() for i in range(len(scripts))]
 
 
-def native_member(fmu: Path) -> str:
-    with zipfile.ZipFile(fmu) as archive:
+def library_in_fmu(row: Platform | None, fmu: Path) -> bytes:
+    archive = archive_with(row, fmu.stem) if row else fmu
+    with zipfile.ZipFile(archive) as opened:
         (member,) = (
-            name for name in archive.namelist() if name.startswith("binaries/") and name[-1] != "/"
+            name
+            for name in opened.namelist()
+            if re.fullmatch(rf"binaries/{row.folder if row else '[^/]+'}/[^/]+", name)
         )
-    return member
+        return opened.read(member)
 
 
-def runner(row: Platform | None, name: str, fmu: Path, folder: Path) -> Runner:
-    """A Runner, or a skipped test that says what is missing; in CI nothing may be."""
+def rebuilt(row: Platform | None, name: str, folder: Path) -> Path:
+    """A library of the sources in the release FMU, each compiled by itself and without options."""
+    release = BUILD / "release" / f"{name}.fmu"
+    if not release.is_file():
+        raise Missing(f"{release.relative_to(ROOT)}, for its sources: ./release.sh")
+    refuse_older(release)
+    compiler = row.compiler if row else "gcc"
+    if shutil.which(compiler) is None:
+        raise Missing(f"{compiler}, for sources on {row.name}: ./setup.sh --platforms")
+    with zipfile.ZipFile(release) as opened:
+        opened.extractall(folder, [n for n in opened.namelist() if n.startswith("sources/")])
+    sources = folder / "sources"
+    files = sorted(path.name for path in sources.glob("*.c"))
+    position = [] if row and row.system == "Windows" else ["-fPIC"]
+    finish([compiler, *position, "-c", *files], sources)
+    library = folder / f"{name}.library"
+    objects = sorted(path.name for path in sources.glob("*.o"))
+    finish([compiler, "-shared", "-o", str(library), *objects], sources)
+    return library
+
+
+@contextmanager
+def named_if_missing() -> Iterator[None]:
+    """Skips the test and says what is missing; in CI nothing may be."""
     try:
-        return Runner(row, name, fmu.with_name(f"{name}.fmu"), folder)
+        yield
     except Missing as missing:
         if os.environ.get("CI"):
             pytest.fail(f"missing: {missing}")
