@@ -40,7 +40,7 @@ step "libFuzzer, ten seconds a target"
 build fuzz
 ctest --preset fuzz --progress -j 2
 
-if command -v qemu-aarch64-static aarch64-linux-gnu-gcc >/dev/null; then
+if command -v qemu-aarch64-static >/dev/null && command -v aarch64-linux-gnu-gcc >/dev/null; then
   step "64-bit Arm in qemu; C tests of src and models"
   build qemu
   ctest --preset qemu --progress -j 2

@@ -8,14 +8,13 @@ import sys
 import uuid
 from pathlib import Path
 
+from atomic_write import atomic_write
 from cyclonedx.model import ExternalReference, ExternalReferenceType, HashAlgorithm, HashType, XsUri
 from cyclonedx.model.bom import Bom
 from cyclonedx.model.component import Component, ComponentType
 from cyclonedx.model.license import DisjunctiveLicense
 from cyclonedx.output.json import JsonV1Dot6
 from cyclonedx.validation.json import JsonStrictValidator
-
-from atomic_write import atomic_write
 from provenance import ProvenanceError, license_texts
 
 CHECKSUMS = "SHA256SUMS"
@@ -23,7 +22,7 @@ BILL = "sbom.cdx.json"
 
 
 def part(text: str) -> Component:
-    """Component of all FMUs, from NAME,VERSION,LICENSE,ADDRESS; the license by its SPDX identifier."""
+    """Component of all FMUs, from NAME,VERSION,LICENSE,ADDRESS; the license as SPDX names it."""
     name, version, license_id, address = text.split(",")
     return Component(
         type=ComponentType.LIBRARY,

@@ -83,7 +83,9 @@ def test_the_bill_of_materials_names_what_is_compiled_in(release: Path, archive)
     bill = json.loads((release / "sbom.cdx.json").read_text())
     assert bill["bomFormat"] == "CycloneDX"
     components = {component["name"]: component for component in bill["components"]}
-    used = next(d["dependsOn"] for d in bill["dependencies"] if d["ref"] == f"{name_of(archive)}.fmu")
+    used = next(
+        d["dependsOn"] for d in bill["dependencies"] if d["ref"] == f"{name_of(archive)}.fmu"
+    )
     assert set(used) == {"SUNDIALS", "musl", "zig", "mingw-w64"}
     for name in used:
         assert re.fullmatch(r"\d+(\.\d+)+", components[name]["version"])
@@ -113,8 +115,8 @@ def test_the_interface_is_that_of_the_fmu_for_one_platform(archive, fmu: Path) -
     with zipfile.ZipFile(fmu.with_name(Path(archive.filename).name)) as built:
         one = built.read("modelDescription.xml").decode()
     every = archive.read("modelDescription.xml").decode()
-    without = re.sub(r"\s*<SourceFiles>.*?</SourceFiles>\s*</(ModelExchange|CoSimulation)>", "", every,
-                     flags=re.DOTALL)  # fmt: skip
+    files = r"\s*<SourceFiles>.*?</SourceFiles>\s*</(ModelExchange|CoSimulation)>"
+    without = re.sub(files, "", every, flags=re.DOTALL)
     assert every != without
     assert re.search(r'guid="([^"]+)"', one)[1] == re.search(r'guid="([^"]+)"', every)[1]
     assert one.partition("<UnitDefinitions>")[2] == every.partition("<UnitDefinitions>")[2]
@@ -144,7 +146,9 @@ def test_linux_exports_the_functions_of_the_standard_only(elf: lief.ELF.Binary) 
 
 def test_linux_needs_glibc_2_17_and_no_libm(elf: lief.ELF.Binary) -> None:
     assert list(elf.libraries) == ["libc.so.6"]
-    versions = [v.name for need in elf.symbols_version_requirement for v in need.get_auxiliary_symbols()]
+    versions = [
+        v.name for need in elf.symbols_version_requirement for v in need.get_auxiliary_symbols()
+    ]
     assert versions
     for version in versions:
         assert tuple(map(int, version.removeprefix("GLIBC_").split("."))) <= (2, 17)
@@ -223,7 +227,7 @@ def test_macos_on_arm_loads_signed_code_only(macho: lief.MachO.Binary) -> None:
         assert macho.has_code_signature
 
 
-# ---- The bill of materials ------------------------------------------------------------------------
+# ---- The bill of materials ----------------------------------------------------------------------
 
 
 def test_a_bill_of_a_file_that_is_not_there_is_refused(tmp_path: Path, capsys) -> None:

@@ -10,8 +10,6 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -168,25 +166,45 @@ def finish(command: list[str], folder: Path) -> None:
 
 
 class Runner:
-    """The library of one FMU on one platform; this one if there is no row."""
+    """The library of one FMU on one platform; the native one if there is no row."""
 
-    def __init__(
-        self, row: Platform | None, fmu: Path, folder: Path, library: Path | None = None
-    ) -> None:
-        """`fmu` is that of this build, `library` one in place of that in an FMU. `folder` takes
-        libraries, scripts and transcripts."""
-        name = fmu.stem
+    def __init__(self, row: Platform | None, name: str, fmu: Path, folder: Path) -> None:
+        """`fmu` is the native one; `folder` takes libraries, scripts and transcripts."""
+        self.row = row
+        self.name = row.name if row else "native"
         self.model: Model = read_model(fmu)
-        self.folder = folder / (row.name if row else "native") / name
+        self.folder = folder / self.name / name
         self.folder.mkdir(parents=True, exist_ok=True)
         if row is None:
             self.command = [str(fmu.parent / "tests" / "platform_host")]
+            archive, member = fmu, native_member(fmu)
         else:
             self.command = [*emulator_of(row), str(host_of(row))]
-        content = library.read_bytes() if library else library_in_fmu(row, fmu)
-        # dlopen searches for names without a folder
-        self.library = f"./{name}{row.suffix if row else ''}"
-        (self.folder / self.library).write_bytes(content)
+            archive = archive_with(row, name)
+            member = f"binaries/{row.folder}/{name}{row.suffix}"
+        self.library = f"./{Path(member).name}"  # dlopen searches for names without a folder
+        with zipfile.ZipFile(archive) as opened:
+            (self.folder / self.library).write_bytes(opened.read(member))
+
+    def recompile(self) -> None:
+        """Replace the library by one that the row's gcc makes of the sources in the release.
+
+        As a foreign build does it: every file by itself, with no options but -fPIC on Linux.
+        """
+        row = self.row
+        assert row is not None
+        if shutil.which(row.compiler) is None:
+            raise Missing(f"{row.compiler}: ./setup.sh --platforms")
+        with zipfile.ZipFile(archive_with(row, self.model.name)) as opened:
+            names = [name for name in opened.namelist() if name.startswith("sources/")]
+            opened.extractall(self.folder, names)
+        sources = self.folder / "sources"
+        files = sorted(path.name for path in sources.glob("*.c"))
+        position = [] if row.system == "Windows" else ["-fPIC"]
+        finish([row.compiler, *position, "-c", *files], sources)
+        objects = [path.name for path in sorted(sources.glob("*.o"))]
+        (self.folder / self.library).unlink()
+        finish([row.compiler, "-shared", "-o", f"../{self.library}", *objects], sources)
 
     def run(self, *scripts: Script) -> list[bytes]:
         """Transcripts of scripts, each in a thread of its own."""
@@ -198,43 +216,23 @@ class Runner:
         return [(self.folder / f"{i}.transcript").read_bytes() for i in range(len(scripts))]
 
 
-def library_in_fmu(row: Platform | None, fmu: Path) -> bytes:
-    archive = archive_with(row, fmu.stem) if row else fmu
-    with zipfile.ZipFile(archive) as opened:
+def native_member(fmu: Path) -> str:
+    with zipfile.ZipFile(fmu) as archive:
         (member,) = (
-            name
-            for name in opened.namelist()
-            if re.fullmatch(rf"binaries/{row.folder if row else '[^/]+'}/[^/]+", name)
+            name for name in archive.namelist() if name.startswith("binaries/") and name[-1] != "/"
         )
-        return opened.read(member)
+    return member
 
 
-def rebuilt(row: Platform | None, name: str, folder: Path) -> Path:
-    """A library of the sources in the release FMU, each compiled by itself and without options."""
-    release = BUILD / "release" / f"{name}.fmu"
-    if not release.is_file():
-        raise Missing(f"{release.relative_to(ROOT)}, for its sources: ./release.sh")
-    refuse_older(release)
-    compiler = row.compiler if row else "gcc"
-    if shutil.which(compiler) is None:
-        raise Missing(f"{compiler}, for sources on {row.name}: ./setup.sh --platforms")
-    with zipfile.ZipFile(release) as opened:
-        opened.extractall(folder, [n for n in opened.namelist() if n.startswith("sources/")])
-    sources = folder / "sources"
-    files = sorted(path.name for path in sources.glob("*.c"))
-    position = [] if row and row.system == "Windows" else ["-fPIC"]
-    finish([compiler, *position, "-c", *files], sources)
-    library = folder / f"{name}.library"
-    objects = sorted(path.name for path in sources.glob("*.o"))
-    finish([compiler, "-shared", "-o", str(library), *objects], sources)
-    return library
-
-
-@contextmanager
-def named_if_missing() -> Iterator[None]:
-    """Skips the test and says what is missing; in CI nothing may be."""
+def runner(
+    row: Platform | None, name: str, fmu: Path, folder: Path, *, recompiled: bool = False
+) -> Runner:
+    """A Runner, or a skipped test that says what is missing; in CI nothing may be."""
     try:
-        yield
+        made = Runner(row, name, fmu.with_name(f"{name}.fmu"), folder)
+        if recompiled:
+            made.recompile()
+        return made
     except Missing as missing:
         if os.environ.get("CI"):
             pytest.fail(f"missing: {missing}")

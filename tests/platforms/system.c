@@ -66,7 +66,7 @@ static unsigned __stdcall run_thread(void *argument) {
     return 0;
 }
 
-bool system_run_threads(void (*run)(void *item), void *const items[], size_t count) {
+bool system_run_threads(void (*run)(void *item), void *const *items, size_t count) {
     enum { MOST = MAXIMUM_WAIT_OBJECTS };
     struct thread threads[MOST];
     HANDLE handles[MOST];
@@ -185,7 +185,7 @@ static void *run_thread(void *argument) {
     return NULL;
 }
 
-bool system_run_threads(void (*run)(void *item), void *const items[], size_t count) {
+bool system_run_threads(void (*run)(void *item), void *const *items, size_t count) {
     enum { MOST = 64 };
     struct thread threads[MOST];
     size_t started = 0;

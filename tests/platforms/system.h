@@ -14,7 +14,7 @@ bool system_find(void *library, const char *name, void *function);
 
 /* Calls run(items[i]) for each i in a thread of its own, all at the same time; returns when all
  * have ended. False if a thread could not be started. */
-bool system_run_threads(void (*run)(void *item), void *const items[], size_t count);
+bool system_run_threads(void (*run)(void *item), void *const *items, size_t count);
 
 /* Puts the host in front of what this library calls to allocate, where the host can do that. */
 void system_watch_allocations(void *library);

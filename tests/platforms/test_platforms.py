@@ -11,14 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.platforms import refusals, scripts
-from tests.platforms.platforms import (
-    FMUS,
-    PLATFORMS,
-    Platform,
-    Runner,
-    named_if_missing,
-    rebuilt,
-)
+from tests.platforms.platforms import FMUS, PLATFORMS, Platform, Runner, runner
 from tests.platforms.scripts import Model, Script, joined
 from tests.platforms.transcript import first_difference, read
 
@@ -39,13 +32,7 @@ Runners = Callable[[Platform | None, str], Runner]
 @pytest.fixture(scope="module")
 def runners(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Runners:
     folder = tmp_path_factory.mktemp("platforms")
-
-    @functools.cache
-    def made(row: Platform | None, name: str) -> Runner:
-        with named_if_missing():
-            return Runner(row, fmu.with_name(f"{name}.fmu"), folder)
-
-    return made
+    return functools.cache(lambda row, name: runner(row, name, fmu, folder))
 
 
 def everything(model: Model) -> Script:
@@ -70,23 +57,17 @@ def test_all_values_states_and_messages_are_the_same(
     assert difference is None, f"native and {row.name} differ in {difference}"
 
 
-@pytest.mark.parametrize(
-    ("row", "name"),
-    [*((None, name) for name in FMUS), *((row, FMUS[0]) for row in PLATFORMS[1:])],
-    ids=lambda value: value if isinstance(value, str) else value.name if value else "native",
-)
-def test_so_are_they_of_the_sources(
-    runners: Runners, fmu: Path, tmp_path: Path, row: Platform | None, name: str
+@each_platform
+@each_fmu
+def test_the_sources_give_the_same_when_they_are_compiled_again(
+    runners: Runners, row: Platform, name: str, fmu: Path, tmp_path: Path
 ) -> None:
-    """Compiled as others would, and run on that platform."""
-    native = runners(None, name)
-    with named_if_missing():
-        library = rebuilt(row, name, tmp_path)
-        other = Runner(row, fmu.with_name(f"{name}.fmu"), tmp_path, library)
+    native, other = runners(None, name), runner(row, name, fmu, tmp_path, recompiled=True)
     script = everything(native.model)
     (expected,) = native.run(script)
     (actual,) = other.run(script)
-    assert first_difference(script, expected, actual) is None
+    difference = first_difference(script, expected, actual)
+    assert difference is None, f"native and {row.name} differ in {difference}"
 
 
 # ---- States --------------------------------------------------------------------------------------

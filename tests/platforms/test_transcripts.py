@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.platforms import refusals, scripts
-from tests.platforms.platforms import FMUS, Runner
+from tests.platforms.platforms import FMUS, Runner, runner
 from tests.platforms.scripts import METHODS, Model, Script, bits, joined
 from tests.platforms.transcript import NOT_WRITTEN, Answer, first_difference, read
 
@@ -20,12 +20,12 @@ each_fmu = pytest.mark.parametrize("name", FMUS)
 
 @pytest.fixture
 def native(fmu: Path, tmp_path: Path, name: str) -> Runner:
-    return Runner(None, fmu.with_name(f"{name}.fmu"), tmp_path)
+    return runner(None, name, fmu, tmp_path)
 
 
 @pytest.fixture
 def arm(fmu: Path, tmp_path: Path) -> Runner:
-    return Runner(None, fmu.with_name("RPManipulator.fmu"), tmp_path)
+    return runner(None, "RPManipulator", fmu, tmp_path)
 
 
 def answers_of(native: Runner, script: Script) -> list[Answer]:
