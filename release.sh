@@ -4,7 +4,7 @@
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # may lead to other modules than those tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"
-case "${1-}" in
+case "$*" in
   "") ;;
   --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; exit ;;
   *) echo "usage: ./release.sh" >&2; exit 2 ;;

@@ -5,14 +5,17 @@ set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin a
 set(RELEASE_FOLDER ${PROJECT_BINARY_DIR}/release)
 
 include(FindZig)
+if(ZIG)
+  file(REAL_PATH ${ZIG} zig_folder)
+  cmake_path(GET zig_folder PARENT_PATH zig_folder)
+endif()
 find_program(LIPO NAMES lipo llvm-lipo llvm-lipo-14 DOC "Joins libraries for macOS")
-if(ZIG AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
+set(mingw_header ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h)
+if(EXISTS ${mingw_header} AND EXISTS ${zig_folder}/LICENSE AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
   set(CAN_RELEASE ON)
   # what zig puts into the libraries, and under which licenses
-  cmake_path(GET ZIG PARENT_PATH zig_folder)
   execute_process(COMMAND ${ZIG} version OUTPUT_VARIABLE zig_version OUTPUT_STRIP_TRAILING_WHITESPACE)
-  file(STRINGS ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h mingw_version
-       REGEX "define __MINGW64_VERSION_(MAJOR|MINOR|BUGFIX)")
+  file(STRINGS ${mingw_header} mingw_version REGEX "define __MINGW64_VERSION_(MAJOR|MINOR|BUGFIX)")
   list(TRANSFORM mingw_version REPLACE ".* " "")
   list(JOIN mingw_version . mingw_version)
 endif()
@@ -95,7 +98,7 @@ endfunction()
 function(add_release)
   if(NOT CAN_RELEASE)
     add_custom_target(release
-      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig and llvm-lipo (./setup.sh --release), and OWN_LIBM."
+      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig with its license and headers, and llvm-lipo (./setup.sh --release), and OWN_LIBM."
       COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
     return()
   endif()
