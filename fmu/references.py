@@ -55,13 +55,20 @@ class Scenario:
     values: dict[str, Any]  # parameters and initial values as they stand in the file
 
 
-def read(path: Path) -> Scenario:
-    """Read a scenario; the command line that runs it checks the rest."""
+def content_of(path: Path) -> bytes:
+    """Content of a file."""
     try:
-        keys = tomllib.loads(path.read_text(encoding="utf-8"))
+        return path.read_bytes()
     except OSError as error:
         raise CarriedScenarioError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:
+
+
+def read(path: Path) -> Scenario:
+    """Read a scenario; the command line that runs it checks the rest."""
+    content = content_of(path)
+    try:
+        keys = tomllib.loads(content.decode())
+    except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
         raise CarriedScenarioError(f"{path}: is not valid TOML: {error}") from None
     title, parameters, initial = (keys.get(k, {}) for k in ("title", "parameters", "initial"))
     if not isinstance(title, str):
@@ -168,7 +175,7 @@ def files(declaration: Declaration, names: Sequence[str]) -> Iterator[tuple[str,
             if ending == PARAMETERS:
                 content = parameter_set(scenario, declaration).encode()
             else:
-                content = (folder / "references" / scenario.name / name).read_bytes()
+                content = content_of(folder / "references" / scenario.name / name)
             yield f"{scenario.name}/{name}", content
 
 
