@@ -15,6 +15,8 @@ from cosim import project
 from cosim.errors import UserError, reason
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
+# signals that end the program; Windows has no SIGHUP, SIGBREAK is its Ctrl-Break and closed console
+ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -64,7 +66,7 @@ def _drop_output() -> None:
 
 
 def _as_program() -> int:
-    """`main`, ended by the user's Ctrl-C, SIGTERM or SIGHUP: temporary files are removed then.
+    """`main`, ended by Ctrl-C or another of `ENDINGS`: temporary files are removed then.
 
     Compiled code of libraries may turn the exception of a signal into another one: whatever
     arrives after a signal counts as its end.
@@ -75,7 +77,7 @@ def _as_program() -> int:
         received.append(number)
         raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)
 
-    for ending in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for ending in (getattr(signal, name) for name in ENDINGS if hasattr(signal, name)):
         # else it is ignored: nohup does so
         if signal.getsignal(ending) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(ending, stop)
@@ -113,7 +115,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
     run.add_argument(
-        "--fmu", type=Path, metavar="PATH", help="the FMU (default: that of the model, in build/)"
+        "--fmu",
+        type=Path,
+        metavar="PATH",
+        help="the FMU, for the scenarios of its model (default: that of each model, in build/)",
     )
     _add_report(run, project.report_folder())
     run.add_argument(

@@ -58,6 +58,7 @@ class Fmi2Instance:
                     modelIdentifier=self.fmu.identifier,
                     unzipDirectory=str(self.fmu.folder),
                     instanceName=self.name,
+                    libraryPath=str(self.fmu.library),
                 )
         except Exception as error:  # fmpy raises bare exceptions
             raise UserError(f"{self.fmu.path}: cannot be loaded: {one_line(error)}") from error

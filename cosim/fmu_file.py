@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import fmpy
 from fmpy.model_description import ModelDescription
@@ -15,6 +15,9 @@ from cosim.input_files import UnreadableError
 from cosim.model import Model, described
 
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
+# this platform's folder of binaries: FMI 3.0's first, because on Arm linux64 may be for x86-64
+PLATFORMS = (fmpy.platform_tuple, fmpy.platform)
+BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
 
 
 class Fmu:
@@ -26,10 +29,11 @@ class Fmu:
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
-        description, self.model = _read(self.path)
+        description, self.model, platform = _read(self.path)
         self.guid = description.guid
         self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
-        self._unpacked = TemporaryDirectory(prefix="cosim-")
+        # Windows does not remove a library that is still loaded, as after a fatal error
+        self._unpacked = TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
         self.folder = Path(self._unpacked.name)
         try:
             fmpy.extract(self.path, self.folder)
@@ -39,13 +43,13 @@ class Fmu:
         except Exception as error:  # fmpy raises bare exceptions, zlib its own
             self.close()
             raise UserError(f"{self.path}: cannot be unpacked: {one_line(error)}") from error
-        library = self.folder / "binaries" / fmpy.platform / f"{self.identifier}{LIBRARY_SUFFIX}"
+        self.library = self.folder / "binaries" / platform / f"{self.identifier}{LIBRARY_SUFFIX}"
         try:
-            check_library(library)
+            check_library(self.library)
         except (OSError, UnreadableError) as error:
             self.close()
             text = error if isinstance(error, UnreadableError) else reason(error)
-            raise UserError(f"{self.path}: {library.name}: {text}") from error
+            raise UserError(f"{self.path}: {self.library.name}: {text}") from error
 
     def __enter__(self) -> "Fmu":
         return self
@@ -67,14 +71,15 @@ def read_model(path: Path) -> Model:
     return _read(Path(path))[1]
 
 
-def _read(path: Path) -> tuple[ModelDescription, Model]:
-    """Model description of an FMU that can be run here."""
+def _read(path: Path) -> tuple[ModelDescription, Model, str]:
+    """Model description of an FMU that can be run here, and the folder of its binary."""
     if path.is_dir():
         raise UserError(f"{path}: is a folder, expected an FMU")
     try:
         check_archive(path)
         description = fmpy.read_model_description(path)
-        platforms = fmpy.supported_platforms(path)
+        with ZipFile(path) as archive:
+            names = archive.namelist()
     except UnreadableError as error:
         raise UserError(f"{path}: {error}") from None
     except OSError as error:
@@ -92,11 +97,15 @@ def _read(path: Path) -> tuple[ModelDescription, Model]:
     identifier = description.coSimulation.modelIdentifier
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
         raise UserError(f"{path}: expected a C identifier as modelIdentifier, found {identifier!r}")
-    if fmpy.platform not in platforms:
+    platforms = sorted({name.split("/")[1] for name in names if BINARY.fullmatch(name)})
+    here = [platform for platform in PLATFORMS if platform in platforms]
+    if not here:
+        way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, names)) else ""
         raise UserError(
-            f"{path}: has no binary for {fmpy.platform} (has: {', '.join(platforms) or 'none'})"
+            f"{path}: has no binary for {' or '.join(PLATFORMS)} "
+            f"(has: {', '.join(platforms) or 'none'}){way_out}"
         )
     try:
-        return description, described(description)
+        return description, described(description), here[0]
     except ValueError as error:
         raise UserError(f"{path}: wrong modelDescription.xml: {one_line(error)}") from error

@@ -119,20 +119,25 @@ def system_folder() -> Path:
     return found[0]
 
 
-def built(folder: Path, suffix: str) -> Path:
+def is_built_from(name: str, folder: Path) -> bool:
+    """Whether an FMU or SSP called `name` is that of the folder of a model or system."""
+    return name.lower() == folder.name.replace("_", "").lower()
+
+
+def built(folder: Path, suffix: str, option: str = "") -> Path:
     """What has been built from the folder of a model (.fmu) or system (.ssp).
 
     Raises
     ------
     UserError
-        If it is not there.
+        If it is not there; names `option`, which takes another file, if it is given.
     """
-    name = folder.name.replace("_", "").lower()
     for path in sorted((ROOT / "build").glob(f"*{suffix}")):
-        if path.stem.lower() == name:
+        if is_built_from(path.stem, folder):
             return path
     kind = suffix.removeprefix(".").upper()
-    raise UserError(f"{ROOT / 'build'}: has no {kind} of {folder.name}, ./run.sh builds it")
+    way_out = "./run.sh builds it" + (f", {option} PATH takes another one" if option else "")
+    raise UserError(f"{ROOT / 'build'}: has no {kind} of {folder.name}: {way_out}")
 
 
 def report_folder(part: str = "") -> Path:

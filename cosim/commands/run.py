@@ -49,18 +49,27 @@ def _open(
 ) -> tuple[list[Scenario], dict[str, Fmu]]:
     """Scenarios called `names`, or all; and FMUs by their models: the one at `path`, or in build/.
 
-    An FMU is opened once, and every scenario of its model is checked against it.
+    An FMU is opened once, and every scenario of its model is checked against it. Without names, the
+    one at `path` runs only the scenarios of its model.
     """
     files = [project.scenario_file(name) for name in dict.fromkeys(names)]
-    files = files or list(project.scenario_files().values())
+    given = stack.enter_context(Fmu(path)) if path else None
+    if not names:
+        files = [
+            file
+            for file in project.scenario_files().values()
+            if given is None or project.is_built_from(given.model.name, project.model_folder(file))
+        ]
     if not files:
-        raise UserError(f"{project.ROOT / 'models'}: has no scenarios")
+        which = f" of {given.model.name}, the model of {path}" if given else ""
+        raise UserError(f"{project.ROOT / 'models'}: has no scenarios{which}")
     chosen, fmus = [], {}
     for file in files:
         folder = project.model_folder(file)
         if folder.name not in fmus:
-            fmu = Fmu(path or project.built(folder, ".fmu"))
-            fmus[folder.name] = stack.enter_context(fmu)
+            fmus[folder.name] = given or stack.enter_context(
+                Fmu(project.built(folder, ".fmu", "--fmu"))
+            )
         chosen.append(scenarios.load(file, fmus[folder.name].model))
     return chosen, fmus
 

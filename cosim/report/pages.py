@@ -31,7 +31,8 @@ def write_page(folder: Path, template: str, **values: object) -> Path:
     """Write index.html of `folder`, complete or not at all; return its path."""
     index = folder / INDEX
     with whole(index) as path:
-        path.write_text(_templates.get_template(template).render(values), encoding="utf-8")
+        text = _templates.get_template(template).render(values)
+        path.write_text(text, encoding="utf-8", newline="\n")
     return index
 
 

@@ -16,14 +16,14 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cosim import project
-from cosim.errors import UserError
+from cosim.errors import UserError, one_line
 
 if TYPE_CHECKING:  # the child does not need these modules
     from cosim.system.ssp import Ssp
@@ -65,7 +65,8 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     system = ssp.system
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
-    with TemporaryDirectory(prefix="cosim-") as name:
+    # Windows does not remove files that a program of a run that was interrupted still holds
+    with TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         plan = {
             "ssp": str(ssp.path.resolve()),
@@ -75,7 +76,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
             "step": system.step,
             "steps": system.steps,
         }
-        (folder / PLAN).write_text(json.dumps(plan), encoding="utf-8")
+        (folder / PLAN).write_text(json.dumps(plan), encoding="utf-8", newline="\n")
         code = _start(folder)
         log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
         if code != 0:
@@ -99,7 +100,8 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
 
 def _start(folder: Path) -> int:
     """Run the child; its exit code."""
-    environment = os.environ | {"TMPDIR": str(folder), "PYTHONUNBUFFERED": "1"}
+    temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))  # the last two: on Windows
+    environment = os.environ | temporary | {"PYTHONUNBUFFERED": "1"}
     with (folder / LOG).open("wb") as log:
         child = subprocess.Popen(
             [sys.executable, "-m", "cosim.system.ecos", str(folder)],
@@ -113,16 +115,25 @@ def _start(folder: Path) -> int:
     try:
         return child.wait()
     except BaseException:
-        with suppress(ProcessLookupError):  # it has just ended
-            os.killpg(child.pid, signal.SIGKILL)
+        _kill(child)
         child.wait()
         raise
 
 
+def _kill(child: subprocess.Popen) -> None:
+    """Kill the child, with the programs that Ecos started where there are process groups."""
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError):  # it has just ended
+            os.killpg(child.pid, signal.SIGKILL)
+    else:
+        child.kill()
+
+
 def _components(ssp: "Ssp", fmu: str) -> str:
     """Name of the component whose FMU it is: Ecos's log names only the FMU."""
+    fmu = fmu.replace("\\", "/")  # a path of Windows
     names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
-    return " or ".join(map(repr, names)) or repr(Path(fmu).name)
+    return " or ".join(map(repr, names)) or repr(PurePosixPath(fmu).name)
 
 
 def _check_values(
@@ -153,13 +164,19 @@ def _check_values(
 
 def _child(folder: Path) -> None:
     """Run the plan of the folder, until a value is not finite or a component has complained."""
-    from ecospy import EcosLib, EcosSimulation
+    try:
+        from ecospy import EcosLib, EcosSimulation
+    except (ImportError, OSError) as error:
+        sys.exit(
+            f"ecospy, which only `system` needs, cannot be loaded: {one_line(error)} "
+            "(it has libraries for Linux and Windows on x86-64)"
+        )
 
     plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
     names, steps = plan["names"], plan["steps"]
     EcosLib.set_log_level("debug")
     rows = np.empty((steps + 1, len(names)))
-    flush = ctypes.CDLL(None).fflush
+    flush = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush
     seen = 0
 
     def go_on(row: int) -> bool:
@@ -183,7 +200,7 @@ def _child(folder: Path) -> None:
         wall_time = time.perf_counter() - begin
         simulation.terminate()
     np.save(folder / ROWS, rows[: row + 1])
-    (folder / DONE).write_text(json.dumps({"wall_time": wall_time}), encoding="utf-8")
+    (folder / DONE).write_text(json.dumps({"wall_time": wall_time}), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ class SspReader:
             self.fail(STRUCTURE, f"element {name!r} is not an FMU", node)
         source = node.get("source")
         parts = PurePosixPath(source).parts
-        if ":" in source or not parts or parts[0] == "/" or ".." in parts:
+        if set(source) & set(":\\") or not parts or parts[0] == "/" or ".." in parts:
             self.fail(STRUCTURE, f"component {name!r}: {source!r} is no path in the SSP", node)
         connectors: dict[str, Connector] = {}
         for child in node.iterfind("ssd:Connectors/ssd:Connector", NAMESPACES):

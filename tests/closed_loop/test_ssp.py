@@ -235,6 +235,10 @@ BAD: dict[str, tuple[dict[str, Edit], list[str]]] = {
         structure("resources/RPController.fmu", "../RPController.fmu"),
         ["component 'controller'", "../RPController.fmu"],
     ),
+    "source outside, as Windows takes it": (
+        structure("resources/RPController.fmu", "..\\RPController.fmu"),
+        ["component 'controller'", "is no path in the SSP"],
+    ),
     "connection from an unknown component": (
         structure('startElement="controller"', 'startElement="contoller"'),
         ["contoller.tau1 -> arm.tau1", "did you mean 'controller'?"],

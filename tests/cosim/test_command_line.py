@@ -85,7 +85,7 @@ def test_run_with_a_worse_reference_fails(
         (["run", "constant_efort"], "did you mean 'constant_effort'"),
         (["run", "--fmu", "/nowhere/X.fmu"], "/nowhere/X.fmu: no such file"),
         (["run", "--fmu", "/"], "is a folder"),
-        (["run"], "build: has no FMU of rp_manipulator, ./run.sh builds it"),
+        (["run"], "build: has no FMU of rp_manipulator: ./run.sh builds it"),
         (["run", "--tolerance", "0"], "between 0 and 1"),
         (["run", "--tolerance", "tight"], "between 0 and 1"),
         (["run", "--fmux", "a"], "--fmux"),
