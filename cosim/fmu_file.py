@@ -25,8 +25,8 @@ BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c
 class Fmu:
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 
-    Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs on
-    this platform.
+    Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs
+    on this platform.
     """
 
     def __init__(self, path: Path) -> None:
