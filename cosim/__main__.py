@@ -13,6 +13,7 @@ from typing import NoReturn
 
 from cosim import project
 from cosim.errors import UserError, reason
+from cosim.model import VERSIONS
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 # signals that end the program; Windows has no SIGHUP, SIGBREAK is its Ctrl-Break and closed console
@@ -111,7 +112,8 @@ def _parser() -> argparse.ArgumentParser:
         description="Simulates each scenario at its own tolerance and at 1e-11, and over the "
         "tolerances 1e-4 to 1e-11; compares all outputs with the reference, and prints the errors "
         "and their bounds. Without names, measures the order of convergence in the communication "
-        "step too. Exit code: 0 all within bounds, 1 not, 2 wrong use.",
+        "step too. The FMUs are of FMI 2.0; those of FMI 3.0 must give the same bits. Exit code: 0 "
+        "all as it should be, 1 not, 2 wrong use.",
     )
     run.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
     run.add_argument(
@@ -120,6 +122,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PATH",
         help="the FMU, for the scenarios of its model (default: that of each model, in build/)",
     )
+    _add_fmi(run, None, "run only FMUs of this version of FMI")
     _add_report(run, project.report_folder())
     run.add_argument(
         "--tolerance",
@@ -133,8 +136,12 @@ def _parser() -> argparse.ArgumentParser:
         description="Prints the name and the title of every scenario.",
     )
     system_options = _Parser(add_help=False)
-    system_options.add_argument(
+    choice = system_options.add_mutually_exclusive_group()
+    choice.add_argument(
         "--ssp", type=Path, metavar="PATH", help="the system (default: the one in build/)"
+    )
+    _add_fmi(
+        choice, VERSIONS[0], "the system in build/ with FMUs of this version of FMI (default: 2)"
     )
     _add_report(system_options, project.report_folder("system"))
     system = commands.add_parser(
@@ -156,6 +163,19 @@ def _parser() -> argparse.ArgumentParser:
         "0 as expected, 1 not, 2 wrong use.",
     )
     return parser
+
+
+def _add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:
+    parser.add_argument("--fmi", type=_version, metavar="{2,3}", default=default, help=text)
+
+
+def _version(text: str) -> str:
+    """Version of FMI from its first digit or in full."""
+    for version in VERSIONS:
+        if text in (version, version[0]):
+            return version
+    known = " or ".join(version[0] for version in VERSIONS)
+    raise argparse.ArgumentTypeError(f"expected {known}, got {text!r}")
 
 
 def _add_report(parser: argparse.ArgumentParser, folder: Path) -> None:

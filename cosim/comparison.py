@@ -1,7 +1,7 @@
 """Runs of scenarios compared with their references."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,14 @@ from cosim.fmu_file import Fmu
 from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.simulation import Result
+
+
+@dataclass(frozen=True)
+class Twin:
+    """The same run on an FMU of another version of FMI."""
+
+    fmi_version: str
+    differing: tuple[str, ...]  # outputs that only one of both has, or whose values differ in a bit
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +29,7 @@ class Run:
     result: Result
     reference: Reference
     errors: dict[str, float]  # relative, per Real output
+    twin: Twin | None = None
 
     @property
     def worst(self) -> str:
@@ -39,15 +48,31 @@ class Run:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within its bound."""
-        return self.error <= self.bound
+        """Whether the error is within its bound, and the twin gives the same bits."""
+        return self.error <= self.bound and not (self.twin and self.twin.differing)
+
+    @property
+    def failure(self) -> str:
+        """Which variable is wrong."""
+        if self.error <= self.bound and self.twin and self.twin.differing:
+            return f"FMI {self.twin.fmi_version}: {self.twin.differing[0]}"
+        return self.worst
 
 
 class Runs:
-    """Runs scenarios on the FMUs of their models, each at a tolerance only once."""
+    """Runs scenarios on the FMUs of their models, each at a tolerance only once.
 
-    def __init__(self, fmus: Mapping[str, Fmu]) -> None:
-        self._fmus = fmus  # by name of the model's folder
+    Parameters
+    ----------
+    fmus : mapping of str to Fmu
+        By name of the model's folder.
+    twins : mapping of str to Fmu, optional
+        FMUs of another version of FMI, which have to give the same bits.
+    """
+
+    def __init__(self, fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu] | None = None) -> None:
+        self._fmus = fmus
+        self._twins = twins or {}
         self._runs: dict[tuple[str, float], Run] = {}
         self._references: dict[str, Reference] = {}
 
@@ -58,10 +83,13 @@ class Runs:
             self._references[scenario.name] = reference.load(scenario, model)
         return self._references[scenario.name]
 
-    def steps_ahead(self, scenario: Scenario, tolerances: Sequence[float]) -> int:
-        """Communication steps that runs at `tolerances` still have to make."""
+    def steps_ahead(
+        self, scenario: Scenario, tolerances: Sequence[float], compared: bool = False
+    ) -> int:
+        """Communication steps still to be made at `tolerances`; `compared`: by twins too."""
         missing = [t for t in tolerances if (scenario.name, t) not in self._runs]
-        return len(missing) * (len(scenario.times) - 1)
+        times = 2 if compared and scenario.model in self._twins else 1
+        return times * len(missing) * (len(scenario.times) - 1)
 
     def run(
         self,
@@ -77,3 +105,28 @@ class Runs:
             errors = reference.errors(result, expected)
             self._runs[key] = Run(scenario, fmu, result, expected, errors)
         return self._runs[key]
+
+    def compared(
+        self,
+        scenario: Scenario,
+        tolerance: float,
+        progress: Callable[[int], object] | None = None,
+    ) -> Run:
+        """`scenario` at `tolerance`, compared with its twin too, if there is one."""
+        run, twin = self.run(scenario, tolerance, progress), self._twins.get(scenario.model)
+        if twin is not None and run.twin is None:
+            other = simulation.simulate(twin, scenario, tolerance, progress)
+            found = Twin(twin.model.fmi_version, differing(run.result, other))
+            run = replace(run, twin=found)
+            self._runs[scenario.name, tolerance] = run
+        return run
+
+
+def differing(one: Result, other: Result) -> tuple[str, ...]:
+    """Outputs that are not in both, or whose values differ in a bit."""
+    columns, others = (
+        {name: column.tobytes() for name, column in zip(r.names, r.values.T, strict=True)}
+        for r in (one, other)
+    )
+    names = dict.fromkeys((*columns, *others))
+    return tuple(name for name in names if columns.get(name) != others.get(name))

@@ -7,7 +7,7 @@ from cosim.comparison import Run
 from cosim.convergence import Convergence
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.study import Measure
-from cosim.texts import counted, milliseconds, verdict
+from cosim.texts import bits, counted, milliseconds, verdict
 from cosim.tolerance_sweep import Sweep
 
 
@@ -30,16 +30,19 @@ def summary(failed: Iterable[str], done: Sequence[object], name: str) -> int:
 
 
 class RunTable:
-    """Runs of scenarios."""
+    """Runs of scenarios; `twin` is the version of FMI whose bits are compared, if any is."""
 
-    def __init__(self, names: Iterable[str]) -> None:
+    def __init__(self, names: Iterable[str], twin: str | None = None) -> None:
         self._width = max(map(len, ("scenario", *names)))
-        columns = "  tolerance    steps      error    bound  wall time  result"
+        title = f"{f'FMI {twin}':<10}  " if twin else ""
+        columns = f"  tolerance    steps      error    bound  wall time  {title}result"
         head(f"{'scenario':<{self._width}}{columns}")
 
     def row(self, run: Run) -> None:
         result = run.result
-        text = "passed" if run.passed else f"FAILED ({run.worst})"
+        text = "passed" if run.passed else f"FAILED ({run.failure})"
+        if run.twin is not None:
+            text = f"{bits(run.twin.differing):<10}  {text}"
         print(
             f"{run.scenario.name:<{self._width}}  {result.tolerance:>9.0e} {result.steps:>8} "
             f"{run.error:>10.2e} {run.bound:>8.0e} {result.wall_time:>8.3f} s  {text}",

@@ -1,8 +1,8 @@
 """Order of convergence in the communication step, with inputs that are smooth functions of time.
 
 A master knows its inputs at the communication points. An FMU that holds them over a step is off by
-the first power of the step; with their derivatives up to order k (fmi2SetRealInputDerivatives) it
-is off by power k + 1. The problems are models/<model>/convergence/<name>.toml, in the format of a
+the first power of the step; with their derivatives up to order k it is off by power
+k + 1. The problems are models/<model>/convergence/<name>.toml, in the format of a
 scenario; the exact final state of each is models/<model>/references/<name>/exact.json.
 """
 
@@ -19,7 +19,7 @@ from fmpy.fmi1 import FMICallException
 from cosim import project, simulation
 from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.model import Model
 from cosim.scenario import Scenario
@@ -209,7 +209,7 @@ def final_state(fmu: Fmu, problem: Problem, order: int, factor: int) -> dict[str
         Communication step, in shortest steps of the problem.
     """
     scenario = problem.scenario
-    with fmu.instance(scenario.name) as instance:
+    with fmu.instance(scenario.name, list(problem.inputs) if order else ()) as instance:
         simulation.initialize(instance, scenario, scenario.tolerance)
         states = instance.reals(list(problem.exact))
         try:
@@ -220,21 +220,17 @@ def final_state(fmu: Fmu, problem: Problem, order: int, factor: int) -> dict[str
         return dict(zip(states.names, states.view.tolist(), strict=True))
 
 
-def _step_through(instance: Fmi2Instance, problem: Problem, order: int, factor: int) -> None:
+def _step_through(instance: Instance, problem: Problem, order: int, factor: int) -> None:
     """All steps, with the inputs' values and derivatives at the beginning of each."""
     times = problem.scenario.times[::factor]
     elapsed = (times - problem.scenario.start)[:-1]
     sines, names = list(problem.inputs.values()), list(problem.inputs)
 
-    # by order, and within an order by input
+    # (steps, orders, inputs)
     known = np.array([[s.derivative(elapsed, i) for s in sines] for i in range(order + 1)])
-    known = known.reshape(len(names) * (order + 1), -1).T
-    inputs = instance.reals(names)
-    orders = np.repeat(np.arange(1, order + 1), len(names)).tolist()
-    derivatives = instance.derivatives(names * order, orders)
-    for t, h, row in zip(times, np.diff(times), known, strict=False):
-        inputs.view[:] = row[: len(names)]
+    known = known.reshape(order + 1, len(names), -1).transpose(2, 0, 1)
+    inputs = instance.input_polynomials(names, order)
+    for t, h, rows in zip(times, np.diff(times), known, strict=False):
+        inputs.view[:] = rows
         inputs.set()
-        derivatives.view[:] = row[len(names) :]
-        derivatives.set()
         instance.do_step(t, h)

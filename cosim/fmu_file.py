@@ -1,6 +1,7 @@
 """FMUs as files: checked, read and unpacked once, for any number of runs."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zipfile import BadZipFile, ZipFile
@@ -11,26 +12,28 @@ from fmpy.model_description import ModelDescription
 from cosim.archives import check_archive, check_library
 from cosim.errors import UserError, one_line, reason
 from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmi3_instance import Fmi3Instance
+from cosim.fmi_instance import Instance
 from cosim.input_files import UnreadableError
-from cosim.model import Model, described
+from cosim.model import VERSIONS, Model, described, is_known
 
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
-# this platform's folder of binaries: FMI 3.0's first, because on Arm linux64 may be for x86-64
-PLATFORMS = (fmpy.platform_tuple, fmpy.platform)
+INSTANCES: dict[str, type[Instance]] = {"2.0": Fmi2Instance, "3.0": Fmi3Instance}
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
 
 
 class Fmu:
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 
-    Raises UserError if the file is not an FMU of FMI 2.0 for co-simulation that runs on this
-    platform.
+    Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs
+    on this platform.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         description, self.model, platform = _read(self.path)
-        self.guid = description.guid
+        self.guid = description.guid  # in FMI 3.0, the instantiationToken
+        self.log_categories = [category.name for category in description.logCategories]
         self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
         # Windows does not remove a library that is still loaded, as after a fatal error
         self._unpacked = TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
@@ -61,9 +64,12 @@ class Fmu:
         """Remove the unpacked copy."""
         self._unpacked.cleanup()
 
-    def instance(self, name: str) -> Fmi2Instance:
-        """A new instance, of the class for the FMU's version of FMI; `name` is in its messages."""
-        return Fmi2Instance(self, name)
+    def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
+        """A new instance, of the class for the FMU's version of FMI; `name` is in its messages.
+
+        What `smooth_inputs` are: `Instance`.
+        """
+        return INSTANCES[self.model.fmi_version](self, name, smooth_inputs)
 
 
 def read_model(path: Path) -> Model:
@@ -90,19 +96,21 @@ def _read(path: Path) -> tuple[ModelDescription, Model, str]:
         raise UserError(f"{path}: not an FMU, it has no modelDescription.xml") from None
     except Exception as error:  # fmpy, lxml and zlib raise what they like for damaged content
         raise UserError(f"{path}: wrong modelDescription.xml: {one_line(error)}") from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
+    if not is_known(description):
         found = f"FMI {description.fmiVersion}"
         found += " for model exchange" if description.modelExchange else ""
-        raise UserError(f"{path}: expected an FMU of FMI 2.0 for co-simulation, found {found}")
+        known = " or ".join(VERSIONS)
+        raise UserError(f"{path}: expected an FMU of FMI {known} for co-simulation, found {found}")
     identifier = description.coSimulation.modelIdentifier
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
         raise UserError(f"{path}: expected a C identifier as modelIdentifier, found {identifier!r}")
     platforms = sorted({name.split("/")[1] for name in names if BINARY.fullmatch(name)})
-    here = [platform for platform in PLATFORMS if platform in platforms]
+    wanted = INSTANCES[description.fmiVersion].PLATFORMS
+    here = [platform for platform in wanted if platform in platforms]
     if not here:
         way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, names)) else ""
         raise UserError(
-            f"{path}: has no binary for {' or '.join(PLATFORMS)} "
+            f"{path}: has no binary for {' or '.join(wanted)} "
             f"(has: {', '.join(platforms) or 'none'}){way_out}"
         )
     try:

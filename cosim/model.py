@@ -5,14 +5,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.model_description import ModelDescription, ModelVariable, SimpleType
 
 from cosim.errors import did_you_mean
 from cosim.input_files import show
 
 Value = float | int | bool | str
 
-FMI_INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 holds
+VERSIONS = ("2.0", "3.0")  # of FMI
+INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 and an Int32 of FMI 3.0 hold
 
 # what a scenario may set, by the name of its section
 PARAMETERS, INITIAL, INPUTS = "parameters", "initial", "inputs"
@@ -29,7 +30,7 @@ class Variable:
 
     name: str
     reference: int  # value reference
-    type: str  # Real, Integer, Boolean, String or Enumeration
+    type: str  # Real, Integer, Boolean, String, Enumeration, or one that is neither read nor set
     causality: str
     initial: str | None  # exact, approx or calculated
     unit: str | None
@@ -52,6 +53,8 @@ class Variable:
         WrongValueError
             If it is not of the variable's type or out of range.
         """
+        if self.type not in TYPES.values():
+            raise WrongValueError(f"is of type {self.type}, which cannot be set here")
         if self.type == "Enumeration":
             return self.item(given)
         if self.type == "Boolean":
@@ -101,9 +104,10 @@ class Model:
     """What an FMU declares."""
 
     name: str
+    fmi_version: str  # one of `VERSIONS`
     variables: Mapping[str, Variable]  # by name, in the order of the model description
     states: tuple[str, ...]  # names of the continuous states, in that order
-    interpolates_inputs: bool
+    interpolates_inputs: bool  # takes inputs that are polynomials over a step
     gives_output_derivatives: bool
     saves_states: bool  # so that an instance can go back to an earlier point
 
@@ -137,8 +141,13 @@ class Model:
         raise WrongValueError(f"{name!r} is not {KINDS[kind]} of the model (known: {known})")
 
 
+def is_known(description: ModelDescription) -> bool:
+    """Whether a description as fmpy reads it is of a known version of FMI and for co-simulation."""
+    return description.fmiVersion in VERSIONS and description.coSimulation is not None
+
+
 def described(description: ModelDescription) -> Model:
-    """Model that a description as fmpy reads it declares, for Co-Simulation.
+    """Model that a description declares that `is_known`.
 
     Raises
     ------
@@ -149,14 +158,27 @@ def described(description: ModelDescription) -> Model:
     derivatives = (unknown.variable.derivative for unknown in description.derivatives)
     return Model(
         name=description.modelName,
+        fmi_version=description.fmiVersion,
         variables={variable.name: _variable(variable) for variable in description.modelVariables},
         states=tuple(dict.fromkeys(state.name for state in derivatives if state is not None)),
-        interpolates_inputs=bool(capabilities.canInterpolateInputs),
+        interpolates_inputs=bool(
+            capabilities.canInterpolateInputs or capabilities.providesIntermediateUpdate
+        ),
         gives_output_derivatives=(capabilities.maxOutputDerivativeOrder or 0) >= 1,
         saves_states=bool(capabilities.canGetAndSetFMUstate),
     )
 
 
+# names of FMI 2.0 and FMI 3.0 -> that of `Variable`
+TYPES = {
+    "Real": "Real",
+    "Integer": "Integer",
+    "Float64": "Real",
+    "Int32": "Integer",
+    "Boolean": "Boolean",
+    "String": "String",
+    "Enumeration": "Enumeration",
+}
 # of the texts in a model description
 CONVERT = {
     "Real": float,
@@ -165,21 +187,26 @@ CONVERT = {
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,
 }
+NUMBERS = ("Real", "Integer")
 
 
 def _variable(variable: ModelVariable) -> Variable:
-    convert = CONVERT[variable.type]
-    least, greatest = FMI_INTEGER if variable.type == "Integer" else (-math.inf, math.inf)
-    items = variable.declaredType.items if variable.declaredType else ()
+    kind = TYPES.get(variable.type, variable.type)
+    if variable.dimensions:
+        kind = f"array of {variable.type}"
+    declared = variable.declaredType or SimpleType()
+    low, high = (x or y for x, y in ((variable.min, declared.min), (variable.max, declared.max)))
+    least, greatest = INTEGER if kind == "Integer" else (-math.inf, math.inf)
+    convert = CONVERT.get(kind, lambda _: None)
     return Variable(
         name=variable.name,
         reference=variable.valueReference,
-        type=variable.type,
+        type=kind,
         causality=variable.causality,
         initial=variable.initial,
-        unit=variable.unit,
+        unit=variable.unit or declared.unit,
         start=None if variable.start is None else convert(variable.start),
-        least=least if variable.min is None else convert(variable.min),
-        greatest=greatest if variable.max is None else convert(variable.max),
-        items={item.name: int(item.value) for item in items},
+        least=convert(low) if low and kind in NUMBERS else least,
+        greatest=convert(high) if high and kind in NUMBERS else greatest,
+        items={item.name: int(item.value) for item in declared.items},
     )

@@ -8,19 +8,22 @@ models/SYSTEM/SystemStructure.ssd       connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
-                                        to case and underscores
+                                        to case and underscores; of FMI 2.0
+build/fmi3/                             the same of FMI 3.0
 build/report/                           what the commands write
 """
 
 from pathlib import Path
 
 from cosim.errors import UserError, did_you_mean
+from cosim.model import VERSIONS
 
 ROOT = Path(__file__).resolve().parents[1]
 
 STRUCTURE = "SystemStructure.ssd"
 STUDY = "study"  # the module of a system's folder that cosim.system.study describes
 SCENARIO_FOLDERS = ("scenarios", "convergence")
+BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 
 
 def scenario_files() -> dict[str, Path]:
@@ -124,20 +127,21 @@ def is_built_from(name: str, folder: Path) -> bool:
     return name.lower() == folder.name.replace("_", "").lower()
 
 
-def built(folder: Path, suffix: str, option: str = "") -> Path:
-    """What has been built from the folder of a model (.fmu) or system (.ssp).
+def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
+    """What has been built from the folder of a model (.fmu) or system (.ssp), of a version of FMI.
 
     Raises
     ------
     UserError
         If it is not there; names `option`, which takes another file, if it is given.
     """
-    for path in sorted((ROOT / "build").glob(f"*{suffix}")):
+    build = ROOT / BUILD_FOLDERS[version]
+    for path in sorted(build.glob(f"*{suffix}")):
         if is_built_from(path.stem, folder):
             return path
     kind = suffix.removeprefix(".").upper()
     way_out = "./run.sh builds it" + (f", {option} PATH takes another one" if option else "")
-    raise UserError(f"{ROOT / 'build'}: has no {kind} of {folder.name}: {way_out}")
+    raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
 
 
 def report_folder(part: str = "") -> Path:

@@ -8,7 +8,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError
-from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.scenario import Scenario
 
@@ -19,7 +19,7 @@ PROGRESS_EVERY = 0.1  # s
 class Result:
     """Recorded outputs of one run: row i is what an importer reads after the step to times[i]."""
 
-    tolerance: float  # relative, as given to fmi2SetupExperiment
+    tolerance: float  # relative, as given to the FMU
     times: np.ndarray  # (rows,) s
     names: tuple[str, ...]  # all Real outputs of the FMU
     values: np.ndarray  # (rows, len(names)) in the variables' units
@@ -44,7 +44,7 @@ def simulate(
         The one that the scenario was checked against.
     scenario : Scenario
     tolerance : float, optional
-        Relative tolerance for fmi2SetupExperiment; None: that of the scenario.
+        Relative tolerance; None: that of the scenario.
     progress : callable, optional
         Called now and then with the number of steps done since the last call.
 
@@ -73,7 +73,7 @@ def simulate(
         )
 
 
-def initialize(instance: Fmi2Instance, scenario: Scenario, tolerance: float) -> None:
+def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None:
     """From instantiated to the first communication point of `scenario`."""
     instance.set_up(scenario.start, scenario.stop, tolerance)
     for name, value in (scenario.parameters | scenario.initial).items():
@@ -85,7 +85,7 @@ def initialize(instance: Fmi2Instance, scenario: Scenario, tolerance: float) -> 
 
 
 def _step_through(
-    instance: Fmi2Instance, scenario: Scenario, progress: Callable[[int], object] | None
+    instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, float]:
     """All steps: recorded outputs (rows, outputs), and the seconds that the loop took."""
     inputs = instance.reals(list(scenario.inputs))

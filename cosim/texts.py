@@ -1,6 +1,6 @@
 """Numbers and verdicts as text, the same on the console, on pages and in pictures."""
 
-from collections.abc import Sized
+from collections.abc import Sequence, Sized
 
 
 def short(number: float) -> str:
@@ -17,6 +17,11 @@ def milliseconds(seconds: float) -> str:
 def counted(things: Sized, name: str) -> str:
     """1 scenario, 2 scenarios."""
     return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")
+
+
+def bits(differing: Sequence[str]) -> str:
+    """How the outputs of two FMUs compare, of which some may differ."""
+    return "other bits" if differing else "same bits"
 
 
 def verdict(passed: bool) -> str:

@@ -1,8 +1,8 @@
 # add_ssp(NAME FOLDER models/... FMUS name ...)
 #
-# Builds NAME.ssp in the current build folder, and release/NAME.ssp with the release, from the system's folder
-# (SystemStructure.ssd and its parameter sets, resources/*.ssv) and the FMUs of add_fmu. Targets: NAME_ssp,
-# NAME_ssp_release.
+# Builds NAME.ssp with the FMUs of add_fmu of FMI 2.0 and fmi3/NAME.ssp with those of FMI 3.0, in the current
+# build folder and with the release, from the system's folder (SystemStructure.ssd and its parameter sets,
+# resources/*.ssv). Targets: NAME_ssp, NAME_fmi3_ssp; of the release NAME_ssp_release, NAME_fmi3_ssp_release.
 function(add_ssp name)
   cmake_parse_arguments(ARG "" "FOLDER" "FMUS" ${ARGN})
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
@@ -15,28 +15,34 @@ function(add_ssp name)
     list(APPEND entries resources/${file_name}=${file})
   endforeach()
 
-  pack_ssp(${CMAKE_CURRENT_BINARY_DIR} fmu)
-  add_custom_target(${name}_ssp ALL DEPENDS ${CMAKE_CURRENT_BINARY_DIR}/${name}.ssp)
-  if(CAN_RELEASE)
-    pack_ssp(${RELEASE_FOLDER} release)
-    add_custom_target(${name}_ssp_release DEPENDS ${RELEASE_FOLDER}/${name}.ssp)
-    set_property(GLOBAL APPEND PROPERTY release_files ${RELEASE_FOLDER}/${name}.ssp)
-    set_property(GLOBAL APPEND PROPERTY release_targets ${name}_ssp_release)
-  endif()
+  foreach(version IN LISTS FMI_VERSIONS)
+    set(target ${name}${${version}_suffix}_ssp)
+    set(below ${${version}_below})
+    pack_ssp(${CMAKE_CURRENT_BINARY_DIR}/${below}${name}.ssp fmu)
+    add_custom_target(${target} ALL DEPENDS ${CMAKE_CURRENT_BINARY_DIR}/${below}${name}.ssp)
+    if(CAN_RELEASE)
+      set(released ${RELEASE_FOLDER}/${below}${name}.ssp)
+      pack_ssp(${released} release)
+      add_custom_target(${target}_release DEPENDS ${released})
+      set_property(GLOBAL APPEND PROPERTY release_files ${released})
+      set_property(GLOBAL APPEND PROPERTY release_targets ${target}_release)
+    endif()
+  endforeach()
 endfunction()
 
-# In add_ssp: FOLDER/NAME.ssp of the FMUs in the folder, which the targets FMU_kind make.
-macro(pack_ssp fmu_folder kind)
+# In add_ssp: the system, of the FMUs beside it, which the targets FMU_kind make.
+function(pack_ssp ssp kind)
+  cmake_path(GET ssp PARENT_PATH fmu_folder)
   set(fmus "")
   set(fmu_entries "")
   foreach(fmu ${ARG_FMUS})
-    list(APPEND fmus ${fmu}_${kind} ${fmu_folder}/${fmu}.fmu)
+    list(APPEND fmus ${fmu}${${version}_suffix}_${kind} ${fmu_folder}/${fmu}.fmu)
     list(APPEND fmu_entries resources/${fmu}.fmu=${fmu_folder}/${fmu}.fmu)
   endforeach()
   add_custom_command(
-    OUTPUT ${fmu_folder}/${name}.ssp
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu_folder}/${name}.ssp ${entries} ${fmu_entries}
+    OUTPUT ${ssp}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${ssp} ${entries} ${fmu_entries}
     DEPENDS ${files} ${fmus}
-    COMMENT "Packing ${name}.ssp"
+    COMMENT "Packing ${ssp}"
     VERBATIM)
-endmacro()
+endfunction()

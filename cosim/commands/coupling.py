@@ -9,5 +9,5 @@ from cosim.system import study
 def run(options: argparse.Namespace) -> int:
     """Make the study; 0 if everything is as expected."""
     folder = project.system_folder()
-    path = options.ssp or project.built(folder, ".ssp", "--ssp")
+    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     return 0 if study.load(folder).study_coupling(path, options.report) else 1

@@ -11,20 +11,22 @@ from cosim.comparison import Run, Runs
 from cosim.convergence import Convergence
 from cosim.errors import UserError
 from cosim.fmu_file import Fmu
+from cosim.model import VERSIONS
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 from cosim.report import pages
 from cosim.scenario import Scenario
 from cosim.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
 
+FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the scenarios that the options name, or all."""
     with ExitStack() as stack:
-        chosen, fmus = _open(options.names, options.fmu, stack)
-        runs = Runs(fmus)
+        chosen, fmus, twins = _open(options, stack)
+        runs = Runs(fmus, twins)
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         with written(options.report):  # and so is a report folder that cannot be made
@@ -32,9 +34,9 @@ def run(options: argparse.Namespace) -> int:
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []
         if options.tolerance is not None:
-            done = _runs(runs, chosen, options.tolerance)
+            done = _runs(runs, chosen, bool(twins), options.tolerance)
         else:
-            done = _runs(runs, chosen, None, TIGHTEST)
+            done = _runs(runs, chosen, bool(twins), None, TIGHTEST)
             sweeps = _sweeps(runs, _quick(done) if options.names else chosen)
             studies = [] if options.names else _convergence(fmus)
         with written(options.report), Progress("report", len(done), "runs") as progress:
@@ -45,44 +47,65 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _open(
-    names: Sequence[str], path: Path | None, stack: ExitStack
-) -> tuple[list[Scenario], dict[str, Fmu]]:
-    """Scenarios called `names`, or all; and FMUs by their models: the one at `path`, or in build/.
+    options: argparse.Namespace, stack: ExitStack
+) -> tuple[list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
+    """Scenarios that the options name, or all; FMUs by their models; and their twins.
 
-    An FMU is opened once, and every scenario of its model is checked against it. Without names, the
-    one at `path` runs only the scenarios of its model.
+    An FMU is opened once, and every scenario of its model is checked against it. Without names, one
+    that is given runs only the scenarios of its model. There are twins if no FMU and no version of
+    FMI is given.
     """
-    files = [project.scenario_file(name) for name in dict.fromkeys(names)]
-    given = stack.enter_context(Fmu(path)) if path else None
-    if not names:
+    files = [project.scenario_file(name) for name in dict.fromkeys(options.names)]
+    given = stack.enter_context(Fmu(options.fmu)) if options.fmu else None
+    if given is not None and options.fmi not in (None, given.model.fmi_version):
+        found = given.model.fmi_version
+        raise UserError(f"{given.path}: is an FMU of FMI {found}, --fmi wants {options.fmi}")
+    if not options.names:
         files = [
             file
             for file in project.scenario_files().values()
             if given is None or project.is_built_from(given.model.name, project.model_folder(file))
         ]
     if not files:
-        which = f" of {given.model.name}, the model of {path}" if given else ""
+        which = f" of {given.model.name}, the model of {options.fmu}" if given else ""
         raise UserError(f"{project.ROOT / 'models'}: has no scenarios{which}")
-    chosen, fmus = [], {}
-    for file in files:
-        folder = project.model_folder(file)
-        if folder.name not in fmus:
-            fmus[folder.name] = given or stack.enter_context(
-                Fmu(project.built(folder, ".fmu", "--fmu"))
-            )
-        chosen.append(scenarios.load(file, fmus[folder.name].model))
-    return chosen, fmus
+    folders = {folder.name: folder for folder in map(project.model_folder, files)}
+    if given is not None:
+        fmus, twins = dict.fromkeys(folders, given), {}
+    elif options.fmi is not None:
+        fmus, twins = _built(folders, options.fmi, "--fmu", stack), {}
+    else:
+        fmus = _built(folders, FIRST, "--fmu", stack)
+        twins = _built(folders, TWIN, "", stack)
+    for file in files if twins else ():
+        scenarios.load(file, twins[project.model_folder(file).name].model)
+    chosen = [scenarios.load(file, fmus[project.model_folder(file).name].model) for file in files]
+    return chosen, fmus, twins
 
 
-def _runs(runs: Runs, chosen: Sequence[Scenario], *tolerances: float | None) -> list[Run]:
+def _built(
+    folders: Mapping[str, Path], version: str, option: str, stack: ExitStack
+) -> dict[str, Fmu]:
+    """FMUs in build/ of one version of FMI, by their models."""
+    return {
+        name: stack.enter_context(Fmu(project.built(folder, ".fmu", option, version)))
+        for name, folder in folders.items()
+    }
+
+
+def _runs(
+    runs: Runs, chosen: Sequence[Scenario], with_twins: bool, *tolerances: float | None
+) -> list[Run]:
     """Run `chosen` at `tolerances`; None: at the tolerance of the scenario."""
-    table = console.RunTable(scenario.name for scenario in chosen)
+    names = (scenario.name for scenario in chosen)
+    table = console.RunTable(names, TWIN if with_twins else None)
     done = []
     for scenario in chosen:
         for tolerance in dict.fromkeys(t or scenario.tolerance for t in tolerances):
             label = f"{scenario.name} at {tolerance:g}"
-            with Progress(label, runs.steps_ahead(scenario, [tolerance])) as progress:
-                run = runs.run(scenario, tolerance, progress)
+            ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
+            with Progress(label, ahead) as progress:
+                run = runs.compared(scenario, tolerance, progress)
             table.row(run)
             console.messages(f"{label}: the FMU says", run.result.messages)
             done.append(run)

@@ -17,7 +17,7 @@ from cosim.system.study import Study
 def run(options: argparse.Namespace) -> int:
     """Run the variants that the options name, or all; or name them."""
     folder = project.system_folder()
-    path = options.ssp or project.built(folder, ".ssp", "--ssp")
+    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     with ExitStack() as stack:
         try:
             unpacked = stack.enter_context(ssp.unpacked(path))

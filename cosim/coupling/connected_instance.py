@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import UserError
-from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.model import INITIAL, PARAMETERS, Value, Variable, WrongValueError
 
@@ -29,7 +29,7 @@ class ConnectedInstance:
 
     Parameters
     ----------
-    instance : Fmi2Instance
+    instance : Instance
         Instantiated.
     wiring : Wiring
     values, slopes : ctypes array of double, ndarray
@@ -37,7 +37,7 @@ class ConnectedInstance:
     """
 
     def __init__(
-        self, instance: Fmi2Instance, wiring: Wiring, values: Array, slopes: np.ndarray
+        self, instance: Instance, wiring: Wiring, values: Array, slopes: np.ndarray
     ) -> None:
         self.instance = instance
         self.sources = np.array(wiring.sources, dtype=int)
@@ -46,9 +46,9 @@ class ConnectedInstance:
         memory = (c_double * len(wiring.outputs)).from_buffer(values, place)
         self.outputs = instance.reals(wiring.outputs, memory)
         self.inputs = instance.reals(wiring.inputs)
-        self._input_slopes = instance.derivatives(wiring.inputs, [1] * len(wiring.inputs))
+        self._lines = instance.input_polynomials(wiring.inputs, 1)
         connected = [wiring.outputs[i] for i in wiring.connected]
-        self._output_slopes = instance.derivatives(connected, [1] * len(connected))
+        self._output_slopes = instance.output_derivatives(connected, 1)
         self._slopes = slopes
         self._slope_places = wiring.first + np.array(wiring.connected, dtype=int)
 
@@ -70,10 +70,10 @@ class ConnectedInstance:
         self.inputs.view[:] = values
         self.inputs.set()
 
-    def set_slopes(self, slopes: np.ndarray) -> None:
-        """Set the derivatives of the inputs with respect to time, (inputs,)."""
-        self._input_slopes.view[:] = slopes
-        self._input_slopes.set()
+    def set_lines(self, values: np.ndarray, slopes: np.ndarray) -> None:
+        """Set the inputs and their derivatives with respect to time, (inputs,) each."""
+        self._lines.view[:] = values, slopes
+        self._lines.set()
 
     def read(self) -> None:
         """Read the outputs into the system's values."""

@@ -6,10 +6,11 @@ what was read at its beginning. In Gauss-Seidel order the components step one af
 each takes the newest outputs: those of the end of the step from components before it, those of its
 beginning from itself and the components behind it.
 
-Inputs are held over a step, or are straight lines (fmi2SetRealInputDerivatives) through the value
-of their source at the time at which it was read, with its slope there
-(fmi2GetRealOutputDerivatives): in Jacobi order they extrapolate from the beginning of the step, in
-Gauss-Seidel order those from components before it meet value and slope at the end of the step.
+Inputs are held over a step, or are straight lines through the value of their source at the time at
+which it was read, with its slope there: in Jacobi order they extrapolate from the beginning of the
+step, in Gauss-Seidel order those from components before it meet value and slope at the end of the
+step. FMI 3.0 knows slopes of inputs only within a step: at the start, those of outputs miss what
+they owe to the slopes of inputs.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +22,7 @@ from fmpy.fmi1 import FMICallException
 
 from cosim.coupling.connected_instance import ConnectedInstance, Wiring
 from cosim.errors import UserError
-from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.model import Value
 from cosim.system.structure import Connection
@@ -97,7 +98,7 @@ class Master:
     time : float
         s.
     do_steps : int
-        Calls of fmi2DoStep so far, rolled back ones included.
+        Steps of components so far, rolled back ones included.
 
     Raises
     ------
@@ -124,9 +125,11 @@ class Master:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
         try:
-            instances = {
-                name: self._stack.enter_context(fmu.instance(name)) for name, fmu in fmus.items()
-            }
+            instances = {}
+            for name, fmu in fmus.items():
+                fed = [c.end_connector for c in connections if c.end_component == name]
+                instance = fmu.instance(name, fed if self.extrapolates else ())
+                instances[name] = self._stack.enter_context(instance)
         except BaseException:
             self._stack.close()
             raise
@@ -140,7 +143,7 @@ class Master:
 
     def _connect(
         self,
-        instances: Mapping[str, Fmi2Instance],
+        instances: Mapping[str, Instance],
         connections: Sequence[Connection],
         also: Sequence[tuple[str, str]],
     ) -> None:
@@ -241,8 +244,9 @@ class Master:
                     component.read_slopes()
             for component in self.components.values():
                 with component.instance.explained(f"at the start, t = {self.time!r} s,"):
-                    component.set_inputs(self.values[component.sources])
-                    component.set_slopes(self.slopes[component.sources])
+                    component.set_lines(
+                        self.values[component.sources], self.slopes[component.sources]
+                    )
         for component in self.components.values():
             with component.instance.explained(f"at the start, t = {self.time!r} s,"):
                 component.read_slopes()
@@ -272,8 +276,7 @@ class Master:
         values = self.values[component.sources]
         if self.extrapolates:
             slopes = self.slopes[component.sources]
-            component.set_inputs(values - length * component.ahead * slopes)
-            component.set_slopes(slopes)
+            component.set_lines(values - length * component.ahead * slopes, slopes)
         else:
             component.set_inputs(values)
 

@@ -57,7 +57,7 @@ class Controlled:
     estimates: np.ndarray  # (accepted,) error of each step, in the norm
     limited: np.ndarray  # (accepted,) whether something else than the tolerance chose the step
     rejected: int  # attempts that were rolled back for good
-    do_steps: int  # calls of fmi2DoStep, those rolled back included
+    do_steps: int  # of components, those rolled back included
 
     @property
     def accepted(self) -> int:

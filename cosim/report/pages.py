@@ -24,7 +24,11 @@ _templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_templates.filters |= {"short": texts.short, "milliseconds": texts.milliseconds}
+_templates.filters |= {
+    "bits": texts.bits,
+    "milliseconds": texts.milliseconds,
+    "short": texts.short,
+}
 
 
 def write_page(folder: Path, template: str, **values: object) -> Path:
@@ -73,11 +77,14 @@ def write_runs(
     }
     for name, study in named.items():
         save(convergence_figure(study), folder / f"{name}.png")
-    models = dict.fromkeys(group[0].fmu.model.name for group in grouped.values())
+    models = [group[0].fmu.model for group in grouped.values()]
+    names = ", ".join(dict.fromkeys(model.name for model in models))
+    versions = " and ".join(dict.fromkeys(model.fmi_version for model in models))
     return write_page(
         folder,
         "runs.html",
-        title=f"{', '.join(models)}: runs against their references",
+        title=f"{names} (FMI {versions}): runs against their references",
+        twin=next((run.twin.fmi_version for run in runs if run.twin), None),
         runs=[run for group in grouped.values() for run in group],
         sweeps=sweeps,
         convergences=named,

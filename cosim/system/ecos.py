@@ -29,9 +29,12 @@ if TYPE_CHECKING:  # the child does not need these modules
     from cosim.system.ssp import Ssp
 
 PLAN, ROWS, DONE, LOG = "plan.json", "rows.npy", "done.json", "ecos.log"
-# of an FMU: [path of the FMU] status text
-MESSAGE = re.compile(r"\[(?P<fmu>[^\]]*\.fmu)\] (?P<status>fmi2\w+) (?P<text>.*)")
-BAD = ("fmi2Discard", "fmi2Error", "fmi2Fatal")
+# of an instance: [path of its FMU] fmi2Status text, [its name] Status text in FMI 3.0
+MESSAGE = re.compile(
+    r"(\[(?P<fmu>[^\]]*\.fmu)\] fmi2|\[debug\] \[(?P<component>[^\]]*)\] )"
+    r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
+)
+BAD = ("Discard", "Error", "Fatal")
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     system = ssp.system
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
+    _check_parameters(ssp, variant)
     # Windows does not remove files that a program of a run that was interrupted still holds
     with TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -89,13 +93,25 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
     for match in messages:
         if match["status"] in BAD:
-            where = f"{variant}: component {_components(ssp, match['fmu'])}"
+            where = f"{variant}: component {_components(ssp, match)}"
             when = "in initialization" if len(values) == 1 else f"by t = {times[-1]:.6g} s"
-            raise UserError(f"{where} failed {when} ({match['status']}): {match['text']}")
+            raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
     if len(values) != system.steps + 1:
         raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
-    texts = [f"{_components(ssp, m['fmu'])}: {m['text']}" for m in messages]
+    texts = [f"{_components(ssp, m)}: {m['text']}" for m in messages]
     return Run(tuple(names), times, values, done["wall_time"], tuple(dict.fromkeys(texts)))
+
+
+def _check_parameters(ssp: "Ssp", variant: str) -> None:
+    """Refuse what Ecos would silently leave out: Enumerations of FMI 3.0."""
+    for component, values in ssp.system.parameters[variant].items():
+        model = ssp.models[component]
+        for name in values:
+            if model.fmi_version == "3.0" and model.variables[name].type == "Enumeration":
+                raise UserError(
+                    f"{ssp.path}: parameter set {variant!r}: component {component!r}: {name!r} is "
+                    "an Enumeration, which Ecos does not set in FMUs of FMI 3.0"
+                )
 
 
 def _start(folder: Path) -> int:
@@ -130,9 +146,11 @@ def _kill(child: subprocess.Popen) -> None:
         child.kill()
 
 
-def _components(ssp: "Ssp", fmu: str) -> str:
-    """Name of the component whose FMU it is: Ecos's log names only the FMU."""
-    fmu = fmu.replace("\\", "/")  # a path of Windows
+def _components(ssp: "Ssp", message: re.Match[str]) -> str:
+    """Name of the component that a message is of: of FMI 2.0, Ecos's log names only the FMU."""
+    if message["component"] is not None:
+        return repr(message["component"])
+    fmu = message["fmu"].replace("\\", "/")  # a path of Windows
     names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
     return " or ".join(map(repr, names)) or repr(PurePosixPath(fmu).name)
 

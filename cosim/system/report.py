@@ -31,10 +31,11 @@ def write_variant(folder: Path, figure: Figure, outcome: Outcome) -> None:
 
 def write_page(folder: Path, ssp: Ssp, study: Study, outcomes: Sequence[Outcome]) -> Path:
     """Write index.html over the runs of `write_variant`; return its path."""
+    versions = " and ".join(sorted({model.fmi_version for model in ssp.models.values()}))
     return pages.write_page(
         folder,
         "system.html",
-        title=f"{ssp.path.stem}: runs against their references",
+        title=f"{ssp.path.stem} (FMI {versions}): runs against their references",
         step=ssp.system.step,
         bound=BOUND,
         measures=study.MEASURES,

@@ -9,7 +9,7 @@ from fmpy import read_model_description
 from cosim.archives import check_archive
 from cosim.errors import UserError, did_you_mean, one_line
 from cosim.input_files import is_file
-from cosim.model import Model, Variable, described
+from cosim.model import VERSIONS, Model, Variable, described, is_known
 from cosim.system.structure import Component, Connector, Parameter, System
 
 # type of a variable -> types of a parameter's value that engines can give it
@@ -79,11 +79,11 @@ class _Checker:
         try:
             check_archive(path)
             description = read_model_description(path, validate=False)
-            if description.fmiVersion == "2.0" and description.coSimulation is not None:
+            if is_known(description):
                 return described(description)
         except Exception as error:  # fmpy raises bare exceptions, zipfile its own
             self.fail(f"{where} is no FMU: {one_line(error)}")
-        self.fail(f"{where} is no FMU of FMI 2.0 for co-simulation")
+        self.fail(f"{where} is no FMU of FMI {' or '.join(VERSIONS)} for co-simulation")
 
     def connector(self, component: Component, connector: Connector) -> None:
         where = f"component {component.name!r}: connector {connector.name!r}"

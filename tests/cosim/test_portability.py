@@ -20,6 +20,7 @@ import pytest
 from cosim import fmu_file, reference, simulation
 from cosim import scenario as scenarios
 from cosim.errors import UserError
+from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmu_file import Fmu
 from tests.support.cosim_project import (
     BUILD,
@@ -276,7 +277,7 @@ def test_on_arm_the_binary_has_the_folder_of_fmi_3(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """linux64, in which fmpy looks there too, holds the binary for x86-64."""
-    monkeypatch.setattr(fmu_file, "PLATFORMS", ("aarch64-linux", "linux64"), raising=False)
+    monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
     binaries = {"aarch64-linux": same, "linux64": lambda _: b"for another machine"}
     with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", binaries)) as opened:
         simulation.simulate(opened, load(SHORT))
@@ -285,7 +286,7 @@ def test_on_arm_the_binary_has_the_folder_of_fmi_3(
 def test_compiled_on_arm_by_fmpy_it_has_that_of_fmi_2(
     fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fmu_file, "PLATFORMS", ("aarch64-linux", "linux64"), raising=False)
+    monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
     with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", {"linux64": same})) as opened:
         simulation.simulate(opened, load(SHORT))
 

@@ -155,7 +155,7 @@ def test_fmu_for_model_exchange(fmu: Path, tmp_path: Path) -> None:
             rest = rest.split("</CoSimulation>", 1)[1]
         return xml[:begin] + '<ModelExchange modelIdentifier="RPManipulator"/>' + rest
 
-    with pytest.raises(UserError, match="expected an FMU of FMI 2.0 for co-simulation"):
+    with pytest.raises(UserError, match="expected an FMU of FMI 2.0 or 3.0 for co-simulation"):
         Fmu(repacked(fmu, tmp_path / "me.fmu", change))
 
 
