@@ -9,6 +9,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
+usage() { echo "usage: ./setup.sh [--release | --dev | --platforms]" >&2; exit 2; }
+[ "$#" -le 1 ] || usage
 release=no dev=no platforms=no
 case "${1-}" in
   "") ;;
@@ -16,7 +18,7 @@ case "${1-}" in
   --dev) dev=yes ;;
   --platforms) release=yes dev=yes platforms=yes ;;
   --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; exit ;;
-  *) echo "usage: ./setup.sh [--release | --dev | --platforms]" >&2; exit 2 ;;
+  *) usage ;;
 esac
 
 fail() { echo "setup.sh: $*" >&2; exit 1; }

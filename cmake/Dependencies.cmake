@@ -20,6 +20,8 @@ function(find_sources name)
       FetchContent_Populate(${folder}_sources)
     endif()
     set(${name}_SOURCE_DIR ${${folder}_sources_SOURCE_DIR} PARENT_SCOPE)
+  elseif(NOT EXISTS ${${name}_SOURCE_DIR}/${ARG_FILE})
+    message(FATAL_ERROR "${name}_SOURCE_DIR: there is no ${ARG_FILE} in ${${name}_SOURCE_DIR}")
   endif()
 endfunction()
 

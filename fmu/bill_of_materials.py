@@ -22,7 +22,7 @@ BILL = "sbom.cdx.json"
 
 
 def part(text: str) -> Component:
-    """Component of all FMUs, from NAME,VERSION,LICENSE,ADDRESS; the license as SPDX names it."""
+    """What is compiled into all of them, from NAME,VERSION,LICENSE,ADDRESS; licenses as in SPDX."""
     name, version, license_id, address = text.split(",")
     return Component(
         type=ComponentType.LIBRARY,
@@ -39,7 +39,7 @@ def part(text: str) -> Component:
 def bill_of_materials(
     checksums: dict[str, str], version: str, license_id: str, parts: list[Component]
 ) -> str:
-    """Text in JSON; it depends only on the arguments: checksums of the FMUs by their names."""
+    """Text in JSON; it depends only on the arguments: checksums of files by their names."""
     bom = Bom(components=parts)
     for name, checksum in checksums.items():
         component = Component(
@@ -65,9 +65,11 @@ def bill_of_materials(
 def main() -> int:
     """Write both files; 2 with a line on standard error where one cannot be written."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("fmus", type=Path, nargs="+", help="files of the release, below the output")
+    parser.add_argument(
+        "files", type=Path, nargs="+", help="files of the release, below the output"
+    )
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
-    parser.add_argument("--version", required=True, help="version of the FMUs")
+    parser.add_argument("--version", required=True, help="version of the project")
     parser.add_argument("--license", type=Path, required=True, help="LICENSE of the project")
     parser.add_argument(
         "--part", action="append", default=[], metavar="NAME,VERSION,LICENSE,ADDRESS",
@@ -77,8 +79,8 @@ def main() -> int:
     try:
         folder = arguments.output
         checksums = {
-            fmu.relative_to(folder).as_posix(): hashlib.sha256(fmu.read_bytes()).hexdigest()
-            for fmu in sorted(arguments.fmus)
+            file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+            for file in sorted(arguments.files)
         }
         license_id = license_texts(arguments.license)["license"]
         parts = [part(text) for text in arguments.part]

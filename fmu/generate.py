@@ -1,4 +1,4 @@
-"""Makes modelDescription.xml and the C tables of an FMU from the variables.toml of its model.
+"""Makes the XML files and the C tables of an FMU from the variables.toml of its model.
 
 declaration/schema.py describes that file.
 """
@@ -16,6 +16,7 @@ from declaration.load import Declaration, DeclarationError, load
 from fmi2.model_description import model_description as fmi2_description
 from fmi3.build_description import build_description
 from fmi3.model_description import model_description as fmi3_description
+from fmi3.terminals import terminals_and_icons
 from provenance import Provenance, ProvenanceError, build_date, license_texts
 
 
@@ -73,6 +74,7 @@ def main() -> int:
             files = {
                 "modelDescription.xml": fmi2_description(declaration, provenance),
                 "fmi3/modelDescription.xml": fmi3_description(declaration, provenance),
+                "terminalsAndIcons.xml": terminals_and_icons(declaration),
                 "value_references.h": value_references(declaration),
                 "variables.c": variable_table(declaration),
             }

@@ -1,8 +1,9 @@
-# add_fmu(NAME FOLDER models/... LIBRARY target [VERSIONS fmi2 fmi3])
+# add_fmu(NAME FOLDER models/... LIBRARY target [REFERENCES scenario ...] [VERSIONS fmi2 fmi3])
 #
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
 # VERSIONS names, from the model's folder (variables.toml, README.md; model.png and pictures of the README
-# where there are any) and the library that defines its struct model. Targets:
+# where there are any) and the library that defines its struct model. The archive carries inputs and references
+# of the scenarios after REFERENCES. Targets:
 #   NAME, NAME_fmi3            the shared objects
 #   NAME_fmu, NAME_fmi3_fmu    the archives
 #   NAME_description           struct model_description as a library
@@ -14,14 +15,14 @@ include(${FMU_SOURCE_DIR}/release.cmake)
 include(${FMU_SOURCE_DIR}/source_code.cmake)
 
 # An adapter of FMI is a folder beside this file and a word here, with the suffix of its targets, the part of
-# paths in the build that tells its files from those of others, and the name of the icon in the archive.
+# paths in the build that tells its files from those of others, and the names of the icon in the archive.
 set(FMI_VERSIONS fmi2 fmi3)
 set(fmi2_suffix "")
 set(fmi2_below "")
-set(fmi2_icon model.png)
+set(fmi2_icons model.png terminalsAndIcons/icon.png)
 set(fmi3_suffix _fmi3)
 set(fmi3_below fmi3/)
-set(fmi3_icon terminalsAndIcons/icon.png)
+set(fmi3_icons terminalsAndIcons/icon.png)
 
 file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/*.c)
 foreach(version IN LISTS FMI_VERSIONS)
@@ -48,14 +49,15 @@ function(add_fmu_library name target version description folder)
 endfunction()
 
 function(add_fmu name)
-  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "VERSIONS" ${ARGN})
+  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
   if(NOT ARG_VERSIONS)
     set(ARG_VERSIONS ${FMI_VERSIONS})
   endif()
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
   set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
-  set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/variables.c
-                ${out}/value_references.h)
+  set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/terminalsAndIcons.xml
+                ${out}/variables.c ${out}/value_references.h)
+  file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
 
   # tables and model descriptions, again whenever a declaration changes
   file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
@@ -64,7 +66,7 @@ function(add_fmu name)
                         ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/atomic_write.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
-  set(declaration ${folder}/variables.toml ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
+  set(declaration ${folder}/variables.toml ${icon} ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${generate} --output ${out}
@@ -94,21 +96,51 @@ function(add_fmu name)
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
+  # scenarios with their references
+  set(references "")
+  set(reference_entries "")
+  if(ARG_REFERENCES)
+    set(references ${out}/references/fmi-ls-manifest.xml)
+    set(layered_standard extra/org.fmi-standard.fmi-ls-ref)
+    set(reference_entries ${layered_standard}/fmi-ls-manifest.xml=${references})
+    set(reference_files "")
+    foreach(scenario IN LISTS ARG_REFERENCES)
+      list(APPEND reference_entries ${layered_standard}/${scenario}=${out}/references/${scenario})
+      list(APPEND reference_files ${folder}/scenarios/${scenario}.toml)
+      foreach(ending _in.csv _ref.csv _ref.opt)
+        list(APPEND reference_files ${folder}/references/${scenario}/${name}${ending})
+      endforeach()
+    endforeach()
+    add_custom_command(
+      OUTPUT ${references}
+      COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/references.py ${folder}/variables.toml ${ARG_REFERENCES}
+              --output ${out}/references
+      DEPENDS ${FMU_SOURCE_DIR}/references.py ${declaration} ${reference_files}
+      COMMENT "Collecting the references of ${name}"
+      VERBATIM)
+  endif()
+
   # what the archives of all versions and platforms have in common
-  file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
   set(entries
+      ${reference_entries}
+      terminalsAndIcons/terminalsAndIcons.xml=${out}/terminalsAndIcons.xml
       documentation=${out}/documentation
       documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
       documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
       $<$<BOOL:${OWN_LIBM}>:documentation/licenses/musl.txt=${MUSL_LICENSE}>)
-  set(files ${out}/documentation/index.html ${icon} ${PROJECT_SOURCE_DIR}/LICENSE
+  set(files ${out}/documentation/index.html ${out}/terminalsAndIcons.xml ${references} ${icon} ${PROJECT_SOURCE_DIR}/LICENSE
             ${FMU_SOURCE_DIR}/package.py ${FMU_SOURCE_DIR}/atomic_write.py)
 
   foreach(version IN LISTS ARG_VERSIONS)
     set(target ${name}${${version}_suffix})
     set(below ${${version}_below})
     add_fmu_library(${name} ${target} ${version} ${name}_description ${out}/${below})
-    set(own_entries ${entries} $<$<BOOL:${icon}>:${${version}_icon}=${icon}>)
+    set(own_entries ${entries})
+    if(icon)
+      foreach(place IN LISTS ${version}_icons)
+        list(APPEND own_entries ${place}=${icon})
+      endforeach()
+    endif()
 
     set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${below}${name}.fmu)
     set(description ${out}/${below}modelDescription.xml)

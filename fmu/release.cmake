@@ -2,17 +2,20 @@
 # bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
 
 set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin aarch64-linux)
-set(release_folder ${PROJECT_BINARY_DIR}/release)
+set(RELEASE_FOLDER ${PROJECT_BINARY_DIR}/release)
 
 include(FindZig)
+if(ZIG)
+  file(REAL_PATH ${ZIG} zig_folder)
+  cmake_path(GET zig_folder PARENT_PATH zig_folder)
+endif()
 find_program(LIPO NAMES lipo llvm-lipo llvm-lipo-14 DOC "Joins libraries for macOS")
-if(ZIG AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
+set(mingw_header ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h)
+if(EXISTS ${mingw_header} AND EXISTS ${zig_folder}/LICENSE AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
   set(CAN_RELEASE ON)
   # what zig puts into the libraries, and under which licenses
-  cmake_path(GET ZIG PARENT_PATH zig_folder)
   execute_process(COMMAND ${ZIG} version OUTPUT_VARIABLE zig_version OUTPUT_STRIP_TRAILING_WHITESPACE)
-  file(STRINGS ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h mingw_version
-       REGEX "define __MINGW64_VERSION_(MAJOR|MINOR|BUGFIX)")
+  file(STRINGS ${mingw_header} mingw_version REGEX "define __MINGW64_VERSION_(MAJOR|MINOR|BUGFIX)")
   list(TRANSFORM mingw_version REPLACE ".* " "")
   list(JOIN mingw_version . mingw_version)
 endif()
@@ -85,7 +88,7 @@ function(add_release_fmu name version)
   endif()
 
   set(described ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name}/${below}release)
-  set(fmu ${release_folder}/${below}${name}.fmu)
+  set(fmu ${RELEASE_FOLDER}/${below}${name}.fmu)
   add_custom_command(
     OUTPUT ${fmu}
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/package.py ${fmu}
@@ -99,7 +102,7 @@ function(add_release_fmu name version)
     COMMENT "Packing release/${below}${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${target}_release DEPENDS ${fmu})
-  set_property(GLOBAL APPEND PROPERTY release_fmus ${fmu})
+  set_property(GLOBAL APPEND PROPERTY release_files ${fmu})
   set_property(GLOBAL APPEND PROPERTY release_targets ${target}_release)
 endfunction()
 
@@ -107,23 +110,23 @@ endfunction()
 function(add_release)
   if(NOT CAN_RELEASE)
     add_custom_target(release
-      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig and llvm-lipo (./setup.sh --release), and OWN_LIBM."
+      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig with its license and headers, and llvm-lipo (./setup.sh --release), and OWN_LIBM."
       COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
     return()
   endif()
-  get_property(fmus GLOBAL PROPERTY release_fmus)
+  get_property(files GLOBAL PROPERTY release_files)
   get_property(targets GLOBAL PROPERTY release_targets)
   set(parts
       --part SUNDIALS,${SUNDIALS_VERSION},BSD-3-Clause,https://computing.llnl.gov/projects/sundials
       --part musl,${MUSL_VERSION},MIT,https://musl.libc.org
       --part zig,${zig_version},MIT,https://ziglang.org
       --part mingw-w64,${mingw_version},ZPL-2.1,https://www.mingw-w64.org)
-  set(bill ${release_folder}/sbom.cdx.json)
+  set(bill ${RELEASE_FOLDER}/sbom.cdx.json)
   add_custom_command(
-    OUTPUT ${bill} ${release_folder}/SHA256SUMS
-    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/bill_of_materials.py ${fmus} --output ${release_folder}
+    OUTPUT ${bill} ${RELEASE_FOLDER}/SHA256SUMS
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/bill_of_materials.py ${files} --output ${RELEASE_FOLDER}
             --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE ${parts}
-    DEPENDS ${targets} ${fmus} ${FMU_SOURCE_DIR}/bill_of_materials.py
+    DEPENDS ${targets} ${files} ${FMU_SOURCE_DIR}/bill_of_materials.py
     COMMENT "Writing checksums and the bill of materials"
     VERBATIM)
   add_custom_target(release DEPENDS ${bill})

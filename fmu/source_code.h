@@ -21,8 +21,4 @@
 HIDE_SYMBOLS
 NO_FUSED_OPERATIONS
 
-#ifdef __FAST_MATH__
-#error "Without -ffast-math: the code relies on the order of its sums"
-#endif
-
 #endif

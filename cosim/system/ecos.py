@@ -126,7 +126,8 @@ def _start(folder: Path) -> int:
             stderr=subprocess.STDOUT,
             cwd=project.ROOT,
             env=environment,
-            process_group=0,  # Ecos starts further programs, which write to the folder too
+            # Ecos starts further programs, which write to the folder too
+            process_group=0 if os.name == "posix" else None,
         )
     try:
         return child.wait()

@@ -20,6 +20,7 @@ from declaration.schema import (
     Item,
     Model,
     Table,
+    Terminal,
     Unit,
     Variable,
 )
@@ -38,10 +39,11 @@ class Declaration:
     experiment: Experiment
     units: dict[str, Unit]
     variables: dict[str, Variable]
+    terminals: dict[str, Terminal]
 
     @property
     def guid(self) -> str:
-        """Hash of what defines the interface: all but texts, C names and default experiment."""
+        """Hash of what defines the interface: all but texts, C names, terminals and experiment."""
         return self.token()
 
     def token(self, *versions: str) -> str:
@@ -83,8 +85,9 @@ def load(path: Path) -> Declaration:
     check_references(variables, places)
     check_names(variables, units, places)
     check_dependencies(variables, places)
+    check_terminals(file.terminals, variables, f"{path}: terminal ")
     by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
-    return Declaration(path, file.model, file.experiment, units, dict(by_reference))
+    return Declaration(path, file.model, file.experiment, units, dict(by_reference), file.terminals)
 
 
 def files_of(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[Path, File]]:
@@ -132,6 +135,10 @@ def place_of(location: list[str | int]) -> tuple[list[str], type[Table], str]:
             words, table = [f"variable {name}"], TYPES[kind]
         case ["variables", name, *keys]:
             words, table = [f"variable {name}"], Variable
+        case ["terminals", name, *keys]:
+            while len(keys) > 1 and keys[0] == "terminals":
+                name, keys = f"{name}.{keys[1]}", keys[2:]
+            words, table = [f"terminal {name}"], Terminal
         case keys:
             words, table = [], File
     path = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
@@ -212,3 +219,19 @@ def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -
         for other in variable.parameters:
             if variables[other].causality != "parameter":
                 raise DeclarationError(f"{places[name]}: '{other}' is not a parameter")
+
+
+def check_terminals(
+    terminals: dict[str, Terminal], variables: dict[str, Variable], place: str
+) -> None:
+    """Check that members are inputs and outputs, and that flows are continuous."""
+    for name, terminal in terminals.items():
+        for kind, member, variable in terminal.members:
+            where = f"{place}{name}: {kind} {member}"
+            if variable not in variables:
+                raise DeclarationError(f"{where}: '{variable}' is not declared")
+            if variables[variable].causality not in ("input", "output"):
+                raise DeclarationError(f"{where}: '{variable}' is no input or output")
+            if kind != "signal" and variables[variable].variability != "continuous":
+                raise DeclarationError(f"{where}: '{variable}' is not continuous")
+        check_terminals(terminal.terminals, variables, f"{place}{name}.")

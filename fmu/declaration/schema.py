@@ -21,6 +21,14 @@ include       further files, relative to this one, whose [variables] and [units]
     derivative_of name of the variable that this one is the time derivative of
     dependencies  of outputs and derivatives: the inputs, states and time they depend on
     parameters    of calculated outputs and derivatives: the parameters they depend on
+[terminals.NAME]
+    rule          "plug": terminals fit whose members have the same names; "bus": members of the
+                  same name are connected; "none": no rule
+    description
+    signals, inflows, outflows
+                  { member = "variable" }: an input or output each; flows of terminals that are
+                  connected sum to zero, an inflow is positive into this model
+    terminals     [terminals.NAME.terminals.NAME]: terminals in this one
 """
 
 from __future__ import annotations
@@ -277,6 +285,34 @@ AnyVariable = Annotated[
 ]
 
 
+class Terminal(Table):
+    """Variables that are connected together, by member, and terminals within."""
+
+    rule: Literal["plug", "bus", "none"]
+    description: str
+    signals: dict[Identifier, str] = {}
+    inflows: dict[Identifier, str] = {}
+    outflows: dict[Identifier, str] = {}
+    terminals: dict[Identifier, Terminal] = {}
+
+    @property
+    def members(self) -> list[tuple[str, str, str]]:
+        """Kind, member and variable of each member."""
+        kinds = {"signal": self.signals, "inflow": self.inflows, "outflow": self.outflows}
+        return [(kind, *member) for kind, members in kinds.items() for member in members.items()]
+
+    @model_validator(mode="after")
+    def check_members(self) -> Self:
+        """Refuse a terminal of nothing, and a member that is there twice."""
+        members = [member for _, member, _ in self.members]
+        if not (members or self.terminals):
+            raise ValueError("has no members and no terminals")
+        for member in members:
+            if members.count(member) > 1:
+                raise ValueError(f"member '{member}' is declared twice")
+        return self
+
+
 class File(Table):
     """One file: a variables.toml, or what it includes."""
 
@@ -285,3 +321,4 @@ class File(Table):
     experiment: Experiment | None = None
     units: dict[str, Unit] = {}
     variables: dict[VariableName, AnyVariable] = {}
+    terminals: dict[Identifier, Terminal] = {}

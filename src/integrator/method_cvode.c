@@ -264,15 +264,18 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
 /* CVODE counts from the last restart on. */
 static void measure_work(struct cvode *cvode, struct method_work *work) {
     struct method_work now = {0};
+    long steps = 0;
+    long error_failures = 0;
     long iteration_failures = 0;
     // these calls fail only without CVODE's memory
-    (void)CVodeGetNumSteps(cvode->solver, &now.steps);
-    (void)CVodeGetNumErrTestFails(cvode->solver, &now.failed_steps);
+    (void)CVodeGetNumSteps(cvode->solver, &steps);
+    (void)CVodeGetNumErrTestFails(cvode->solver, &error_failures);
     (void)CVodeGetNumStepSolveFails(cvode->solver, &iteration_failures);
     (void)CVodeGetLastStep(cvode->solver, &now.last_step);
     (void)CVodeGetLastOrder(cvode->solver, &now.last_order);
     (void)CVodeGetCurrentTime(cvode->solver, &now.internal);
-    now.failed_steps += iteration_failures;
+    now.steps = steps;
+    now.failed_steps = (int64_t)error_failures + iteration_failures;
     if (now.steps == 0) {
         now.last_order = 0;
     }

@@ -21,7 +21,12 @@ struct erk {
     struct sundials base; /* first */
     void *solver;
     double next_step; /* s: first internal step of the next advance; 0: ARKODE finds one */
-    double watched;   /* s since the restart: the last time that the observer was asked about */
+
+    /* of the running advance */
+    double end;        /* s since the restart */
+    double watched;    /* s since the restart: the last time that the observer was asked about */
+    bool is_cut_short; /* by the observer, at that time */
+    double *cut_x;     /* the state there */
 };
 
 static enum status status_of_flag(const struct problem *problem, int flag) {
@@ -52,6 +57,43 @@ static enum status status_of_flag(const struct problem *problem, int flag) {
     }
 }
 
+/* ---- Observation ---------------------------------------------------------------------------- */
+
+/* Called by ERKStep after each step that it accepts; ends the advance where the observer says so.
+ * Times that come again, after a failure, are not reported twice. */
+static int observe(sunrealtype t, N_Vector x, void *user_data) {
+    struct erk *erk = user_data;
+    const struct problem *problem = erk->base.problem;
+    if (t <= erk->watched || t >= erk->end) {
+        return 0;
+    }
+    erk->watched = t;
+    erk->is_cut_short = problem_ends_at(problem, t, small_vector_data(x));
+    if (erk->is_cut_short) {
+        memcpy(erk->cut_x, small_vector_data(x), problem->ode.state_count * sizeof(double));
+    }
+    return erk->is_cut_short ? 1 : 0;
+}
+
+/* Before an advance to the time end, which writes the state to x. */
+static int begin_watching(struct erk *erk, double end, double x[]) {
+    const struct problem *problem = erk->base.problem;
+    erk->is_cut_short = false;
+    erk->cut_x = x;
+    erk->end = end;
+    erk->watched = problem->reached;
+    return ERKStepSetPostprocessStepFn(erk->solver, problem->observer != NULL ? observe : NULL);
+}
+
+/* An advance that the observer ends is none that fails. */
+static void report_text(int error_code, const char *module, const char *function, char *text,
+                        void *erk_pointer) {
+    const struct erk *erk = erk_pointer;
+    if (!erk->is_cut_short) {
+        sundials_text(error_code, module, function, text, erk_pointer);
+    }
+}
+
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static void destroy(void *memory) {
@@ -66,7 +108,7 @@ static bool create_solver(struct erk *erk) {
     struct sundials *base = &erk->base;
     erk->solver = ERKStepCreate(sundials_rhs, 0.0, base->x, base->context);
     return erk->solver != NULL &&
-           ERKStepSetErrHandlerFn(erk->solver, sundials_text, base) == ARK_SUCCESS &&
+           ERKStepSetErrHandlerFn(erk->solver, report_text, base) == ARK_SUCCESS &&
            ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
            ERKStepSetTableNum(erk->solver, table) == ARK_SUCCESS &&
            // steps end at the points asked for: no polynomial is needed, which saves an evaluation
@@ -139,33 +181,6 @@ static void add_work(const struct erk *erk, struct method_work *work) {
     }
 }
 
-/* Asks the observer about a time that comes after the others, as times may come again; the state
- * there is x. */
-static bool is_ended_at(struct erk *erk, double t, const double x[]) {
-    const struct problem *problem = erk->base.problem;
-    if (problem->observer == NULL || t <= erk->watched) {
-        return false;
-    }
-    erk->watched = t;
-    return problem_ends_at(problem, t, x);
-}
-
-/* The internal steps of ERKStep in normal mode, one by one. */
-static int advance_watched(struct erk *erk, double t, int64_t max_steps, double *stopped_at,
-                           double x[], struct method_work *work) {
-    int flag = ARK_SUCCESS;
-    *stopped_at = erk->base.problem->reached;
-    for (int64_t steps = 0; flag >= 0 && *stopped_at < t && !work->is_cut_short; steps++) {
-        if (steps == max_steps) {
-            return ARK_TOO_MUCH_WORK;
-        }
-        flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_ONE_STEP);
-        sundials_get_state(&erk->base, x);
-        work->is_cut_short = flag >= 0 && *stopped_at < t && is_ended_at(erk, *stopped_at, x);
-    }
-    return flag;
-}
-
 /* Step by step, after ERKStep has failed: it gives up at the first right-hand side that cannot be
  * evaluated, and then reports the time of that evaluation, not the one of its last state. Here ever
  * shorter steps are tried. x: the last valid state. */
@@ -178,7 +193,7 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     sundials_set_state(&erk->base, begin_x);
     sundials_get_state(&erk->base, x);
     int flag = start(erk, begin, end, erk->next_step);
-    for (int64_t steps = 0; flag >= 0 && good < end && !work->is_cut_short; steps++) {
+    for (int64_t steps = 0; flag >= 0 && good < end; steps++) {
         if (steps == max_steps) {
             flag = ARK_TOO_MUCH_WORK;
             break;
@@ -188,8 +203,10 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
             good = *stopped_at;
             sundials_get_state(&erk->base, x);
             (void)ERKStepGetCurrentStep(erk->solver, &step);
-            work->is_cut_short = good < end && is_ended_at(erk, good, x);
             continue;
+        }
+        if (erk->is_cut_short) {
+            break;
         }
         step = 0.5 * fmin(step, end - good);
         if (problem->failed_at < good || !(step > 16.0 * DBL_EPSILON * fmax(good, end))) {
@@ -208,25 +225,34 @@ static int integrate(struct erk *erk, double t, int64_t max_steps, const double 
     // parts of equal length leave no sliver at the end
     const double begin = erk->base.problem->reached;
     const double length = t - begin;
-    erk->watched = begin;
     const double first_step = erk->next_step > 0.0 ? length / ceil(length / erk->next_step) : 0.0;
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
+        flag = begin_watching(erk, t, x);
+    }
+    if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
     }
-    if (flag == ARK_SUCCESS && erk->base.problem->observer != NULL) {
-        flag = advance_watched(erk, t, max_steps, stopped_at, x, work);
-    } else if (flag == ARK_SUCCESS) {
+    if (flag == ARK_SUCCESS) {
         flag = ERKStepEvolve(erk->solver, t, erk->base.x, stopped_at, ARK_NORMAL);
     }
-    if (flag < 0 && flag != ARK_TOO_MUCH_WORK) {
+    const bool is_given_up = flag < 0 && flag != ARK_TOO_MUCH_WORK && !erk->is_cut_short;
+    if (is_given_up) {
         add_work(erk, work);
         flag = advance_carefully(erk, begin, t, max_steps, begin_x, stopped_at, x, work);
-    } else {
-        sundials_get_state(&erk->base, x);
     }
     add_work(erk, work);
+    if (erk->is_cut_short) {
+        work->steps++; // ERKStep does not count the step after which it was ended
+        work->internal = erk->watched;
+        work->is_cut_short = true;
+        *stopped_at = erk->watched;
+        return ARK_SUCCESS;
+    }
+    if (!is_given_up) {
+        sundials_get_state(&erk->base, x);
+    }
     return flag;
 }
 

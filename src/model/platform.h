@@ -3,6 +3,10 @@
 #ifndef PLATFORM_H
 #define PLATFORM_H
 
+#if defined(__FAST_MATH__)
+#error "Without -ffast-math: the code relies on the order of its sums"
+#endif
+
 #if defined(__GNUC__)
 
 /* The caller must look at the returned status. */

@@ -51,7 +51,7 @@ ATTRIBUTES = {
     r"|sigwait\w*|pthread_\w+|siginterrupt)",
     "time": r"(clock|tzset|clock_\w+|pthread_\w+)",
 }
-ARGUMENTS = {"preexec_fn", "pass_fds"}
+ARGUMENTS = {"preexec_fn", "pass_fds", "process_group", "start_new_session"}
 # a branch is not looked into whose condition asks what there is
 ASKS = re.compile(r"hasattr\(|sys\.platform|os\.name")
 
@@ -77,7 +77,9 @@ def _not_portable_call(call: ast.Call) -> Iterator[str]:
     """Texts in the encoding or with the line ends of the system, and arguments of POSIX."""
     name = ast.unparse(call.func)
     given = {keyword.arg: keyword.value for keyword in call.keywords}
-    yield from (f"{name}({argument}=)" for argument in ARGUMENTS & set(given))
+    for argument in sorted(ARGUMENTS & set(given)):
+        if not ASKS.search(ast.unparse(given[argument])):
+            yield f"{name}({argument}=)"
     if name.endswith("CDLL") and [ast.unparse(x) for x in call.args] == ["None"]:
         yield f"{name}(None)"
     if given.keys() & {"text", "universal_newlines"} and "encoding" not in given:
@@ -111,6 +113,7 @@ def test_sources_use_what_every_system_has(path: Path) -> None:
         ("os.killpg(1, 2)", "os.killpg"),
         ("x = signal.SIGHUP", "signal.SIGHUP"),
         ("run(preexec_fn=f)", "run(preexec_fn=)"),
+        ("run(process_group=0)", "run(process_group=)"),
         ("run(x, text=True)", "run without encoding"),
         ("ctypes.CDLL(None)", "ctypes.CDLL(None)"),
         ("open(x)", "open without encoding"),
@@ -135,6 +138,7 @@ def test_what_not_every_system_has_is_noticed(line: str, found: str) -> None:
         "x.open('w', encoding=y, newline=z)",
         "read_text(x, 1)",
         "signal.SIGINT",
+        "run(process_group=0 if os.name == 'posix' else None)",
         "if hasattr(os, 'killpg'):\n    os.killpg(1, 2)",
         "ctypes.CDLL('x' if sys.platform == 'win32' else None)",
     ],

@@ -43,6 +43,7 @@ static void test_energy_is_the_work_of_the_inputs(void) {
 /* ---- Instantiate ---------------------------------------------------------------------------- */
 
 static void test_instantiate_says_what_it_refuses(void) {
+    fmu_only_in(2, "FMI 3.0 has other arguments: test_fmi3.c");
     static const char guid[] = RP_MANIPULATOR_GUID;
     static const struct {
         const char *name;
@@ -73,6 +74,7 @@ static void test_instantiate_says_what_it_refuses(void) {
 }
 
 static void test_instantiate_without_functions_gives_no_instance(void) {
+    fmu_only_in(2, "FMI 3.0 has no structure of callbacks");
     TEST_ASSERT_NULL(fmu.Instantiate("m", fmi2CoSimulation, RP_MANIPULATOR_GUID, NULL, NULL,
                                      fmi2False, fmi2True));
     TEST_ASSERT_NULL(fmu.Instantiate(NULL, fmi2ModelExchange, NULL, NULL, NULL, 0, 0));
@@ -163,9 +165,11 @@ static void test_reset_brings_back_start_values_and_no_experiment(void) {
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 3.0, 0.5, fmi2True));
     fmu_assert_reset_is_fresh(c, "after a run with everything set");
 
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c)); // no experiment any more
-    fmu_assert_reset_is_fresh(c, "after an initialization without experiment");
+    if (fmu_version == 2) { // in FMI 3.0 the experiment comes with this call
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c));
+        fmu_assert_reset_is_fresh(c, "after an initialization without experiment");
+    }
 }
 
 static void test_reset_right_after_instantiate_and_twice(void) {

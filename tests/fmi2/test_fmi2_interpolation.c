@@ -1,6 +1,7 @@
 /* Inputs that are polynomials over a step. FMI 2.0, section 4.2.1. */
 #include "fmu_polynomials.h"
 
+#include <float.h>
 #include <limits.h>
 #include <math.h>
 #include <unity.h>
@@ -19,7 +20,9 @@ static void step(fmi2Component c, double time, double length) {
 /* Position and speed after s seconds with the force p, from q2 and dq2. */
 static void assert_slid(fmi2Component c, const struct fmu_polynomial *p, double s, double q2,
                         double dq2) {
-    const double tolerance = 1e-11;
+    // in FMI 3.0 the times at which the input is asked for are rounded
+    const double time = fmu_get(c, RP_MANIPULATOR_time);
+    const double tolerance = 1e-11 + (fmu_version == 3 ? 20.0 * DBL_EPSILON * fabs(time) : 0.0);
     TEST_ASSERT_DOUBLE_WITHIN(tolerance, dq2 + fmu_polynomial_integral(p, 1, s) / fmu_slide_mass,
                               fmu_get(c, RP_MANIPULATOR_dq2));
     TEST_ASSERT_DOUBLE_WITHIN(tolerance,
@@ -259,6 +262,7 @@ static void test_setting_the_value_again_ends_the_polynomial(void) {
 /* ---- Arguments that are refused ------------------------------------------------------------- */
 
 static void test_input_derivatives_that_are_refused(void) {
+    fmu_only_in(2, "FMI 3.0 has no derivatives of inputs");
     static const struct {
         fmi2ValueReference reference;
         fmi2Integer order;

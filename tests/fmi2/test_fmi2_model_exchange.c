@@ -109,7 +109,7 @@ static void test_start_values_are_the_first_states(void) {
 
 static void test_nominals_are_positive(void) {
     double nominals[FMU_STATES] = {0};
-    const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
+    const fmi2Component c = fmu_me_initialized(&messages, 0.0);
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetNominalsOfContinuousStates(c, nominals, FMU_STATES));
     for (int i = 0; i < FMU_STATES; i++) {
         TEST_ASSERT_EQUAL_DOUBLE(1.0, nominals[i]); // none is declared
@@ -179,7 +179,7 @@ static void test_wrong_sizes_and_missing_arrays_are_errors(void) {
     for (size_t f = 0; f < FMU_COUNT(array_functions); f++) {
         const enum fmu_function function = array_functions[f];
         const size_t right = function == FMU_GetEventIndicators ? 0 : FMU_STATES;
-        const char *name = fmu_function_names[function];
+        const char *name = fmu_name_of(function);
         for (size_t i = 0; i < 2 * FMU_COUNT(counts); i++) {
             const size_t count = counts[i / 2];
             const bool missing = i % 2 == 1;
@@ -205,7 +205,7 @@ static void test_wrong_sizes_and_missing_arrays_are_errors(void) {
 
 static void test_time_is_what_is_set(void) {
     static const double times[] = {0.5, 0.25, 0.0, 1e6, -3.0};
-    for (int mode = 0; mode < 2; mode++) {
+    for (int mode = fmu_version == 3 ? 1 : 0; mode < 2; mode++) { // FMI 3.0: not in event mode
         const fmi2Component c = mode == 0 ? in_event_mode() : fmu_me_initialized(&messages, 0.0);
         for (size_t i = 0; i < FMU_COUNT(times); i++) {
             TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetTime(c, times[i]));
@@ -249,7 +249,9 @@ static void test_there_are_no_events(void) {
         TEST_ASSERT_EQUAL_INT(fmi2False, enter_event_mode);
         TEST_ASSERT_EQUAL_INT(fmi2False, terminate);
         TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c)); // from itself too
+        if (fmu_version == 2) { // from itself too
+            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
+        }
     }
 }
 

@@ -78,6 +78,7 @@ static void test_output_derivatives_agree_with_each_other(void) {
 /* Once the input is set, they are those of the next step: before the first step and after another
  * one, in either order of calls. Derivatives that are not set again are 0. */
 static void test_output_derivatives_follow_what_is_set(void) {
+    fmu_only_in(2, "FMI 3.0 has no derivatives of inputs");
     const fmi2ValueReference f2 = RP_MANIPULATOR_f2;
     const fmi2Integer first = 1;
     const double value = 3.0;
@@ -154,6 +155,9 @@ static void test_missing_arrays(void) {
     double value = 1.0;
     for (int i = 0; i < 6; i++) {
         const bool input = i % 2 == 0;
+        if (input && fmu_version == 3) { // which has none
+            continue;
+        }
         const int missing = i / 2;
         const fmi2ValueReference reference = input ? RP_MANIPULATOR_f2 : RP_MANIPULATOR_q1;
         const fmi2Component c = fmu_initialized(&messages, 0.0);

@@ -110,8 +110,8 @@ EACH_METHOD static void test_the_new_handle_is_only_written(void) {
 /* ---- Kinds of instances --------------------------------------------------------------------- */
 
 static void check_kind(fmi2Type from, fmi2Type to) {
-    for (size_t i = 0; i < FMU_STATES_PER_KIND; i++) {
-        const fmi2Component source = fmu_reach(from, &fmu_states_of(from)[i], &messages);
+    for (size_t i = 0; i < fmu_states_of(from)->count; i++) {
+        const fmi2Component source = fmu_reach(from, &fmu_states_of(from)->states[i], &messages);
         struct fmu_bytes bytes = fmu_save_bytes(source);
         const fmi2Component c = fmu_reach(to, fmu_state_of(to, 'M'), &messages);
         fmi2FMUstate good = fmu_save(c);

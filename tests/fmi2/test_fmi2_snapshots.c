@@ -73,14 +73,15 @@ static void check_state(fmi2Type type, const struct fmu_state *state) {
 
 static void test_every_state_is_restored(void) {
     for (size_t t = 0; t < FMU_COUNT(types); t++) {
-        for (size_t i = 0; i < FMU_STATES_PER_KIND; i++) {
-            check_state(types[t], &fmu_states_of(types[t])[i]);
+        for (size_t i = 0; i < fmu_states_of(types[t])->count; i++) {
+            check_state(types[t], &fmu_states_of(types[t])->states[i]);
         }
     }
 }
 
 /* The status of a failed step is part of the state. */
 static void test_the_time_of_a_failed_step_is_restored(void) {
+    fmu_only_in(2, "in FMI 3.0 a failed step leaves the instance as it was");
     double reached = -1.0;
     double restored = -1.0;
     const struct fmu_state *failed = fmu_state_of(fmi2CoSimulation, 'F');
@@ -200,7 +201,7 @@ static fmi2Status call_with(enum fmu_function function, fmi2Component c, fmi2FMU
 static void assert_handle_refused(enum fmu_function function, fmi2Component c, fmi2FMUstate state) {
     struct fmu_values before;
     struct fmu_values after;
-    const char *name = fmu_function_names[function];
+    const char *name = fmu_name_of(function);
     fmi2FMUstate good = fmu_save(c);
     fmi2FMUstate given = state;
     TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &before));

@@ -124,7 +124,7 @@ static void assert_works(const struct pair *pair, fmi2Component c) {
 static void assert_refused(const struct pair *pair, fmi2Component c) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call(pair, c), pair->text);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], pair->text);
-    fmu_assert_logged(&messages, fmu_function_names[pair->function]);
+    fmu_assert_logged(&messages, fmu_name_of(pair->function));
     fmu_assert_in_state(c, fmu_state_of(pair->type, 'E'), 0.0, &messages, pair->text);
 }
 
@@ -166,8 +166,7 @@ static void check_all(fmi2Type type, char letter) {
             .function = (enum fmu_function)function,
             .state = fmu_state_of(type, letter),
         };
-        snprintf(pair.text, sizeof pair.text, "%s of a %s instance %s",
-                 fmu_function_names[function],
+        snprintf(pair.text, sizeof pair.text, "%s of a %s instance %s", fmu_name_of(function),
                  type == fmi2CoSimulation ? "Co-Simulation" : "Model Exchange", pair.state->name);
         check(&pair);
     }
@@ -231,6 +230,6 @@ static void test_no_instance_is_an_error_and_no_crash(void) {
         }
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error,
                                       fmu_call((enum fmu_function)function, NULL, 0.0, step),
-                                      fmu_function_names[function]);
+                                      fmu_name_of(function));
     }
 }

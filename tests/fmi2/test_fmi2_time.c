@@ -29,11 +29,13 @@ static void test_experiments_that_are_refused(void) {
     for (size_t i = 0; i < FMU_COUNT(cases); i++) {
         const fmi2Component c = fmu_instantiate(&messages, false);
         fmu_log_clear(&messages);
-        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.SetupExperiment(c, cases[i].has_tolerance,
-                                                             cases[i].tolerance, cases[i].start,
-                                                             cases[i].has_stop, cases[i].stop));
-        fmu_assert_logged(&messages, cases[i].word);
+        // in FMI 3.0 the second call has these arguments
+        TEST_ASSERT_EQUAL_INT(fmu_version == 2 ? fmi2Error : fmi2OK,
+                              fmu.SetupExperiment(c, cases[i].has_tolerance, cases[i].tolerance,
+                                                  cases[i].start, cases[i].has_stop,
+                                                  cases[i].stop));
         TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c));
+        fmu_assert_logged(&messages, cases[i].word);
         fmu_assert_reset_is_fresh(c, cases[i].word);
         fmu_free(c);
     }
@@ -49,6 +51,7 @@ static void test_what_is_not_defined_is_not_looked_at(void) {
 }
 
 static void test_initialization_needs_an_experiment(void) {
+    fmu_only_in(2, "in FMI 3.0 the experiment comes with the initialization");
     const fmi2Component c = fmu_instantiate(&messages, false);
     TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c));
     fmu_assert_logged(&messages, "experiment");
@@ -276,6 +279,7 @@ static void test_an_endless_step_is_discarded(void) {
 
 /* fmi2Discard of fmi2DoStep: section 4.2.2; fmi2LastSuccessfulTime: 4.2.3. */
 static void test_a_failed_step_tells_how_far_it_got(void) {
+    fmu_only_in(2, "in FMI 3.0 a failed step leaves the instance as it was");
     const fmi2ValueReference max_steps = RP_MANIPULATOR_max_internal_steps;
     const fmi2ValueReference references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                              RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
@@ -306,6 +310,7 @@ static void test_a_failed_step_tells_how_far_it_got(void) {
 /* ---- Status --------------------------------------------------------------------------------- */
 
 static void test_status_tells_what_can_be_known(void) {
+    fmu_only_in(2, "FMI 3.0 has no status of a step");
     static const fmi2StatusKind kinds[] = {fmi2DoStepStatus, fmi2PendingStatus,
                                            fmi2LastSuccessfulTime, fmi2Terminated,
                                            (fmi2StatusKind)99};
@@ -352,11 +357,12 @@ static fmi2Status status_into_nothing(int function, fmi2Component c) {
 }
 
 static void test_status_into_nothing_is_an_error(void) {
+    fmu_only_in(2, "FMI 3.0 has no status of a step");
     for (int function = FMU_GetStatus; function <= FMU_GetStringStatus; function++) {
         const fmi2Component c = fmu_initialized(&messages, 0.0);
         fmu_log_clear(&messages);
         TEST_ASSERT_EQUAL_INT(fmi2Error, status_into_nothing(function, c));
-        fmu_assert_logged(&messages, fmu_function_names[function]);
+        fmu_assert_logged(&messages, fmu_name_of(function));
         fmu_assert_in_error(c);
         fmu_free(c);
     }

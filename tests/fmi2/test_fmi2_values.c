@@ -113,7 +113,7 @@ static void test_missing_arrays(void) {
                 TEST_ASSERT_EQUAL_INT(fmi2Error,
                                       access(function, c, references[j], counts[i], values[j]));
                 fmu_assert_logged(&messages, "NULL");
-                fmu_assert_logged(&messages, fmu_function_names[function]);
+                fmu_assert_logged(&messages, fmu_name_of(function));
                 fmu_assert_in_error(c);
             }
         }

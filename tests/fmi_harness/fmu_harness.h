@@ -3,7 +3,7 @@
 #ifndef FMU_HARNESS_H
 #define FMU_HARNESS_H
 
-#include "fmu_library.h"
+#include "fmu_version.h"
 #include "value_references.h"
 
 #define FMU_COUNT(array) (sizeof(array) / sizeof(array)[0])
@@ -98,6 +98,9 @@ fmi2Status fmu_get_all(fmi2Component component, struct fmu_values *values);
 /* Fails the test at the first variable whose bits differ, and names it. */
 void fmu_assert_same_values(const struct fmu_values *expected, const struct fmu_values *actual,
                             const char *message);
+
+/* Ignores the running test where the FMU is one of another version. */
+void fmu_only_in(unsigned version, const char *reason);
 
 /* The next calls are refused as after an fmi2Error (section 4.2.4), and the message says so. */
 void fmu_assert_in_error(fmi2Component component);

@@ -8,18 +8,15 @@
 const char *const fmu_function_names[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_NAME)};
 #undef FMU_NAME
 
-void *fmu_library_open(const char *path, struct fmu_functions *functions) {
-#define FMU_OFFSET(name) offsetof(struct fmu_functions, name),
-    static const size_t offsets[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_OFFSET)};
-#undef FMU_OFFSET
-
+void *fmu_library_load(const char *path, const char *const names[], const size_t offsets[],
+                       size_t count, void *functions) {
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (library == NULL) {
         fprintf(stderr, "%s\n", dlerror());
         return NULL;
     }
-    for (size_t i = 0; i < FMU_FUNCTION_COUNT; i++) {
-        void *symbol = dlsym(library, fmu_function_names[i]);
+    for (size_t i = 0; i < count; i++) {
+        void *symbol = dlsym(library, names[i]);
         if (symbol == NULL) {
             fprintf(stderr, "%s\n", dlerror());
             dlclose(library);
@@ -29,4 +26,11 @@ void *fmu_library_open(const char *path, struct fmu_functions *functions) {
         memcpy((char *)functions + offsets[i], &symbol, sizeof symbol);
     }
     return library;
+}
+
+void *fmu_library_open(const char *path, struct fmu_functions *functions) {
+#define FMU_OFFSET(name) offsetof(struct fmu_functions, name),
+    static const size_t offsets[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_OFFSET)};
+#undef FMU_OFFSET
+    return fmu_library_load(path, fmu_function_names, offsets, FMU_FUNCTION_COUNT, functions);
 }

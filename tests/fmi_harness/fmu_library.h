@@ -72,6 +72,11 @@ struct fmu_functions {
 /* As the standard spells it: "fmi2GetReal". */
 extern const char *const fmu_function_names[FMU_FUNCTION_COUNT];
 
+/* Handle of the shared object at path, for dlclose, with its functions of these names at their
+ * offsets in a structure. NULL, with a line on stderr, where it or one of them is not found. */
+void *fmu_library_load(const char *path, const char *const names[], const size_t offsets[],
+                       size_t count, void *functions);
+
 /* Handle of the shared object at path, for dlclose. NULL, with a line on stderr, where it or one of
  * the functions is not found. */
 void *fmu_library_open(const char *path, struct fmu_functions *functions);

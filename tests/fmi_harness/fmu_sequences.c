@@ -110,6 +110,10 @@ fmi2Status fmu_apply(fmi2Component component, const struct fmu_operation *operat
         return fmu.SetupExperiment(component, fmi2False, 0.0, operation->point, has_stop,
                                    has_stop ? operation->value : 0.0);
     case FMU_ENTER:
+        if (fmu_version == 3) { // the experiment belongs to this call, and not to an FMU state
+            (void)fmu.SetupExperiment(component, fmi2False, 0.0, operation->point, has_stop,
+                                      has_stop ? operation->value : 0.0);
+        }
         return fmu.EnterInitializationMode(component);
     case FMU_EXIT:
         return fmu.ExitInitializationMode(component);
@@ -186,7 +190,8 @@ static void add_initialization(struct fmu_sequence *sequence, struct fmu_random 
         add(sequence, derive(random));
     }
     sequence->readable_from = sequence->count;
-    add(sequence, (struct fmu_operation){.kind = FMU_ENTER});
+    add(sequence,
+        (struct fmu_operation){.kind = FMU_ENTER, .point = sequence->end, .value = INFINITY});
     if (!holds_long(seed)) {
         add(sequence, set_within(random, &tunable[fmu_random_below(random, FMU_COUNT(tunable))]));
         add(sequence, derive(random));
@@ -236,9 +241,11 @@ void fmu_sequence_make(struct fmu_sequence *sequence, unsigned seed) {
     while (sequence->count < SHORT) {
         add_steps(sequence, &random);
     }
+    const double stop = fmu_random_below(&random, 2) == 0 ? sequence->end : INFINITY;
     for (size_t i = 0; i < sequence->count; i++) {
-        if (sequence->operations[i].kind == FMU_SETUP && fmu_random_below(&random, 2) == 0) {
-            sequence->operations[i].value = sequence->end;
+        if (sequence->operations[i].kind == FMU_SETUP ||
+            sequence->operations[i].kind == FMU_ENTER) {
+            sequence->operations[i].value = stop;
         }
     }
 }

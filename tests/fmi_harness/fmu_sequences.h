@@ -24,7 +24,7 @@ enum fmu_operation_kind {
     FMU_SET_INTEGER, /* reference = order */
     FMU_DERIVE,      /* derivative of this order of the input reference = value, per s^order */
     FMU_SETUP,       /* start at point (s), stop at value (s) where that is finite */
-    FMU_ENTER,       /* initialization mode */
+    FMU_ENTER,       /* initialization mode, with the point and value of FMU_SETUP */
     FMU_EXIT,
     FMU_STEP, /* from point to point + value (s) */
 };

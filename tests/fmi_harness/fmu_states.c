@@ -5,30 +5,12 @@
 #include <string.h>
 #include <unity.h>
 
-const struct fmu_state fmu_co_simulation_states[FMU_STATES_PER_KIND] = {
-    {'I', "instantiated", FMU_SetupExperiment},
-    {'M', "in initialization mode", FMU_ExitInitializationMode},
-    {'C', "between steps", FMU_DoStep},
-    {'F', "after a failed step", FMU_Terminate},
-    {'T', "terminated", FMU_GetRealStatus},
-    {'E', "in the error state", FMU_FUNCTION_COUNT},
-};
-
-const struct fmu_state fmu_model_exchange_states[FMU_STATES_PER_KIND] = {
-    {'I', "instantiated", FMU_SetupExperiment},
-    {'M', "in initialization mode", FMU_ExitInitializationMode},
-    {'V', "in event mode", FMU_EnterContinuousTimeMode},
-    {'N', "in continuous-time mode", FMU_CompletedIntegratorStep},
-    {'T', "terminated", FMU_FUNCTION_COUNT},
-    {'E', "in the error state", FMU_FUNCTION_COUNT},
-};
-
-const struct fmu_state *fmu_states_of(fmi2Type type) {
-    return type == fmi2CoSimulation ? fmu_co_simulation_states : fmu_model_exchange_states;
+const struct fmu_states *fmu_states_of(fmi2Type type) {
+    return type == fmi2CoSimulation ? &fmu_co_simulation_states : &fmu_model_exchange_states;
 }
 
 const struct fmu_state *fmu_state_of(fmi2Type type, char letter) {
-    const struct fmu_state *state = fmu_states_of(type);
+    const struct fmu_state *state = fmu_states_of(type)->states;
     while (state->letter != letter) {
         state++;
     }

@@ -104,8 +104,59 @@ MISTAKES = {
         "[variables.m1]",
         ["variable n", "an int32 is not continuous"],
     ),
-    "name_of_an_alias": ("[variables.ee_x]", "[variables.der_q1]", ["der_q1", "FMI 2.0", "dq1"]),
+    "name_of_an_alias": ("[variables.D11]", "[variables.der_q1]", ["der_q1", "FMI 2.0", "dq1"]),
     "declared_twice": ("[variables.m1]", "[variables.time]", ["time", "declared twice"]),
+}
+
+# what is replaced, by what, and what the message must say beside the file
+MISTAKES_IN_TERMINALS = {
+    "unknown_variable": ('q1 = "q1", dq1', 'q1 = "q9", dq1', ["arm.joint1", "signal q1", "'q9'"]),
+    "no_input_or_output": (
+        'q1 = "q1", dq1',
+        'q1 = "D11", dq1',
+        ["arm.joint1", "'D11' is no input"],
+    ),
+    "parameter": (
+        '{ f2 = "f2" }',
+        '{ f2 = "m1" }',
+        ["arm.joint2", "inflow f2", "'m1' is no input"],
+    ),
+    "member_twice": (
+        '{ tau1 = "tau1" }',
+        '{ q1 = "tau1" }',
+        ["terminal arm.joint1", "member 'q1' is declared twice"],
+    ),
+    "key_twice": ('{ tau1 = "tau1" }', '{ x = "tau1", x = "f2" }', ["is not valid TOML"]),
+    "unknown_kind": ("inflows =", "flows =", ["arm.joint1", "unknown key 'flows'", "inflows"]),
+    "unknown_rule": ('rule = "plug"', 'rule = "socket"', ["arm.joint1", "'socket'", "'plug'"]),
+    "rule_missing": ('rule = "bus"\n', "", ["terminal arm", "rule is missing"]),
+    "description_missing": (
+        'description = "Joint 1, about z0"\n',
+        "",
+        ["terminal arm.joint1", "description is missing"],
+    ),
+    "no_members": (
+        "[terminals.end_effector]",
+        '[terminals.x]\nrule = "none"\ndescription = "X"\n[terminals.end_effector]',
+        ["terminal x", "no members"],
+    ),
+    "no_table": ("[terminals.arm]", "[terminals]\nx = 1\n[terminals.arm]", ["x", "not a table"]),
+    "nested_no_table": (
+        "[terminals.arm.terminals.joint1]",
+        "[terminals.arm.terminals]\nx = 1\n[terminals.arm.terminals.joint1]",
+        ["terminal arm.x", "not a table"],
+    ),
+    "name_with_space": ("[terminals.arm]", '[terminals."an arm"]', ["an arm", "C identifier"]),
+    "member_with_space": ('{ f2 = "f2" }', '{ "f 2" = "f2" }', ["arm.joint2", "C identifier"]),
+    "variable_number": ('{ f2 = "f2" }', "{ f2 = 21 }", ["arm.joint2", "inflows.f2 = 21"]),
+    "discrete_flow": (
+        "[terminals.arm]",
+        '[variables.n]\nreference = 99\nfield = "n"\ncausality = "output"\ntype = "int32"\n'
+        'variability = "discrete"\ndependencies = []\ndescription = "N"\n'
+        '[terminals.x]\nrule = "none"\ndescription = "X"\noutflows = { n = "n" }\n'
+        "[terminals.arm]",
+        ["terminal x", "outflow n", "'n' is not continuous"],
+    ),
 }
 
 # what is replaced, by what, and what the message must say beside the file
@@ -173,6 +224,7 @@ CASES = [
     pytest.param(model, *mistake, id=name)
     for model, mistakes in (
         ("rp_manipulator", MISTAKES),
+        ("rp_manipulator", MISTAKES_IN_TERMINALS),
         ("rp_trajectory", MISTAKES_IN_ENUMERATIONS),
     )
     for name, mistake in mistakes.items()

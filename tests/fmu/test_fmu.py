@@ -15,6 +15,7 @@ from fmpy.validation import validate_fmu
 from tests.support.paths import ROOT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
+CROSS_CHECK = ("_in.csv", "_ref.csv", "_ref.opt")  # endings of a reference's files
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +45,16 @@ def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
         "documentation/licenses/license.txt",
         "documentation/licenses/musl.txt",
         "documentation/licenses/sundials.txt",
+        "extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml",
+        *(
+            f"extra/org.fmi-standard.fmi-ls-ref/{scenario}/{name}"
+            for scenario in ("irregular_steps", "sixtieth")
+            for name in (*(f"RPManipulator{end}" for end in CROSS_CHECK), "parameters.ssv")
+        ),
         "model.png",
         "modelDescription.xml",
+        "terminalsAndIcons/icon.png",
+        "terminalsAndIcons/terminalsAndIcons.xml",
     }
     for info in entries.values():
         assert info.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)

@@ -211,7 +211,7 @@ def test_the_same_bytes_every_time(tmp_path: Path) -> None:
     generated(VARIABLES, tmp_path / "first")
     generated(VARIABLES, tmp_path / "second")
     files = [path for path in (tmp_path / "first").rglob("*") if path.is_file()]
-    assert len(files) == 4
+    assert len(files) == 5
     for file in files:
         name = file.relative_to(tmp_path / "first")
         assert file.read_bytes() == (tmp_path / "second" / name).read_bytes()

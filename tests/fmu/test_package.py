@@ -28,3 +28,9 @@ def test_packing_what_is_not_there_is_refused(tmp_path: Path, entry: str) -> Non
     assert result.returncode == 2
     assert entry in result.stderr and len(result.stderr.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_folder_of_an_archive_is_made(tmp_path: Path) -> None:
+    archive = tmp_path / "not" / "there" / "yet" / "x.fmu"
+    subprocess.run([sys.executable, PACKAGE, archive, f"a={PACKAGE}"], check=True)
+    assert zipfile.ZipFile(archive).namelist() == ["a"]

@@ -71,10 +71,12 @@ def elementary_functions() -> set[str]:
 # ---- The archives -------------------------------------------------------------------------------
 
 
-def test_a_release_has_checksums_of_all_its_fmus(release: Path) -> None:
+def test_a_release_has_checksums_of_all_its_files(release: Path) -> None:
     lines = [line.split("  ") for line in (release / "SHA256SUMS").read_text().splitlines()]
-    found = {path.relative_to(release).as_posix() for path in release.rglob("*.fmu")}
-    assert {name for _, name in lines} == found >= {f"{name}.fmu" for name in NAMES}
+    files = [path for pattern in ("*.fmu", "*.ssp") for path in release.rglob(pattern)]
+    found = {path.relative_to(release).as_posix() for path in files}
+    assert {name for _, name in lines} == found
+    assert found >= {"ClosedLoop.ssp", *(f"{name}.fmu" for name in NAMES)}
     for checksum, name in lines:
         assert hashlib.sha256((release / name).read_bytes()).hexdigest() == checksum, name
 

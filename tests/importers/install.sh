@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-ci_tools=(ecospy libcosimpy fmu-manipulation-toolbox)
+ci_tools=(ecospy libcosimpy fmuloader fmu-manipulation-toolbox)
 heavy_tools=(fmi-sim cofmupy pathsim-fmi gemseo-fmu) # minutes, up to 1 GB each
 
 usage() {
@@ -23,6 +23,7 @@ pins() {
   case "$1" in
     ecospy) echo ecospy==0.7.2 ;;
     libcosimpy) echo libcosimpy==0.0.6 ;;
+    fmuloader) echo fmuloader==0.1.2rc0 ;;
     fmu-manipulation-toolbox)
       echo fmu-manipulation-toolbox==2.0 xmlschema==4.3.2 elementpath==5.1.4 colorama==0.4.6 ;;
     fmi-sim) echo fmi-sim@0.7.0 ;; # its dependencies are in its Cargo.lock

@@ -12,40 +12,44 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Sequence
-from ctypes import c_double
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from fmpy import fmi2
 
-from tests.support.instances import STATES, Instance, LoadedFmu
+from tests.importers.by_fmpy import co_simulation, euler
+from tests.support.instances import LoadedFmu
 from tests.support.paths import ROOT
 
 SCRIPTS = ROOT / "tests" / "importers"
 BOUND = 1e-12  # of each output's maximum
 TIME_LIMIT = 60.0  # s, of one tool
+VERSIONS = ("fmi2", "fmi3")
 
 
 class Importer(NamedTuple):
     """How a tool runs the plan of this test."""
 
+    versions: Sequence[str] = VERSIONS
     inputs: str = "beginning"  # of the step that they are held over; or its "end"
     sets_states: bool = True  # False: it can only set parameters and inputs before it starts
     false_alarm: str | None = None  # regular expression of a complaint that is the tool's own error
 
 
 IMPORTERS = {
-    "ecospy": Importer(),
+    # Ecos leaves enumerations of FMI 3.0 out, and says so.
+    "ecospy": Importer(false_alarm="Variable named 'solver_method' is of unsupported type"),
     # The FMI Library in libcosimpy 0.0.6 wants a start value for the independent variable, which
     # FMI 2.0.5, section 2.2.7, forbids; corrected upstream (fmi-library, pull request 129).
     # libcosim leaves enumerations out, and says so.
     "libcosimpy": Importer(
+        versions=["fmi2"],
         false_alarm=r"Start attribute is required for this causality, variability and initial"
-        r"|FMI 2.0 Enumeration variable type not supported, variable with name solver_method"
+        r"|FMI 2.0 Enumeration variable type not supported, variable with name solver_method",
     ),
+    "fmuloader": Importer(),
     "fmi-sim": Importer(),
     "cofmupy": Importer(),
     "pathsim-fmi": Importer(inputs="end"),
@@ -54,7 +58,14 @@ IMPORTERS = {
 CHECKER = "fmu-manipulation-toolbox"
 REQUIRED = set(os.environ.get("REQUIRED_IMPORTERS", "").replace(",", " ").split())
 if os.environ.get("CI"):
-    REQUIRED |= {"ecospy", "libcosimpy", CHECKER}
+    REQUIRED |= {"ecospy", "libcosimpy", "fmuloader", CHECKER}
+
+
+class Built(NamedTuple):
+    """The FMU of one version."""
+
+    path: Path
+    loaded: LoadedFmu
 
 
 def folder_of(tool: str) -> Path:
@@ -96,8 +107,13 @@ def complaints(output: str, false_alarm: str | None = None) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
+def built(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Built]:
+    """The arm's FMU of each version."""
+    paths = {"fmi2": fmu, "fmi3": fmu.parent / "fmi3" / fmu.name}
+    return {
+        version: Built(path, LoadedFmu(path, tmp_path_factory.mktemp(version)))
+        for version, path in paths.items()
+    }
 
 
 def make_plan(loaded: LoadedFmu, initial: bool = True) -> dict[str, Any]:
@@ -117,45 +133,6 @@ def make_plan(loaded: LoadedFmu, initial: bool = True) -> dict[str, Any]:
     }
 
 
-def inputs_at(plan: dict[str, Any], i: int) -> dict[str, float]:
-    return {name: values[i] for name, values in plan["inputs"].items()}
-
-
-def co_simulation(loaded: LoadedFmu, plan: dict[str, Any], inputs: str) -> np.ndarray:
-    """Outputs (steps + 1, outputs), with the inputs of the steps' beginning or of their end."""
-    later = {"beginning": 0, "end": 1}[inputs]
-    with Instance(loaded) as arm:
-        arm.initialize(**plan["parameters"], **plan["initial"], **inputs_at(plan, 0))
-        rows = [arm.get(*plan["outputs"])]
-        for i in range(plan["steps"]):
-            arm.set(**inputs_at(plan, i + later))
-            arm.step(plan["start"] + i * plan["step"], plan["step"])
-            rows.append(arm.get(*plan["outputs"]))
-    return np.array(rows)
-
-
-def euler(loaded: LoadedFmu, plan: dict[str, Any]) -> np.ndarray:
-    """Outputs (steps + 1, outputs) of Model Exchange by Euler's method, inputs as they are."""
-    x, dx = (c_double * len(STATES))(), (c_double * len(STATES))()
-    times = [plan["start"] + i * plan["step"] for i in range(plan["steps"] + 1)]
-    with Instance(loaded, fmi2.FMU2Model) as arm:
-        arm.initialize(**plan["parameters"], **plan["initial"], **inputs_at(plan, 0))
-        arm.fmi.newDiscreteStates()
-        arm.fmi.enterContinuousTimeMode()
-        rows = [arm.get(*plan["outputs"])]
-        for i in range(plan["steps"]):
-            arm.fmi.getContinuousStates(x, len(x))
-            arm.fmi.getDerivatives(dx, len(dx))
-            for k in range(len(x)):
-                x[k] += dx[k] * (times[i + 1] - times[i])
-            arm.fmi.setTime(times[i + 1])
-            arm.fmi.setContinuousStates(x, len(x))
-            arm.set(**inputs_at(plan, i + 1))
-            arm.fmi.completedIntegratorStep()
-            rows.append(arm.get(*plan["outputs"]))
-    return np.array(rows)
-
-
 def difference(values: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """Largest difference of each output over all communication points, of its maximum."""
     assert values.shape == expected.shape
@@ -166,13 +143,13 @@ def difference(values: np.ndarray, expected: np.ndarray) -> np.ndarray:
 # ---- the tools ---------------------------------------------------------------------------------
 
 
-def run(tool: str, interface: str, fmu: Path, plan: dict[str, Any], folder: Path) -> np.ndarray:
+def run(tool: str, fmu: Path, plan: dict[str, Any], folder: Path, *options: str) -> np.ndarray:
     """Outputs (steps + 1, outputs) of the plan as the tool runs it."""
     installed = folder_of(tool)
     python: list[str | Path] = [installed / "bin" / "python"]
     extra: list[str | Path] = []
     if tool == "fmi-sim":
-        python, extra = [sys.executable], [installed / "bin" / "fmi-sim", interface]
+        python, extra = [sys.executable], [installed / "bin" / "fmi-sim", *options]
     driver = SCRIPTS / f"run_{tool.replace('-', '_')}.py"
     plan_file, result = folder / "plan.json", folder / "result.json"
     plan_file.write_text(json.dumps(plan), encoding="utf-8")
@@ -182,32 +159,56 @@ def run(tool: str, interface: str, fmu: Path, plan: dict[str, Any], folder: Path
     return np.array(json.loads(result.read_text(encoding="utf-8")))
 
 
-def report(tool: str, plan: dict[str, Any], differences: np.ndarray) -> None:
+def report(case: str, plan: dict[str, Any], differences: np.ndarray) -> None:
     worst = int(differences.argmax())
-    print(f"{tool}: largest difference {differences[worst]:.1e} ({plan['outputs'][worst]})")
+    print(f"{case}: largest difference {differences[worst]:.1e} ({plan['outputs'][worst]})")
 
 
-@pytest.mark.parametrize("tool", IMPORTERS)
+def cases() -> Iterator[tuple[str, str, list[str]]]:
+    """Tool, version and options of each co-simulation."""
+    for tool, importer in IMPORTERS.items():
+        for version in importer.versions:
+            choices = [[]]
+            if (tool, version) == ("fmi-sim", "fmi3"):
+                event, early = "--event-mode-used", "--early-return-allowed"
+                choices = [[], [event], [early], [event, early]]
+            for options in choices:
+                yield tool, version, options
+
+
+@pytest.mark.parametrize(
+    ("tool", "version", "options"),
+    [pytest.param(*case, id=" ".join([*case[:2], *case[2]])) for case in cases()],
+)
 def test_co_simulation_is_that_of_fmpy(
-    tool: str, fmu: Path, loaded: LoadedFmu, tmp_path: Path
+    tool: str, version: str, options: list[str], built: dict[str, Built], tmp_path: Path
 ) -> None:
     importer = IMPORTERS[tool]
+    fmu, loaded = built[version]
     plan = make_plan(loaded, importer.sets_states)
-    values = run(tool, "co-simulation", fmu, plan, tmp_path)
+    values = run(tool, fmu, plan, tmp_path, "co-simulation", *options)
     differences = difference(values, co_simulation(loaded, plan, importer.inputs))
-    report(tool, plan, differences)
+    report(" ".join([tool, version, *options]), plan, differences)
     assert differences.max() <= BOUND
 
 
-def test_model_exchange_is_that_of_fmpy(fmu: Path, loaded: LoadedFmu, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", VERSIONS)
+def test_model_exchange_is_that_of_fmpy(
+    version: str, built: dict[str, Built], tmp_path: Path
+) -> None:
+    fmu, loaded = built[version]
     plan = make_plan(loaded)
-    values = run("fmi-sim", "model-exchange", fmu, plan, tmp_path)
+    values = run("fmi-sim", fmu, plan, tmp_path, "model-exchange")
     differences = difference(values, euler(loaded, plan))
-    report("fmi-sim", plan, differences)
+    report(f"fmi-sim {version}", plan, differences)
     assert differences.max() <= BOUND
 
 
-def test_the_plan_tells_one_order_of_inputs_from_the_other(loaded: LoadedFmu) -> None:
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_plan_tells_one_order_of_inputs_from_the_other(
+    version: str, built: dict[str, Built]
+) -> None:
+    loaded = built[version].loaded
     plan = make_plan(loaded)
     beginning, end = (co_simulation(loaded, plan, inputs) for inputs in ("beginning", "end"))
     assert difference(end, beginning).min() > 1e6 * BOUND
@@ -217,25 +218,38 @@ def fmutool_check(fmu: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     return start([folder_of(CHECKER) / "bin" / "fmutool", "-check", "-input", fmu], folder)
 
 
-def test_fmutool_finds_nothing(fmu: Path, tmp_path: Path) -> None:
-    process = fmutool_check(fmu, tmp_path)
+@pytest.mark.parametrize("name", ["RPManipulator", "RPController", "RPTrajectory"])
+@pytest.mark.parametrize("version", VERSIONS)
+def test_fmutool_finds_nothing(version: str, name: str, fmu: Path, tmp_path: Path) -> None:
+    below = fmu.parent if version == "fmi2" else fmu.parent / version
+    process = fmutool_check(below / f"{name}.fmu", tmp_path)
     assert process.returncode == 0, process.stdout
     assert complaints(process.stdout, false_alarm="No semantic error") == []
-    assert "seems to be compliant with FMI-2.0" in process.stdout
-    assert "No semantic error against the FMI-2 standard" in process.stdout
+    number = version[-1]
+    assert f"seems to be compliant with FMI-{number}.0" in process.stdout
+    assert f"No semantic error against the FMI-{number} standard" in process.stdout
 
 
-def test_fmutool_finds_an_error(fmu: Path, tmp_path: Path) -> None:
-    wrong = tmp_path / "wrong.fmu"
-    with zipfile.ZipFile(fmu) as source, zipfile.ZipFile(wrong, "w") as target:
+@pytest.mark.parametrize(
+    ("version", "right", "wrong", "words"),
+    [
+        ("fmi2", ' initial="calculated"', ' initial="exact"', "a start value is required"),
+        ("fmi3", ' valueReference="21"', ' valueReference="-21"', "-21"),
+    ],
+)
+def test_fmutool_finds_an_error(
+    version: str, right: str, wrong: str, words: str, built: dict[str, Built], tmp_path: Path
+) -> None:
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(built[version].path) as source, zipfile.ZipFile(broken, "w") as target:
         for name in source.namelist():
             content = source.read(name)
             if name == "modelDescription.xml":
-                content = content.replace(b' initial="calculated"', b' initial="exact"', 1)
+                content = content.replace(right.encode(), wrong.encode(), 1)
             target.writestr(name, content)
-    process = fmutool_check(wrong, tmp_path)
+    process = fmutool_check(broken, tmp_path)
     assert process.returncode != 0
-    assert "a start value is required" in process.stdout
+    assert words in process.stdout
 
 
 def test_required_importers_are_known() -> None:

@@ -5,6 +5,7 @@ import functools
 import importlib.util
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -19,7 +20,7 @@ from tests.support.paths import ROOT
 
 FMUS = ("RPManipulator", "RPTrajectory", "RPController")
 BUILD = ROOT / "build"
-# what the hosts are compiled with, and where wine keeps its files
+# of builds for one platform, of the hosts, and of wine
 SCRATCH = BUILD / "platforms"
 HOST_SOURCES = ("platform_host.c", "script.c", "calls.c", "run.c", "system.c")
 TIME_LIMIT = 900.0  # s; zig makes its C library for Windows when it is asked for the first time
@@ -34,7 +35,7 @@ class Platform:
     suffix: str  # of the library
     system: str  # platform.system() and platform.machine() where it runs without an emulator
     machine: str
-    target: str  # for zig
+    preset: str  # of CMakePresets.json that builds it with zig
     compiler: str  # where zig is not installed
     emulator: tuple[str, ...]
 
@@ -43,18 +44,18 @@ class Platform:
 PLATFORMS = (
     Platform(
         name="linux64", folder="linux64", suffix=".so", system="Linux", machine="x86_64",
-        target="x86_64-linux-gnu.2.17", compiler="x86_64-linux-gnu-gcc",
+        preset="x86_64-linux", compiler="x86_64-linux-gnu-gcc",
         emulator=("qemu-x86_64-static", "-L", "/usr/x86_64-linux-gnu"),
     ),
     Platform(
         name="win64", folder="win64", suffix=".dll", system="Windows", machine="AMD64",
-        target="x86_64-windows-gnu", compiler="x86_64-w64-mingw32-gcc",
+        preset="x86_64-windows", compiler="x86_64-w64-mingw32-gcc",
         emulator=("wine",),
     ),
     Platform(
         name="aarch64-linux", folder="aarch64-linux", suffix=".so",
         system="Linux", machine="aarch64",
-        target="aarch64-linux-gnu.2.17", compiler="aarch64-linux-gnu-gcc",
+        preset="aarch64-linux", compiler="aarch64-linux-gnu-gcc",
         emulator=("qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"),
     ),
 )  # fmt: skip
@@ -69,7 +70,7 @@ class Missing(Exception):
 
 def archive_with(row: Platform, name: str) -> Path:
     """The FMU with the library of this platform: a release, or a build for this platform only."""
-    places = (BUILD / "release" / f"{name}.fmu", SCRATCH / row.name / f"{name}.fmu")
+    places = (BUILD / "release" / f"{name}.fmu", SCRATCH / row.preset / f"{name}.fmu")
     for place in places:
         if place.is_file():
             with zipfile.ZipFile(place) as archive:
@@ -106,7 +107,9 @@ def emulator_of(row: Platform) -> tuple[str, ...]:
 
 def compiler_of(row: Platform) -> list[str]:
     if importlib.util.find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc", "-target", row.target]
+        toolchain = ROOT / "cmake" / "toolchains" / f"zig-{row.preset}.cmake"
+        target = re.search(r"\(ZIG_TARGET (\S+)\)", toolchain.read_text()).group(1)
+        return [sys.executable, "-m", "ziglang", "cc", "-target", target]
     if shutil.which(row.compiler) is not None:
         return [row.compiler]
     raise Missing(f"zig or {row.compiler}, for the host of {row.name}: ./setup.sh --platforms")
@@ -124,7 +127,8 @@ def host_of(row: Platform) -> Path:
     host.parent.mkdir(parents=True, exist_ok=True)
     fmpy = importlib.util.find_spec("fmpy")
     headers = Path(fmpy.origin).parent / "c-code"
-    command += ["-std=c17", "-O2", "-isystem", str(headers), "-o", str(host)]
+    # -O3 and -s as for the release: zig has the C library for these options
+    command += ["-std=c17", "-O3", "-s", "-isystem", str(headers), "-o", str(host)]
     command += [str(sources / name) for name in HOST_SOURCES]
     if row.system == "Linux":
         command += ["-rdynamic", "-pthread", "-ldl"]  # -rdynamic: its malloc for the FMU

@@ -65,7 +65,7 @@ def test_a_release_without_this_platform(row: Platform, release: Path) -> None:
 
 
 def test_a_build_for_one_platform_is_found(row: Platform, release: Path) -> None:
-    only = platforms.SCRATCH / row.name / release.name
+    only = platforms.SCRATCH / row.preset / release.name
     only.parent.mkdir(parents=True)
     assert platforms.archive_with(row, NAME) == release
     release.rename(only)

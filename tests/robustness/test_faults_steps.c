@@ -81,10 +81,14 @@ static double assert_discarded(fmi2Component c, double t, double h, const char *
     discarded++;
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached),
                                   about);
-    TEST_ASSERT_TRUE_MESSAGE(reached >= t && reached < t + h, about);
+    // in FMI 3.0 the instance is where it was before the step
+    TEST_ASSERT_TRUE_MESSAGE(fmu_version == 3 ? reached == t : reached >= t && reached < t + h,
+                             about);
     TEST_ASSERT_TRUE_MESSAGE(reached == fmu_get(c, RP_MANIPULATOR_time), about);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
-    TEST_ASSERT_EQUAL_INT(fmi2False, terminated);
+    if (fmu_version == 2) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
+        TEST_ASSERT_EQUAL_INT(fmi2False, terminated);
+    }
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, messages.count[fmi2Error], messages.texts);
     if (messages.count[fmi2Discard] > 0) { // there is a logger
         fmu_assert_logged(&messages, message);
@@ -138,7 +142,9 @@ static void halve_to_the_end(fmi2Component c, fmi2Component other,
         fmi2Status status = fmu.DoStep(c, t, h, fmi2False);
         while (status == fmi2Discard) {
             (void)assert_discarded(c, t, h, obstacle->message);
-            fmu_restore(c, state);
+            if (fmu_version == 2) {
+                fmu_restore(c, state);
+            }
             h *= 0.5;
             fmu_log_clear(&messages);
             status = fmu.DoStep(c, t, h, fmi2False);
@@ -162,10 +168,12 @@ static void overcome(const struct obstacle *obstacle, fmi2Integer method, bool h
                                   about);
     TEST_ASSERT_TRUE_MESSAGE((messages.count[fmi2Discard] > 0) == has_logger, about);
     const double reached = assert_discarded(c, start, obstacle->length, obstacle->message);
-    TEST_ASSERT_TRUE_MESSAGE(reached > start, about);
+    TEST_ASSERT_TRUE_MESSAGE(fmu_version == 3 || reached > start, about);
     assert_is_state_at(c, obstacle, method, reached);
 
-    fmu_restore(c, state);
+    if (fmu_version == 2) {
+        fmu_restore(c, state);
+    }
     assert_same(c, other);
     halve_to_the_end(c, other, obstacle);
     fmu_assert_reset_is_fresh(c, about);
@@ -174,7 +182,8 @@ static void overcome(const struct obstacle *obstacle, fmi2Integer method, bool h
 }
 
 static void overcome_all(fmi2Integer method) {
-    for (size_t i = 0; i < FMU_COUNT(obstacles); i++) {
+    const size_t count = fmu_version == 2 ? FMU_COUNT(obstacles) : 1; // no slopes in FMI 3.0
+    for (size_t i = 0; i < count; i++) {
         overcome(&obstacles[i], method, true);
         overcome(&obstacles[i], method, false);
     }

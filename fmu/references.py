@@ -1,0 +1,209 @@
+"""Collects scenarios for an FMU: what goes into extra/org.fmi-standard.fmi-ls-ref.
+
+For each scenario a folder with its inputs, reference and options in the format of the FMI
+cross-check, and its parameters as a parameter set of SSP; beside them fmi-ls-manifest.xml, which
+says what each file is (FMI Layered Standard References 1.0.0-alpha.1).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tomllib
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from atomic_write import atomic_write
+from declaration.load import Declaration, DeclarationError, load
+from declaration.schema import Enumeration, Float64, Variable
+from description_parts import document
+
+MANIFEST = "fmi-ls-manifest.xml"
+NAME = "org.fmi-standard.fmi-ls-ref"
+VERSION = "1.0.0-alpha.1"
+DESCRIPTION = "Layered Standard providing information on related files included in an FMU."
+NAMESPACES = {
+    "fmi-ls": "http://fmi-standard.org/fmi-ls-manifest",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+}
+PARAMETERS = "parameters.ssv"
+
+# of a scenario, by the ending of their names: role, type and what they are
+FILES = {
+    "_in.csv": ("other", "text/csv", "Inputs, each held until the next row"),
+    "_ref.csv": ("result", "text/csv", "Reference: outputs at the end of each step"),
+    "_ref.opt": ("configuration", "text/csv", "Start, stop and step in s, relative tolerance"),
+    PARAMETERS: ("parameter", "application/x-ssp-parameter-set", "Parameters and initial values"),
+}
+
+
+class CarriedScenarioError(Exception):
+    """A scenario that an FMU cannot carry: file and reason in one line."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What a parameter set and the manifest need of a scenario."""
+
+    name: str
+    path: Path
+    title: str
+    values: dict[str, Any]  # parameters and initial values as they stand in the file
+
+
+def content_of(path: Path) -> bytes:
+    """Content of a file."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise CarriedScenarioError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def read(path: Path) -> Scenario:
+    """Read a scenario; the command line that runs it checks the rest."""
+    content = content_of(path)
+    try:
+        keys = tomllib.loads(content.decode())
+    except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
+        raise CarriedScenarioError(f"{path}: is not valid TOML: {error}") from None
+    title, parameters, initial = (keys.get(k, {}) for k in ("title", "parameters", "initial"))
+    if not isinstance(title, str):
+        raise CarriedScenarioError(f"{path}: title is missing or not a text")
+    if not isinstance(parameters, dict) or not isinstance(initial, dict):
+        raise CarriedScenarioError(f"{path}: parameters and initial must be tables")
+    return Scenario(path.stem, path, title, parameters | initial)
+
+
+def tag(name: str) -> str:
+    """A name with its prefix, as ElementTree wants it."""
+    prefix, _, local = name.partition(":")
+    return f"{{{NAMESPACES[prefix]}}}{local}"
+
+
+# ---- the parameter set
+
+
+def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
+    """Text of the .ssv (SSP 1.0) with the values that are not the start values of the FMU."""
+    root = ET.Element(
+        tag("ssv:ParameterSet"), version="1.0", name=scenario.name, description=scenario.title
+    )
+    parameters = ET.SubElement(root, tag("ssv:Parameters"))
+    units = set()
+    for name, value in scenario.values.items():
+        variable = declaration.variables.get(name)
+        if variable is None:
+            raise CarriedScenarioError(f"{scenario.path}: '{name}' is not declared")
+        parameter = ET.SubElement(parameters, tag("ssv:Parameter"), name=name)
+        kind, attributes = typed(variable, value, f"{scenario.path}: {name}")
+        ET.SubElement(parameter, tag(f"ssv:{kind}"), attributes)
+        units |= {variable.unit} if isinstance(variable, Float64) else set()
+    if units:
+        add_units(root, sorted(units), declaration)
+    return document(root)
+
+
+def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, str]]:
+    """Element of a value and its attributes."""
+    if isinstance(variable, Enumeration):
+        if not isinstance(value, str) or value not in variable.items:
+            raise CarriedScenarioError(
+                f"{place} = {value!r:.40} is not one of {', '.join(variable.items)}"
+            )
+        return "Enumeration", {"value": value}
+    wanted = (int, float) if isinstance(variable, Float64) else (int,)
+    if type(value) not in wanted:
+        raise CarriedScenarioError(
+            f"{place} = {value!r:.40} is not a value of type {variable.type}"
+        )
+    if isinstance(variable, Float64):
+        return "Real", {"value": repr(float(value)), "unit": variable.unit}
+    return "Integer", {"value": str(value)}
+
+
+def add_units(root: ET.Element, names: Sequence[str], declaration: Declaration) -> None:
+    """Write the units in use by their SI base exponents."""
+    units = ET.SubElement(root, tag("ssv:Units"))
+    for name in names:
+        exponents = {b: str(e) for b, e in declaration.units[name].exponents.items()}
+        unit = ET.SubElement(units, tag("ssc:Unit"), name=name)
+        ET.SubElement(unit, tag("ssc:BaseUnit"), exponents)
+
+
+# ---- the manifest
+
+
+def manifest(model: str, scenarios: Sequence[Scenario]) -> str:
+    """Text of fmi-ls-manifest.xml."""
+    root = ET.Element("fmiReferences")
+    root.set(tag("fmi-ls:fmi-ls-name"), NAME)
+    root.set(tag("fmi-ls:fmi-ls-version"), VERSION)
+    root.set(tag("fmi-ls:fmi-ls-description"), DESCRIPTION)
+    for scenario in scenarios:
+        for ending, (role, kind, what) in FILES.items():
+            ET.SubElement(
+                root,
+                "Related",
+                source=f"{scenario.name}/{file_name(model, ending)}",
+                role=role,
+                type=kind,
+                description=f"{what} ({scenario.title})",
+            )
+    return document(root)
+
+
+def file_name(model: str, ending: str) -> str:
+    """Name of a file of a scenario: after the model where the cross-check has it so."""
+    return model + ending if ending.startswith("_") else ending
+
+
+# ---- all files
+
+
+def files(declaration: Declaration, names: Sequence[str]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of each file."""
+    folder, model = declaration.path.parent, declaration.model.name
+    scenarios = [read(folder / "scenarios" / f"{name}.toml") for name in names]
+    yield MANIFEST, manifest(model, scenarios).encode()
+    for scenario in scenarios:
+        for ending in FILES:
+            name = file_name(model, ending)
+            if ending == PARAMETERS:
+                content = parameter_set(scenario, declaration).encode()
+            else:
+                content = content_of(folder / "references" / scenario.name / name)
+            yield f"{scenario.name}/{name}", content
+
+
+def write(output: Path, contents: Mapping[str, bytes]) -> None:
+    """Write the files below a folder."""
+    for name, content in contents.items():
+        (output / name).parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(output / name) as temporary:
+            temporary.write_bytes(content)
+
+
+def main() -> int:
+    """Collect; 2 with a line on standard error where something is missing or wrong."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("variables", type=Path, help="variables.toml of the model")
+    parser.add_argument("names", nargs="+", metavar="NAME", help="scenarios of the model")
+    parser.add_argument("--output", type=Path, required=True, help="folder for the files")
+    arguments = parser.parse_args()
+    for prefix, namespace in NAMESPACES.items():
+        ET.register_namespace(prefix, namespace)
+    try:
+        declaration = load(arguments.variables)
+        write(arguments.output, dict(files(declaration, arguments.names)))
+    except (DeclarationError, CarriedScenarioError, OSError) as error:
+        print(f"references.py: {error!s:.2000}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,379 @@
+/* What FMI 3.0 asks of every function: instances, messages, counts and types of values, event mode,
+ * results of a step. Sections 2.2.4, 2.2.6.2, 2.3.1 and 4.2. */
+#include "fmu3_harness.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+/* ---- Instances ------------------------------------------------------------------------------ */
+
+/* Called as fmi3LogMessageCallback. */
+static void count_message(fmi3InstanceEnvironment environment, fmi3Status status,
+                          fmi3String category, fmi3String message) {
+    struct fmu3_importer *to = environment;
+    to->count[status]++;
+    snprintf(to->category, sizeof to->category, "%s", category);
+    snprintf(to->texts, sizeof to->texts, "%s", message);
+}
+
+static void test_instantiate_says_what_it_refuses(void) {
+    static const struct {
+        const char *name, *token;
+        const char *wrong, *expected; /* words of the message */
+    } cases[] = {
+        {NULL, RP_MANIPULATOR_TOKEN_FMI3, "name", "not empty"},
+        {"", RP_MANIPULATOR_TOKEN_FMI3, "name", "not empty"},
+        {"m", NULL, "token", RP_MANIPULATOR_TOKEN_FMI3},
+        {"m", "{another}", "{another}", RP_MANIPULATOR_TOKEN_FMI3},
+        {"m", RP_MANIPULATOR_GUID, RP_MANIPULATOR_GUID, RP_MANIPULATOR_TOKEN_FMI3},
+        {"m", "{%s%n#}", "{?s?n##}", RP_MANIPULATOR_TOKEN_FMI3},
+    };
+    for (size_t i = 0; i < 2 * FMU3_COUNT(cases); i++) {
+        const char *name = cases[i / 2].name;
+        const char *token = cases[i / 2].token;
+        fmu3_clear_messages(&importer);
+        TEST_ASSERT_NULL(i % 2 == 0 ? fmu3.InstantiateModelExchange(name, token, NULL, false, false,
+                                                                    &importer, count_message)
+                                    : fmu3.InstantiateCoSimulation(name, token, NULL, false, false,
+                                                                   false, false, NULL, 0, &importer,
+                                                                   count_message, NULL));
+        TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+        TEST_ASSERT_EQUAL_STRING("logStatusError", importer.category);
+        fmu3_assert_logged(&importer, cases[i / 2].wrong);
+        fmu3_assert_logged(&importer, cases[i / 2].expected);
+    }
+}
+
+static void test_scheduled_execution_is_refused(void) {
+    TEST_ASSERT_NULL(fmu3.InstantiateScheduledExecution("m", RP_MANIPULATOR_TOKEN_FMI3, "", false,
+                                                        false, &importer, count_message, NULL, NULL,
+                                                        NULL));
+    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+    fmu3_assert_logged(&importer, "Co-Simulation");
+}
+
+/* Continuous inputs and outputs of the model, and nothing else, may be named for intermediate
+ * updates. */
+static void test_variables_of_intermediate_updates(void) {
+    static const fmi3ValueReference good[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_q1,
+                                              RP_MANIPULATOR_total_energy, RP_MANIPULATOR_tau1};
+    static const fmi3ValueReference bad[] = {RP_MANIPULATOR_m1,
+                                             RP_MANIPULATOR_time,
+                                             RP_MANIPULATOR_D11,
+                                             RP_MANIPULATOR_solver_steps,
+                                             RP_MANIPULATOR_solver_last_step,
+                                             9,
+                                             9999,
+                                             UINT32_MAX};
+    struct fmu3_options options = {.required = good, .required_count = FMU3_COUNT(good)};
+    (void)fmu3_co_simulation(&importer, &options);
+    TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
+    for (size_t i = 0; i < FMU3_COUNT(bad); i++) {
+        char number[16];
+        const fmi3ValueReference mixed[] = {good[0], bad[i]};
+        options = (struct fmu3_options){.required = mixed, .required_count = 2};
+        fmu3_clear_messages(&importer);
+        TEST_ASSERT_NULL(fmu3_try_co_simulation(&importer, &options));
+        snprintf(number, sizeof number, "%u", (unsigned)bad[i]);
+        fmu3_assert_logged(&importer, number);
+        TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+    }
+    options = (struct fmu3_options){.required = NULL, .required_count = 2};
+    TEST_ASSERT_NULL(fmu3_try_co_simulation(&importer, &options));
+    fmu3_assert_logged(&importer, "NULL");
+}
+
+static void test_callbacks_may_be_null(void) {
+    const fmi3ValueReference tau1 = RP_MANIPULATOR_tau1;
+    const fmi3Instance instance = fmu3.InstantiateCoSimulation(
+        "m", RP_MANIPULATOR_TOKEN_FMI3, NULL, true, true, true, true, &tau1, 1, NULL, NULL, NULL);
+    TEST_ASSERT_NOT_NULL(instance);
+    fmu3_initialize(instance, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterStepMode(instance));
+    fmu3_step(instance, 0.0, 0.1);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_set(instance, RP_MANIPULATOR_ddq1, 1.0));
+    fmu3.FreeInstance(instance);
+    TEST_ASSERT_NULL(fmu3.InstantiateModelExchange("", "", NULL, false, false, NULL, NULL));
+    TEST_ASSERT_NULL(fmu3.InstantiateScheduledExecution("m", RP_MANIPULATOR_TOKEN_FMI3, "", false,
+                                                        false, NULL, NULL, NULL, NULL, NULL));
+}
+
+/* ---- Messages ------------------------------------------------------------------------------- */
+
+static void discard(fmi3Instance instance) {
+    TEST_ASSERT_EQUAL_INT(fmi3Discard, fmu3_try_set(instance, RP_MANIPULATOR_tau1, NAN));
+}
+
+static void fail(fmi3Instance instance) {
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_set(instance, RP_MANIPULATOR_ddq1, 1.0));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.Reset(instance));
+}
+
+/* Section 2.3.1: with logging off errors are sent all the same, and nothing else. */
+static void test_errors_cannot_be_silenced(void) {
+    static const struct fmu3_options logging = {.logging_on = true};
+    static const fmi3String events[] = {"logEvents"};
+    const fmi3Instance quiet = fmu3_co_simulation(&importer, NULL);
+    for (int round = 0; round < 3; round++) {
+        if (round == 1) {
+            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(quiet, false, 0, NULL));
+        } else if (round == 2) {
+            static const fmi3String errors[] = {"logStatusError", "logStatusFatal"};
+            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(quiet, false, 2, errors));
+        }
+        fmu3_clear_messages(&importer);
+        discard(quiet);
+        fmu3_initialize(quiet, 0.0);
+        TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
+        fail(quiet);
+        TEST_ASSERT_EQUAL_UINT(1, fmu3_message_count(&importer));
+        TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+    }
+
+    const fmi3Instance loud = fmu3_co_simulation(&importer, &logging);
+    fmu3_clear_messages(&importer);
+    discard(loud);
+    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Discard]);
+    TEST_ASSERT_GREATER_THAN_UINT(0, importer.count[fmi3OK]); // the call
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(loud, true, 1, events));
+    fmu3_clear_messages(&importer);
+    discard(loud);
+    TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
+    fmu3_initialize(loud, 0.0);
+    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3OK]);
+    TEST_ASSERT_EQUAL_STRING("logEvents", importer.category);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(loud, true, 0, NULL));
+    discard(loud);
+    TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Discard]);
+}
+
+static void test_an_unknown_category_is_an_error(void) {
+    static const fmi3String unknown[] = {"logEvents", "logNothing"};
+    const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetDebugLogging(instance, true, 2, unknown));
+    fmu3_assert_logged(&importer, "logNothing");
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.Reset(instance));
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetDebugLogging(instance, true, 2, NULL));
+}
+
+/* ---- Values --------------------------------------------------------------------------------- */
+
+/* nValues counts elements: all variables are scalars. */
+static void test_counts_that_differ_are_errors(void) {
+    static const size_t counts[] = {0, 1, 3, SIZE_MAX};
+    const fmi3ValueReference references[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
+    const fmi3Int32 orders[] = {1, 1};
+    for (size_t i = 0; i < FMU3_COUNT(counts); i++) {
+        for (int which = 0; which < 8; which++) {
+            double values[] = {-1.0, -1.0, -1.0};
+            fmi3Int32 integers[3] = {0};
+            fmi3Int64 items[3] = {0};
+            fmi3Status status = fmi3OK;
+            const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+            fmu3_initialize(c, 0.0);
+            fmu3_clear_messages(&importer);
+            switch (which) {
+            case 0:
+                status = fmu3.GetFloat64(c, references, 2, values, counts[i]);
+                break;
+            case 1:
+                status = fmu3.SetFloat64(c, references, 2, values, counts[i]);
+                break;
+            case 2:
+                status = fmu3.GetInt32(c, references, 2, integers, counts[i]);
+                break;
+            case 3:
+                status = fmu3.GetInt64(c, references, 2, items, counts[i]);
+                break;
+            case 4:
+                status = fmu3.GetOutputDerivatives(c, references, 2, orders, values, counts[i]);
+                break;
+            case 5:
+                status = fmu3.GetDirectionalDerivative(c, references, 2, references, 2, values,
+                                                       counts[i], values, 2);
+                break;
+            case 6:
+                status = fmu3.GetAdjointDerivative(c, references, 2, references, 2, values, 2,
+                                                   values, counts[i]);
+                break;
+            default:
+                status = fmu3.GetString(c, references, 2, NULL, counts[i]);
+                break;
+            }
+            TEST_ASSERT_EQUAL_INT(fmi3Error, status);
+            TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
+            fmu3_assert_logged(&importer, "2 are expected");
+            TEST_ASSERT_TRUE(values[0] == -1.0);
+            fmu3_free(c);
+        }
+    }
+}
+
+/* Integers and enumerations have functions of their own types. */
+static void test_types(void) {
+    const fmi3ValueReference method = RP_MANIPULATOR_solver_method;
+    const fmi3ValueReference steps = RP_MANIPULATOR_max_internal_steps;
+    fmi3Int32 integer = -1;
+    fmi3Int64 item = -1;
+    fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt64(c, &method, 1, &item, 1));
+    TEST_ASSERT_EQUAL_INT(1, item);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt32(c, &steps, 1, &integer, 1));
+    TEST_ASSERT_EQUAL_INT(100000, integer);
+    item = 3;
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetInt64(c, &method, 1, &item, 1));
+    item = 0;
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt64(c, &method, 1, &item, 1));
+    TEST_ASSERT_EQUAL_INT(3, item);
+
+    static const fmi3Int64 no_items[] = {0, 4, -1, INT64_MAX, INT64_MIN, (INT64_C(1) << 32) + 1};
+    for (size_t i = 0; i < FMU3_COUNT(no_items); i++) {
+        TEST_ASSERT_EQUAL_INT(fmi3Discard, fmu3.SetInt64(c, &method, 1, &no_items[i], 1));
+    }
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetInt32(c, &method, 1, &integer, 1));
+    fmu3_assert_logged(&importer, "enumeration");
+    c = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetInt64(c, &steps, 1, &item, 1));
+    fmu3_assert_logged(&importer, "int32");
+    c = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetInt32(c, &method, 1, &integer, 1));
+    c = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetInt64(c, &steps, 1, &item, 1));
+}
+
+/* Each of the types that no variable has. */
+static void test_types_without_variables(void) {
+    const fmi3ValueReference q1 = RP_MANIPULATOR_q1;
+    for (int which = 0; which < 6; which++) {
+        static char memory[16];
+        size_t size = 0;
+        fmi3Binary binary = NULL;
+        fmi3String string = NULL;
+        fmi3Status status = fmi3OK;
+        const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+        fmu3_clear_messages(&importer);
+        switch (which) {
+        case 0:
+            status = fmu3.GetFloat32(c, &q1, 1, (fmi3Float32 *)(void *)memory, 1);
+            break;
+        case 1:
+            status = fmu3.GetUInt64(c, &q1, 1, (fmi3UInt64 *)(void *)memory, 1);
+            break;
+        case 2:
+            status = fmu3.GetBoolean(c, &q1, 1, (fmi3Boolean *)memory, 1);
+            break;
+        case 3:
+            status = fmu3.GetString(c, &q1, 1, &string, 1);
+            break;
+        case 4:
+            status = fmu3.SetBinary(c, &q1, 1, &size, &binary, 1);
+            break;
+        default:
+            status = fmu3.SetInt8(c, &q1, 1, (const fmi3Int8 *)memory, 1);
+            break;
+        }
+        TEST_ASSERT_EQUAL_INT(fmi3Error, status);
+        fmu3_assert_logged(&importer, "value reference 10");
+        fmu3_free(c);
+    }
+}
+
+/* Start values, and what was set, can be read before initialization. */
+static void test_values_before_initialization(void) {
+    const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_TRUE(fmu3_get(c, RP_MANIPULATOR_m1) == 2.0);
+    fmu3_set(c, RP_MANIPULATOR_q2, 0.25);
+    TEST_ASSERT_TRUE(fmu3_get(c, RP_MANIPULATOR_q2) == 0.25);
+    TEST_ASSERT_TRUE(fmu3_get(c, RP_MANIPULATOR_ee_x) == 0.75);
+}
+
+/* ---- Event mode ----------------------------------------------------------------------------- */
+
+static void update_discrete_states(fmi3Instance c) {
+    bool flags[] = {true, true, true, true, true};
+    double next = -1.0;
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2],
+                                                            &flags[3], &flags[4], &next));
+    for (size_t i = 0; i < FMU3_COUNT(flags); i++) {
+        TEST_ASSERT_FALSE(flags[i]);
+    }
+    TEST_ASSERT_TRUE(next != -1.0);
+}
+
+/* An input that jumps in event mode does what it does between steps. */
+static void test_inputs_may_jump_in_event_mode(void) {
+    static const struct fmu3_options events = {.event_mode = true};
+    double x[2][FMU3_STATES];
+    for (int with_events = 0; with_events < 2; with_events++) {
+        const fmi3Instance c = fmu3_co_simulation(&importer, with_events ? &events : NULL);
+        fmu3_initialize(c, 0.0);
+        if (with_events) {
+            update_discrete_states(c);
+            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterStepMode(c));
+        }
+        for (int i = 0; i < 20; i++) {
+            if (i % 4 == 1 && with_events) {
+                TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterEventMode(c));
+            }
+            if (i % 4 == 1) {
+                fmu3_set(c, RP_MANIPULATOR_tau1, i - 7.0);
+                fmu3_set(c, RP_MANIPULATOR_m2, 1.0 + 0.1 * i);
+            }
+            if (i % 4 == 1 && with_events) {
+                update_discrete_states(c);
+                TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterStepMode(c));
+            }
+            fmu3_step(c, 0.05 * i, 0.05);
+        }
+        fmu3_get_states(c, x[with_events]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+}
+
+static void test_results_of_an_event_need_a_place(void) {
+    static const struct fmu3_options events = {.event_mode = true};
+    for (int missing = 0; missing < 6; missing++) {
+        bool flags[5];
+        bool *places[5];
+        double next;
+        for (int i = 0; i < 5; i++) {
+            places[i] = i == missing ? NULL : &flags[i];
+        }
+        const fmi3Instance c = fmu3_co_simulation(&importer, &events);
+        fmu3_initialize(c, 0.0);
+        TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.UpdateDiscreteStates(c, places[0], places[1],
+                                                                   places[2], places[3], places[4],
+                                                                   missing == 5 ? NULL : &next));
+        fmu3_assert_logged(&importer, "NULL");
+        fmu3_free(c);
+    }
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static void test_results_of_a_step_need_a_place(void) {
+    for (int missing = 0; missing < 4; missing++) {
+        bool flags[3];
+        double reached;
+        const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+        fmu3_initialize(c, 0.0);
+        TEST_ASSERT_EQUAL_INT(
+            fmi3Error, fmu3.DoStep(c, 0.0, 0.1, true, missing == 0 ? NULL : &flags[0],
+                                   missing == 1 ? NULL : &flags[1], missing == 2 ? NULL : &flags[2],
+                                   missing == 3 ? NULL : &reached));
+        fmu3_assert_logged(&importer, "NULL");
+        fmu3_free(c);
+    }
+}
+
+/* The stop time comes with the initialization. */
+static void test_no_step_passes_the_stop_time(void) {
+    const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterInitializationMode(c, false, 0.0, 1.0, true, 2.0));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.ExitInitializationMode(c));
+    fmu3_step(c, 1.0, 0.75);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_step(c, 1.75, 0.5).status);
+    fmu3_assert_logged(&importer, "stop time is 2");
+}

@@ -1,0 +1,162 @@
+"""The built FMUs of FMI 3.0 as their importers see them: archive, binary, model description."""
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from tests.support.cosim_project import FMUS
+
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+MODELS = list(FMUS)
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def path(request: pytest.FixtureRequest) -> Path:
+    """Each FMU of FMI 3.0."""
+    of_fmi2 = FMUS[request.param]
+    return of_fmi2.parent / "fmi3" / of_fmi2.name
+
+
+@pytest.fixture(scope="module")
+def root(path: Path) -> ET.Element:
+    """Its model description."""
+    with zipfile.ZipFile(path) as archive:
+        return ET.fromstring(archive.read("modelDescription.xml"))
+
+
+@pytest.fixture(scope="module")
+def fmi2_root(path: Path) -> ET.Element:
+    """The model description of the FMU of FMI 2.0."""
+    with zipfile.ZipFile(path.parents[1] / path.name) as archive:
+        return ET.fromstring(archive.read("modelDescription.xml"))
+
+
+def variables(root: ET.Element) -> dict[str, ET.Element]:
+    return {v.get("name", ""): v for v in root.find("ModelVariables")}
+
+
+def test_the_archive_holds_what_importers_look_for(path: Path) -> None:
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        entries = {info.filename: info for info in archive.infolist()}
+    assert {name for name in entries if not name.endswith(".svg")} == {
+        f"binaries/x86_64-linux/{path.stem}.so",
+        "documentation/index.html",
+        "documentation/licenses/license.txt",
+        "documentation/licenses/musl.txt",
+        "documentation/licenses/sundials.txt",
+        "modelDescription.xml",
+    }
+    assert {info.date_time for info in entries.values()} == {(1980, 1, 1, 0, 0, 0)}
+
+
+def test_the_binary_exports_the_functions_of_the_standard_and_nothing_else(
+    path: Path, tmp_path: Path
+) -> None:
+    with zipfile.ZipFile(path) as archive:
+        binary = archive.extract(f"binaries/x86_64-linux/{path.stem}.so", tmp_path)
+    command = ["nm", "-D", "--defined-only", binary]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    exported = {line.split()[-1] for line in output.splitlines()}
+    header = (HEADERS / "fmi3Functions.h").read_text()
+    standard = set(re.findall(r"fmi3FullName\((fmi3\w+)\)", header))
+    assert len(standard) == 75
+    assert exported == standard
+
+
+def test_fmpy_finds_no_problem(path: Path) -> None:
+    assert validate_fmu(str(path)) == []
+    command = [Path(sys.executable).parent / "fmpy", "validate", path]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "No problems found." in output
+
+
+def test_variables_are_those_of_fmi_2(root: ET.Element, fmi2_root: ET.Element) -> None:
+    """But for the aliases that FMI 2.0 needs."""
+    types = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
+    expected = {
+        name: variable
+        for name, variable in variables(fmi2_root).items()
+        if not name.startswith("der_")
+    }
+    assert [*variables(root)] == [*expected]
+    for name, variable in variables(root).items():
+        old = expected[name]
+        assert variable.tag == types[old[0].tag]
+        for key in ("valueReference", "description", "causality", "variability", "initial"):
+            assert variable.get(key) == old.get(key), (name, key)
+        for key in ("start", "min", "max"):
+            assert variable.get(key) == old[0].get(key), (name, key)
+
+
+def test_units_stand_in_types(root: ET.Element, fmi2_root: ET.Element) -> None:
+    """Importers refuse them on variables; every type is used."""
+    types = {t.get("name"): t for t in root.find("TypeDefinitions")}
+    used = set()
+    for name, variable in variables(root).items():
+        assert not set(variable.attrib) & {"unit", "displayUnit", "nominal", "quantity"}
+        if variable.tag == "Int32":
+            continue
+        declared = types[variable.get("declaredType")]
+        used.add(variable.get("declaredType"))
+        for key in ("unit", "displayUnit", "nominal"):
+            assert declared.get(key) == variables(fmi2_root)[name][0].get(key), (name, key)
+    assert used == set(types)
+    assert not set(types) & set(variables(root))
+
+
+def test_states_and_derivatives(root: ET.Element) -> None:
+    """`derivative` is a value reference; the derivatives stand in the order of the states."""
+    by_reference = {v.get("valueReference"): v for v in variables(root).values()}
+    derivatives = [e.get("valueReference") for e in root.iter("ContinuousStateDerivative")]
+    states = [by_reference[reference].get("derivative") for reference in derivatives]
+    assert None not in states
+    assert states == sorted(states, key=int)
+    with_derivative = {v.get("derivative") for v in variables(root).values()} - {None}
+    assert with_derivative == set(states)
+
+
+def test_outputs_and_initial_unknowns(root: ET.Element) -> None:
+    names = {v.get("valueReference"): n for n, v in variables(root).items()}
+    outputs = [n for n, v in variables(root).items() if v.get("causality") == "output"]
+    assert [names[e.get("valueReference")] for e in root.iter("Output")] == outputs
+    for element in root.iter("InitialUnknown"):
+        assert variables(root)[names[element.get("valueReference")]].get("initial") == "calculated"
+
+
+def test_intermediate_updates_are_of_continuous_inputs_and_outputs(root: ET.Element) -> None:
+    for name, variable in variables(root).items():
+        expected = (
+            variable.tag == "Float64"
+            and variable.get("causality") in ("input", "output")
+            and variable.get("variability") == "continuous"
+        )
+        assert (variable.get("intermediateUpdate") == "true") == expected, name
+
+
+def test_the_token_is_not_the_guid(root: ET.Element, fmi2_root: ET.Element) -> None:
+    assert root.get("instantiationToken") != fmi2_root.get("guid")
+
+
+@pytest.mark.parametrize("known", ["parameters", "states"])
+def test_parameters_are_knowns_of_outputs(known: str) -> None:
+    """Unlike in FMI 2.0."""
+    path = FMUS["rp_manipulator"]
+    with zipfile.ZipFile(path.parent / "fmi3" / path.name) as archive:
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+    elements = variables(root)
+    output = elements["potential_energy"].get("valueReference")
+    (structure,) = [e for e in root.iter("Output") if e.get("valueReference") == output]
+    expected = {
+        "parameters": ["m1", "m2", "l1", "lc1", "a", "g"],
+        "states": ["q1", "q2"],
+    }[known]
+    dependencies = structure.get("dependencies").split()
+    assert {elements[name].get("valueReference") for name in expected} <= set(dependencies)

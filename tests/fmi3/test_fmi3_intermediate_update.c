@@ -1,0 +1,494 @@
+/* Intermediate updates: inputs at four times of a step, outputs after each internal step, and an
+ * early return that is asked for there. FMI 3.0, section 4.2.2. */
+#include "each_method.h"
+#include "fmu3_harness.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unity.h>
+
+static const fmi3ValueReference inputs[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
+static const fmi3ValueReference outputs[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_ddq1};
+
+static const struct fmu3_options with_inputs = {
+    .intermediate_updates = true, .required = inputs, .required_count = FMU3_COUNT(inputs)};
+static const struct fmu3_options with_outputs = {.intermediate_updates = true,
+                                                 .early_return = true,
+                                                 .required = outputs,
+                                                 .required_count = FMU3_COUNT(outputs)};
+
+static fmi3Instance swinging(const struct fmu3_options *options, int with_method, double start) {
+    const fmi3Instance instance = fmu3_co_simulation(&importer, options);
+    fmu3_set_method(instance, with_method);
+    fmu3_set(instance, RP_MANIPULATOR_relative_tolerance, 1e-11);
+    fmu3_set(instance, RP_MANIPULATOR_q1, 0.3);
+    fmu3_set(instance, RP_MANIPULATOR_dq1, 1.0);
+    fmu3_initialize(instance, start);
+    return instance;
+}
+
+/* ---- Inputs --------------------------------------------------------------------------------- */
+
+/* tau1 and f2 as functions of time, with all their derivatives at t. */
+static void smooth_inputs(double t, double u[2]) {
+    u[0] = 12.0 + 6.0 * sin(7.0 * t);
+    u[1] = 4.0 + 5.0 * cos(5.0 * t);
+}
+
+struct asked {
+    double times[16];
+    unsigned count;
+    fmi3Status status; /* the worst of setting the inputs */
+};
+
+static void set_smooth_inputs(struct fmu3_importer *of, const struct fmu3_update *update) {
+    struct asked *asked = of->data;
+    double u[2];
+    if (!update->set) {
+        return;
+    }
+    smooth_inputs(update->time, u);
+    const fmi3Status status = fmu3.SetFloat64(of->instance, inputs, 2, u, 2);
+    asked->status = status > asked->status ? status : asked->status;
+    if (asked->count < FMU3_COUNT(asked->times)) {
+        asked->times[asked->count++] = update->time;
+    }
+}
+
+/* x' of the arm at time t, with the inputs as functions of time: an instance for Model Exchange. */
+static void slope(fmi3Instance instance, double t, const double x[FMU3_STATES],
+                  double dx[FMU3_STATES]) {
+    double u[2];
+    smooth_inputs(t, u);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetTime(instance, t));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetContinuousStates(instance, x, FMU3_STATES));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFloat64(instance, inputs, 2, u, 2));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetContinuousStateDerivatives(instance, dx, FMU3_STATES));
+}
+
+/* The reference: the classical Runge-Kutta method from 0 to end, at steps that leave 1e-13. */
+static void integrate_reference(double end, double x[FMU3_STATES]) {
+    enum { STEPS = 8192 };
+    const fmi3Instance instance = fmu3_model_exchange(&importer);
+    fmu3_initialize(instance, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterContinuousTimeMode(instance));
+    const double h = end / STEPS;
+    for (int i = 0; i < STEPS; i++) {
+        static const double weights[] = {1.0, 2.0, 2.0, 1.0};
+        static const double nodes[] = {0.0, 0.5, 0.5, 1.0};
+        double sum[FMU3_STATES] = {0};
+        double k[FMU3_STATES] = {0};
+        for (int stage = 0; stage < 4; stage++) {
+            double at[FMU3_STATES];
+            for (int j = 0; j < FMU3_STATES; j++) {
+                at[j] = x[j] + h * nodes[stage] * k[j];
+            }
+            slope(instance, (i + nodes[stage]) * h, at, k);
+            for (int j = 0; j < FMU3_STATES; j++) {
+                sum[j] += weights[stage] * k[j];
+            }
+        }
+        for (int j = 0; j < FMU3_STATES; j++) {
+            x[j] += h / 6.0 * sum[j];
+        }
+    }
+    fmu3_free(instance);
+}
+
+static double error_of(const double reference[FMU3_STATES], int with_method, double end, int steps,
+                       bool held) {
+    struct asked asked = {.status = fmi3OK};
+    const double h = end / steps;
+    importer.update = set_smooth_inputs;
+    importer.data = &asked;
+    const fmi3Instance instance = swinging(held ? NULL : &with_inputs, with_method, 0.0);
+    for (int i = 0; i < steps; i++) {
+        if (held) {
+            double u[2];
+            smooth_inputs(i * h, u);
+            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFloat64(instance, inputs, 2, u, 2));
+        }
+        fmu3_step(instance, i * h, h);
+    }
+    double x[FMU3_STATES];
+    double error = 0.0;
+    fmu3_get_states(instance, x);
+    for (int j = 0; j < FMU3_STATES; j++) {
+        error = fmax(error, fabs(x[j] - reference[j]));
+    }
+    TEST_ASSERT_EQUAL_INT(fmi3OK, asked.status);
+    fmu3_free(instance);
+    return error;
+}
+
+/* Over three halvings of the step, down to 100 times the error of the integration. */
+EACH_METHOD static void test_the_order_is_four(void) {
+    const double end = 1.6;
+    double reference[FMU3_STATES] = {0.3, 0.0, 1.0, 0.0};
+    integrate_reference(end, reference);
+    const double coarse = error_of(reference, method, end, 16, false);
+    const double fine = error_of(reference, method, end, 128, false);
+    const double order = log2(coarse / fine) / 3.0;
+    char text[128];
+    snprintf(text, sizeof text, "errors %.2e and %.2e, order %.2f", coarse, fine, order);
+    TEST_ASSERT_TRUE_MESSAGE(fine > 100.0 * 1e-12, text);
+    TEST_ASSERT_TRUE_MESSAGE(fabs(order - 4.0) <= 0.2, text);
+
+    // held inputs are of order 1
+    const double held_order = log2(error_of(reference, method, end, 16, true) /
+                                   error_of(reference, method, end, 128, true)) /
+                              3.0;
+    TEST_ASSERT_TRUE(fabs(held_order - 1.0) <= 0.2);
+}
+
+static void test_inputs_are_asked_for_at_four_times(void) {
+    struct asked asked = {.status = fmi3OK};
+    importer.update = set_smooth_inputs;
+    importer.data = &asked;
+    const fmi3Instance instance = swinging(&with_inputs, 1, 2.0);
+    fmu3_step(instance, 2.0, 0.75);
+    static const double expected[] = {2.0, 2.25, 2.5, 2.75};
+    TEST_ASSERT_EQUAL_UINT(4, asked.count);
+    TEST_ASSERT_EQUAL_MEMORY(expected, asked.times, sizeof expected);
+
+    // the last one is the value of the input from then on
+    double u[2];
+    smooth_inputs(2.75, u);
+    TEST_ASSERT_TRUE(u[0] == fmu3_get(instance, RP_MANIPULATOR_tau1));
+    TEST_ASSERT_TRUE(u[1] == fmu3_get(instance, RP_MANIPULATOR_f2));
+}
+
+/* What is asked for and not set keeps its value: the same bits as without intermediate updates. */
+EACH_METHOD static void test_what_is_not_set_keeps_its_value(void) {
+    double x[2][FMU3_STATES];
+    for (int updates = 0; updates < 2; updates++) {
+        const fmi3Instance instance = swinging(updates ? &with_inputs : NULL, method, 0.0);
+        for (int i = 0; i < 50; i++) {
+            if (i % 10 == 0) {
+                fmu3_set(instance, RP_MANIPULATOR_tau1, 3.0 + i);
+            }
+            fmu3_step(instance, 0.02 * i, 0.02);
+        }
+        fmu3_get_states(instance, x[updates]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+    TEST_ASSERT_GREATER_THAN_UINT(199, importer.updates);
+}
+
+/* No input is among the variables: none is asked for. */
+static void note_set(struct fmu3_importer *of, const struct fmu3_update *update) {
+    *(unsigned *)of->data += update->set;
+}
+
+static void test_inputs_that_were_not_named_are_not_asked_for(void) {
+    unsigned asked = 0;
+    importer.update = note_set;
+    importer.data = &asked;
+    const fmi3Instance instance = swinging(&with_outputs, 1, 0.0);
+    fmu3_step(instance, 0.0, 0.5);
+    TEST_ASSERT_EQUAL_UINT(0, asked);
+    TEST_ASSERT_GREATER_THAN_UINT(0, importer.updates);
+}
+
+/* ---- Outputs -------------------------------------------------------------------------------- */
+
+enum { MOST_POINTS = 4000 };
+
+struct points {
+    unsigned count;
+    double times[MOST_POINTS];
+    double values[MOST_POINTS][2];
+    double derivatives[MOST_POINTS];
+    bool is_wrong; /* a status or a flag */
+};
+
+static void get_outputs(struct fmu3_importer *of, const struct fmu3_update *update) {
+    const fmi3Int32 order = 1;
+    struct points *points = of->data;
+    const unsigned i = points->count;
+    if (i == MOST_POINTS) {
+        return;
+    }
+    points->times[i] = update->time;
+    points->is_wrong |= update->set || !update->get || !update->finished || *update->return_early ||
+                        *update->early_time != update->time;
+    points->is_wrong |= fmu3.GetFloat64(of->instance, outputs, 2, points->values[i], 2) != fmi3OK ||
+                        fmu3.GetOutputDerivatives(of->instance, &outputs[0], 1, &order,
+                                                  &points->derivatives[i], 1) != fmi3OK;
+    points->count++;
+}
+
+/* The values at internal steps are those of an instance that steps there, within the error of the
+ * integration; times rise; the last one is the end of the step. Watching changes no bit. */
+EACH_METHOD static void test_outputs_at_internal_steps(void) {
+    static struct points points;
+    const double start = 1.0;
+    double x[2][FMU3_STATES];
+    memset(&points, 0, sizeof points);
+    importer.update = get_outputs;
+    importer.data = &points;
+    for (int watched = 0; watched < 2; watched++) {
+        const fmi3Instance instance = swinging(watched ? &with_outputs : NULL, method, start);
+        fmu3_step(instance, start, 0.5);
+        fmu3_step(instance, start + 0.5, 0.25);
+        fmu3_get_states(instance, x[watched]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+    TEST_ASSERT_FALSE(points.is_wrong);
+    TEST_ASSERT_GREATER_THAN_UINT(10, points.count);
+    TEST_ASSERT_LESS_THAN_UINT(MOST_POINTS, points.count);
+
+    double last = start;
+    bool is_end_seen = false;
+    const fmi3Instance other = swinging(NULL, method, start);
+    for (unsigned i = 0; i < points.count; i++) {
+        TEST_ASSERT_TRUE(points.times[i] > last);
+        is_end_seen |= points.times[i] == start + 0.5;
+        (void)fmu3_try_step(other, last, points.times[i] - last);
+        last = points.times[i];
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, fmu3_get(other, RP_MANIPULATOR_q1), points.values[i][0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, fmu3_get(other, RP_MANIPULATOR_ddq1), points.values[i][1]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, fmu3_get(other, RP_MANIPULATOR_dq1), points.derivatives[i]);
+    }
+    TEST_ASSERT_TRUE(is_end_seen);
+    TEST_ASSERT_TRUE(last == start + 0.75);
+}
+
+/* ---- Early return --------------------------------------------------------------------------- */
+
+struct request {
+    unsigned at_update; /* counted from 1 */
+    double after;       /* s: the time asked for comes after that of the update by this */
+    double time;        /* s: that was asked for */
+    unsigned could;     /* updates in which it was allowed */
+    unsigned could_not;
+};
+
+static void ask_for_return(struct fmu3_importer *of, const struct fmu3_update *update) {
+    struct request *request = of->data;
+    request->could += update->can_return_early;
+    request->could_not += !update->can_return_early;
+    if (of->updates == request->at_update) {
+        request->time = update->time + request->after;
+        *update->return_early = true;
+        *update->early_time = request->time;
+    }
+}
+
+/* At the time asked for, or at the internal step where that lies before; the rest of the step ends
+ * where the whole one does. */
+EACH_METHOD static void test_an_early_return_is_obeyed(void) {
+    static const double after[] = {0.0, -1.0, 1e-3, 0.04, 1e-9};
+    const double end = 0.6;
+    const fmi3Instance whole = swinging(NULL, method, 0.0);
+    fmu3_step(whole, 0.0, end);
+    for (size_t i = 0; i < FMU3_COUNT(after); i++) {
+        struct request request = {.at_update = 8, .after = after[i]};
+        importer.update = ask_for_return;
+        importer.data = &request;
+        importer.updates = 0;
+        const fmi3Instance instance = swinging(&with_outputs, method, 0.0);
+        const struct fmu3_step early = fmu3_try_step(instance, 0.0, end);
+        TEST_ASSERT_EQUAL_INT(fmi3OK, early.status);
+        TEST_ASSERT_TRUE(early.early);
+        TEST_ASSERT_FALSE(early.event || early.terminate);
+        TEST_ASSERT_TRUE(early.reached == fmu3_get(instance, RP_MANIPULATOR_time));
+        TEST_ASSERT_TRUE(early.reached < end);
+        if (after[i] >= 1e-3) {
+            TEST_ASSERT_TRUE(early.reached == request.time);
+        } else {
+            TEST_ASSERT_DOUBLE_WITHIN(1.1e-9, request.time - fmin(after[i], 0.0), early.reached);
+        }
+
+        request.at_update = 0;
+        fmu3_step(instance, early.reached, end - early.reached);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, fmu3_get(whole, RP_MANIPULATOR_q1),
+                                  fmu3_get(instance, RP_MANIPULATOR_q1));
+        fmu3_free(instance);
+    }
+}
+
+/* Nor at the end of the step, whatever the importer says there. */
+static void test_no_early_return_where_it_is_not_allowed(void) {
+    for (int allowed = 0; allowed < 2; allowed++) {
+        struct fmu3_options options = with_outputs;
+        struct request request = {.at_update = allowed ? 0 : 3, .after = 0.0};
+        options.early_return = allowed;
+        importer.update = ask_for_return;
+        importer.data = &request;
+        importer.updates = 0;
+        const fmi3Instance instance = swinging(&options, 1, 0.0);
+        fmu3_step(instance, 0.0, 0.5);
+        TEST_ASSERT_EQUAL_UINT(allowed ? 1 : importer.updates, request.could_not);
+        TEST_ASSERT_EQUAL_UINT(allowed ? importer.updates - 1 : 0, request.could);
+    }
+}
+
+/* An input that moves has the value of the time of the return. */
+static void set_and_return(struct fmu3_importer *of, const struct fmu3_update *update) {
+    if (update->set) {
+        fmi3Float64 u[2];
+        smooth_inputs(update->time, u);
+        (void)fmu3.SetFloat64(of->instance, inputs, 2, u, 2);
+    } else {
+        *update->return_early = true;
+        *update->early_time = 0.1;
+    }
+}
+
+static void test_inputs_stop_where_the_step_does(void) {
+    struct fmu3_options options = with_inputs;
+    double u[2];
+    options.early_return = true;
+    importer.update = set_and_return;
+    const fmi3Instance instance = swinging(&options, 1, 0.0);
+    const struct fmu3_step early = fmu3_try_step(instance, 0.0, 0.15);
+    TEST_ASSERT_TRUE(early.early && early.reached == 0.1);
+    smooth_inputs(0.1, u);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, u[0], fmu3_get(instance, RP_MANIPULATOR_tau1));
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, u[1], fmu3_get(instance, RP_MANIPULATOR_f2));
+}
+
+/* ---- What fails in an intermediate update ------------------------------------------------------
+ */
+
+/* One call, made in the first update that allows to get, or to set. */
+struct intrusion {
+    const char *name;
+    bool while_setting;
+    fmi3Status (*call)(fmi3Instance instance);
+    fmi3Status status;
+    unsigned calls;
+};
+
+static void intrude(struct fmu3_importer *of, const struct fmu3_update *update) {
+    struct intrusion *intrusion = of->data;
+    if (intrusion->calls == 0 && update->set == intrusion->while_setting) {
+        intrusion->calls++;
+        intrusion->status = intrusion->call(of->instance);
+    }
+}
+
+static fmi3Status get_parameter(fmi3Instance instance) {
+    const fmi3ValueReference reference = RP_MANIPULATOR_m1;
+    double value;
+    return fmu3.GetFloat64(instance, &reference, 1, &value, 1);
+}
+
+static fmi3Status get_unnamed_output(fmi3Instance instance) {
+    const fmi3ValueReference reference = RP_MANIPULATOR_ee_x;
+    double value;
+    return fmu3.GetFloat64(instance, &reference, 1, &value, 1);
+}
+
+static fmi3Status get_counter(fmi3Instance instance) {
+    const fmi3ValueReference reference = RP_MANIPULATOR_solver_steps;
+    fmi3Int32 value;
+    return fmu3.GetInt32(instance, &reference, 1, &value, 1);
+}
+
+static fmi3Status get_q1(fmi3Instance instance) {
+    double value;
+    return fmu3.GetFloat64(instance, &outputs[0], 1, &value, 1);
+}
+
+static fmi3Status set_tau1(fmi3Instance instance) {
+    return fmu3_try_set(instance, RP_MANIPULATOR_tau1, 1.0);
+}
+
+static fmi3Status set_parameter(fmi3Instance instance) {
+    return fmu3_try_set(instance, RP_MANIPULATOR_m1, 1.0);
+}
+
+static fmi3Status set_output(fmi3Instance instance) {
+    return fmu3_try_set(instance, RP_MANIPULATOR_q1, 1.0);
+}
+
+static fmi3Status set_not_a_number(fmi3Instance instance) {
+    return fmu3_try_set(instance, RP_MANIPULATOR_tau1, NAN);
+}
+
+static fmi3Status free_instance(fmi3Instance instance) {
+    fmu3.FreeInstance(instance);
+    return fmi3Error;
+}
+
+static fmi3Status free_after_error(fmi3Instance instance) {
+    (void)fmu3.Reset(instance);
+    fmu3.FreeInstance(instance);
+    (void)fmu3.Reset(instance);
+    return fmi3Error;
+}
+
+static fmi3Status step_again(fmi3Instance instance) {
+    return fmu3_try_step(instance, 0.0, 0.1).status;
+}
+
+static fmi3Status reset(fmi3Instance instance) {
+    return fmu3.Reset(instance);
+}
+
+static fmi3Status terminate(fmi3Instance instance) {
+    return fmu3.Terminate(instance);
+}
+
+static fmi3Status save(fmi3Instance instance) {
+    fmi3FMUState state = NULL;
+    return fmu3.GetFMUState(instance, &state);
+}
+
+static fmi3Status derive(fmi3Instance instance) {
+    const double seed = 1.0;
+    double result;
+    return fmu3.GetDirectionalDerivative(instance, &outputs[1], 1, inputs, 1, &seed, 1, &result, 1);
+}
+
+/* The step then returns an error, whatever was called; the instance can be reset and goes on. */
+static void test_what_is_not_allowed_makes_the_step_fail(void) {
+    static const fmi3ValueReference both[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_q1,
+                                              RP_MANIPULATOR_ddq1};
+    static const struct fmu3_options options = {.intermediate_updates = true,
+                                                .early_return = true,
+                                                .required = both,
+                                                .required_count = FMU3_COUNT(both)};
+    static const struct intrusion intrusions[] = {
+        {"a parameter is read", false, get_parameter, fmi3OK, 0},
+        {"an output that was not named", false, get_unnamed_output, fmi3OK, 0},
+        {"an integer is read", false, get_counter, fmi3OK, 0},
+        {"an output is read while inputs are set", true, get_q1, fmi3OK, 0},
+        {"an input is set after an internal step", false, set_tau1, fmi3OK, 0},
+        {"a parameter is set", true, set_parameter, fmi3OK, 0},
+        {"an output is set", true, set_output, fmi3OK, 0},
+        {"an input is not a number", true, set_not_a_number, fmi3OK, 0},
+        {"the instance is freed", false, free_instance, fmi3OK, 0},
+        {"the instance is freed while inputs are set", true, free_instance, fmi3OK, 0},
+        {"the instance is freed after an error", false, free_after_error, fmi3OK, 0},
+        {"a step in a step", false, step_again, fmi3OK, 0},
+        {"a reset", false, reset, fmi3OK, 0},
+        {"a termination", true, terminate, fmi3OK, 0},
+        {"a state is saved", false, save, fmi3OK, 0},
+        {"a derivative", false, derive, fmi3OK, 0},
+    };
+    for (size_t i = 0; i < FMU3_COUNT(intrusions); i++) {
+        struct intrusion intrusion = intrusions[i];
+        importer.update = intrude;
+        importer.data = &intrusion;
+        const fmi3Instance instance = swinging(&options, 1, 0.0);
+        fmu3_clear_messages(&importer);
+        const struct fmu3_step step = fmu3_try_step(instance, 0.0, 0.5);
+        TEST_ASSERT_EQUAL_UINT_MESSAGE(1, intrusion.calls, intrusion.name);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, intrusion.status, intrusion.name);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, step.status, intrusion.name);
+        TEST_ASSERT_TRUE_MESSAGE(step.reached == -1.0 && step.early, intrusion.name); // not written
+        TEST_ASSERT_GREATER_THAN_UINT_MESSAGE(0, importer.count[fmi3Error], intrusion.name);
+
+        // terminated: values can be read, and a reset leads out
+        (void)fmu3_get(instance, RP_MANIPULATOR_q1);
+        TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_step(instance, 0.0, 0.1).status);
+        TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.Reset(instance));
+        fmu3_initialize(instance, 0.0);
+        fmu3_step(instance, 0.0, 0.1);
+        fmu3_free(instance);
+    }
+}

@@ -1,0 +1,208 @@
+"""terminalsAndIcons.xml of the FMUs, and that equal members are what the closed loop connects."""
+
+import shutil
+import struct
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+from typing import NamedTuple
+
+import fmpy
+import pytest
+from lxml import etree
+
+from tests.support.generator import change, copied, generate
+from tests.support.paths import ROOT
+
+SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+FILE = "terminalsAndIcons/terminalsAndIcons.xml"
+ICON = "terminalsAndIcons/icon.png"
+COMPONENTS = {"arm": "RPManipulator", "controller": "RPController", "trajectory": "RPTrajectory"}
+SSD = ROOT / "models" / "closed_loop" / "SystemStructure.ssd"
+SSD_NAMESPACE = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+
+# Members are named by memberName; kind and causality of their variables.
+SIGNAL_IN, SIGNAL_OUT = ("signal", "input"), ("signal", "output")
+MOTION = {1: ["q1", "dq1"], 2: ["q2", "dq2"]}
+EFFORT = {1: "tau1", 2: "f2"}
+REFERENCE = {1: ["q1", "dq1", "ddq1"], 2: ["q2", "dq2", "ddq2"]}
+END_EFFECTOR = ["ee_x", "ee_y", "ee_vx", "ee_vy"]
+
+
+def joints(name: str, members: dict[int, dict[str, tuple[str, str]]]) -> dict:
+    """A bus with a plug for each joint."""
+    return {
+        name: ("bus", {}),
+        **{f"{name}.joint{joint}": ("plug", members[joint]) for joint in (1, 2)},
+    }
+
+
+EXPECTED = {
+    "arm": joints(
+        "arm",
+        {
+            j: dict.fromkeys(MOTION[j], SIGNAL_OUT) | {EFFORT[j]: ("inflow", "input")}
+            for j in (1, 2)
+        },
+    )
+    | {"end_effector": ("none", dict.fromkeys(END_EFFECTOR, SIGNAL_OUT))},
+    "controller": joints(
+        "arm",
+        {
+            j: dict.fromkeys(MOTION[j], SIGNAL_IN) | {EFFORT[j]: ("outflow", "output")}
+            for j in (1, 2)
+        },
+    )
+    | joints("reference", {j: dict.fromkeys(REFERENCE[j], SIGNAL_IN) for j in (1, 2)}),
+    "trajectory": joints("reference", {j: dict.fromkeys(REFERENCE[j], SIGNAL_OUT) for j in (1, 2)})
+    | {"end_effector": ("none", dict.fromkeys(END_EFFECTOR, SIGNAL_OUT))},
+}
+
+
+class Described(NamedTuple):
+    """What an FMU says of its terminals."""
+
+    terminals: dict[str, ET.Element]  # by path, for example arm.joint1
+    causality: dict[str, str]  # of its variables
+
+
+def path_of(fmu: Path, version: str, component: str) -> Path:
+    folder = fmu.parent if version == "fmi2" else fmu.parent / version
+    return folder / f"{COMPONENTS[component]}.fmu"
+
+
+def by_path(parent: ET.Element, above: str = "") -> dict[str, ET.Element]:
+    """All terminals, also nested ones."""
+    found = {}
+    for terminal in parent.iterfind("Terminal"):
+        path = above + terminal.get("name")
+        assert path not in found
+        found |= {path: terminal} | by_path(terminal, f"{path}.")
+    return found
+
+
+def described(fmu: Path) -> Described:
+    with zipfile.ZipFile(fmu) as archive:
+        terminals = ET.fromstring(archive.read(FILE)).find("Terminals")
+    variables = fmpy.read_model_description(str(fmu)).modelVariables
+    return Described(by_path(terminals), {v.name: v.causality for v in variables})
+
+
+@pytest.fixture(params=COMPONENTS)
+def component(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture(params=["fmi2", "fmi3"])
+def version(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+# ---- what is in the FMUs -------------------------------------------------------------------------
+
+
+def test_the_file_follows_the_schema(fmu: Path, version: str, component: str) -> None:
+    with zipfile.ZipFile(path_of(fmu, version, component)) as archive:
+        document = etree.fromstring(archive.read(FILE))
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(document)
+    assert document.get("fmiVersion") == "3.0"
+
+
+def test_the_icon_keeps_its_shape(fmu: Path, version: str, component: str) -> None:
+    with zipfile.ZipFile(path_of(fmu, version, component)) as archive:
+        icon, document = archive.read(ICON), ET.fromstring(archive.read(FILE))
+    assert icon.startswith(b"\x89PNG")
+    width, height = struct.unpack(">II", icon[16:24])
+    graphics = document.find("GraphicalRepresentation")
+    for element in ("CoordinateSystem", "Icon"):
+        x1, y1, x2, y2 = (
+            float(graphics.find(element).get(key)) for key in ("x1", "y1", "x2", "y2")
+        )
+        assert (y2 - y1) / (x2 - x1) == pytest.approx(height / width, rel=1e-12)
+        assert (x1, y1) == (-x2, -y2)
+
+
+def test_members_are_variables_of_the_right_kind(fmu: Path, version: str, component: str) -> None:
+    terminals, causality = described(path_of(fmu, version, component))
+    found = {
+        path: (
+            terminal.get("matchingRule"),
+            {
+                member.get("memberName"): (
+                    member.get("variableKind"),
+                    causality[member.get("variableName")],
+                )
+                for member in terminal.iterfind("TerminalMemberVariable")
+            },
+        )
+        for path, terminal in terminals.items()
+    }
+    assert found == EXPECTED[component]
+    for path, terminal in terminals.items():
+        assert len(terminal.findall("TerminalMemberVariable")) == len(found[path][1])
+
+
+def test_terminals_of_the_same_name_connect_the_closed_loop(fmu: Path, version: str) -> None:
+    ends: dict[tuple[str, str], list[tuple[str, str, str]]] = {}
+    for component in COMPONENTS:
+        terminals, causality = described(path_of(fmu, version, component))
+        for path, terminal in terminals.items():
+            if terminal.get("matchingRule") == "plug":
+                for member in terminal.iterfind("TerminalMemberVariable"):
+                    variable = member.get("variableName")
+                    end = (causality[variable], component, variable)
+                    ends.setdefault((path, member.get("memberName")), []).append(end)
+    connections = set()
+    for pair in ends.values():
+        (first, *source), (second, *target) = sorted(pair, reverse=True)
+        assert (first, second) == ("output", "input")
+        connections.add((*source, *target))
+    keys = ("startElement", "startConnector", "endElement", "endConnector")
+    in_ssp = ET.parse(SSD).getroot().iter(f"{SSD_NAMESPACE}Connection")
+    assert connections == {tuple(c.get(key) for key in keys) for c in in_ssp}
+
+
+# ---- what the generator does ---------------------------------------------------------------------
+
+
+def generated_file(variables: Path, output: Path) -> ET.Element:
+    result = generate(variables, output)
+    assert result.returncode == 0, result.stderr
+    return ET.parse(output / "terminalsAndIcons.xml").getroot()
+
+
+def test_a_model_without_picture_has_no_icon(tmp_path: Path) -> None:
+    document = generated_file(copied("rp_manipulator", tmp_path), tmp_path / "out")
+    assert [child.tag for child in document] == ["Terminals"]
+
+
+def test_a_model_without_terminals_has_an_icon_only(tmp_path: Path) -> None:
+    variables = copied("rp_manipulator", tmp_path)
+    shutil.copy(ROOT / "models" / "rp_manipulator" / "model.png", variables.parent)
+    text = variables.read_text()
+    variables.write_text(text[: text.index("[terminals.arm]")])
+    document = generated_file(variables, tmp_path / "out")
+    assert [child.tag for child in document] == ["GraphicalRepresentation"]
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(etree.fromstring(ET.tostring(document)))
+
+
+@pytest.mark.parametrize("content", [b"", b"GIF89a", b"\x89PNG\r\n\x1a\n\0\0"])
+def test_a_picture_that_is_no_png_is_named(tmp_path: Path, content: bytes) -> None:
+    variables = copied("rp_manipulator", tmp_path)
+    icon = variables.with_name("model.png")
+    icon.write_bytes(content)
+    result = generate(variables, tmp_path / "out")
+    assert result.returncode == 2
+    assert result.stderr == f"generate.py: {icon}: is not a PNG file\n"
+
+
+def test_terminals_are_no_part_of_the_token(tmp_path: Path) -> None:
+    tokens = []
+    for name in ("as_it_is", "renamed"):
+        variables = copied("rp_manipulator", tmp_path / name)
+        if name == "renamed":
+            change(variables, "[terminals.end_effector]", "[terminals.tip]")
+        assert generate(variables, tmp_path / name / "out").returncode == 0
+        description = ET.parse(tmp_path / name / "out" / "fmi3" / "modelDescription.xml").getroot()
+        tokens.append(description.get("instantiationToken"))
+    assert tokens[0] == tokens[1]
