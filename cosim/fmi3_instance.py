@@ -131,7 +131,8 @@ class Fmi3Instance(Instance):
                 error, self._raised = self._raised, None
                 raise error
         if self._terminates.value:
-            raise UserError(f"{self.name}: the FMU ends the simulation at t = {self._time.value!r}")
+            time = self._time.value
+            raise UserError(f"{self.name}: the FMU ends the simulation at t = {time!r} s")
 
     def saved_state(self) -> SavedState:
         fmi = self.fmi

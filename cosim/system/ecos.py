@@ -93,12 +93,12 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
     for match in messages:
         if match["status"] in BAD:
-            where = f"{variant}: component {_components(ssp, match)}"
+            where = f"{variant}: component {_sender(ssp, match)}"
             when = "in initialization" if len(values) == 1 else f"by t = {times[-1]:.6g} s"
             raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
     if len(values) != system.steps + 1:
         raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
-    texts = [f"{_components(ssp, m)}: {m['text']}" for m in messages]
+    texts = [f"{_sender(ssp, m)}: {m['text']}" for m in messages]
     return Run(tuple(names), times, values, done["wall_time"], tuple(dict.fromkeys(texts)))
 
 
@@ -146,11 +146,15 @@ def _kill(child: subprocess.Popen) -> None:
         child.kill()
 
 
-def _components(ssp: "Ssp", message: re.Match[str]) -> str:
-    """Name of the component that a message is of: of FMI 2.0, Ecos's log names only the FMU."""
-    if message["component"] is not None:
-        return repr(message["component"])
-    fmu = message["fmu"].replace("\\", "/")  # a path of Windows
+def _sender(ssp: "Ssp", message: re.Match[str]) -> str:
+    """Name of the component that a message is of."""
+    component = message["component"]
+    return repr(component) if component is not None else _components(ssp, message["fmu"])
+
+
+def _components(ssp: "Ssp", fmu: str) -> str:
+    """Name of the component whose FMU it is: of FMI 2.0, Ecos's log names only the FMU."""
+    fmu = fmu.replace("\\", "/")  # a path of Windows
     names = [c.name for c in ssp.system.components if fmu.endswith("/" + c.source)]
     return " or ".join(map(repr, names)) or repr(PurePosixPath(fmu).name)
 

@@ -29,6 +29,11 @@ NAMES = list(FILES)
 SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion
 
 
+def fmi3_fmu(path: Path) -> Path:
+    """The FMU of FMI 3.0 beside one of FMI 2.0."""
+    return path.parent / "fmi3" / path.name
+
+
 def names_of(model: str) -> list[str]:
     """Scenarios of one model, by its folder."""
     return [name for name, path in FILES.items() if project.model_folder(path).name == model]
