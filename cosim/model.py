@@ -192,7 +192,7 @@ CONVERT = {
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,
 }
-NUMBERS = ("Real", "Integer")
+NUMBERS = ("Real", "Integer", "Enumeration")
 
 
 def _variable(variable: ModelVariable) -> Variable:
