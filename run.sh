@@ -6,6 +6,7 @@
 #   ./run.sh --list                names of the scenarios, without building
 #   ./run.sh system [VARIANT ...]  the closed loop in Ecos; --list: names of its variants
 #   ./run.sh coupling              what the coupling of the closed loop costs
+#   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # may lead to other modules than those tested here

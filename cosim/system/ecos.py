@@ -103,14 +103,14 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
 
 
 def _check_parameters(ssp: "Ssp", variant: str) -> None:
-    """Refuse what Ecos would silently leave out: Enumerations of FMI 3.0."""
+    """Refuse what Ecos would leave out with a warning in its log only: Enumerations."""
     for component, values in ssp.system.parameters[variant].items():
         model = ssp.models[component]
         for name in values:
-            if model.fmi_version == "3.0" and model.variables[name].type == "Enumeration":
+            if model.variables[name].type == "Enumeration":
                 raise UserError(
                     f"{ssp.path}: parameter set {variant!r}: component {component!r}: {name!r} is "
-                    "an Enumeration, which Ecos does not set in FMUs of FMI 3.0"
+                    "an Enumeration, which Ecos does not set"
                 )
 
 
