@@ -5,6 +5,7 @@
 #define COMPONENT_H
 
 #include "calls.h"
+#include "derivatives.h"
 #include "instance.h"
 
 /* The numbers are those of fmi2Status and fmi3Status. */
@@ -39,6 +40,7 @@ struct adapter {
     enum fmi_state after_error;    /* the state that an error leads to */
     unsigned always_logged;        /* categories sent by an instance made with logging off, too */
     unsigned never_silent;         /* categories that component_set_logging cannot switch off */
+    enum known_kinds knowns;       /* of directional and adjoint derivatives */
 
     /* Sends a finished text to the importer. */
     void (*send)(const struct component *component, enum component_status status,

@@ -142,9 +142,10 @@ enum component_status access_get_directional_derivative(struct component *compon
         !component_has_arrays(component, call, known_count, knowns, seed)) {
         return COMPONENT_ERROR;
     }
-    return component_result(
-        component, instance_get_directional_derivative(component->instance, unknowns, unknown_count,
-                                                       knowns, known_count, seed, result));
+    return component_result(component,
+                            instance_get_directional_derivative(
+                                component->instance, component->adapter->knowns, unknowns,
+                                unknown_count, knowns, known_count, seed, result));
 }
 
 enum component_status access_get_adjoint_derivative(struct component *component, unsigned call,
@@ -157,6 +158,7 @@ enum component_status access_get_adjoint_derivative(struct component *component,
         return COMPONENT_ERROR;
     }
     return component_result(
-        component, instance_get_adjoint_derivative(component->instance, unknowns, unknown_count,
-                                                   knowns, known_count, seed, result));
+        component,
+        instance_get_adjoint_derivative(component->instance, component->adapter->knowns, unknowns,
+                                        unknown_count, knowns, known_count, seed, result));
 }

@@ -36,6 +36,7 @@ static const struct adapter adapter = {
     .states = ~(unsigned)STATE_INTERMEDIATE_UPDATE,
     .after_error = STATE_ERROR,
     .always_logged = ~(1u << LOG_EVENTS | 1u << LOG_ALL),
+    .knowns = KNOWN_MOTION,
     .send = send_text,
 };
 

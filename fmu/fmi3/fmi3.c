@@ -35,6 +35,7 @@ static const struct adapter adapter = {
     .after_error = STATE_TERMINATED,
     .always_logged = ERRORS,
     .never_silent = ERRORS,
+    .knowns = KNOWN_ARGUMENTS,
     .send = send_text,
 };
 

@@ -164,7 +164,11 @@ static bool is_unknown(const struct instance *instance, const struct variable *v
            (variable->causality == CAUSALITY_OUTPUT || variable->causality == CAUSALITY_LOCAL);
 }
 
-static bool is_known(const struct instance *instance, const struct variable *variable) {
+static bool is_time(const struct variable *variable) {
+    return variable->causality == CAUSALITY_INDEPENDENT;
+}
+
+static bool is_moving(const struct instance *instance, const struct variable *variable) {
     if (variable->owner != VARIABLE_OF_MODEL) {
         return false;
     }
@@ -174,8 +178,14 @@ static bool is_known(const struct instance *instance, const struct variable *var
             instance->state.phase == PHASE_INITIALIZATION);
 }
 
-static enum status check_matrix(const struct instance *instance, const unsigned unknowns[],
-                                size_t unknown_count, const unsigned knowns[], size_t known_count) {
+static bool is_argument(const struct instance *instance, const struct variable *variable) {
+    return is_moving(instance, variable) || is_time(variable) ||
+           (variable->owner == VARIABLE_OF_MODEL && variable->causality == CAUSALITY_PARAMETER);
+}
+
+static enum status check_matrix(const struct instance *instance, enum known_kinds kinds,
+                                const unsigned unknowns[], size_t unknown_count,
+                                const unsigned knowns[], size_t known_count) {
     for (size_t i = 0; i < unknown_count; i++) {
         if (find_as(instance, unknowns[i], is_unknown, "an output, a local or a derivative") ==
             NULL) {
@@ -183,8 +193,13 @@ static enum status check_matrix(const struct instance *instance, const unsigned 
         }
     }
     for (size_t i = 0; i < known_count; i++) {
-        if (find_as(instance, knowns[i], is_known,
-                    "an input, a state or, in initialization mode, a parameter") == NULL) {
+        const struct variable *known =
+            kinds == KNOWN_MOTION
+                ? find_as(instance, knowns[i], is_moving,
+                          "an input, a state or, in initialization mode, a parameter")
+                : find_as(instance, knowns[i], is_argument,
+                          "an input, a state, a parameter or the time");
+        if (known == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
     }
@@ -195,11 +210,12 @@ static double *place_in(char *structure, const struct variable *variable) {
     return (double *)(void *)(structure + variable->offset);
 }
 
-enum status instance_get_directional_derivative(struct instance *instance,
+enum status instance_get_directional_derivative(struct instance *instance, enum known_kinds kinds,
                                                 const unsigned unknowns[], size_t unknown_count,
                                                 const unsigned knowns[], size_t known_count,
                                                 const double v[], double result[]) {
-    enum status status = check_matrix(instance, unknowns, unknown_count, knowns, known_count);
+    enum status status =
+        check_matrix(instance, kinds, unknowns, unknown_count, knowns, known_count);
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
@@ -208,11 +224,12 @@ enum status instance_get_directional_derivative(struct instance *instance,
     }
 
     memset(instance->first_derivatives, 0, instance->model->values_size);
+    double dt = 0.0;
     for (size_t i = 0; i < known_count; i++) {
         const struct variable *variable = variable_of(instance->description, knowns[i]);
-        *place_in(instance->first_derivatives, variable) += v[i];
+        *(is_time(variable) ? &dt : place_in(instance->first_derivatives, variable)) += v[i];
     }
-    status = propagate(instance, 0.0, NULL);
+    status = propagate(instance, dt, NULL);
     if (status != STATUS_OK) {
         return status;
     }
@@ -236,8 +253,9 @@ static enum status multiply_column(struct instance *instance, const unsigned unk
                                    size_t unknown_count, const struct variable *known,
                                    const double v[], double *product) {
     memset(instance->first_derivatives, 0, instance->model->values_size);
-    *place_in(instance->first_derivatives, known) = 1.0;
-    const enum status status = propagate(instance, 0.0, NULL);
+    double dt = 0.0;
+    *(is_time(known) ? &dt : place_in(instance->first_derivatives, known)) = 1.0;
+    const enum status status = propagate(instance, dt, NULL);
     if (status != STATUS_OK) {
         return status;
     }
@@ -249,22 +267,26 @@ static enum status multiply_column(struct instance *instance, const unsigned unk
     return isfinite(*product) ? STATUS_OK : instance_not_finite(instance, known->name);
 }
 
-enum status instance_get_adjoint_derivative(struct instance *instance, const unsigned unknowns[],
-                                            size_t unknown_count, const unsigned knowns[],
-                                            size_t known_count, const double v[], double result[]) {
-    enum status status = check_matrix(instance, unknowns, unknown_count, knowns, known_count);
+enum status instance_get_adjoint_derivative(struct instance *instance, enum known_kinds kinds,
+                                            const unsigned unknowns[], size_t unknown_count,
+                                            const unsigned knowns[], size_t known_count,
+                                            const double v[], double result[]) {
+    enum status status =
+        check_matrix(instance, kinds, unknowns, unknown_count, knowns, known_count);
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
     // all of them before the first one is written: each waits at the place of its known
+    double by_time = 0.0;
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
         const struct variable *known = variable_of(instance->description, knowns[i]);
         status = multiply_column(instance, unknowns, unknown_count, known, v,
-                                 place_in(instance->second_derivatives, known));
+                                 is_time(known) ? &by_time
+                                                : place_in(instance->second_derivatives, known));
     }
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
         const struct variable *known = variable_of(instance->description, knowns[i]);
-        result[i] = double_in(instance->second_derivatives, known);
+        result[i] = is_time(known) ? by_time : double_in(instance->second_derivatives, known);
     }
     return status;
 }

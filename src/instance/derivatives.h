@@ -16,18 +16,26 @@ MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_output_derivatives(struct instance *instance, const unsigned references[],
                                     size_t count, const int orders[], double values[]);
 
+/* What derivatives are taken with respect to. */
+enum known_kinds {
+    KNOWN_MOTION,    /* inputs, states and, before the first step, parameters */
+    KNOWN_ARGUMENTS, /* inputs, states, parameters and the time */
+};
+
 /* Writes J v: J the derivatives of unknowns (Real variables of the model that are not parameters or
- * inputs) with respect to knowns (inputs, states; before the first step parameters too). */
+ * inputs) with respect to knowns of these kinds. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
-    instance_get_directional_derivative(struct instance *instance, const unsigned unknowns[],
-                                        size_t unknown_count, const unsigned knowns[],
-                                        size_t known_count, const double v[], double result[]);
+    instance_get_directional_derivative(struct instance *instance, enum known_kinds kinds,
+                                        const unsigned unknowns[], size_t unknown_count,
+                                        const unsigned knowns[], size_t known_count,
+                                        const double v[], double result[]);
 
 /* Writes v^T J, one value per known, for the same unknowns and knowns; v has one value per unknown.
  */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
-    instance_get_adjoint_derivative(struct instance *instance, const unsigned unknowns[],
-                                    size_t unknown_count, const unsigned knowns[],
-                                    size_t known_count, const double v[], double result[]);
+    instance_get_adjoint_derivative(struct instance *instance, enum known_kinds kinds,
+                                    const unsigned unknowns[], size_t unknown_count,
+                                    const unsigned knowns[], size_t known_count, const double v[],
+                                    double result[]);
 
 #endif

@@ -160,7 +160,8 @@ static void test_directional_derivatives(void) {
     const unsigned knowns[] = {OSCILLATOR_X, OSCILLATOR_U, OSCILLATOR_V};
     const double v[] = {0.5, 3.0, 7.0};
     double result[3];
-    ASSERT_OK(instance_get_directional_derivative(instance, unknowns, 3, knowns, 3, v, result));
+    ASSERT_OK(instance_get_directional_derivative(instance, KNOWN_MOTION, unknowns, 3, knowns, 3, v,
+                                                  result));
     TEST_ASSERT_EQUAL_DOUBLE(-4.0 * 0.5 + 3.0, result[0]);
     TEST_ASSERT_EQUAL_DOUBLE(7.0, result[1]);
     TEST_ASSERT_EQUAL_DOUBLE(0.5, result[2]);
@@ -173,16 +174,17 @@ static void test_knowns_and_unknowns_that_are_none_are_refused(void) {
     const unsigned setting = OSCILLATOR_EFFECTIVE_TOLERANCE;
     const double one = 1.0;
     double value = -7.0;
-    ASSERT_OK(instance_get_directional_derivative(instance, &x, 1, &omega, 1, &one, &value));
+    ASSERT_OK(instance_get_directional_derivative(instance, KNOWN_MOTION, &x, 1, &omega, 1, &one,
+                                                  &value));
     ASSERT_OK(instance_exit_initialization(instance));
     value = -7.0;
     const struct {
         const unsigned *unknown, *known;
     } cases[] = {{&x, &omega}, {&x, &energy}, {&omega, &x}, {&setting, &x}, {&x, &setting}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              instance_get_directional_derivative(instance, cases[i].unknown, 1,
-                                                                  cases[i].known, 1, &one, &value));
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_get_directional_derivative(
+                                                           instance, KNOWN_MOTION, cases[i].unknown,
+                                                           1, cases[i].known, 1, &one, &value));
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "is refused"), last_text);
     }
     TEST_ASSERT_EQUAL_DOUBLE(-7.0, value);

@@ -68,7 +68,8 @@ static enum status derive_energy(double *value) {
 
 static enum status derive_energy_by_x(double *value) {
     const double one = 1.0;
-    return instance_get_directional_derivative(instance, &energy, 1, &x, 1, &one, value);
+    return instance_get_directional_derivative(instance, KNOWN_MOTION, &energy, 1, &x, 1, &one,
+                                               value);
 }
 
 static void assert_fails(enum status call(double *), const char *expected) {
