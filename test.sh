@@ -55,7 +55,7 @@ tests/importers/install.sh || [ -z "${CI-}" ]
 step "gcc, optimized; all tests"
 build default
 if build/venv/bin/python -c 'import ziglang' 2>/dev/null; then
-  cmake --build --preset default --target release >build/release.log || { cat build/release.log; exit 1; }
+  cmake --build --preset default --target release >build/release.log 2>&1 || { cat build/release.log; exit 1; }
 else
   echo "release: skipped, ./setup.sh --platforms installs what it needs"
 fi

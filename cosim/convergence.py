@@ -2,7 +2,8 @@
 
 A master knows its inputs at the communication points. An FMU that holds them over a step is off by
 the first power of the step; with their derivatives up to order k it is off by power
-k + 1. The problems are models/<model>/convergence/<name>.toml, in the format of a
+k + 1. An FMU of FMI 3.0 that asks for the inputs at four times of a step (intermediate update) is
+off by power 4. The problems are models/<model>/convergence/<name>.toml, in the format of a
 scenario; the exact final state of each is models/<model>/references/<name>/exact.json.
 """
 
@@ -19,6 +20,7 @@ from fmpy.fmi1 import FMICallException
 from cosim import project, simulation
 from cosim import scenario as scenarios
 from cosim.errors import UserError
+from cosim.fmi3_instance import Fmi3Instance
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.model import Model
@@ -27,11 +29,19 @@ from cosim.signals import Sines
 
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: inputs are held
-NAMES = ("inputs held", "1st derivatives", "2nd derivatives", "3rd derivatives")
+INTERMEDIATE_UPDATE = len(ORDERS)  # the case after those of the orders
+NAMES = (
+    "inputs held",
+    "1st derivatives",
+    "2nd derivatives",
+    "3rd derivatives",
+    "intermediate update",
+)  # of the cases
+POWERS = (1, 2, 3, 4, 4)  # of the step, which the error follows in each case
 LARGEST_DEVIATION = 0.2  # of a slope from the order expected
 CLEAR_OF_INTEGRATION = 100.0  # an error counts from this many times the integration's own
 FEWEST_FITTED = 4  # errors that a slope needs: three halvings of the step
-ALL_FITTED = 2  # up to this order, the slope is that over all steps
+ALL_FITTED = 3  # up to this power, the slope is that over all steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +65,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Row:
-    """What was found with the input derivatives up to one order."""
+    """What was found in one case."""
 
     name: str
     errors: tuple[float, ...]  # relative, one per step
@@ -65,10 +75,10 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
-    """Errors of the final state over the communication step, for each order of derivatives."""
+    """Errors of the final state over the communication step, in the first cases of `NAMES`."""
 
     problem: Problem
-    errors: np.ndarray  # (orders, steps) relative
+    errors: np.ndarray  # (cases, steps) relative
 
     @property
     def scenario(self) -> Scenario:
@@ -81,42 +91,45 @@ class Convergence:
 
         With the highest derivatives and the shortest step the inputs are all but exact, and the
         integrator restarts most often: what is left there bounds its error in the other runs.
+        With intermediate update, the error of the inputs is as small as the integrator's there, and
+        the two may cancel: the second shortest step counts, too.
         """
-        return float(self.errors[-1, -1])
+        shortest = 2 if len(self.errors) > INTERMEDIATE_UPDATE else 1
+        return float(self.errors[-1, -shortest:].max())
 
     @property
     def fitted(self) -> np.ndarray:
-        """Which errors the slopes are fitted to, (orders, steps): those clear of integration's."""
+        """Which errors the slopes are fitted to, (cases, steps): those clear of integration's."""
         return self.errors >= CLEAR_OF_INTEGRATION * self.integration_error
 
     @cached_property
     def slopes(self) -> tuple[float, ...]:
-        """Slope of log error over log step, one per order; NaN if too few errors count."""
+        """Slope of log error over log step, one per case; NaN if too few errors count."""
         return tuple(
             slope(self.problem.steps[use], errors[use]) if use.sum() >= FEWEST_FITTED else math.nan
             for errors, use in zip(self.errors, self.fitted, strict=True)
         )
 
     def holds(self, i: int) -> bool:
-        """Whether the slope of ORDERS[i] is the one expected, from as many errors as it takes."""
-        enough = bool(self.fitted[i].all()) or ORDERS[i] > ALL_FITTED
-        return enough and abs(self.slopes[i] - (ORDERS[i] + 1)) <= LARGEST_DEVIATION
+        """Whether the slope of case i is the one expected, from as many errors as it takes."""
+        enough = bool(self.fitted[i].all()) or POWERS[i] > ALL_FITTED
+        return enough and abs(self.slopes[i] - POWERS[i]) <= LARGEST_DEVIATION
 
     @property
     def rows(self) -> list[Row]:
-        """A row per order, as tables show them."""
+        """A row per case, as tables show them."""
         return [
-            Row(NAMES[order], tuple(self.errors[i].tolist()), self.slopes[i], self.holds(i))
-            for i, order in enumerate(ORDERS)
+            Row(NAMES[i], tuple(errors.tolist()), self.slopes[i], self.holds(i))
+            for i, errors in enumerate(self.errors)
         ]
 
     @property
     def violations(self) -> list[str]:
         """What is not as it should be, one sentence each."""
         return [
-            f"{NAMES[order]}: slope {self.slopes[i]:.2f} over {self.fitted[i].sum()} steps whose "
-            f"error is {CLEAR_OF_INTEGRATION:g} times that of the integration, expected {order + 1}"
-            for i, order in enumerate(ORDERS)
+            f"{NAMES[i]}: slope {self.slopes[i]:.2f} over {self.fitted[i].sum()} steps whose "
+            f"error is {CLEAR_OF_INTEGRATION:g} times that of the integration, expected {POWERS[i]}"
+            for i in range(len(self.errors))
             if not self.holds(i)
         ]
 
@@ -172,57 +185,73 @@ def load(path: Path, model: Model) -> Problem:
     return Problem(scenario, inputs, exact, largest)
 
 
-def steps_ahead(problem: Problem) -> int:
-    """Communication steps that `study` makes."""
+def steps_ahead(problem: Problem, with_updates: bool) -> int:
+    """Communication steps that `study` makes, with intermediate update or without."""
+    cases = len(ORDERS) + with_updates
     shortest = len(problem.scenario.times) - 1
-    return len(ORDERS) * sum(shortest // factor for factor in FACTORS)
+    return cases * sum(shortest // factor for factor in FACTORS)
 
 
 def study(
-    fmu: Fmu, problem: Problem, progress: Callable[[int], object] = lambda _: None
+    fmu: Fmu,
+    problem: Problem,
+    progress: Callable[[int], object] = lambda _: None,
+    updated: Fmu | None = None,
 ) -> Convergence:
-    """Run `problem` with every order of input derivatives and every communication step.
+    """Run `problem` in every case and with every communication step.
+
+    Parameters
+    ----------
+    fmu : Fmu
+        For all orders of input derivatives.
+    problem : Problem
+    progress : callable, optional
+        Called with the number of steps that each run has made.
+    updated : Fmu, optional
+        For intermediate update; without it, this case is left out.
 
     Raises
     ------
     UserError
-        If a function of the FMU fails.
+        If a function of an FMU fails.
     """
-    errors = np.empty((len(ORDERS), len(FACTORS)))
-    for i, order in enumerate(ORDERS):
+    fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
+    errors = np.empty((len(fmus), len(FACTORS)))
+    for i, of_case in enumerate(fmus):
         for j, factor in enumerate(FACTORS):
-            errors[i, j] = problem.error(final_state(fmu, problem, order, factor))
+            errors[i, j] = problem.error(final_state(of_case, problem, i, factor))
             progress((len(problem.scenario.times) - 1) // factor)
     return Convergence(problem, errors)
 
 
-def final_state(fmu: Fmu, problem: Problem, order: int, factor: int) -> dict[str, float]:
+def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
     """States at the end of a run.
 
     Parameters
     ----------
     fmu : Fmu
     problem : Problem
-    order : int
-        Highest derivative of the inputs that is set, along with all lower ones; 0: none.
+    case : int
+        Highest derivative of the inputs that is set, along with all lower ones, 0: none; or
+        INTERMEDIATE_UPDATE.
     factor : int
         Communication step, in shortest steps of the problem.
     """
     scenario = problem.scenario
-    with fmu.instance(scenario.name, list(problem.inputs) if order else ()) as instance:
+    step_through = _with_updates if case == INTERMEDIATE_UPDATE else _with_derivatives
+    with fmu.instance(scenario.name, list(problem.inputs) if case else ()) as instance:
         simulation.initialize(instance, scenario, scenario.tolerance)
         states = instance.reals(list(problem.exact))
         try:
-            _step_through(instance, problem, order, factor)
+            step_through(instance, problem, case, scenario.times[::factor])
             states.get()
         except FMICallException as error:
             raise instance.failure(error, f"with steps of {factor} times the shortest") from error
         return dict(zip(states.names, states.view.tolist(), strict=True))
 
 
-def _step_through(instance: Instance, problem: Problem, order: int, factor: int) -> None:
+def _with_derivatives(instance: Instance, problem: Problem, order: int, times: np.ndarray) -> None:
     """All steps, with the inputs' values and derivatives at the beginning of each."""
-    times = problem.scenario.times[::factor]
     elapsed = (times - problem.scenario.start)[:-1]
     sines, names = list(problem.inputs.values()), list(problem.inputs)
 
@@ -233,4 +262,14 @@ def _step_through(instance: Instance, problem: Problem, order: int, factor: int)
     for t, h, rows in zip(times, np.diff(times), known, strict=False):
         inputs.view[:] = rows
         inputs.set()
+        instance.do_step(t, h)
+
+
+def _with_updates(instance: Fmi3Instance, problem: Problem, _: int, times: np.ndarray) -> None:
+    """All steps, with the inputs' values at the times that the FMU asks for."""
+    start, sines = problem.scenario.start, list(problem.inputs.values())
+    instance.input_functions(
+        list(problem.inputs), lambda time: [s.derivative(time - start, 0) for s in sines]
+    )
+    for t, h in zip(times, np.diff(times), strict=False):
         instance.do_step(t, h)

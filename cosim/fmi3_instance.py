@@ -1,7 +1,7 @@
 """Instances of FMUs of FMI 3.0: without event mode and early return, which no master here uses."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from ctypes import Array, byref, c_double
 from functools import partial
@@ -31,7 +31,7 @@ class Fmi3Instance(Instance):
     """An instance of an FMU of FMI 3.0.
 
     FMI 3.0 has no derivatives of inputs: in a step, the FMU asks for the values of the inputs at
-    times inside of it (intermediate update), and is given those of the polynomials.
+    times inside of it (intermediate update), and is given those of the polynomials or functions.
     """
 
     PLATFORMS = (fmpy.platform_tuple,)
@@ -56,7 +56,7 @@ class Fmi3Instance(Instance):
         if logged:
             with suppress(FMICallException):  # messages are not worth a run
                 fmi.setDebugLogging(True, logged)
-        self._inputs: _SmoothInputs | None = None  # of the next step
+        self._inputs: Callable[[float], object] | None = None  # sets those of a time in a step, s
         self._start = 0.0  # s, of the present step
         self._raised: BaseException | None = None  # in a callback, where it would be lost
 
@@ -106,18 +106,41 @@ class Fmi3Instance(Instance):
         coefficients = np.zeros((order + 1, len(names)))
         inputs = _SmoothInputs(self.reals(names), coefficients)
 
+        def set_in_step(time: float) -> None:
+            inputs.set_at(time - self._start)
+
         def set_all() -> None:
             inputs.set_at(0.0)
-            self._inputs = inputs if order else None
+            self._inputs = set_in_step if order else None
 
         return InputPolynomials(coefficients, set_all)
+
+    def input_functions(
+        self, names: Sequence[str], values: Callable[[float], Sequence[float] | np.ndarray]
+    ) -> None:
+        """Let Real inputs be functions of time in all further steps.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of inputs that are among `smooth_inputs`.
+        values : callable
+            Their values at a time (s), (inputs,).
+        """
+        inputs = self.reals(names)
+
+        def set_in_step(time: float) -> None:
+            inputs.view[:] = values(time)
+            inputs.set()
+
+        self._inputs = set_in_step
 
     def _update(self, _environment: int, time: float, set_requested: bool, *_: object) -> None:
         """Called by the FMU within a step."""
         if not set_requested or self._inputs is None:
             return
         try:
-            self._inputs.set_at(time - self._start)
+            self._inputs(time)
         except BaseException as error:  # Ctrl-C, too
             self._raised = error
 

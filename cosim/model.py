@@ -112,6 +112,11 @@ class Model:
     saves_states: bool  # so that an instance can go back to an earlier point
 
     @property
+    def asks_for_inputs(self) -> bool:
+        """Whether it asks for the inputs at times within a step: intermediate update."""
+        return self.interpolates_inputs and self.fmi_version == "3.0"
+
+    @property
     def real_outputs(self) -> list[str]:
         """Names of all outputs of type Real."""
         found = (v for v in self.variables.values() if v.causality == "output")
@@ -187,7 +192,7 @@ CONVERT = {
     "Boolean": lambda text: text in ("true", "1"),
     "String": str,
 }
-NUMBERS = ("Real", "Integer")
+NUMBERS = ("Real", "Integer", "Enumeration")
 
 
 def _variable(variable: ModelVariable) -> Variable:

@@ -32,7 +32,8 @@ foreach(platform IN LISTS RELEASE_PLATFORMS)
   add_custom_target(platform_${platform}
     COMMAND ${CMAKE_COMMAND} -S ${PROJECT_SOURCE_DIR} --preset ${platform} -B ${folder} ${same_settings}
             --log-level=WARNING
-    COMMAND ${CMAKE_COMMAND} --build ${folder} --target libraries
+    COMMAND ${CMAKE_COMMAND} -E env --unset=MAKEFLAGS
+            ${CMAKE_COMMAND} --build ${folder} --target libraries --parallel 2
     COMMENT "Building for ${platform}"
     VERBATIM)
   list(APPEND platform_targets platform_${platform})

@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         else:
             done = _runs(runs, chosen, bool(twins), None, TIGHTEST)
             sweeps = _sweeps(runs, _quick(done) if options.names else chosen)
-            studies = [] if options.names else _convergence(fmus)
+            studies = [] if options.names else _convergence(fmus, twins)
         with written(options.report), Progress("report", len(done), "runs") as progress:
             index = pages.write_runs(options.report, done, sweeps, studies, progress)
     print(f"\nreport: {from_here(index)}")
@@ -142,11 +142,15 @@ def _sweeps(runs: Runs, chosen: Sequence[Scenario]) -> list[Sweep]:
     return sweeps
 
 
-def _convergence(fmus: Mapping[str, Fmu]) -> list[Convergence]:
-    """Study the order of convergence of the models whose FMUs are open."""
+def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Convergence]:
+    """Study the order of convergence of the models whose FMUs are open.
+
+    An FMU that asks for inputs within a step, or else its twin, shows that of intermediate update.
+    """
     studies = []
     for file in project.convergence_files():
-        fmu = fmus.get(project.model_folder(file).name)
+        folder = project.model_folder(file).name
+        fmu = fmus.get(folder)
         if fmu is None:
             continue
         problem = convergence.load(file, fmu.model)
@@ -154,8 +158,11 @@ def _convergence(fmus: Mapping[str, Fmu]) -> list[Convergence]:
         if not fmu.model.interpolates_inputs:
             print(f"\n{name}: left out, the FMU does not interpolate inputs")
             continue
-        with Progress(f"{name}, all steps", convergence.steps_ahead(problem)) as progress:
-            study = convergence.study(fmu, problem, progress)
+        both = (fmu, twins.get(folder))
+        updated = next((x for x in both if x is not None and x.model.asks_for_inputs), None)
+        ahead = convergence.steps_ahead(problem, updated is not None)
+        with Progress(f"{name}, all steps", ahead) as progress:
+            study = convergence.study(fmu, problem, progress, updated)
         console.convergence(study)
         studies.append(study)
     return studies

@@ -8,11 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from cosim.convergence import CLEAR_OF_INTEGRATION, FEWEST_FITTED, NAMES, ORDERS, Convergence
+from cosim.convergence import CLEAR_OF_INTEGRATION, FEWEST_FITTED, NAMES, POWERS, Convergence
 from cosim.report.style import DASHED, FLOOR, MUTED, STYLE, error_axis
 from cosim.texts import milliseconds, short
 
-COLORS = ("#b0435f", "#d1793a", "#2f8f83", "#1d4e79")
+COLORS = ("#b0435f", "#d1793a", "#2f8f83", "#1d4e79", "#7a4fa3")
 
 
 def convergence_figure(convergence: Convergence) -> Figure:
@@ -21,18 +21,18 @@ def convergence_figure(convergence: Convergence) -> Figure:
     with mpl.rc_context(STYLE):
         picture = Figure(figsize=(11, 6.8), layout="constrained")
         axes = picture.subplots()
-        for i, order in enumerate(ORDERS):
+        for i in range(len(convergence.errors)):
             used = convergence.fitted[i]
             style = {"color": COLORS[i], "markersize": 7, "linewidth": 1.8}
             errors = np.maximum(convergence.errors[i], FLOOR)
-            label = f"{NAMES[order]}: slope {convergence.slopes[i]:.2f}"
+            label = f"{NAMES[i]}: slope {convergence.slopes[i]:.2f}"
             marked = {"marker": "o", "markeredgecolor": "white", "label": label}
             axes.plot(steps[used], errors[used], **style, **marked)
             rest = {"marker": "o", "markerfacecolor": "white", "linestyle": "none"}
-            rest["label"] = None if used.all() else f"{NAMES[order]}: not fitted"
+            rest["label"] = None if used.all() else f"{NAMES[i]}: not fitted"
             axes.plot(steps[~used], errors[~used], **style, **rest)
             if used.sum() >= FEWEST_FITTED:
-                _triangle(axes, steps[used], errors[used], order + 1, COLORS[i])
+                _triangle(axes, steps[used], errors[used], POWERS[i], COLORS[i])
         _integration(axes, convergence)
         axes.set_xscale("log")
         axes.set_xlim(steps.min() / 1.3, steps.max() * 1.3)
@@ -49,14 +49,14 @@ def convergence_figure(convergence: Convergence) -> Figure:
     return picture
 
 
-def _triangle(axes: Axes, steps: np.ndarray, errors: np.ndarray, order: int, color: str) -> None:
-    """A triangle with the slope `order` below the third and second last of the errors fitted."""
+def _triangle(axes: Axes, steps: np.ndarray, errors: np.ndarray, power: int, color: str) -> None:
+    """A triangle with the slope `power` below the third and second last of the errors fitted."""
     right, left = steps[-3], steps[-2]
     bottom = errors[-2] / 4
-    top = bottom * (right / left) ** order
+    top = bottom * (right / left) ** power
     axes.plot([left, right, right, left], [bottom, bottom, top, bottom], color=color, linewidth=1.0)
     axes.annotate(
-        f"{order}",
+        f"{power}",
         (right, math.sqrt(bottom * top)),
         xytext=(5, 0),
         textcoords="offset points",

@@ -87,7 +87,8 @@ NONNULL double integrator_next_step(const struct integrator *integrator);
  * (t, s since the last restart). True: the advance ends there. */
 typedef bool integrator_observer(void *context, double t, const double x[]);
 
-/* Of the next advances; NULL: none. Watching does not change results. */
+/* Of the next advances; NULL: none. Watching changes neither states nor internal steps; a method
+ * may evaluate the right-hand side more often. */
 NONNULL_ARGUMENTS(1)
 void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,
                              void *context);

@@ -206,13 +206,14 @@ static bool interpolate(void *memory, double t, double x[]) {
 }
 
 /* Takes the internal steps to t, which CVode in normal mode would take, one by one and asks the
- * observer about each. */
+ * observer about each that changes the time. */
 static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
                              double x[], bool *is_cut_short) {
     const struct problem *problem = cvode->base.problem;
     long begin = 0;
     long steps = 0;
     double internal = 0.0;
+    double watched = problem->reached;
     (void)CVodeGetNumSteps(cvode->solver, &begin);
     (void)CVodeGetCurrentTime(cvode->solver, &internal);
     int flag = CV_SUCCESS;
@@ -225,7 +226,10 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
         flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_ONE_STEP);
         sundials_get_state(&cvode->base, x);
         internal = *stopped_at;
-        *is_cut_short = flag >= 0 && internal < t && problem_ends_at(problem, internal, x);
+        if (flag >= 0 && internal < t && internal > watched) {
+            watched = internal;
+            *is_cut_short = problem_ends_at(problem, internal, x);
+        }
     }
     return flag;
 }

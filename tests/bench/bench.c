@@ -10,8 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char usage[] = "usage: bench RPManipulator.so [--repeats N] [--quick] [--json FILE] "
-                            "[--only GROUP[,GROUP...]]";
+static const char usage[] =
+    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 [--repeats N] "
+    "[--quick] [--json FILE] [--only GROUP[,GROUP...]]";
 
 static const struct {
     const char *name;
@@ -45,8 +46,8 @@ int main(int count, char **arguments) {
     const char *json = NULL;
     bool all = true;
     bool chosen[GROUPS] = {false};
-    require(count >= 2, usage);
-    for (int i = 2; i < count; i++) {
+    require(count >= 3, usage);
+    for (int i = 3; i < count; i++) {
         const bool has_value = i + 1 < count;
         if (strcmp(arguments[i], "--quick") == 0) {
             bench.quick = true;
@@ -63,6 +64,8 @@ int main(int count, char **arguments) {
     }
     require(bench.repeats >= 1 && bench.repeats <= MOST_REPEATS, "from 1 to 101 repeats");
     require(fmu_library_open(arguments[1], &bench.fmu) != NULL, "the FMU cannot be loaded");
+    require(fmu3_library_open(arguments[2], &bench.fmu3) != NULL,
+            "the FMU of FMI 3.0 cannot be loaded");
 
     report_open(&bench.report, json, bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {

@@ -2,11 +2,13 @@
 #ifndef BENCH_H
 #define BENCH_H
 
+#include "fmu3_library.h"
 #include "fmu_library.h"
 #include "report.h"
 
 struct bench {
     struct fmu_functions fmu;
+    struct fmu3_functions fmu3;
     struct report report;
     int repeats;
     bool quick; /* little of everything: shows that it works, the figures mean nothing */

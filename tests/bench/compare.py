@@ -181,6 +181,8 @@ def main() -> None:
     parser.add_argument("--bench", type=Path, default=build / "tests/bench/bench")
     parser.add_argument("--library", type=Path,
                         default=build / "fmu/RPManipulator/RPManipulator.so")  # fmt: skip
+    parser.add_argument("--library-fmi3", type=Path,
+                        default=build / "fmu/RPManipulator/fmi3/RPManipulator.so")  # fmt: skip
     parser.add_argument("--fmu", type=Path, default=build / "RPManipulator.fmu")
     parser.add_argument("--output", type=Path, default=build / "report/benchmark")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
@@ -188,13 +190,13 @@ def main() -> None:
     parser.add_argument("--readme", action="store_true", help="put it all into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
-    for path in (options.bench, options.library, options.fmu):
+    for path in (options.bench, options.library, options.library_fmi3, options.fmu):
         if not path.exists():
             sys.exit(f"{path}: no such file. Build it and run this with\n"
                      "    ./setup.sh --dev && cmake --preset default && "
                      "cmake --build build --target benchmark")  # fmt: skip
     options.output.mkdir(parents=True, exist_ok=True)
-    program = [str(options.bench), str(options.library)]
+    program = [str(options.bench), str(options.library), str(options.library_fmi3)]
     small = ["--quick"] if options.quick else []
 
     with tempfile.TemporaryDirectory() as name:

@@ -20,6 +20,8 @@ static double run_once(const struct run *run, const struct fmu_functions *fmu,
         return plain_loop_run(problem, run->tolerance, states);
     case FMU:
         return fmu_run(fmu, problem, run->method, run->tolerance, states, counts);
+    case FMU3:
+        return fmu3_run(run->fmu3, problem, run->method, run->tolerance, states, counts);
     case MUJOCO:
         return mujoco_run(problem, run->integrator, run->substeps, states);
     }
@@ -110,7 +112,7 @@ void race_report(const struct race *race, struct report *report, const char *gro
         for (int j = 0; j < 4; j++) { // of the reference, for other references to compare with
             report_number(report, ends[j], problem->reference[problem->steps - 1][j]);
         }
-        printf("  %-19s %9.2f us", run->name, us);
+        printf("  %-20s %8.2f us", run->name, us);
         const double ratio = race_ratio(race, i, 0);
         printf(" %7.3f  error %7.1e", ratio, race->error[i]);
         if (run->solver == MUJOCO) {
@@ -120,7 +122,7 @@ void race_report(const struct race *race, struct report *report, const char *gro
             report_number(report, "tolerance", run->tolerance);
             printf("  tolerance %7.1e", run->tolerance);
         }
-        if (run->solver == FMU) {
+        if (run->solver == FMU || run->solver == FMU3) {
             report_number(report, "effective_tolerance", race->counts[i].effective_tolerance);
             report_number(report, "internal_steps", race->counts[i].internal_steps);
             report_number(report, "evaluations", race->counts[i].evaluations);

@@ -2,21 +2,22 @@
 #ifndef BENCH_RACE_H
 #define BENCH_RACE_H
 
-#include "fmu_run.h"
+#include "fmu3_run.h"
 #include "mujoco_run.h"
 #include "report.h"
 
-enum { MOST_RUNS = 8, MOST_REPEATS = 101 };
+enum { MOST_RUNS = 10, MOST_REPEATS = 101 };
 
-enum solver { PLAIN_LOOP, FMU, MUJOCO };
+enum solver { PLAIN_LOOP, FMU, FMU3, MUJOCO };
 
 struct run {
     const char *name;
     enum solver solver;
-    enum method method; /* of the FMU */
-    double tolerance;   /* of the plain loop, or requested from the FMU */
+    enum method method; /* of an FMU */
+    double tolerance;   /* of the plain loop, or requested from an FMU */
     enum mujoco_integrator integrator;
-    int substeps; /* of MuJoCo in a communication step */
+    int substeps;                      /* of MuJoCo in a communication step */
+    const struct fmu3_functions *fmu3; /* of FMU3: the FMU of FMI 3.0 */
 };
 
 struct race {
@@ -25,7 +26,7 @@ struct race {
     struct run runs[MOST_RUNS];
     double seconds[MOST_RUNS][MOST_REPEATS]; /* of one communication step */
     double error[MOST_RUNS];
-    struct fmu_counts counts[MOST_RUNS]; /* where the solver is the FMU */
+    struct fmu_counts counts[MOST_RUNS]; /* where the solver is an FMU */
 };
 
 void race_add(struct race *race, struct run run);

@@ -31,20 +31,35 @@ static void add_mujoco(struct race *race, int substeps) {
     }
 }
 
+/* The same FMU of FMI 3.0. */
+static void add_fmi3(struct race *race, const struct fmu3_functions *fmu3, double tolerance) {
+    static const struct {
+        const char *name;
+        enum method method;
+    } added[] = {{"cvode_adams, FMI 3.0", CVODE_ADAMS}, {"erk, FMI 3.0", ERK}};
+    for (size_t i = 0; i < sizeof added / sizeof added[0]; i++) {
+        race_add(race, (struct run){.name = added[i].name,
+                                    .solver = FMU3,
+                                    .method = added[i].method,
+                                    .tolerance = tolerance,
+                                    .fmu3 = fmu3});
+    }
+}
+
 static struct target at_most(double limit) {
     return (struct target){limit > 0.0 ? AT_MOST : NO_TARGET, limit};
 }
 
-/* erk against another run of the same race */
+/* A run against another one of the same race. */
 static void report_against(const struct race *race, struct report *report, const char *work,
-                           const char *peer, struct target target) {
-    const int run = race_find(race, "erk");
+                           const char *name_of_run, const char *peer, struct target target) {
+    const int run = race_find(race, name_of_run);
     const double ratio = race_ratio(race, run, race_find(race, peer));
     char name[64];
-    snprintf(name, sizeof name, "erk to %s", peer);
+    snprintf(name, sizeof name, "%s to %s", name_of_run, peer);
     report_row(report, "against", work, name);
     report_number(report, "error", race->error[run]);
-    printf("  %-28s %7.3f", name, ratio);
+    printf("  %-36s %7.3f", name, ratio);
     report_judged(report, "ratio", ratio, target);
     printf("\n");
     report_row_end(report);
@@ -81,12 +96,16 @@ static void measure_free_motion(struct bench *bench) {
 void measure_steps(struct bench *bench) {
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
         const struct work *work = &table[i];
+        const bool is_usual = work->tolerance == 1e-8 && work->steps > 1;
         const bool judged = work->tolerance == 1e-8 && work->inputs == INPUTS_CHANGING;
         struct problem *problem = problem_create(work->step, work->steps, work->inputs, 0.0);
         struct race race = {0};
         race_add_usual(&race, &bench->fmu, work->tolerance);
         if (judged) {
             add_mujoco(&race, 1);
+        }
+        if (is_usual) {
+            add_fmi3(&race, &bench->fmu3, work->tolerance);
         }
         race_run(&race, &bench->fmu, problem, bench->repeats);
         const struct target targets[MOST_RUNS] = {
@@ -95,8 +114,13 @@ void measure_steps(struct bench *bench) {
         if (judged) {
             report_error(&race, &bench->report, work->name);
         }
+        if (is_usual) {
+            report_against(&race, &bench->report, work->name, "cvode_adams, FMI 3.0", "cvode_adams",
+                           at_most(1.05));
+            report_against(&race, &bench->report, work->name, "erk, FMI 3.0", "erk", at_most(1.05));
+        }
         if (judged && mujoco_available()) {
-            report_against(&race, &bench->report, work->name, "MuJoCo RK4",
+            report_against(&race, &bench->report, work->name, "erk", "MuJoCo RK4",
                            at_most(work->step == 1e-3 ? 0.2 : 0.0));
         }
         problem_destroy(problem);

@@ -27,9 +27,14 @@ static void sweep_mujoco(struct bench *bench, const char *name, const struct pro
             continue;
         }
         struct race race = {0};
-        race_add(&race, (struct run){"MuJoCo RK4", MUJOCO, 0, 0.0, MUJOCO_RK4, substeps});
-        race_add(&race, (struct run){"MuJoCo implicitfast", MUJOCO, 0, 0.0, MUJOCO_IMPLICITFAST,
-                                     substeps});
+        race_add(&race, (struct run){.name = "MuJoCo RK4",
+                                     .solver = MUJOCO,
+                                     .integrator = MUJOCO_RK4,
+                                     .substeps = substeps});
+        race_add(&race, (struct run){.name = "MuJoCo implicitfast",
+                                     .solver = MUJOCO,
+                                     .integrator = MUJOCO_IMPLICITFAST,
+                                     .substeps = substeps});
         race_run(&race, &bench->fmu, problem, bench->repeats);
         race_report(&race, &bench->report, "precision", name, problem, NULL);
     }

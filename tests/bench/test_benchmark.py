@@ -19,7 +19,7 @@ import peers
 import plots
 import table
 
-BENCH = [os.environ["RP_BENCH"], os.environ["RP_LIBRARY"]]
+BENCH = [os.environ["RP_BENCH"], os.environ["RP_LIBRARY"], os.environ["RP_LIBRARY_FMI3"]]
 FMU = Path(os.environ["RP_FMU"])
 GROUPS = {"steps", "against", "precision", "step size", "instances", "threads", "calls", "life"}
 SHORT = arm.Work("1 ms steps, inputs changing", 1e-3, 50, True)
@@ -85,6 +85,17 @@ def test_both_references_agree(result: dict) -> None:
         assert (row["step"], row["steps"]) == (work.step, work.steps)
         end = np.array([row[f"end_{name}"] for name in arm.STATES])
         np.testing.assert_allclose(end, work.reference[-1].astype(float), rtol=1e-12)
+
+
+def test_both_versions_of_fmi_do_the_same(result: dict) -> None:
+    for work in compare.CHANGING:
+        for method in ("cvode_adams", "erk"):
+            older = compare.find(result["rows"], work.name, method)
+            newer = compare.find(result["rows"], work.name, f"{method}, FMI 3.0")
+            for figure in ("error", "effective_tolerance", "internal_steps", "evaluations"):
+                assert newer[figure] == older[figure]
+            row = compare.find(result["rows"], work.name, f"{method}, FMI 3.0 to {method}")
+            assert (row["judged"], row["comparison"], row["limit"]) == ("ratio", "<=", 1.05)
 
 
 def test_program_refuses_nonsense() -> None:

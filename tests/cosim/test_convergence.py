@@ -1,4 +1,5 @@
-"""How the error falls with the communication step: slopes 1 to 4 with input derivatives 0 to 3."""
+"""How the error falls with the communication step: slopes 1 to 4 with input derivatives 0 to 3, and
+slope 4 with intermediate update of FMI 3.0."""
 
 import importlib.util
 import json
@@ -6,7 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +18,15 @@ import sympy as sp
 
 from cosim import __main__ as cli
 from cosim import console, convergence
-from cosim.convergence import FACTORS, ORDERS, Convergence, Problem
+from cosim.convergence import (
+    FACTORS,
+    INTERMEDIATE_UPDATE,
+    NAMES,
+    ORDERS,
+    POWERS,
+    Convergence,
+    Problem,
+)
 from cosim.errors import UserError
 from cosim.fmu_file import Fmu
 from cosim.project import convergence_files
@@ -48,13 +57,21 @@ def problem() -> Problem:
 
 
 @pytest.fixture(scope="module")
-def study(opened: Fmu, problem: Problem) -> Convergence:
-    return convergence.study(opened, problem)
+def updated(opened: Fmu) -> Iterator[Fmu]:
+    """The FMU of FMI 3.0 beside the other one."""
+    with Fmu(opened.path.parent / "fmi3" / opened.path.name) as fmu:
+        yield fmu
+
+
+@pytest.fixture(scope="module")
+def study(opened: Fmu, updated: Fmu, problem: Problem) -> Convergence:
+    return convergence.study(opened, problem, updated=updated)
 
 
 def made_up(problem: Problem, *coefficients: float, floor: float = 1e-13) -> Convergence:
-    """Errors that are coefficient * step^(order + 1) + floor."""
-    errors = [c * problem.steps ** (i + 1) + floor for i, c in enumerate(coefficients)]
+    """Errors that are coefficient * step^power + floor."""
+    powers = zip(coefficients, POWERS, strict=False)
+    errors = [c * problem.steps**power + floor for c, power in powers]
     return Convergence(problem, np.array(errors))
 
 
@@ -108,32 +125,55 @@ def test_derivatives_of_the_inputs_are_exact() -> None:
 # ---- The FMU -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_order_of_convergence(study: Convergence, order: int) -> None:
-    errors, used = study.errors[order], study.fitted[order]
+@pytest.mark.parametrize("case", range(len(NAMES)))
+def test_order_of_convergence(study: Convergence, case: int) -> None:
+    errors, used = study.errors[case], study.fitted[case]
     assert np.all(np.isfinite(errors))
     assert list(study.problem.steps) == pytest.approx([1e-3 * factor for factor in FACTORS])
     assert np.all(errors[used] >= 100 * study.integration_error)
-    assert used.all() if order <= 2 else used[:4].all()
+    assert used.all() if case <= 2 else used[:4].all()
     slope = np.polyfit(np.log10(study.problem.steps[used]), np.log10(errors[used]), 1)[0]
-    assert study.slopes[order] == pytest.approx(slope, rel=1e-9)
-    assert abs(slope - (order + 1)) <= 0.2
-    assert study.holds(order)
+    assert study.slopes[case] == pytest.approx(slope, rel=1e-9)
+    assert abs(slope - (1, 2, 3, 4, 4)[case]) <= 0.2
+    assert study.holds(case)
 
 
+def taylor(sines: Sines, times: np.ndarray, _: np.ndarray) -> list[np.ndarray]:
+    """Derivatives 0 to 3 at `times`, (4, steps)."""
+    return [sines.derivative(times, order) for order in ORDERS]
+
+
+def cubic(sines: Sines, times: np.ndarray, h: np.ndarray) -> list[np.ndarray]:
+    """Derivatives 0 to 3 at `times` of the cubic through four values of each step, (4, steps)."""
+    a, b, c, d = (sines.derivative(times + h * i / 3, 0).astype(h.dtype) for i in range(4))
+    return [
+        a,
+        (-11 * a + 18 * b - 9 * c + 2 * d) / (2 * h),
+        (2 * a - 5 * b + 4 * c - d) * 9 / h**2,
+        (-a + 3 * b - 3 * c + d) * 27 / h**3,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("case", "derivatives"), [(ORDERS[-1], taylor), (INTERMEDIATE_UPDATE, cubic)]
+)
 def test_error_of_the_integration_by_itself(
-    maker: ModuleType, opened: Fmu, study: Convergence
+    maker: ModuleType,
+    opened: Fmu,
+    updated: Fmu,
+    study: Convergence,
+    case: int,
+    derivatives: Callable[[Sines, np.ndarray, np.ndarray], list[np.ndarray]],
 ) -> None:
-    """Against the exact solution for the very polynomials that the FMU is given, 3rd order.
+    """Against the exact solution for the very cubics that the FMU is given.
 
     The inputs have no error here, so all of it is the integrator's. It is at most twice the study's
-    estimate, the error at the shortest step, and at most a hundredth of every error that the slope
-    is fitted to.
+    estimate and at most a hundredth of every error that the slope is fitted to. The slope is also
+    that of all errors from a hundred times this one.
     """
     import heyoka as hy
 
-    problem, order = study.problem, ORDERS[-1]
-    width = order + 1
+    problem, width = study.problem, len(ORDERS)
     polynomials = {}
     for i, name in enumerate(problem.inputs):
         c = [hy.par[width * i + k] for k in range(width)]
@@ -142,22 +182,26 @@ def test_error_of_the_integration_by_itself(
     real = np.longdouble
     motion = maker.integrator(problem.scenario, polynomials, real, width * len(polynomials))
     start = motion.state.copy()
-    for j, factor in enumerate(FACTORS):
-        times = problem.scenario.times[::factor]
-        known = np.array(
-            [s.derivative(times, k) for s in problem.inputs.values() for k in range(width)]
-        )
+    errors = []
+    for factor in FACTORS:
+        times = problem.scenario.times[::factor].astype(real)
+        h = np.diff(times)
+        known = np.vstack([derivatives(s, times[:-1], h) for s in problem.inputs.values()])
         motion.state[:] = start
-        elapsed = times.astype(real)
-        for i in range(len(times) - 1):
+        for length, row in zip(h, known.T.astype(real), strict=True):
             motion.time = real(0)
-            motion.pars[:] = known[:, i].astype(real)
-            motion.propagate_until(elapsed[i + 1] - elapsed[i])
+            motion.pars[:] = row
+            motion.propagate_until(length)
         exact = dict(zip(problem.exact, motion.state.astype(float).tolist(), strict=True))
-        states = convergence.final_state(opened, problem, order, factor)
-        error = replace(problem, exact=exact).error(states)
-        assert error <= 2 * study.integration_error
-        assert not study.fitted[-1, j] or study.errors[-1, j] >= 100 * error
+        fmu = updated if case == INTERMEDIATE_UPDATE else opened
+        states = convergence.final_state(fmu, problem, case, factor)
+        errors.append(replace(problem, exact=exact).error(states))
+    largest, found = max(errors), study.errors[case]
+    assert largest <= 2 * study.integration_error
+    assert np.all(found[study.fitted[case]] >= 100 * largest)
+    clear = found >= 100 * largest
+    assert clear[:5].all() and study.fitted[case].sum() <= clear.sum()
+    assert abs(convergence.slope(problem.steps[clear], found[clear]) - 4) <= 0.2
 
 
 # ---- Fit and verdict ---------------------------------------------------------------------------
@@ -209,6 +253,21 @@ def test_values_that_are_not_finite_fail(problem: Problem) -> None:
     assert not Convergence(problem, errors).passed
 
 
+def test_errors_that_cancel_are_no_estimate(problem: Problem) -> None:
+    """With intermediate update, the error at the shortest step may be small by chance."""
+    found = made_up(problem, 1.0, 10.0, 100.0, 100.0, 2.0, floor=0.0)
+    found.errors[-1, -1] = 1e-15
+    assert found.integration_error == found.errors[-1, -2]
+    assert found.fitted[-1].tolist() == [True] * 4 + [False] * 3
+    assert found.passed
+
+
+def test_a_wrong_slope_with_intermediate_update_fails(problem: Problem) -> None:
+    found = made_up(problem, 1.0, 10.0, 100.0, 100.0, 2.0, floor=0.0)
+    found.errors[-1] = problem.steps**3.5
+    assert [text[:31] for text in found.violations] == ["intermediate update: slope 3.50"]
+
+
 # ---- Files and report --------------------------------------------------------------------------
 
 
@@ -245,8 +304,10 @@ def test_report_shows_the_order(study: Convergence, tmp_path: Path) -> None:
     page = index.read_text(encoding="utf-8")
     picture = (tmp_path / "convergence.png").read_bytes()
     assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
-    assert 'src="convergence.png"' in page and "3rd derivatives" in page
-    assert f"{study.slopes[3]:.2f}" in page and "FAILED" not in page
+    assert 'src="convergence.png"' in page and "FAILED" not in page
+    for name, slope in zip(NAMES, study.slopes, strict=True):
+        assert f"<td>{name}</td>" in page and f"<td>{slope:.2f}</td>" in page
+    assert "at four times of a step" in page
 
 
 def test_report_shows_a_failure(problem: Problem, tmp_path: Path) -> None:
@@ -255,6 +316,7 @@ def test_report_shows_a_failure(problem: Problem, tmp_path: Path) -> None:
     index = pages.write_runs(tmp_path, [], convergences=[made_up(problem, 1, 1, 1, 1), broken])
     page = index.read_text(encoding="utf-8")
     assert page.count("FAILED") == 1 and "1st derivatives: slope 1.00" in page
+    assert "intermediate update" not in page  # of an FMU of FMI 2.0
     for name in ("convergence", f"convergence_{PATH.stem}"):  # the first one, and each further one
         assert (tmp_path / f"{name}.png").is_file() and f'src="{name}.png"' in page
 
@@ -286,6 +348,27 @@ def test_run_of_all_measures_the_order(
     assert [round(float(row[-2])) for row in found] == [1, 2, 3, 4]
     assert (folder / "convergence.png").is_file()
     assert 'src="convergence.png"' in (folder / "index.html").read_text()
+
+
+@pytest.mark.parametrize("arguments", [[], ["--fmi", "3"]])
+def test_intermediate_update_is_measured_with_fmi3(
+    project: Path,
+    fmu: Path,
+    updated: Fmu,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+) -> None:
+    """Beside the FMU of FMI 2.0, and with that of FMI 3.0 only."""
+    (project / "build/fmi3").mkdir(parents=True)
+    shutil.copy(updated.path, project / "build/fmi3")
+    if not arguments:
+        shutil.copy(fmu, project / "build")
+    shutil.copy(MODEL / "variables.toml", project / "models" / MODEL.name)
+    assert cli.main(["run", *arguments, "--report", str(project / "report")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    found = [line.split() for line in lines if line.startswith(NAMES)]
+    assert [row[-1] for row in found] == ["passed"] * 5
+    assert [round(float(row[-2])) for row in found] == [1, 2, 3, 4, 4]
 
 
 @pytest.mark.parametrize("arguments", [["constant_effort_single_step"], ["--tolerance", "1e-6"]])

@@ -212,7 +212,7 @@ def test_what_is_built_has_the_name_of_its_folder(root: Path) -> None:
     folder = root / "models" / "rp_plant"
     assert project.built(folder, ".fmu") == root / "build" / "RPPlant.fmu"
     assert project.built(folder, ".ssp") == root / "build" / "RPPlant.ssp"
-    with pytest.raises(UserError, match=r"build: has no FMU of toy, \./run\.sh builds it"):
+    with pytest.raises(UserError, match=r"build: has no FMU of toy: \./run\.sh builds it"):
         project.built(root / "models" / "toy", ".fmu")
 
 

@@ -230,6 +230,6 @@ static void test_no_instance_is_an_error_and_no_crash(void) {
         }
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error,
                                       fmu_call((enum fmu_function)function, NULL, 0.0, step),
-                                      fmu_name_of(function));
+                                      fmu_name_of((enum fmu_function)function));
     }
 }

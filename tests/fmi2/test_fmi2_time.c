@@ -362,7 +362,7 @@ static void test_status_into_nothing_is_an_error(void) {
         const fmi2Component c = fmu_initialized(&messages, 0.0);
         fmu_log_clear(&messages);
         TEST_ASSERT_EQUAL_INT(fmi2Error, status_into_nothing(function, c));
-        fmu_assert_logged(&messages, fmu_name_of(function));
+        fmu_assert_logged(&messages, fmu_name_of((enum fmu_function)function));
         fmu_assert_in_error(c);
         fmu_free(c);
     }

@@ -255,6 +255,42 @@ EACH_METHOD static void test_outputs_at_internal_steps(void) {
     TEST_ASSERT_TRUE(last == start + 0.75);
 }
 
+/* An output that depends on inputs directly follows them while they move. */
+static const fmi3ValueReference power[] = {RP_MANIPULATOR_actuator_power, RP_MANIPULATOR_dq1,
+                                           RP_MANIPULATOR_dq2};
+
+static void compare_power(struct fmu3_importer *of, const struct fmu3_update *update) {
+    double *largest_error = of->data;
+    double u[2];
+    double values[3];
+    smooth_inputs(update->time, u);
+    if (update->set) {
+        (void)fmu3.SetFloat64(of->instance, inputs, 2, u, 2);
+    } else if (fmu3.GetFloat64(of->instance, power, 3, values, 3) == fmi3OK) {
+        const double expected = u[0] * values[1] + u[1] * values[2];
+        *largest_error = fmax(*largest_error, fabs(values[0] - expected));
+    } else {
+        *largest_error = INFINITY;
+    }
+}
+
+EACH_METHOD static void test_outputs_follow_moving_inputs(void) {
+    static const fmi3ValueReference all[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2,
+                                             RP_MANIPULATOR_actuator_power, RP_MANIPULATOR_dq1,
+                                             RP_MANIPULATOR_dq2};
+    static const struct fmu3_options options = {
+        .intermediate_updates = true, .required = all, .required_count = FMU3_COUNT(all)};
+    double largest_error = 0.0;
+    importer.update = compare_power;
+    importer.data = &largest_error;
+    const fmi3Instance instance = swinging(&options, method, 0.0);
+    for (int i = 0; i < 10; i++) {
+        fmu3_step(instance, 0.05 * i, 0.05);
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(60, importer.updates);
+    TEST_ASSERT_TRUE(largest_error < 1e-3); // of the cubic
+}
+
 /* ---- Early return --------------------------------------------------------------------------- */
 
 struct request {
@@ -307,6 +343,37 @@ EACH_METHOD static void test_an_early_return_is_obeyed(void) {
                                   fmu3_get(instance, RP_MANIPULATOR_q1));
         fmu3_free(instance);
     }
+}
+
+/* A state that was saved after an early return is complete. */
+EACH_METHOD static void test_an_early_return_can_be_gone_back_to(void) {
+    static fmi3Byte bytes[16384];
+    double x[3][FMU3_STATES];
+    struct request request = {.at_update = 8};
+    importer.update = ask_for_return;
+    importer.data = &request;
+    fmi3FMUState state = NULL;
+    size_t size = 0;
+    const fmi3Instance instance = swinging(&with_outputs, method, 0.0);
+    const struct fmu3_step early = fmu3_try_step(instance, 0.0, 0.6);
+    TEST_ASSERT_TRUE(early.early);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetFMUState(instance, &state));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SerializedFMUStateSize(instance, state, &size));
+    TEST_ASSERT_TRUE(size <= sizeof bytes);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SerializeFMUState(instance, state, bytes, size));
+    for (int i = 0; i < 2; i++) {
+        fmu3_step(instance, early.reached, 0.2);
+        fmu3_get_states(instance, x[i]);
+        TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFMUState(instance, state));
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+
+    const fmi3Instance other = swinging(NULL, method, 0.0);
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.DeserializeFMUState(other, bytes, size, &state));
+    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFMUState(other, state));
+    fmu3_step(other, early.reached, 0.2);
+    fmu3_get_states(other, x[2]);
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[2], sizeof x[0]);
 }
 
 /* Nor at the end of the step, whatever the importer says there. */

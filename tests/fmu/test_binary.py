@@ -12,7 +12,8 @@ import pytest
 from tests.support.paths import ROOT
 from tests.support.source_copy import copy_sources, run, settings_of
 
-FMUS = ("RPManipulator", "RPTrajectory", "RPController")
+NAMES = ("RPManipulator", "RPTrajectory", "RPController")
+FMUS = (*NAMES, *(f"fmi3/{name}" for name in NAMES))
 
 
 @pytest.fixture(scope="module", params=FMUS)
@@ -20,8 +21,8 @@ def binary(
     request: pytest.FixtureRequest, fmu: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Path:
     """The shared object of each FMU, taken out of its archive."""
-    with zipfile.ZipFile(fmu.with_name(f"{request.param}.fmu")) as archive:
-        name = f"binaries/linux64/{request.param}.so"
+    with zipfile.ZipFile(fmu.parent / f"{request.param}.fmu") as archive:
+        (name,) = [n for n in archive.namelist() if re.fullmatch(r"binaries/.*linux.*\.so", n)]
         return Path(archive.extract(name, tmp_path_factory.mktemp("fmu")))
 
 

@@ -18,7 +18,9 @@ import pytest
 from tests.support.paths import ROOT
 
 NAMES = ("RPManipulator", "RPTrajectory", "RPController")
-LARGEST = 2_500_000  # bytes of an FMU
+BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
+LARGEST = {"fmi2": 2_500_000, "fmi3": 3_500_000}  # bytes of an FMU
+FUNCTIONS = {"fmi2": 44, "fmi3": 75}  # of the standard
 
 # what the loader of each platform has
 KERNEL = re.compile(r"KERNEL32\.dll|api-ms-win-crt-[a-z]+-l1-1-0\.dll")
@@ -36,9 +38,13 @@ def release(fmu: Path) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module", params=NAMES)
+EACH = [(version, name) for version in BELOW for name in NAMES]
+
+
+@pytest.fixture(scope="module", params=EACH, ids=lambda each: "-".join(each))
 def archive(request: pytest.FixtureRequest, release: Path) -> Iterator[zipfile.ZipFile]:
-    with zipfile.ZipFile(release / f"{request.param}.fmu") as archive:
+    version, name = request.param
+    with zipfile.ZipFile(release / f"{BELOW[version]}{name}.fmu") as archive:
         yield archive
 
 
@@ -46,15 +52,20 @@ def name_of(archive: zipfile.ZipFile) -> str:
     return Path(archive.filename).stem
 
 
-def binary(archive: zipfile.ZipFile, folder: str, suffix: str) -> bytes:
-    return archive.read(f"binaries/{folder}/{name_of(archive)}{suffix}")
+def version_of(archive: zipfile.ZipFile) -> str:
+    return "fmi3" if Path(archive.filename).parent.name == "fmi3" else "fmi2"
 
 
-def fmi2_functions() -> set[str]:
+def binary(archive: zipfile.ZipFile, folders: dict[str, str], suffix: str) -> bytes:
+    return archive.read(f"binaries/{folders[version_of(archive)]}/{name_of(archive)}{suffix}")
+
+
+def functions(archive: zipfile.ZipFile) -> set[str]:
     """Names of all functions of the standard, from its header."""
-    header = Path(fmpy.__file__).parent / "c-code" / "fmi2Functions.h"
-    names = set(re.findall(r"FMI2_Export \w+ +(fmi2\w+);", header.read_text()))
-    assert len(names) == 44
+    version = version_of(archive)
+    header = Path(fmpy.__file__).parent / "c-code" / f"{version}Functions.h"
+    names = set(re.findall(rf"{version.upper()}_Export \w+ +({version}\w+);", header.read_text()))
+    assert len(names) == FUNCTIONS[version]
     return names
 
 
@@ -76,7 +87,8 @@ def test_a_release_has_checksums_of_all_its_files(release: Path) -> None:
     files = [path for pattern in ("*.fmu", "*.ssp") for path in release.rglob(pattern)]
     found = {path.relative_to(release).as_posix() for path in files}
     assert {name for _, name in lines} == found
-    assert found >= {"ClosedLoop.ssp", *(f"{name}.fmu" for name in NAMES)}
+    names = {"ClosedLoop.ssp", *(f"{name}.fmu" for name in NAMES)}
+    assert found == {f"{below}{name}" for below in BELOW.values() for name in names}
     for checksum, name in lines:
         assert hashlib.sha256((release / name).read_bytes()).hexdigest() == checksum, name
 
@@ -85,9 +97,8 @@ def test_the_bill_of_materials_names_what_is_compiled_in(release: Path, archive)
     bill = json.loads((release / "sbom.cdx.json").read_text())
     assert bill["bomFormat"] == "CycloneDX"
     components = {component["name"]: component for component in bill["components"]}
-    used = next(
-        d["dependsOn"] for d in bill["dependencies"] if d["ref"] == f"{name_of(archive)}.fmu"
-    )
+    file = Path(archive.filename).relative_to(release).as_posix()
+    used = next(d["dependsOn"] for d in bill["dependencies"] if d["ref"] == file)
     assert set(used) == {"SUNDIALS", "musl", "zig", "mingw-w64"}
     for name in used:
         assert re.fullmatch(r"\d+(\.\d+)+", components[name]["version"])
@@ -100,13 +111,16 @@ def test_the_bill_of_materials_names_what_is_compiled_in(release: Path, archive)
 def test_an_fmu_has_the_binaries_of_all_platforms_and_is_small(archive) -> None:
     name = name_of(archive)
     found = {entry for entry in archive.namelist() if entry.startswith("binaries/")}
-    assert found == {
-        f"binaries/linux64/{name}.so",
-        f"binaries/win64/{name}.dll",
-        f"binaries/darwin64/{name}.dylib",
-        f"binaries/aarch64-linux/{name}.so",
-    }
-    assert Path(archive.filename).stat().st_size < LARGEST
+    suffixes = {"linux": "so", "windows": "dll", "darwin": "dylib"}
+    if version_of(archive) == "fmi3":
+        processors = {"linux": ("x86_64", "aarch64"), "windows": ("x86_64",)}
+        processors["darwin"] = processors["linux"]
+        folders = [(f"{p}-{system}", system) for system in suffixes for p in processors[system]]
+    else:
+        folders = [("linux64", "linux"), ("aarch64-linux", "linux"), ("win64", "windows")]
+        folders += [("darwin64", "darwin")]
+    assert found == {f"binaries/{folder}/{name}.{suffixes[system]}" for folder, system in folders}
+    assert Path(archive.filename).stat().st_size < LARGEST[version_of(archive)]
 
 
 def test_the_standard_finds_no_fault(archive) -> None:
@@ -114,9 +128,13 @@ def test_the_standard_finds_no_fault(archive) -> None:
 
 
 def test_the_interface_is_that_of_the_fmu_for_one_platform(archive, fmu: Path) -> None:
-    with zipfile.ZipFile(fmu.with_name(Path(archive.filename).name)) as built:
+    built_file = fmu.parent / BELOW[version_of(archive)] / Path(archive.filename).name
+    with zipfile.ZipFile(built_file) as built:
         one = built.read("modelDescription.xml").decode()
     every = archive.read("modelDescription.xml").decode()
+    if version_of(archive) == "fmi3":
+        assert one == every  # sources/buildDescription.xml names the sources
+        return
     files = r"\s*<SourceFiles>.*?</SourceFiles>\s*</(ModelExchange|CoSimulation)>"
     without = re.sub(files, "", every, flags=re.DOTALL)
     assert every != without
@@ -134,16 +152,17 @@ def test_no_file_names_the_machine_that_built_it(archive) -> None:
 # ---- Linux --------------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=[("linux64", "X86_64"), ("aarch64-linux", "AARCH64")], ids=lambda p: p[0])
+@pytest.fixture(params=[("linux64", "x86_64"), ("aarch64-linux", "aarch64")], ids=lambda p: p[0])
 def elf(request: pytest.FixtureRequest, archive) -> lief.ELF.Binary:
     folder, machine = request.param
-    parsed = lief.ELF.parse(list(binary(archive, folder, ".so")))
-    assert parsed.header.machine_type == getattr(lief.ELF.ARCH, machine)
+    folders = {"fmi2": folder, "fmi3": f"{machine}-linux"}
+    parsed = lief.ELF.parse(list(binary(archive, folders, ".so")))
+    assert parsed.header.machine_type == getattr(lief.ELF.ARCH, machine.upper())
     return parsed
 
 
-def test_linux_exports_the_functions_of_the_standard_only(elf: lief.ELF.Binary) -> None:
-    assert {symbol.name for symbol in elf.exported_symbols} == fmi2_functions()
+def test_linux_exports_the_functions_of_the_standard_only(elf: lief.ELF.Binary, archive) -> None:
+    assert {symbol.name for symbol in elf.exported_symbols} == functions(archive)
 
 
 def test_linux_needs_glibc_2_17_and_no_libm(elf: lief.ELF.Binary) -> None:
@@ -172,12 +191,12 @@ def test_linux_is_read_only_where_it_can_be(elf: lief.ELF.Binary) -> None:
 
 @pytest.fixture
 def pe(archive) -> lief.PE.Binary:
-    return lief.PE.parse(list(binary(archive, "win64", ".dll")))
+    return lief.PE.parse(list(binary(archive, {"fmi2": "win64", "fmi3": "x86_64-windows"}, ".dll")))
 
 
-def test_windows_exports_the_functions_of_the_standard_only(pe: lief.PE.Binary) -> None:
+def test_windows_exports_the_functions_of_the_standard_only(pe: lief.PE.Binary, archive) -> None:
     assert pe.header.machine == lief.PE.Header.MACHINE_TYPES.AMD64
-    assert {entry.name for entry in pe.get_export().entries} == fmi2_functions()
+    assert {entry.name for entry in pe.get_export().entries} == functions(archive)
 
 
 def test_windows_needs_nothing_to_be_installed(pe: lief.PE.Binary) -> None:
@@ -200,17 +219,19 @@ def test_windows_loads_it_anywhere_and_runs_no_data(pe: lief.PE.Binary) -> None:
 # ---- macOS --------------------------------------------------------------------------------------
 
 
-@pytest.fixture(params=["X86_64", "ARM64"])
+@pytest.fixture(params=[("x86_64", "X86_64"), ("aarch64", "ARM64")], ids=lambda p: p[0])
 def macho(request: pytest.FixtureRequest, archive) -> lief.MachO.Binary:
-    fat = lief.MachO.parse(list(binary(archive, "darwin64", ".dylib")))
-    assert fat.size == 2
-    return fat.take(getattr(lief.MachO.Header.CPU_TYPE, request.param))
+    processor, header = request.param
+    folders = {"fmi2": "darwin64", "fmi3": f"{processor}-darwin"}
+    parsed = lief.MachO.parse(list(binary(archive, folders, ".dylib")))
+    assert parsed.size == (2 if version_of(archive) == "fmi2" else 1)
+    return parsed.take(getattr(lief.MachO.Header.CPU_TYPE, header))
 
 
-def test_macos_exports_the_functions_of_the_standard(macho: lief.MachO.Binary) -> None:
+def test_macos_exports_the_functions_of_the_standard(macho: lief.MachO.Binary, archive) -> None:
     """And two names that its linker adds to every library."""
     exported = {symbol.name for symbol in macho.exported_symbols}
-    expected = {f"_{name}" for name in fmi2_functions()}
+    expected = {f"_{name}" for name in functions(archive)}
     assert exported == expected | {"___dso_handle", "__mh_dylib_header"}
 
 

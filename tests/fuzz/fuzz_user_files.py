@@ -24,6 +24,8 @@ from declaration.c_tables import value_references, variable_table  # noqa: E402
 from declaration.load import DeclarationError  # noqa: E402
 from declaration.load import load as load_declaration  # noqa: E402
 from fmi2.model_description import model_description  # noqa: E402
+from fmi3.model_description import model_description as fmi3_model_description  # noqa: E402
+from fmi3.terminals import terminals_and_icons  # noqa: E402
 from provenance import Provenance  # noqa: E402
 
 from cosim import reference  # noqa: E402
@@ -202,6 +204,8 @@ class Fuzz:
     def generate(self) -> None:
         declaration = load_declaration(self.model / "variables.toml")
         model_description(declaration, Provenance("1"))
+        fmi3_model_description(declaration, Provenance("1"))
+        terminals_and_icons(declaration)
         value_references(declaration)
         variable_table(declaration)
 

@@ -28,3 +28,22 @@ static void test_a_shifted_polynomial_is_the_same_function(void) {
     TEST_ASSERT_EQUAL_DOUBLE(5.0 + 7.0 * 1.5, shifted.d[2]);
     TEST_ASSERT_EQUAL_DOUBLE(7.0, shifted.d[3]);
 }
+
+static void test_a_polynomial_through_four_values(void) {
+    double values[POLYNOMIAL_NODES];
+    for (int k = 0; k < POLYNOMIAL_NODES; k++) {
+        values[k] = polynomial_value(&cubic, 0.25 * k);
+    }
+    const struct polynomial through = polynomial_through(values, 0.75);
+    for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, cubic.d[k], through.d[k]);
+    }
+    TEST_ASSERT_TRUE(values[0] == through.d[0]);
+}
+
+static void test_equal_values_are_held(void) {
+    static const double values[POLYNOMIAL_NODES] = {0.1, 0.1, 0.1, 0.1};
+    const struct polynomial held = {{0.1}};
+    const struct polynomial through = polynomial_through(values, 0.3);
+    TEST_ASSERT_EQUAL_MEMORY(&held, &through, sizeof held);
+}

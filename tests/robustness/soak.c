@@ -2,7 +2,7 @@
  * steps with snapshots, and loading and unloading of the shared object. */
 #define _GNU_SOURCE // mallinfo2, RTLD_NOLOAD
 
-#include "fmu_library.h"
+#include "fmu_version.h"
 #include "value_references.h"
 
 #include <dlfcn.h>
@@ -153,13 +153,13 @@ static void step_on(unsigned long cycle) {
     (void)(i % 10 == 0 ? step_again(*c, i, i % 100 == 0) : step(*c, i));
 }
 
-static const char *paths[3];
+static const char *paths[3]; /* that of this build's FMU first */
 
 /* As importers do: load, instantiate, a few steps, free, unload. Two other FMUs are loaded
  * meanwhile and unloaded in the same order. */
 static void reload(unsigned long cycle) {
     void *others[2];
-    void *library = fmu_library_open(paths[0], &fmu);
+    void *library = fmu_version_open(&fmu);
     if (library == NULL) {
         expect(false, "the FMU cannot be loaded");
         return;
@@ -221,7 +221,7 @@ int main(int argc, char **argv) {
     for (size_t i = 0; count > 0 && i < sizeof campaigns / sizeof campaigns[0]; i++) {
         if (strcmp(argv[1], campaigns[i].name) == 0) {
             memcpy(paths, &argv[3], sizeof paths);
-            if (!campaigns[i].loads && fmu_library_open(paths[0], &fmu) == NULL) {
+            if (!campaigns[i].loads && fmu_version_open(&fmu) == NULL) {
                 return 2;
             }
             run(&campaigns[i], count);

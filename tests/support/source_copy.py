@@ -13,8 +13,8 @@ SETTINGS = (
 
 
 def copy_sources(to: Path) -> Path:
-    """What a build needs: no build folder, no references."""
-    ignored = shutil.ignore_patterns("build", ".git", "__pycache__", "references")
+    """What a build needs."""
+    ignored = shutil.ignore_patterns("build", ".git", "__pycache__")
     return shutil.copytree(ROOT, to, ignore=ignored)
 
 

@@ -1,0 +1,230 @@
+/* Who watches the internal steps of an integrator sees each of them once, changes none, and may end
+ * an advance. */
+#include "each_method.h"
+#include "integrator.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+/* x' = v, v' = -x; from failing_from (s) on the right-hand side gives NaN. */
+static double failing_from;
+
+static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
+    (void)context;
+    dx[0] = x[1];
+    dx[1] = t >= failing_from ? NAN : -x[0];
+    return STATUS_OK;
+}
+
+static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
+    (void)t;
+    (void)x;
+    (void)context;
+    static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
+    memcpy(J, columns, sizeof columns);
+    return STATUS_OK;
+}
+
+static struct integrator *integrator;
+static unsigned message_count;
+
+static void count_message(void *context, enum status status, const char *text) {
+    (void)context;
+    (void)status;
+    message_count += text[0] != '\0';
+}
+
+static const double tolerance = 1e-9;
+static const double start[2] = {1.0, 0.0};
+
+void setUp(void) {
+    static const double absolute[2] = {1e-11, 1e-11};
+    const struct ode ode = {.state_count = 2, .rhs = circle_rhs, .jacobian = circle_jacobian};
+    const struct message_sink sink = {.write = count_message};
+    const struct integrator_settings settings = {.method = (enum integrator_method)method,
+                                                 .relative_tolerance = tolerance,
+                                                 .absolute_tolerances = absolute};
+    failing_from = INFINITY;
+    message_count = 0;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, INFINITY, 0.0));
+}
+
+void tearDown(void) {
+    integrator_destroy(integrator);
+}
+
+static void begin_again(void) {
+    tearDown();
+    setUp();
+}
+
+/* ---- A watcher ------------------------------------------------------------------------------ */
+
+enum { MOST_STEPS = 20000 };
+
+static struct {
+    unsigned count;
+    unsigned end_at; /* the step after which it ends the advance, counted from 1; 0: none */
+    double times[MOST_STEPS];
+    double largest_error;
+} seen;
+
+static bool watch(void *context, double t, const double x[]) {
+    TEST_ASSERT_EQUAL_PTR(&seen, context);
+    TEST_ASSERT_TRUE(seen.count < MOST_STEPS);
+    seen.times[seen.count++] = t;
+    seen.largest_error = fmax(seen.largest_error, fmax(fabs(x[0] - cos(t)), fabs(x[1] + sin(t))));
+    return seen.count == seen.end_at;
+}
+
+static void begin_watching(unsigned end_at) {
+    memset(&seen, 0, sizeof seen);
+    seen.end_at = end_at;
+    integrator_set_observer(integrator, watch, &seen);
+}
+
+static enum status advance(double t, int64_t steps, double *reached, double x[2]) {
+    return integrator_advance(integrator, t, steps, reached, x);
+}
+
+/* ---- Tests ---------------------------------------------------------------------------------- */
+
+static const double stops[] = {0.1, 0.100001, 2.0, 2.5, 9.0};
+enum { STOPS = 5 };
+
+EACH_METHOD static void test_each_step_is_seen_once(void) {
+    double x[2];
+    double reached;
+    begin_watching(0);
+    for (int i = 0; i < STOPS; i++) {
+        const unsigned before = seen.count;
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(stops[i], 100000, &reached, x));
+        for (unsigned k = before; k < seen.count; k++) {
+            TEST_ASSERT_TRUE(seen.times[k] < stops[i]);
+        }
+    }
+    for (unsigned k = 1; k < seen.count; k++) {
+        TEST_ASSERT_TRUE(seen.times[k] > seen.times[k - 1]);
+    }
+    TEST_ASSERT_TRUE(seen.largest_error < 1e3 * tolerance);
+
+    // all but those that end at a stop, or beyond the last one
+    struct integrator_statistics statistics;
+    integrator_get_statistics(integrator, &statistics);
+    TEST_ASSERT_TRUE(seen.count < statistics.steps);
+    TEST_ASSERT_TRUE(seen.count + STOPS >= statistics.steps);
+}
+
+EACH_METHOD static void test_watching_changes_nothing(void) {
+    double x[2][STOPS][2];
+    struct integrator_statistics statistics[2];
+    memset(statistics, 0, sizeof statistics);
+    for (int watched = 0; watched < 2; watched++) {
+        double reached;
+        begin_again();
+        if (watched) {
+            begin_watching(0);
+        }
+        for (int i = 0; i < STOPS; i++) {
+            TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(stops[i], 100000, &reached, x[watched][i]));
+        }
+        integrator_get_statistics(integrator, &statistics[watched]);
+    }
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+    TEST_ASSERT_TRUE(statistics[0].steps == statistics[1].steps);
+    TEST_ASSERT_TRUE(statistics[0].rhs_evaluations <= statistics[1].rhs_evaluations);
+    TEST_ASSERT_TRUE(statistics[0].last_step == statistics[1].last_step);
+}
+
+EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
+    double x[2];
+    double reached;
+    begin_watching(7);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 100000, &reached, x));
+    TEST_ASSERT_EQUAL_UINT(7, seen.count);
+    TEST_ASSERT_TRUE(reached == seen.times[6]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
+    TEST_ASSERT_EQUAL_UINT(0, message_count);
+    struct integrator_statistics statistics;
+    integrator_get_statistics(integrator, &statistics);
+    TEST_ASSERT_TRUE(statistics.steps == 7);
+
+    integrator_set_observer(integrator, NULL, NULL);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 100000, &reached, x));
+    TEST_ASSERT_TRUE(reached == 9.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e4 * tolerance, cos(9.0), x[0]);
+    TEST_ASSERT_EQUAL_UINT(7, seen.count);
+}
+
+/* An integrator that gives up begins again with shorter steps: no time is seen twice. */
+EACH_METHOD static void test_times_rise_where_the_right_hand_side_fails(void) {
+    double x[2];
+    double reached;
+    failing_from = 2.0;
+    begin_watching(0);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, advance(9.0, 1000, &reached, x));
+    TEST_ASSERT_TRUE(reached < 2.0);
+    TEST_ASSERT_GREATER_THAN_UINT(5, seen.count);
+    for (unsigned k = 1; k < seen.count; k++) {
+        TEST_ASSERT_TRUE(seen.times[k] > seen.times[k - 1]);
+    }
+    TEST_ASSERT_TRUE(seen.times[seen.count - 1] <= reached);
+}
+
+/* Also then it may end the advance, which does not fail. */
+EACH_METHOD static void test_an_advance_that_would_fail_is_ended_before(void) {
+    double x[2];
+    double reached;
+    failing_from = 2.0;
+    begin_watching(0);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, advance(9.0, 1000, &reached, x));
+    const unsigned all = seen.count;
+    begin_again();
+    failing_from = 2.0;
+    begin_watching(all);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 1000, &reached, x));
+    TEST_ASSERT_TRUE(reached == seen.times[all - 1]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
+}
+
+EACH_METHOD static void test_the_limit_of_steps_holds(void) {
+    double x[2][2];
+    double reached[2];
+    for (int watched = 0; watched < 2; watched++) {
+        begin_again();
+        if (watched) {
+            begin_watching(0);
+        }
+        TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
+                              advance(9.0, 12, &reached[watched], x[watched]));
+    }
+    TEST_ASSERT_TRUE(reached[0] == reached[1]);
+    TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
+    TEST_ASSERT_EQUAL_UINT(12, seen.count);
+}
+
+/* ---- Points that were passed ------------------------------------------------------------------
+ */
+
+EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) {
+    double x[2] = {-7.0, -7.0};
+    double expected[2];
+    double reached;
+    TEST_ASSERT_FALSE(integrator_interpolate(integrator, 0.5, x));
+    TEST_ASSERT_TRUE(x[0] == -7.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(2.0, 100000, &reached, x));
+    const double next = 2.0 + 1e-6;
+    if (!integrator_has_history(integrator)) {
+        TEST_ASSERT_FALSE(integrator_interpolate(integrator, next, x));
+        return;
+    }
+    TEST_ASSERT_TRUE(integrator_interpolate(integrator, next, x));
+    begin_again();
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(2.0, 100000, &reached, expected));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(next, 100000, &reached, expected));
+    TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
+    TEST_ASSERT_FALSE(integrator_interpolate(integrator, 100.0, x));
+}
