@@ -66,7 +66,7 @@ def _by_calls(axes: Axes, study: StepErrors) -> None:
     axes.xaxis.set_major_locator(FixedLocator(study.calls[0]))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda calls, _: f"{calls:.0f}"))
-    axes.set_xlabel("calls of fmi2DoStep")
+    axes.set_xlabel("calls of DoStep")
     axes.set_ylabel("largest relative error of the arm's states")
     _title(axes, "Error against calls")
 

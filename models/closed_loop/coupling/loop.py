@@ -112,7 +112,7 @@ class ClosedLoop:
         stop: float | None = None,
         changes: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> tuple[Columns, int]:
-        """Values at all communication points by name, with "time", and calls of fmi2DoStep."""
+        """Values at all communication points by name, with "time", and calls of DoStep."""
         stop = self.stop if stop is None else stop
         times = grid(stop, step)
         with self.master(method) as master:

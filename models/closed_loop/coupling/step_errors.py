@@ -28,7 +28,7 @@ class StepErrors:
     steps: np.ndarray  # s
     errors: np.ndarray  # of the arm's states, relative to the largest value of each
     energies: np.ndarray  # J, that the coupling adds to the arm
-    calls: np.ndarray  # of fmi2DoStep
+    calls: np.ndarray  # of DoStep
 
     def slopes(self, values: np.ndarray) -> list[float]:
         """Of log |values| over log steps, by method."""

@@ -28,7 +28,7 @@ def step_error_lines(study: StepErrors) -> list[str]:
             lines.append(f"{method.name:<{width}}  {cells}  {slope:>5.2f}  {good}")
         lines.append("")
     calls = "".join(f"{count:>11}" for count in study.calls[0])
-    return [*lines, f"{'calls of fmi2DoStep':<{width}}  {calls}"]
+    return [*lines, f"{'calls of DoStep':<{width}}  {calls}"]
 
 
 def tracking_lines(tracking: list[Tracking]) -> list[str]:
