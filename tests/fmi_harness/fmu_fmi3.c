@@ -2,7 +2,8 @@
  * SetupExperiment, which only keeps its arguments for EnterInitializationMode; derivatives of
  * inputs, which intermediate updates give where FMU_UPDATES says so, and which count for nothing
  * otherwise; the status of a step, of which only the time is known. */
-#include "fmu3_library.h"
+#include "fmu_fmi3.h"
+
 #include "fmu_version.h"
 #include "value_references.h"
 
@@ -13,6 +14,8 @@ const unsigned fmu_version = 3;
 
 static struct fmu3_functions fmi3;
 
+struct fmu_fmi3_options fmu_fmi3_options;
+
 enum { INPUTS = 2, ORDERS = 4 };
 static const fmi3ValueReference inputs[INPUTS] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
 
@@ -20,7 +23,8 @@ struct adapted {
     fmi3Instance instance;
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
-    bool is_model_exchange;
+    bool is_model_exchange, has_event_mode;
+    fmi3IntermediateUpdateCallback update; /* of the options */
     bool has_tolerance, has_stop;
     double tolerance, start, stop;
     double step_start;            /* s */
@@ -35,6 +39,10 @@ static fmi2Status status_of(fmi3Status status) {
 /* Functions may be called without an instance. */
 static fmi3Instance instance_of(fmi2Component c) {
     return c != NULL ? ((const struct adapted *)c)->instance : NULL;
+}
+
+fmi3Instance fmu_fmi3_instance(fmi2Component c) {
+    return instance_of(c);
 }
 
 /* ---- Callbacks ------------------------------------------------------------------------------ */
@@ -52,11 +60,11 @@ static void update(fmi3InstanceEnvironment adapted_pointer, fmi3Float64 time, fm
                    fmi3Boolean *return_early, fmi3Float64 *early_time) {
     const struct adapted *adapted = adapted_pointer;
     double values[INPUTS];
-    (void)get;
-    (void)finished;
-    (void)can_return_early;
-    (void)return_early;
-    (void)early_time;
+    if (adapted->update != NULL) {
+        adapted->update(adapted->environment, time, set, get, finished, can_return_early,
+                        return_early, early_time);
+        return;
+    }
     for (size_t i = 0; i < INPUTS; i++) {
         const double t = time - adapted->step_start;
         const double *d = adapted->input[i];
@@ -102,9 +110,17 @@ static fmi2Component Instantiate(fmi2String name, fmi2Type type, fmi2String guid
         adapted->instance = fmi3.InstantiateModelExchange(name, token, location, visible != 0,
                                                           logging_on != 0, adapted, pass_on);
     } else {
+        const struct fmu_fmi3_options *options = &fmu_fmi3_options;
+        const bool has_update = options->update != NULL;
+        adapted->has_event_mode = options->event_mode;
+        adapted->update = options->update;
         adapted->instance = fmi3.InstantiateCoSimulation(
-            name, token, location, visible != 0, logging_on != 0, false, false, inputs,
-            FMU_UPDATES ? INPUTS : 0, adapted, pass_on, FMU_UPDATES ? update : NULL);
+            name, token, location, visible != 0, logging_on != 0, options->event_mode,
+            options->early_return, has_update ? options->required : inputs,
+            has_update    ? options->required_count
+            : FMU_UPDATES ? INPUTS
+                          : 0,
+            adapted, pass_on, has_update || FMU_UPDATES ? update : NULL);
     }
     if (adapted->instance == NULL) {
         free(adapted);
@@ -151,7 +167,11 @@ static fmi2Status EnterInitializationMode(fmi2Component c) {
 }
 
 static fmi2Status ExitInitializationMode(fmi2Component c) {
-    return status_of(fmi3.ExitInitializationMode(instance_of(c)));
+    const fmi3Status status = fmi3.ExitInitializationMode(instance_of(c));
+    if (status == fmi3OK && ((const struct adapted *)c)->has_event_mode) {
+        return status_of(fmi3.EnterStepMode(instance_of(c)));
+    }
+    return status_of(status);
 }
 
 static fmi2Status Terminate(fmi2Component c) {

@@ -1,19 +1,32 @@
-/* An instance under fuzzing, with what holds for every call of every target. */
+/* An instance under fuzzing, with what holds for every call of every target. Its functions are
+ * those of FMI 2.0, or stand for those of FMI 3.0: fmu_version.h. */
 #ifndef FUZZ_INSTANCE_H
 #define FUZZ_INSTANCE_H
 
-#include "fmu_library.h"
+#include "fmu_version.h"
 #include "fuzz.h"
 #include "value_references.h"
-
-#include <fmi2Functions.h>
 
 /* Internal steps that one communication step may take here, so that executions are quick. */
 enum { FUZZ_MAX_INTERNAL_STEPS = 300 };
 
+extern struct fmu_functions fuzz_fmu;
+
+/* What instances for Co-Simulation may have besides in FMI 3.0. */
+enum fuzz_variety {
+    FUZZ_EVENT_MODE = 1 << 0, /* then saved states are of another kind */
+    FUZZ_EARLY_RETURN = 1 << 1,
+    FUZZ_UPDATES = 1 << 2, /* intermediate ones */
+    FUZZ_VARIETIES = 1 << 3
+};
+
+/* Called before an instance is made, and with 0 after it. NULL: there are no varieties. */
+extern void (*fuzz_choose_variety)(unsigned variety);
+
 struct fuzz_instance {
     fmi2Component component;
     fmi2Type kind;
+    unsigned variety; /* bits of enum fuzz_variety */
     bool has_logger;
     bool tells_refusals;            /* errors and discards must come with a text */
     bool in_error;                  /* since an fmi2Error (section 4.2.4) */
@@ -26,6 +39,8 @@ struct fuzz_instance {
 /* NULL and false where has_logger is false: logging_on then means nothing. Freed by
  * fuzz_instance_free. */
 struct fuzz_instance *fuzz_instance_create(fmi2Type kind, bool has_logger, bool logging_on);
+struct fuzz_instance *fuzz_instance_create_variety(fmi2Type kind, unsigned variety, bool has_logger,
+                                                   bool logging_on);
 void fuzz_instance_free(struct fuzz_instance *instance);
 
 /* Callbacks whose environment is the instance. */
@@ -36,10 +51,14 @@ fmi2CallbackFunctions fuzz_callbacks(struct fuzz_instance *instance, bool has_lo
 fmi2Status fuzz_check(struct fuzz_instance *instance, enum fmu_function function,
                       fmi2Status status);
 
+/* The same for any function, by its name. */
+fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, bool works_in_error,
+                           fmi2Status status);
+
 #define FUZZ_CHECKED(instance, name, ...)                                                          \
-    fuzz_check(instance, FMU_##name, FUZZ_CALL(fmi2##name((instance)->component, __VA_ARGS__)))
+    fuzz_check(instance, FMU_##name, FUZZ_CALL(fuzz_fmu.name((instance)->component, __VA_ARGS__)))
 #define FUZZ_CHECKED_PLAIN(instance, name)                                                         \
-    fuzz_check(instance, FMU_##name, FUZZ_CALL(fmi2##name((instance)->component)))
+    fuzz_check(instance, FMU_##name, FUZZ_CALL(fuzz_fmu.name((instance)->component)))
 
 /* fmi2Reset, and max_internal_steps as above. */
 void fuzz_reset(struct fuzz_instance *instance);

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-const char *const fuzz_target_name = "fuzz_numeric";
+const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 
 enum { MAX_STEPS = 8, MAX_INTERNAL_STEPS = 1000 };
 

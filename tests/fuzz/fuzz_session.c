@@ -10,7 +10,9 @@ struct fuzz_instance *fuzz_session_instance(struct fuzz_session *session) {
     struct fuzz_instance **instance = &session->instances[selector % FUZZ_INSTANCES];
     if (*instance == NULL) {
         const fmi2Type kind = selector & 0x80 ? fmi2ModelExchange : fmi2CoSimulation;
-        *instance = fuzz_instance_create(kind, selector & 0x40, selector & 0x20);
+        const bool has_varieties = kind == fmi2CoSimulation && fuzz_choose_variety != NULL;
+        const unsigned variety = has_varieties ? selector / 4 % FUZZ_VARIETIES : 0;
+        *instance = fuzz_instance_create_variety(kind, variety, selector & 0x40, selector & 0x20);
         fuzz_limit_steps(*instance, FUZZ_MAX_INTERNAL_STEPS);
     }
     return *instance;
@@ -160,6 +162,7 @@ void fuzz_call_SerializeFMUstate(struct fuzz_session *session, struct fuzz_insta
     *serialized = (struct fuzz_serialized){.bytes = bytes,
                                            .size = needed,
                                            .kind = instance->kind,
+                                           .variety = instance->variety,
                                            .in_error = state->in_error,
                                            .time = state->time};
 }
@@ -176,12 +179,14 @@ void fuzz_call_DeSerializeFMUstate(struct fuzz_session *session, struct fuzz_ins
     memcpy(bytes, serialized->bytes, size);
     const fmi2Status status =
         FUZZ_CHECKED(instance, DeSerializeFMUstate, bytes, size, &state->handle);
-    const bool fits = size == serialized->size && serialized->kind == instance->kind;
+    const unsigned other_variety = serialized->variety ^ instance->variety;
+    const bool is_same_kind =
+        serialized->kind == instance->kind && (other_variety & FUZZ_EVENT_MODE) == 0;
+    const bool fits = size == serialized->size && is_same_kind;
     if (status != (fits ? fmi2OK : fmi2Error) || (state->handle != NULL) != fits) {
         fuzz_fail("fmi2DeSerializeFMUstate of %zu bytes of %zu, of a state of %s kind, has the "
                   "status %d",
-                  size, serialized->size,
-                  serialized->kind == instance->kind ? "the same" : "another", (int)status);
+                  size, serialized->size, is_same_kind ? "the same" : "another", (int)status);
     }
     if (fits) {
         state->owner = instance;

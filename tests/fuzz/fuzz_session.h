@@ -20,6 +20,7 @@ struct fuzz_session {
         fmi2Byte *bytes; /* NULL: none */
         size_t size;
         fmi2Type kind;
+        unsigned variety;
         bool in_error;
         double time; /* s */
     } serialized[FUZZ_SERIALIZED];
@@ -34,10 +35,14 @@ void fuzz_session_free_instance(struct fuzz_session *session, struct fuzz_instan
 void fuzz_session_end(struct fuzz_session *session);
 
 /* One call of each function, with arguments that the input says, and what holds for it:
- * fuzz_calls.c, of values fuzz_access.c, of states fuzz_session.c. */
+ * of values in fuzz_access.c, of modes in fuzz_modes.c, of states in fuzz_session.c. Those of one
+ * version only are in its target: fuzz_calls.c, fuzz_calls_fmi3.c. */
 typedef void fuzz_operation(struct fuzz_session *session, struct fuzz_instance *instance);
 #define FUZZ_OPERATION(name) fuzz_operation fuzz_call_##name;
 FMU_FUNCTION_LIST(FUZZ_OPERATION)
 #undef FUZZ_OPERATION
+
+/* A run of a target: these calls, and sequences of calls that lead further. */
+void fuzz_session_run(struct fuzz_input *input, fuzz_operation *const calls[], size_t count);
 
 #endif

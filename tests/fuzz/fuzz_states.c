@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const fuzz_target_name = "fuzz_states";
+const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 
 enum { BASES = 12, BYTES_CAPACITY = 2048, MAX_MUTATIONS = 12, MAX_OPERATIONS = 10 };
 

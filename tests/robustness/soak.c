@@ -207,10 +207,11 @@ static void run(const struct campaign *campaign, unsigned long count) {
     const long growth = after.own - before.own;
     expect(growth <= growth_limit, "the resident memory grows");
     expect(after.used - before.used <= growth_limit * 1024, "the allocated memory grows");
-    printf("figures: soak %s; cycles %lu; seconds %.1f; findings %lu; resident memory %ld KiB; "
-           "memory growth %ld KiB; growth with pages of files %ld KiB; growth of allocated memory "
+    printf("figures: soak %s, FMI %u.0; cycles %lu; seconds %.1f; findings %lu; resident memory "
+           "%ld KiB; memory growth %ld KiB; growth with pages of files %ld KiB; growth of "
+           "allocated memory "
            "%ld bytes\n",
-           campaign->name, count,
+           campaign->name, fmu_version, count,
            (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec),
            findings, after.resident, growth, after.resident - before.resident,
            after.used - before.used);

@@ -168,8 +168,9 @@ static unsigned run_threads(unsigned thread_count, unsigned instance_count) {
     }
     clock_gettime(CLOCK_MONOTONIC, &end);
     findings += thread_count - started;
-    printf("figures: threads; threads %u; calls %lu; instances %u; seconds %.1f; findings %u\n",
-           thread_count, calls, thread_count * instance_count,
+    printf("figures: threads, FMI %u.0; threads %u; calls %lu; instances %u; seconds %.1f; "
+           "findings %u\n",
+           fmu_version, thread_count, calls, thread_count * instance_count,
            (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec),
            findings);
     return findings;
