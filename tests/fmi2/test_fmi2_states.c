@@ -166,7 +166,7 @@ static void check_all(fmi2Type type, char letter) {
             .function = (enum fmu_function)function,
             .state = fmu_state_of(type, letter),
         };
-        snprintf(pair.text, sizeof pair.text, "%s of a %s instance %s", fmu_name_of(function),
+        snprintf(pair.text, sizeof pair.text, "%s of a %s instance %s", fmu_name_of(pair.function),
                  type == fmi2CoSimulation ? "Co-Simulation" : "Model Exchange", pair.state->name);
         check(&pair);
     }
