@@ -31,6 +31,8 @@ RENAMES = "generated/elementary_functions.h"
 
 # not on every system, and nothing that they define is used
 NOT_NEEDED = {"endian.h", "features.h"}
+# every importer has them, and an FMU must not (FMI 3.0, section 2.5)
+OF_IMPORTERS = {"fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"}
 # behind conditions that never hold: options of SUNDIALS, and C++
 NOT_REACHED = {"caliper/cali.h", "mpi.h", "sundials/sundials_context.hpp"}
 
@@ -172,7 +174,7 @@ class SourceFolder:
         as_it_is = text[line.start : line.end]
         if line.name in NOT_NEEDED:
             return ""
-        if line.name in NOT_REACHED:
+        if line.name in NOT_REACHED | OF_IMPORTERS:
             return as_it_is
         searched = [path.parent, *library.include] if line.is_quoted else library.include
         for folder in searched:
