@@ -115,6 +115,28 @@ def test_fmpy_compiles_an_fmu_without_binaries(
     assert_same_bits(built[archive.stem], LoadedFmu(archive, tmp_path / "compiled"))
 
 
+def test_fmpy_compiles_an_fmu_of_fmi_3(fmu: Path, tmp_path: Path) -> None:
+    """By its buildDescription.xml, with fmpy's own headers of FMI."""
+    run("cmake", "--build", fmu.parent, "--target", "RPManipulator_fmi3_sources")
+    release = fmu.parent / "fmu" / "RPManipulator" / "fmi3" / "release"
+    assert not list(release.rglob("fmi3Functions.h"))
+    archive = tmp_path / "RPManipulator.fmu"
+    entries = [f"{name}={release / name}" for name in ("modelDescription.xml", "sources")]
+    run(sys.executable, ROOT / "fmu" / "package.py", archive, *entries)
+    command = Path(sys.executable).parent / "fmpy"
+    assert "No problems found." in run(command, "validate", archive)
+    options = ["--configuration", "Debug"]
+    run(command, "compile", archive, *options, CMAKE_BUILD_PARALLEL_LEVEL="2")
+    runs = [
+        fmpy.simulate_fmu(
+            str(path), stop_time=2.0, output_interval=0.01, start_values={"q1": 0.3, "tau1": 2.0}
+        )
+        for path in (fmu.parent / "fmi3" / "RPManipulator.fmu", archive)
+    ]
+    assert runs[0]["q1"][-1] != runs[0]["q1"][0]
+    assert runs[0].tobytes() == runs[1].tobytes()
+
+
 # ---- Plain compilers ----------------------------------------------------------------------------
 
 
