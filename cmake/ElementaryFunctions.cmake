@@ -32,7 +32,7 @@ target_include_directories(elementary_functions
   PRIVATE ${MUSL_SOURCE_DIR}/src/internal ${MUSL_SOURCE_DIR}/arch/generic)
 # none of them is a function that the compiler knows: it would make floor of floor
 target_compile_options(elementary_functions PRIVATE
-  ${foreign_options} -fno-builtin -ffile-prefix-map=${MUSL_SOURCE_DIR}=musl
+  ${foreign_options} -fno-builtin $<$<CONFIG:Release>:-ffile-prefix-map=${MUSL_SOURCE_DIR}=musl>
   "SHELL:-include \"${CMAKE_CURRENT_LIST_DIR}/musl.h\"")
 
 # headers that musl includes and not every system has: empty ones, where the system's are not found

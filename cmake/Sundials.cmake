@@ -35,5 +35,5 @@ target_include_directories(sundials
   PRIVATE ${SUNDIALS_SOURCE_DIR}/src/sundials)
 target_link_libraries(sundials PUBLIC reserve elementary_functions)
 target_compile_options(sundials PRIVATE
-  ${foreign_options} -ffile-prefix-map=${SUNDIALS_SOURCE_DIR}=sundials
+  ${foreign_options} $<$<CONFIG:Release>:-ffile-prefix-map=${SUNDIALS_SOURCE_DIR}=sundials>
   "SHELL:-include \"${PROJECT_SOURCE_DIR}/src/integrator/sundials_allocation.h\"")
