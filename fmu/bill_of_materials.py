@@ -14,6 +14,7 @@ from cyclonedx.model.bom import Bom
 from cyclonedx.model.component import Component, ComponentType
 from cyclonedx.model.license import DisjunctiveLicense
 from cyclonedx.output.json import JsonV1Dot6
+from cyclonedx.spdx import is_supported_id
 from cyclonedx.validation.json import JsonStrictValidator
 from provenance import ProvenanceError, license_texts
 
@@ -23,7 +24,12 @@ BILL = "sbom.cdx.json"
 
 def part(text: str) -> Component:
     """What is compiled into all of them, from NAME,VERSION,LICENSE,ADDRESS; licenses as in SPDX."""
-    name, version, license_id, address = text.split(",")
+    try:
+        name, version, license_id, address = text.split(",")
+    except ValueError:
+        raise ValueError(f"{text}: not NAME,VERSION,LICENSE,ADDRESS") from None
+    if not is_supported_id(license_id):
+        raise ValueError(f"{text}: SPDX has no license {license_id}")
     return Component(
         type=ComponentType.LIBRARY,
         name=name,

@@ -16,7 +16,16 @@ import tempfile
 from pathlib import Path
 
 LINES, BRANCHES = 0.95, 0.90
-PYTHON_TESTS = ("declaration", "document", "generate", "package")
+PYTHON_TESTS = (
+    "bill_of_materials",
+    "declaration",
+    "document",
+    "generate",
+    "package",
+    "references",
+    "source_folder",
+    "terminals",
+)
 
 
 def run(*command: object, **options: object) -> None:

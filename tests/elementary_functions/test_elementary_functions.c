@@ -80,7 +80,16 @@ static void assert_same(double expected, double actual) {
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&expected, &actual, sizeof expected, about);
 }
 
+/* Valgrind calculates in double whatever the type. */
+static bool long_double_is_longer(void) {
+    const volatile long double one = 1.0L;
+    return one + LDBL_EPSILON != one;
+}
+
 static void assert_close(long double expected, double units, double actual) {
+    if (!long_double_is_longer()) {
+        return; // expected is itself off, and by more
+    }
     const double nearest = (double)expected;
     if (!isfinite(nearest) || nearest == 0.0) {
         assert_same(nearest, actual);

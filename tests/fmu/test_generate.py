@@ -359,3 +359,30 @@ def test_the_declarations_are_readable_by_others() -> None:
     """Other programs read the file with nothing but a TOML reader."""
     content = tomllib.loads(VARIABLES.read_text())
     assert content["variables"]["q1"]["reference"] == 10
+
+
+@pytest.mark.parametrize("fmi", ["fmi2", "fmi3"])
+def test_a_description_of_sources_names_each_c_file(tmp_path: Path, fmi: str) -> None:
+    sources = tmp_path / "sources"
+    sources.mkdir()
+    for name in ("b.c", "a.c", "a.h"):
+        (sources / name).touch()
+    root = generated(VARIABLES, tmp_path, "--sources", sources, "--fmi", fmi)
+    if fmi == "fmi2":
+        files = root.iterfind("CoSimulation/SourceFiles/File")
+        schema = "fmi2/fmi2ModelDescription.xsd"
+        path = tmp_path / "modelDescription.xml"
+    else:
+        path = sources / "buildDescription.xml"
+        files = ET.parse(path).iterfind("BuildConfiguration/SourceFileSet/SourceFile")
+        schema = "fmi3/fmi3BuildDescription.xsd"
+    assert [file.get("name") for file in files] == ["a.c", "b.c"]
+    etree.XMLSchema(file=Path(fmpy.__file__).parent / "schema" / schema).assertValid(
+        etree.parse(path)
+    )
+
+
+def test_a_folder_without_sources_is_told(tmp_path: Path) -> None:
+    result = generate(VARIABLES, tmp_path, "--sources", tmp_path)
+    assert result.returncode == 2
+    assert result.stderr == f"generate.py: {tmp_path}: has no C files\n"

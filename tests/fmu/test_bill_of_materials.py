@@ -1,0 +1,87 @@
+"""The program that writes a release's checksums and its bill of materials, on two small files."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import ROOT
+
+PROGRAM = ROOT / "fmu" / "bill_of_materials.py"
+PART = "Solver,1.2.3,BSD-3-Clause,https://solver.example"
+
+
+def write(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Run the program on the files of a folder; later options prevail."""
+    files = sorted(folder.rglob("*.fmu"))
+    command = [sys.executable, PROGRAM, *files, "--output", folder, "--version", "1.0.0"]
+    command += ["--license", ROOT / "LICENSE", *options]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def release(tmp_path: Path) -> Path:
+    """Folder with the files of a release, one of them in a folder below."""
+    folder = tmp_path / "a release"
+    (folder / "below").mkdir(parents=True)
+    (folder / "One.fmu").write_bytes(b"one")
+    (folder / "below" / "Two.fmu").write_bytes(b"two")
+    return folder
+
+
+def test_sha256sum_accepts_the_checksums_until_a_file_changes(release: Path) -> None:
+    result = write(release)
+    assert result.returncode == 0, result.stderr
+    check = ["sha256sum", "--check", "--quiet", "--strict", "SHA256SUMS"]
+    assert subprocess.run(check, cwd=release, check=False).returncode == 0
+    (release / "One.fmu").write_bytes(b"two")
+    assert subprocess.run(check, cwd=release, check=False, capture_output=True).returncode == 1
+
+
+def test_the_bill_gives_checksums_and_parts(release: Path) -> None:
+    assert write(release, "--part", PART).returncode == 0
+    bill = json.loads((release / "sbom.cdx.json").read_text())
+    components = {component["name"]: component for component in bill["components"]}
+    assert set(components) == {"One.fmu", "below/Two.fmu", "Solver"}
+    assert components["Solver"]["version"] == "1.2.3"
+    assert components["Solver"]["licenses"] == [{"license": {"id": "BSD-3-Clause"}}]
+    sums = dict(
+        reversed(line.split("  ")) for line in (release / "SHA256SUMS").read_text().splitlines()
+    )
+    uses = {each["ref"]: each.get("dependsOn") for each in bill["dependencies"]}
+    for name, checksum in sums.items():
+        assert components[name]["hashes"] == [{"alg": "SHA-256", "content": checksum}]
+        assert uses[name] == ["Solver"]
+
+
+def test_the_same_files_give_the_same_bytes_and_others_another_number(release: Path) -> None:
+    def bill() -> bytes:
+        assert write(release, "--part", PART).returncode == 0
+        return (release / "sbom.cdx.json").read_bytes()
+
+    first = bill()
+    assert bill() == first
+    (release / "One.fmu").write_bytes(b"another")
+    numbers = [json.loads(each)["serialNumber"] for each in (first, bill())]
+    assert numbers[0] != numbers[1]
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--license", "nowhere"], "nowhere"),
+        (["--output", "/nowhere"], "/nowhere"),
+        (["--part", "Solver,1.2.3,BSD-3-Clause"], "Solver"),
+        (["--part", PART.replace("BSD-3-Clause", "my own")], "my own"),
+    ],
+)
+def test_what_cannot_be_written_is_told_in_a_line(
+    release: Path, options: list[str], reason: str
+) -> None:
+    result = write(release, *options)
+    assert result.returncode == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("bill_of_materials.py: ") and reason in line
+    assert not (release / "SHA256SUMS").exists()
