@@ -3,6 +3,7 @@
 #include "arithmetic_double.h"
 #include "rp_calculated.h"
 #include "rp_propagation.h"
+#include "rp_series.h"
 
 #include <stdio.h>
 
@@ -72,6 +73,7 @@ const struct model rp_model = {
     .derivatives = {offsetof(struct rp_values, dq), sizeof(double[4])},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
+    .series = &rp_series,
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,

@@ -6,8 +6,14 @@
 #include "internals.h"
 
 /* How the integrator gets to a time: it goes on from its history, gets that back first, after a
- * restore, or restarts because an input or a parameter has changed. */
-enum continuation { CONTINUE_NOW, CONTINUE_AFTER_REPLAY, CONTINUE_AFTER_RESTART };
+ * restore, restarts on the same motion, because the history has become too long, or restarts
+ * because an input or a parameter has changed. */
+enum continuation {
+    CONTINUE_NOW,
+    CONTINUE_AFTER_REPLAY,
+    CONTINUE_AFTER_RESTART,
+    CONTINUE_AFTER_CHANGE,
+};
 
 /* target: s since the restart. */
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,

@@ -53,12 +53,15 @@ static enum status setup(struct instance *instance) {
     memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial);
     memory->block = calloc(1, memory->size);
     instance->first_derivatives = calloc(2, values_size);
-    instance->u = calloc((POLYNOMIAL_NODES + 1) * input_count + 1, sizeof(double));
+    instance->u =
+        calloc((POLYNOMIAL_NODES + 1 + SERIES_INPUT_LENGTH) * input_count + 1, sizeof(double));
     if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
     instance->nodes = instance->u + input_count;
+    instance->input_series =
+        (double(*)[SERIES_INPUT_LENGTH])(instance->nodes + POLYNOMIAL_NODES * input_count);
     memory->values = memory->block;
     memory->held = memory->values + values_size;
     memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
@@ -68,11 +71,15 @@ static enum status setup(struct instance *instance) {
     if (model->states.size == 0) {
         return STATUS_OK;
     }
-    const struct ode ode = {.state_count = count_of(model->states),
-                            .rhs = instance_rhs,
-                            .jacobian = instance_jacobian,
-                            .context = instance};
-    return integrator_create(&ode, &instance->sink, &instance->integrator);
+    instance->ode = (struct ode){.state_count = count_of(model->states),
+                                 .rhs = instance_rhs,
+                                 .jacobian = instance_jacobian,
+                                 .context = instance};
+    if (model->series != NULL) {
+        instance->ode.series = instance_series;
+        instance->ode.series_row_count = model->series->row_count;
+    }
+    return integrator_create(&instance->ode, &instance->sink, &instance->integrator);
 }
 
 enum status instance_create(const struct model_description *description,
@@ -150,6 +157,9 @@ enum status instance_enter_initialization(struct instance *instance) {
 
 enum status instance_exit_initialization(struct instance *instance) {
     enum status status = instance_check_parameters(instance);
+    if (status == STATUS_OK) {
+        status = instance_check_method(instance);
+    }
     if (status == STATUS_OK && instance->integrator != NULL) {
         instance_report_tolerance(instance);
         status = instance_configure_integrator(instance);

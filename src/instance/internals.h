@@ -7,10 +7,6 @@
 #include "instance.h"
 #include "polynomial.h"
 
-/* Internal steps after which the integrator restarts though nothing has changed: the most that a
- * restored snapshot has to replay. Larger: fewer restarts, slower rollback. */
-enum { INSTANCE_LONGEST_HISTORY = 1000 };
-
 /* Bounds of what the integrator can run at: below, rounding stops its error test from converging;
  * above, results have no digit left. */
 #define INSTANCE_FINEST_TOLERANCE   1e-14
@@ -36,10 +32,12 @@ struct instance_state {
     double span;        /* s since the restart that the integrator may not pass */
     double first_time;  /* s since the restart */
     double latest_time; /* s since the restart */
+    double passed_time; /* s since the restart: where the last internal step ended */
     struct integrator_statistics statistics;
     int64_t steps_before_restart; /* internal steps */
-    double restart_step; /* s: first internal step of the last restart; 0: the method found one */
-    double next_step;    /* s: the same, for a restart now */
+    double restart_step;  /* s: first internal step of the last restart; 0: the method found one */
+    double next_step;     /* s: the same, for a restart now */
+    bool restart_goes_on; /* the last restart was on the solution before it */
 };
 
 /* Parts of one block of memory, of which a snapshot is a copy. */
@@ -62,14 +60,16 @@ struct instance {
     struct instance_state state;
     struct instance_memory memory;
 
-    bool states_are_settable;      /* after initialization, too */
-    bool outputs_are_valid;        /* the calculated values belong to the others */
-    bool history_is_lost;          /* the integrator is not where state says: replay first */
-    struct integrator *integrator; /* NULL: the model has no states */
+    bool states_are_settable; /* after initialization, too */
+    bool outputs_are_valid;   /* the calculated values belong to the others */
+    bool history_is_lost;     /* the integrator is not where state says: replay first */
+    struct ode ode;
+    struct integrator *integrator;         /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the
                                               tolerances of the states */
-    bool inputs_move;        /* since the last restart; otherwise u holds their values */
-    double *u;               /* one value per input, as the right-hand side sees them */
+    bool inputs_move; /* since the last restart; otherwise u holds their values */
+    double *u;        /* one value per input, as the right-hand side sees them */
+    double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;

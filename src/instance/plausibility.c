@@ -53,7 +53,8 @@ static bool has_possible_settings(const struct instance *instance,
         {"max_internal_steps", own->max_internal_steps,
          instance->integrator == NULL || own->max_internal_steps >= 1},
         {"solver_method", own->solver_method,
-         own->solver_method > INTEGRATOR_NO_METHOD && own->solver_method < INTEGRATOR_METHODS},
+         own->solver_method > INTEGRATOR_NO_METHOD && own->solver_method < INTEGRATOR_METHODS &&
+             integrator_is_possible((enum integrator_method)own->solver_method, &instance->ode)},
     };
     return are_possible(instance, values, COUNT(values)) &&
            (!state->experiment_defined ||
@@ -81,7 +82,9 @@ static bool has_possible_statistics(const struct instance *instance,
 static bool has_possible_history(const struct instance *instance,
                                  const struct instance_state *state) {
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    const int64_t most_steps = INSTANCE_LONGEST_HISTORY + (int64_t)state->own.max_internal_steps;
+    const int64_t most_steps =
+        integrator_longest_history((enum integrator_method)state->own.solver_method) +
+        (int64_t)state->own.max_internal_steps;
     const bool exists = state->has_history;
     const struct named_value values[] = {
         {"restart_time", state->restart_time.s, isfinite(state->restart_time.s)},
@@ -93,6 +96,7 @@ static bool has_possible_history(const struct instance *instance,
         {"first_time", state->first_time, !exists || state->first_time > 0.0},
         {"latest_time", state->latest_time,
          !exists || (state->latest_time >= state->first_time && isfinite(state->latest_time))},
+        {"passed_time", state->passed_time, !exists || state->passed_time >= state->first_time},
         {"span", state->span, !exists || state->span >= state->latest_time},
     };
     return are_possible(instance, values, COUNT(values));

@@ -1,5 +1,10 @@
 #include "right_hand_side.h"
 
+#include <string.h>
+
+_Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
+               "the series of an input is its polynomial");
+
 bool instance_inputs_move(const struct polynomial inputs[], size_t count) {
     for (size_t i = 0; i < count; i++) {
         for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
@@ -22,6 +27,11 @@ void instance_prepare_inputs(struct instance *instance) {
     instance->inputs_move =
         instance_inputs_move(instance->memory.running, count_of(instance->model->inputs));
     evaluate_inputs(instance, 0.0);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        double *coefficients = instance->input_series[i];
+        memset(coefficients, 0, sizeof *instance->input_series);
+        coefficients[0] = instance->u[i];
+    }
 }
 
 enum status instance_rhs(double t, const double x[], double dx[], void *instance_pointer) {
@@ -40,4 +50,32 @@ enum status instance_jacobian(double t, const double x[], double J[], void *inst
     }
     return instance->model->jacobian(instance->memory.held, instance->state.restart_time.s + t, x,
                                      instance->u, J);
+}
+
+/* Coefficients of the inputs at t, in units of time of unit. */
+static void expand_inputs(const struct instance *instance, double t, double unit) {
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        double *coefficients = instance->input_series[i];
+        const struct polynomial input = polynomial_shifted(&instance->memory.running[i], t);
+        double power = 1.0; // unit^k / k!
+        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+            coefficients[k] = input.d[k] * power;
+            power *= unit / (k + 1);
+        }
+    }
+}
+
+enum status instance_series(double t, double unit, int first, int last,
+                            double rows[][SERIES_LENGTH], void *instance_pointer) {
+    const struct instance *instance = instance_pointer;
+    if (first == 0 && instance->inputs_move) {
+        expand_inputs(instance, t, unit);
+    }
+    const struct series_origin origin = {
+        .values = instance->memory.held,
+        .t = instance->state.restart_time.s + t,
+        .unit = unit,
+        .inputs = (const double(*)[SERIES_INPUT_LENGTH])instance->input_series,
+    };
+    return instance->model->series->extend(&origin, first, last, rows);
 }

@@ -14,5 +14,6 @@ NONNULL void instance_prepare_inputs(struct instance *instance);
 /* context: the instance. t: s since the restart. */
 ode_rhs instance_rhs;
 ode_jacobian instance_jacobian;
+ode_series instance_series;
 
 #endif

@@ -82,10 +82,12 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_real(codec, &state->span);
     codec_real(codec, &state->first_time);
     codec_real(codec, &state->latest_time);
+    codec_real(codec, &state->passed_time);
     transfer_statistics(codec, &state->statistics);
     codec_int64(codec, &state->steps_before_restart);
     codec_real(codec, &state->restart_step);
     codec_real(codec, &state->next_step);
+    codec_bool(codec, "restart_goes_on", &state->restart_goes_on);
     transfer_values(codec, instance->description, block + (memory->values - memory->block));
     transfer_values(codec, instance->description, block + (memory->held - memory->block));
     // pending, current and running lie side by side

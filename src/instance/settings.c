@@ -77,6 +77,21 @@ static struct integrator_settings settings_of(const struct instance *instance) {
     };
 }
 
+enum status instance_check_method(const struct instance *instance) {
+    const enum integrator_method method = (enum integrator_method)instance->state.own.solver_method;
+    if (instance->integrator == NULL || integrator_is_possible(method, &instance->ode)) {
+        return STATUS_OK;
+    }
+    message_write(
+        &instance->sink, STATUS_INVALID_PARAMETERS,
+        "solver_method = %d (%s) is refused: %s has no Taylor series. %s is for any model, "
+        "%s for a stiff one, %s for inputs that change in each step",
+        (int)method, integrator_method_name(method), instance->description->name,
+        integrator_method_name(INTEGRATOR_CVODE_ADAMS),
+        integrator_method_name(INTEGRATOR_CVODE_BDF), integrator_method_name(INTEGRATOR_ERK));
+    return STATUS_INVALID_PARAMETERS;
+}
+
 bool instance_is_configured_otherwise(const struct instance *instance) {
     const struct integrator_settings wanted = settings_of(instance);
     return instance->configured.method != wanted.method ||

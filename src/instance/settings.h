@@ -13,6 +13,10 @@ instance_check_experiment(const struct instance *instance,
 /* STATUS_OK if the parameters are consistent; otherwise a message says why not. */
 MUST_CHECK NONNULL enum status instance_check_parameters(const struct instance *instance);
 
+/* STATUS_OK if the method that is set can integrate the model; otherwise a message says which can.
+ */
+MUST_CHECK NONNULL enum status instance_check_method(const struct instance *instance);
+
 /* Computes the tolerance that the integrator runs at. */
 NONNULL void instance_update_tolerance(struct instance *instance);
 

@@ -245,8 +245,9 @@ static enum status integrate(struct step *step) {
     status = advance(step);
 
     // a step that ended early cannot be replayed: its end was not known when it began
-    state->has_history =
-        status == STATUS_OK && !step->is_early && integrator_has_history(instance->integrator);
+    state->has_history = status == STATUS_OK && !step->is_early &&
+                         integrator_longest_history(instance->configured.method) > 0;
+    state->passed_time = integrator_passed_time(instance->integrator);
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
     }

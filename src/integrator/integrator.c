@@ -29,15 +29,27 @@ static const struct method *const methods[INTEGRATOR_METHODS] = {
     INTEGRATOR_METHOD_LIST(METHOD_ENTRY)};
 #undef METHOD_ENTRY
 
+const char *integrator_method_name(enum integrator_method method) {
+    return methods[method]->name;
+}
+
 double integrator_tolerance_fraction(enum integrator_method method) {
     return methods[method]->tolerance_fraction;
 }
 
+int64_t integrator_longest_history(enum integrator_method method) {
+    return methods[method]->longest_history;
+}
+
+bool integrator_is_possible(enum integrator_method method, const struct ode *ode) {
+    return !methods[method]->needs_series || ode->series != NULL;
+}
+
 /* Room for any method. */
-static size_t reserve_size(size_t state_count) {
+static size_t reserve_size(const struct ode *ode) {
     size_t largest = 0;
     for (int i = INTEGRATOR_NO_METHOD + 1; i < INTEGRATOR_METHODS; i++) {
-        const size_t size = methods[i]->memory_size(state_count);
+        const size_t size = methods[i]->memory_size(ode);
         largest = size > largest ? size : largest;
     }
     return largest;
@@ -58,7 +70,7 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->absolute_tolerances = created->values;
     created->reached_x = created->values + n;
     created->x = created->values + 2 * n;
-    if (!reserve_create(&created->reserve, reserve_size(n))) {
+    if (!reserve_create(&created->reserve, reserve_size(ode))) {
         integrator_destroy(created);
         return STATUS_OUT_OF_MEMORY;
     }
@@ -121,17 +133,14 @@ enum status integrator_configure(struct integrator *integrator,
 
 /* ---- Integration ---------------------------------------------------------------------------- */
 
-bool integrator_has_history(const struct integrator *integrator) {
-    return integrator->method->has_history;
-}
-
-enum status integrator_restart(struct integrator *integrator, const double x[], double span,
-                               double first_step) {
+enum status integrator_restart(struct integrator *integrator, const double x[],
+                               const struct integrator_start *start) {
     struct problem *problem = &integrator->problem;
     integrator->statistics.restarts++;
     integrator->internal = -INFINITY;
-    problem->span = span;
-    problem->first_step = first_step;
+    problem->span = start->span;
+    problem->first_step = start->first_step;
+    problem->goes_on = start->goes_on;
     problem->reached = 0.0;
     problem->failed_at = -INFINITY;
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));
@@ -140,6 +149,10 @@ enum status integrator_restart(struct integrator *integrator, const double x[], 
 
 double integrator_next_step(const struct integrator *integrator) {
     return integrator->method->next_step(integrator->memory, integrator->reached_x);
+}
+
+double integrator_passed_time(const struct integrator *integrator) {
+    return integrator->internal;
 }
 
 static void add_work(struct integrator *integrator, const struct method_work *work) {

@@ -1,10 +1,11 @@
-/* Integration of an ode by SUNDIALS, which stays behind this handle: no type or message of it
- * leaves.
+/* Integration of an ode, by SUNDIALS or by Taylor series. SUNDIALS stays behind this handle: no
+ * type or message of it leaves.
  *
  * Time is counted from the last restart, so that its rounding does not grow with the time of the
  * simulation. CVODE steps past the requested times and interpolates; a restart drops what lies
- * beyond. The Runge-Kutta method ends its steps at the requested times and has no history. One
- * handle serves one thread at a time; handles share nothing. */
+ * beyond. The Runge-Kutta method ends its steps at the requested times and has no history. The
+ * Taylor method does so too, unless a restart goes on along the same solution. One handle serves
+ * one thread at a time; handles share nothing. */
 #ifndef INTEGRATOR_H
 #define INTEGRATOR_H
 
@@ -26,7 +27,9 @@ struct integrator;
     /* CVODE, for stiff equations: orders 1 to 5, Newton with the Jacobian */                      \
     X(INTEGRATOR_CVODE_BDF, integrator_cvode_bdf)                                                  \
     /* explicit Runge-Kutta of order 5 (ARKODE's ERKStep) */                                       \
-    X(INTEGRATOR_ERK, integrator_erk)
+    X(INTEGRATOR_ERK, integrator_erk)                                                              \
+    /* Taylor series of orders 5 to 31 */                                                          \
+    X(INTEGRATOR_TAYLOR, integrator_taylor)
 
 #define INTEGRATOR_METHOD_CODE(code, symbol) code,
 enum integrator_method {
@@ -35,8 +38,20 @@ enum integrator_method {
 };
 #undef INTEGRATOR_METHOD_CODE
 
+/* As in the variable solver_method. */
+const char *integrator_method_name(enum integrator_method method);
+
 /* A method keeps a tolerance over thousands of restarts if it runs at this fraction of it. */
 double integrator_tolerance_fraction(enum integrator_method method);
+
+/* Internal steps after which the integrator is to be restarted though nothing has changed, the most
+ * that a replay repeats; 0: the method has no history, each advance starts fresh, and a restart
+ * between two of them changes nothing. */
+int64_t integrator_longest_history(enum integrator_method method);
+
+/* Whether the method can integrate the ode: all but INTEGRATOR_TAYLOR can, which needs its series.
+ */
+NONNULL bool integrator_is_possible(enum integrator_method method, const struct ode *ode);
 
 struct integrator_settings {
     enum integrator_method method;
@@ -70,18 +85,26 @@ void integrator_destroy(struct integrator *integrator);
 MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrator,
                                                     const struct integrator_settings *settings);
 
-/* True: an advance goes on from the internal steps before it. False: each advance starts fresh, and
- * a restart between two of them changes nothing. */
-NONNULL bool integrator_has_history(const struct integrator *integrator);
+/* Times in s after the restart. */
+struct integrator_start {
+    double span; /* > 0: the right-hand side is not evaluated beyond, nor may integrator_advance go
+                    there; INFINITY: no limit */
+    double first_step; /* what integrator_next_step gave for a solution like this one; 0: none is
+                          known */
+    bool goes_on; /* the solution is the one that was integrated up to here: further advances are
+                     likely */
+};
 
-/* Starts from x at time 0 with no history. span (> 0): the right-hand side is not evaluated beyond
- * it, nor may integrator_advance go there; INFINITY: no limit.
- * first_step: what integrator_next_step gave for a solution like this one, s; 0: none is known. */
+/* Starts from x at time 0 with no history. */
 MUST_CHECK NONNULL enum status integrator_restart(struct integrator *integrator, const double x[],
-                                                  double span, double first_step);
+                                                  const struct integrator_start *start);
 
 /* After an advance: how long a first internal step can be after a restart here, s; 0: unknown. */
 NONNULL double integrator_next_step(const struct integrator *integrator);
+
+/* After an advance: where the last internal step ended, s since the restart. Up to there
+ * integrator_interpolate gives states. */
+NONNULL double integrator_passed_time(const struct integrator *integrator);
 
 /* Called after each internal step that ends before the t of an advance, with the state x there
  * (t, s since the last restart). True: the advance ends there. */
@@ -104,7 +127,8 @@ MUST_CHECK NONNULL bool integrator_interpolate(struct integrator *integrator, do
  * observer ended the advance.
  *
  * Deterministic: after a restart, results depend only on its arguments and the first t, which
- * bounds the first internal step. With a history, stops at further times do not matter. */
+ * bounds the first internal step. With a history, stops at further times do not matter, as long as
+ * it is not longer than integrator_longest_history. */
 MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
                                                   int64_t max_steps, double *reached, double x[]);
 

@@ -23,11 +23,14 @@ struct method {
      * error and thousands of them add up. Larger: faster and less accurate. */
     double tolerance_fraction;
 
-    /* Further advances go on from earlier internal steps, so that a restart makes a difference. */
-    bool has_history;
+    /* integrator_longest_history */
+    int64_t longest_history;
 
-    /* Bytes that create allocates at most, for this number of states. */
-    size_t (*memory_size)(size_t state_count);
+    /* Needs the series of the ode. */
+    bool needs_series;
+
+    /* Bytes that create allocates at most. */
+    size_t (*memory_size)(const struct ode *ode);
 
     /* Allocates all that the method needs; nothing is allocated later. problem outlives the memory.
      * On failure *memory is NULL. */

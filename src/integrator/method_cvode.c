@@ -326,8 +326,11 @@ static double next_step(void *memory, const double x[]) {
  * 19 times that tolerance; at 1/100 it is 97 times, for 8 % fewer internal steps. */
 #define TOLERANCE_FRACTION 2e-3
 
+/* Longer: fewer restarts, slower rollback. */
+#define LONGEST_HISTORY 1000
+
 #define COMMON                                                                                     \
-    .tolerance_fraction = TOLERANCE_FRACTION, .has_history = true,                                 \
+    .tolerance_fraction = TOLERANCE_FRACTION, .longest_history = LONGEST_HISTORY,                  \
     .memory_size = sundials_memory_size, .destroy = destroy, .configure = configure,               \
     .restart = restart, .advance = advance, .interpolate = interpolate, .next_step = next_step
 

@@ -288,7 +288,7 @@ static double next_step(void *memory, const double x[]) {
 const struct method integrator_erk = {
     .name = "erk",
     .tolerance_fraction = TOLERANCE_FRACTION,
-    .has_history = false,
+    .longest_history = 0,
     .memory_size = sundials_memory_size,
     .create = create,
     .destroy = destroy,

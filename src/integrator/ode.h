@@ -2,6 +2,7 @@
 #ifndef ODE_H
 #define ODE_H
 
+#include "series.h"
 #include "status.h"
 
 #include <stddef.h>
@@ -14,10 +15,17 @@ typedef enum status ode_rhs(double t, const double x[], double dx[], void *conte
 /* Writes the derivatives of f by x: J[i + state_count j] is that of f_i by x_j. As ode_rhs else. */
 typedef enum status ode_jacobian(double t, const double x[], double J[], void *context);
 
+/* Writes the Taylor coefficients of orders first to last of the solution that is at rows[i][0] at
+ * the time t, as struct series does; unit: s. */
+typedef enum status ode_series(double t, double unit, int first, int last,
+                               double rows[][SERIES_LENGTH], void *context);
+
 struct ode {
     size_t state_count; /* > 0 */
     ode_rhs *rhs;
-    ode_jacobian *jacobian; /* for INTEGRATOR_CVODE_BDF only */
+    ode_jacobian *jacobian;  /* for INTEGRATOR_CVODE_BDF only */
+    ode_series *series;      /* for INTEGRATOR_TAYLOR only; NULL: there is none */
+    size_t series_row_count; /* >= state_count, where there is one */
     void *context;
 };
 

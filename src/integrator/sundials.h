@@ -20,7 +20,7 @@ struct sundials {
 };
 
 /* Bytes for the context and the method that needs most, the one with matrices. */
-size_t sundials_memory_size(size_t state_count);
+size_t sundials_memory_size(const struct ode *ode);
 
 /* Allocates memory of size bytes that begins with a struct sundials, with the context and the
  * vectors in it. NULL where memory is short. */

@@ -4,6 +4,7 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include "series.h"
 #include "status.h"
 
 #include <stddef.h>
@@ -31,6 +32,10 @@ struct model {
      * Implicit methods need it. Pure as right_hand_side; NULL if the model has no states. */
     enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
                             double J[]);
+
+    /* The Taylor series of the states; NULL: the model offers none. With it the right-hand side has
+     * all derivatives at every time within a step, or the series says where it has not. */
+    const struct series *series;
 
     /* Writes all calculated fields of values from its parameters, inputs and states at time t. */
     enum status (*outputs)(void *values, double t);

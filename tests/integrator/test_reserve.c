@@ -229,19 +229,37 @@ static enum status decay_jacobian(double t, const double x[], double J[], void *
     return STATUS_OK;
 }
 
+static enum status decay_series(double t, double unit, int first, int last,
+                                double row[][SERIES_LENGTH], void *count) {
+    (void)t;
+    for (size_t i = 0; i < *(const size_t *)count; i++) {
+        for (int k = first > 0 ? first : 1; k <= last; k++) {
+            row[i][k] = -unit / k * row[i][k - 1];
+        }
+    }
+    return STATUS_OK;
+}
+
 /* Methods in this order: every pair follows one another. */
 static void test_the_reserve_of_an_integrator_is_enough(void) {
     enum { MOST = 100 };
     static const enum integrator_method methods[] = {
-        INTEGRATOR_CVODE_ADAMS, INTEGRATOR_CVODE_BDF, INTEGRATOR_ERK,        INTEGRATOR_CVODE_ADAMS,
-        INTEGRATOR_ERK,         INTEGRATOR_CVODE_BDF, INTEGRATOR_CVODE_ADAMS};
+        INTEGRATOR_CVODE_ADAMS, INTEGRATOR_CVODE_BDF,   INTEGRATOR_ERK,       INTEGRATOR_TAYLOR,
+        INTEGRATOR_CVODE_ADAMS, INTEGRATOR_ERK,         INTEGRATOR_CVODE_BDF, INTEGRATOR_TAYLOR,
+        INTEGRATOR_ERK,         INTEGRATOR_CVODE_ADAMS, INTEGRATOR_TAYLOR,    INTEGRATOR_CVODE_BDF,
+        INTEGRATOR_CVODE_ADAMS};
     static double x[MOST];
     static double tolerances[MOST];
     for (size_t i = 0; i < MOST; i++) {
         tolerances[i] = 1e-10;
     }
     for (size_t n = 1; n <= MOST; n += n < 20 ? 1 : 20) {
-        const struct ode ode = {n, decay, decay_jacobian, &n};
+        const struct ode ode = {.state_count = n,
+                                .rhs = decay,
+                                .jacobian = decay_jacobian,
+                                .series = decay_series,
+                                .series_row_count = n,
+                                .context = &n};
         const struct message_sink quiet = {0};
         struct integrator *integrator = NULL;
         const long before = allocator_calls();
@@ -253,7 +271,9 @@ static void test_the_reserve_of_an_integrator_is_enough(void) {
             const struct integrator_settings settings = {methods[i], 1e-8, tolerances, 0.0};
             double reached = 0.0;
             TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, 10.0, 0.0));
+            TEST_ASSERT_EQUAL_INT(
+                STATUS_OK,
+                integrator_restart(integrator, x, &(struct integrator_start){.span = 10.0}));
             TEST_ASSERT_EQUAL_INT(STATUS_OK,
                                   integrator_advance(integrator, 1.0, 1000, &reached, x));
         }
@@ -272,7 +292,7 @@ static size_t bytes_taken(const struct method *method, const struct ode *ode) {
     struct problem problem = {.ode = *ode};
     struct reserve whole;
     void *memory = NULL;
-    TEST_ASSERT_TRUE(reserve_create(&whole, method->memory_size(ode->state_count)));
+    TEST_ASSERT_TRUE(reserve_create(&whole, method->memory_size(ode)));
     reserve_enter(&whole);
     TEST_ASSERT_EQUAL_INT(STATUS_OK, method->create(&problem, &memory));
     reserve_leave(&whole);
@@ -284,12 +304,17 @@ static size_t bytes_taken(const struct method *method, const struct ode *ode) {
 
 static void test_the_reserve_of_an_integrator_is_no_larger_than_needed(void) {
     for (size_t n = 1; n <= 100; n++) {
-        const struct ode ode = {n, decay, decay_jacobian, &n};
+        const struct ode ode = {.state_count = n,
+                                .rhs = decay,
+                                .jacobian = decay_jacobian,
+                                .series = decay_series,
+                                .series_row_count = n,
+                                .context = &n};
         size_t size = 0;
         size_t most = 0;
         for (size_t i = 0; i < sizeof all_methods / sizeof all_methods[0]; i++) {
             const size_t taken = bytes_taken(all_methods[i], &ode);
-            const size_t wanted = all_methods[i]->memory_size(n);
+            const size_t wanted = all_methods[i]->memory_size(&ode);
             most = taken > most ? taken : most;
             size = wanted > size ? wanted : size;
         }

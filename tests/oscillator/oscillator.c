@@ -25,6 +25,21 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
+/* x' = v, v' = -omega^2 x + gain u, order by order. */
+static enum status extend(const struct series_origin *origin, int first, int last,
+                          double row[][SERIES_LENGTH]) {
+    const struct oscillator_values *values = origin->values;
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
+        const double u = k <= SERIES_INPUT_LENGTH ? origin->inputs[0][k - 1] : 0.0;
+        const double a = -values->omega * values->omega * row[0][k - 1] + values->gain * u;
+        row[0][k] = origin->unit / k * row[1][k - 1];
+        row[1][k] = origin->unit / k * a;
+    }
+    return STATUS_OK;
+}
+
+static const struct series series = {.row_count = 2, .extend = extend};
+
 static enum status outputs(void *values_pointer, double t) {
     struct oscillator_values *values = values_pointer;
     (void)t;
@@ -70,6 +85,7 @@ const struct model oscillator_model = {
     .derivatives = {offsetof(struct oscillator_values, v), 2 * sizeof(double)},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
+    .series = &series,
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,

@@ -35,7 +35,7 @@ static const struct variable variables[] = {
     {84, "effective_relative_tolerance",
      OF_INSTANCE(VARIABLE_FLOAT64, effective_relative_tolerance), CAUSALITY_LOCAL,
      VARIABILITY_FIXED, INITIAL_CALCULATED, 0.0, ANY},
-    {90, "solver_method", OF_INSTANCE(VARIABLE_ENUMERATION, solver_method), FIXED, 1.0, 1.0, 3.0,
+    {90, "solver_method", OF_INSTANCE(VARIABLE_ENUMERATION, solver_method), FIXED, 1.0, 1.0, 4.0,
      1.0},
     {91, "max_step", OF_INSTANCE(VARIABLE_FLOAT64, max_step), FIXED, 0.0, 0.0, INFINITY, 1.0},
 };

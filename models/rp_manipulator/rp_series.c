@@ -1,0 +1,85 @@
+/* Recurrences for the coefficients of a motion, from the equations of motion (13).
+ *
+ * With w = q1', v = q2', L = l1 + q2, P = L w and the inertia without the slide
+ * F = m1 lc1^2 + I1z + I2z, the momentum about the joint is N = J w = F w + m2 L P, and that along
+ * the slide m2 y with y = v - a w. (14) plus a times (15), and (15) over m2, are
+ *
+ *   N' = tau1 + a f2 + a m2 P w - g c1 (m1 lc1 + m2 L)          y' = f2 / m2 + P w - g s1
+ *
+ * because N' = J w' + 2 m2 L v w and P' = L w' + v w. With s1' = w c1 and c1' = -w s1 all right
+ * sides are products of two series, (x z)_n = sum of x_i z_(n-i), and a derivative gives
+ * x_k = (unit / k) (x')_(k-1). N and P at order k contain the unknown w_k:
+ *
+ *   P_k = L_0 w_k + sum of L_(i+1) w_(k-1-i)
+ *   N_k = F w_k + m2 (L_0 P_k + sum of L_(i+1) P_(k-1-i))
+ *
+ * which F + m2 L_0^2 = J at the origin solves for w_k. It is above 0 for valid parameters. */
+#include "rp_series.h"
+
+#include "rp_model.h"
+
+#include <math.h>
+
+enum row { Q1, Q2, W, V, L, P, S, C, ROWS };
+
+/* Sums over i = 0 .. n of a product of two series, x_i z_(n-i), or x_(i+1) z_(n-i) where `ahead`
+ * stands in the name. */
+struct products {
+    double P_w, L_c, w_s, w_c;
+    double ahead_L_w, ahead_L_P;
+};
+
+static inline struct products products_of_order(double row[][SERIES_LENGTH], int n) {
+    struct products sum = {0};
+    for (int i = 0; i <= n; i++) {
+        const int j = n - i;
+        sum.P_w += row[P][i] * row[W][j];
+        sum.L_c += row[L][i] * row[C][j];
+        sum.w_s += row[W][i] * row[S][j];
+        sum.w_c += row[W][i] * row[C][j];
+        sum.ahead_L_w += row[L][i + 1] * row[W][j];
+        sum.ahead_L_P += row[L][i + 1] * row[P][j];
+    }
+    return sum;
+}
+
+/* What the states of the origin determine. */
+static void begin(const struct rp_parameters *p, double row[][SERIES_LENGTH]) {
+    row[L][0] = p->l1 + row[Q2][0];
+    row[P][0] = row[L][0] * row[W][0];
+    row[S][0] = sin(row[Q1][0]);
+    row[C][0] = cos(row[Q1][0]);
+}
+
+static enum status extend(const struct series_origin *origin, int first, int last,
+                          double row[][SERIES_LENGTH]) {
+    const struct rp_parameters *p = &((const struct rp_values *)origin->values)->parameters;
+    const double fixed_inertia = rp_fixed_inertia(p);
+    if (first == 0) {
+        begin(p, row);
+    }
+    const double L0 = row[L][0];
+    const double J0 = fixed_inertia + p->m2 * L0 * L0;
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
+        const int n = k - 1;
+        const double h = origin->unit / k;
+        const double tau1 = n < SERIES_INPUT_LENGTH ? origin->inputs[0][n] : 0.0;
+        const double f2 = n < SERIES_INPUT_LENGTH ? origin->inputs[1][n] : 0.0;
+        row[Q1][k] = h * row[W][n];
+        row[Q2][k] = h * row[V][n];
+        row[L][k] = row[Q2][k];
+
+        const struct products sum = products_of_order(row, n);
+        const double weight = p->g * (p->m1 * p->lc1 * row[C][n] + p->m2 * sum.L_c);
+        const double N = h * (tau1 + p->a * f2 + p->a * p->m2 * sum.P_w - weight);
+        const double y = h * (f2 / p->m2 + sum.P_w - p->g * row[S][n]);
+        row[S][k] = h * sum.w_c;
+        row[C][k] = -h * sum.w_s;
+        row[W][k] = (N - p->m2 * (L0 * sum.ahead_L_w + sum.ahead_L_P)) / J0;
+        row[P][k] = L0 * row[W][k] + sum.ahead_L_w;
+        row[V][k] = y + p->a * row[W][k];
+    }
+    return STATUS_OK;
+}
+
+const struct series rp_series = {.row_count = ROWS, .extend = extend};

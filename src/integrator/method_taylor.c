@@ -1,0 +1,297 @@
+/* Steps by the Taylor series of the solution (Jorba and Zou, A software package for the numerical
+ * integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14, 2005).
+ *
+ * The unit of time of a series is the way to the requested time. Orders are added until the terms
+ * one unit ahead are within the tolerance; the step lands there, and the state is the sum of the
+ * coefficients. Where the largest order is not enough, a step is as long as this order allows.
+ *
+ * Where a restart goes on along the solution, its first step has the largest order and all the
+ * length that this allows. The requested times in it are values of one polynomial. */
+#include "method.h"
+#include "reserve.h"
+
+#include <float.h>
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* The last coefficient of an input enters the states' two orders before. */
+enum { LEAST_ORDER = SERIES_INPUT_LENGTH + 1 };
+
+/* Of the length that the last terms allow (Jorba and Zou, section 3.2.1). */
+static const double safety = 0.9;
+
+/* Units of the longest step that goes past requested times: terms that are needed for one much
+ * longer may have underflowed. */
+static const double most_units = 1000.0;
+
+/* Where a term overflows, the next unit over the one before. */
+static const double shrinking = 0x1p-20;
+
+struct taylor {
+    struct problem *problem;
+    int largest_order;
+    double begin; /* of the series, s since the restart */
+    double unit;  /* of its coefficients, s */
+    int order;
+    double passed;  /* s since the restart: where the step ended that goes past requested times;
+                       -INFINITY: there is none */
+    double *weight; /* of each state: 1 over its tolerance */
+    double (*row)[SERIES_LENGTH];
+};
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+static size_t memory_size(const struct ode *ode) {
+    const size_t padding = 4 * _Alignof(max_align_t);
+    return sizeof(struct taylor) + padding + ode->state_count * sizeof(double) +
+           ode->series_row_count * sizeof(double[SERIES_LENGTH]);
+}
+
+static void destroy(void *memory) {
+    struct taylor *taylor = memory;
+    reserve_free(taylor->row);
+    reserve_free(taylor->weight);
+    reserve_free(taylor);
+}
+
+static enum status create(struct problem *problem, void **memory) {
+    *memory = NULL;
+    struct taylor *taylor = reserve_calloc(1, sizeof *taylor);
+    if (taylor == NULL) {
+        return STATUS_OUT_OF_MEMORY;
+    }
+    taylor->problem = problem;
+    taylor->weight = reserve_calloc(problem->ode.state_count, sizeof *taylor->weight);
+    taylor->row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->row);
+    if (taylor->weight == NULL || taylor->row == NULL) {
+        destroy(taylor);
+        return STATUS_OUT_OF_MEMORY;
+    }
+    *memory = taylor;
+    return STATUS_OK;
+}
+
+/* Steps cost least near 1 - ln(tolerance) / 2 where all orders cost the same (Jorba and Zou,
+ * section 3.2). The first ones, with their sine and cosine, cost as much as several others. */
+static enum status configure(void *memory) {
+    struct taylor *taylor = memory;
+    const double e = 2.718281828459045;
+    int order = LEAST_ORDER;
+    for (double left = taylor->problem->settings.relative_tolerance;
+         left < 1.0 && order < SERIES_LENGTH - 1; left *= e * e) {
+        order++;
+    }
+    taylor->largest_order = order;
+    return STATUS_OK;
+}
+
+static enum status restart(void *memory, const double x[]) {
+    struct taylor *taylor = memory;
+    (void)x;
+    taylor->passed = -INFINITY;
+    return STATUS_OK;
+}
+
+/* ---- Series --------------------------------------------------------------------------------- */
+
+/* Begins the series at the state x, with the orders from 0 to last. */
+static enum status begin(struct taylor *taylor, double t, double unit, const double x[], int last) {
+    const struct integrator_settings *settings = &taylor->problem->settings;
+    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+        taylor->row[i][0] = x[i];
+        taylor->weight[i] =
+            1.0 / (settings->relative_tolerance * fabs(x[i]) + settings->absolute_tolerances[i]);
+    }
+    taylor->begin = t;
+    taylor->unit = unit;
+    taylor->order = last;
+    return problem_series(taylor->problem, t, unit, 0, last, taylor->row);
+}
+
+static enum status add_order(struct taylor *taylor) {
+    taylor->order++;
+    return problem_series(taylor->problem, taylor->begin, taylor->unit, taylor->order,
+                          taylor->order, taylor->row);
+}
+
+/* Sum of the terms of an order, one unit ahead, in tolerances of the states. */
+static double size_of_terms(const struct taylor *taylor, int order) {
+    double size = 0.0;
+    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+        size += fabs(taylor->row[i][order]) * taylor->weight[i];
+    }
+    return size;
+}
+
+/* The length of a step, in units, at whose end the terms of both the last orders are within the
+ * tolerance, and the bound at most; NaN where a term is not finite. */
+static double step_of_last_terms(const struct taylor *taylor, double bound) {
+    const double before = size_of_terms(taylor, taylor->order - 1);
+    const double last = size_of_terms(taylor, taylor->order);
+    if (!isfinite(before + last)) {
+        return NAN;
+    }
+    const double allowed =
+        fmin(pow(before, -1.0 / (taylor->order - 1)), pow(last, -1.0 / taylor->order));
+    return fmin(safety * allowed, bound);
+}
+
+/* Adds orders until the terms one unit ahead are within the tolerance and become smaller, or to the
+ * largest order. Writes the length of the step, in units, 1 at most; NaN as above. */
+static enum status add_orders(struct taylor *taylor, double *step) {
+    double before = size_of_terms(taylor, taylor->order - 1);
+    double last = size_of_terms(taylor, taylor->order);
+    while (!(before <= 1.0 && last <= before)) {
+        if (taylor->order == taylor->largest_order) {
+            *step = step_of_last_terms(taylor, 1.0);
+            return STATUS_OK;
+        }
+        const enum status status = add_order(taylor);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        before = last;
+        last = size_of_terms(taylor, taylor->order);
+    }
+    *step = 1.0;
+    return STATUS_OK;
+}
+
+/* The state at begin + s unit. */
+static void evaluate(const struct taylor *taylor, double s, double x[]) {
+    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+        const double *row = taylor->row[i];
+        double sum = row[taylor->order];
+        for (int k = taylor->order - 1; k >= 0; k--) {
+            sum = sum * s + row[k];
+        }
+        x[i] = sum;
+    }
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+/* Longest step from the time t on, s. */
+static double limit(const struct problem *problem, double t) {
+    const double max_step = problem->settings.max_step;
+    return fmin(problem->span - t, max_step > 0.0 ? max_step : INFINITY);
+}
+
+/* Begins the series of a step at the state x, the orders of which depend on is_long; writes the
+ * length of the step in units. */
+static enum status expand_in(struct taylor *taylor, double unit, double t, bool is_long,
+                             const double x[], double *step) {
+    const int first_orders = is_long ? taylor->largest_order : LEAST_ORDER;
+    const enum status status = begin(taylor, t, unit, x, first_orders);
+    if (status != STATUS_OK || !is_long) {
+        return status != STATUS_OK ? status : add_orders(taylor, step);
+    }
+    *step = step_of_last_terms(taylor, fmin(most_units, limit(taylor->problem, t) / unit));
+    return STATUS_OK;
+}
+
+/* Expands the solution about the state x at the time t. is_long: for a step as long as possible;
+ * otherwise for one of `length` (s) at most, which is the unit unless terms overflow. Writes the
+ * length of the step in units. */
+static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
+                          const double x[], double *step, struct method_work *work) {
+    for (double unit = length; unit >= DBL_MIN; unit *= shrinking) {
+        const enum status status = expand_in(taylor, unit, t, is_long, x, step);
+        if (status != STATUS_OK || !isnan(*step)) {
+            return status;
+        }
+        work->failed_steps++;
+    }
+    return STATUS_NOT_FINITE;
+}
+
+/* One internal step from the state x at the time now towards the time t. Writes where it ends to
+ * *end and the state there, or at t if that is earlier, to x. */
+static enum status take_step(struct taylor *taylor, double now, double t, bool is_long, double x[],
+                             double *end, struct method_work *work) {
+    // parts of equal length leave no sliver at the end; nor does rounding
+    const double parts = ceil((t - now) / limit(taylor->problem, now) * (1.0 - 1e-14));
+    const double length = parts > 1.0 ? (t - now) / parts : t - now;
+    double step;
+    const enum status status = expand(taylor, now, length, is_long, x, &step, work);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    const bool lands = step == 1.0 && taylor->unit == t - now;
+    *end = lands ? t : now + step * taylor->unit;
+    if (!(*end > now)) {
+        return STATUS_NO_CONVERGENCE;
+    }
+    evaluate(taylor, *end > t ? (t - now) / taylor->unit : step, x);
+    work->steps++;
+    work->last_order = taylor->order;
+    work->last_step = *end - now;
+    work->internal = *end;
+    return STATUS_OK;
+}
+
+static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work) {
+    struct taylor *taylor = memory;
+    const struct problem *problem = taylor->problem;
+    bool is_long = problem->goes_on && problem->reached == 0.0;
+    memcpy(x, begin_x, problem->ode.state_count * sizeof(double));
+    taylor->passed = -INFINITY;
+    work->internal = problem->reached;
+    *stopped_at = problem->reached;
+    while (*stopped_at < t) {
+        if (work->steps == max_steps) {
+            return STATUS_TOO_MANY_STEPS;
+        }
+        double end;
+        const enum status status = take_step(taylor, *stopped_at, t, is_long, x, &end, work);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        if (end > t) {
+            taylor->passed = end;
+            end = t;
+        }
+        *stopped_at = end;
+        is_long = false;
+        if (end < t && problem->observer != NULL && problem_ends_at(problem, end, x)) {
+            work->is_cut_short = true;
+            break;
+        }
+    }
+    return STATUS_OK;
+}
+
+static bool interpolate(void *memory, double t, double x[]) {
+    const struct taylor *taylor = memory;
+    if (t > taylor->passed) {
+        return false;
+    }
+    evaluate(taylor, (t - taylor->begin) / taylor->unit, x);
+    return true;
+}
+
+/* The length of a step follows from the series. */
+static double next_step(void *memory, const double x[]) {
+    (void)memory;
+    (void)x;
+    return 0.0;
+}
+
+#define TOLERANCE_FRACTION 1e-1
+
+const struct method integrator_taylor = {
+    .name = "taylor",
+    .tolerance_fraction = TOLERANCE_FRACTION,
+    .longest_history = 1,
+    .needs_series = true,
+    .memory_size = memory_size,
+    .create = create,
+    .destroy = destroy,
+    .configure = configure,
+    .restart = restart,
+    .advance = advance,
+    .interpolate = interpolate,
+    .next_step = next_step,
+};

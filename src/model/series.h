@@ -1,0 +1,36 @@
+/* The Taylor series of a solution, which a model may offer beside its right-hand side. */
+#ifndef SERIES_H
+#define SERIES_H
+
+#include "status.h"
+
+#include <stddef.h>
+
+/* Coefficients of a row: orders 0 to SERIES_LENGTH - 1. */
+enum { SERIES_LENGTH = 32 };
+
+/* Of an input: inputs are polynomials of degree 3 at most. */
+enum { SERIES_INPUT_LENGTH = 4 };
+
+/* Coefficient k of a quantity y is unit^k / k! times its k-th derivative by the time, so that
+ * y(t + s unit) is the sum of y_k s^k; all coefficients have the unit of y. */
+struct series_origin {
+    const void *values;                          /* value structure, of which parameters are read */
+    double t;                                    /* s */
+    double unit;                                 /* s: unit of time of the coefficients, > 0 */
+    const double (*inputs)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
+};
+
+struct series {
+    /* Rows that extend writes: the states in their order, then whatever it needs of other
+     * quantities. */
+    size_t row_count;
+
+    /* Writes the coefficients of the orders first to last (< SERIES_LENGTH) of all rows, from those
+     * of lower orders; first is 0, with the states' coefficients of order 0 given, or follows the
+     * last of the call before. The same coefficients, to the bit, however many a call adds. */
+    enum status (*extend)(const struct series_origin *origin, int first, int last,
+                          double rows[][SERIES_LENGTH]);
+};
+
+#endif
