@@ -242,6 +242,9 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     *stopped_at = problem->reached;
     while (*stopped_at < t) {
         if (work->steps == max_steps) {
+            message_write(&problem->sink, STATUS_TOO_MANY_STEPS,
+                          "%s: %lld internal steps end at %g s of %g s", integrator_taylor.name,
+                          (long long)max_steps, *stopped_at, t);
             return STATUS_TOO_MANY_STEPS;
         }
         double end;

@@ -149,12 +149,16 @@ static void test_a_history_does_not_contradict_itself(void) {
     const double latest[2] = {state.first_time, state.span};
     const double not_latest[2] = {0.999 * state.first_time, INFINITY};
     check_real(&state.latest_time, "latest_time", latest, not_latest);
+    const double passed[2] = {state.first_time, INFINITY};
+    const double not_passed[2] = {0.999 * state.first_time, -INFINITY};
+    check_real(&state.passed_time, "passed_time", passed, not_passed);
     const double span[2] = {state.latest_time, INFINITY};
     const double not_span[2] = {0.999 * state.latest_time, -INFINITY};
     check_real(&state.span, "span", span, not_span);
 
     // internal steps since the restart: at least one, and no more than restart and step allow
-    const int64_t most = INSTANCE_LONGEST_HISTORY + (int64_t)state.own.max_internal_steps;
+    const int64_t most =
+        integrator_longest_history(INTEGRATOR_CVODE_ADAMS) + (int64_t)state.own.max_internal_steps;
     state.statistics.steps = state.steps_before_restart + most;
     TEST_ASSERT_TRUE(is_plausible());
     state.statistics.steps++;
@@ -164,7 +168,7 @@ static void test_a_history_does_not_contradict_itself(void) {
 
     // all of that does not matter without a history
     state.has_history = false;
-    state.first_time = state.latest_time = state.span = -1.0;
+    state.first_time = state.latest_time = state.passed_time = state.span = -1.0;
     TEST_ASSERT_TRUE(is_plausible());
 }
 

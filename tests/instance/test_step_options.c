@@ -21,6 +21,9 @@ static void create(void) {
     const unsigned reference = OSCILLATOR_SOLVER_METHOD;
     ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &instance));
     ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
+    const unsigned limited = OSCILLATOR_MAX_STEP;
+    const double max_step = 0.25; // so that all methods need some steps
+    ASSERT_OK(instance_set_real(instance, &limited, 1, &max_step));
     const struct instance_experiment experiment = {.start_time = 1.0};
     ASSERT_OK(instance_setup_experiment(instance, &experiment));
     ASSERT_OK(instance_enter_initialization(instance));

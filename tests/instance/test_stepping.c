@@ -26,13 +26,23 @@ static enum status watched_rhs(const void *values, double t, const double x[], c
     return oscillator_model.right_hand_side(values, t, x, u, dx);
 }
 
+static enum status watched_extend(const struct series_origin *origin, int first, int last,
+                                  double row[][SERIES_LENGTH]) {
+    latest = fmax(latest, origin->t);
+    return oscillator_model.series->extend(origin, first, last, row);
+}
+
 static struct instance *create(void) {
+    static struct series series;
     static struct model model;
     static struct model_description model_description;
     const unsigned reference = OSCILLATOR_SOLVER_METHOD;
     struct instance *created = NULL;
     model = oscillator_model;
     model.right_hand_side = watched_rhs;
+    series = *oscillator_model.series;
+    series.extend = watched_extend;
+    model.series = &series;
     model_description = oscillator_description;
     model_description.model = &model;
     ASSERT_OK(instance_create(&model_description, &last_text_sink, &created));
@@ -222,7 +232,8 @@ EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
         initialize_until(instance, 0.0, stops[i]);
         step_held(100, h);
         TEST_ASSERT_TRUE(latest <= stops[i] * (1.0 + 1e-12));
-        TEST_ASSERT_TRUE(latest >= stops[i] * (1.0 - 1e-12));
+        // a series is evaluated where a step begins
+        TEST_ASSERT_TRUE(method == INTEGRATOR_TAYLOR || latest >= stops[i] * (1.0 - 1e-12));
         TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(instance, OSCILLATOR_X));
     }
 }

@@ -90,12 +90,17 @@ static void create(ode_rhs *rhs, ode_series *series) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
 }
 
-static void configure(double tolerance) {
+static void configure_with(double tolerance, double max_step) {
     const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
     const struct integrator_settings settings = {.method = (enum integrator_method)method,
                                                  .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = absolute};
+                                                 .absolute_tolerances = absolute,
+                                                 .max_step = max_step};
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+}
+
+static void configure(double tolerance) {
+    configure_with(tolerance, 0.0);
 }
 
 static void restart(double span) {
@@ -275,16 +280,18 @@ EACH_METHOD static void test_too_many_steps_leave_a_valid_state(void) {
     step_limit = 20;
     restart(INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
-                          integrator_advance(integrator, 10.0, step_limit, &reached, x));
-    TEST_ASSERT_TRUE(reached > 0.0 && reached < 10.0);
+                          integrator_advance(integrator, 100.0, step_limit, &reached, x));
+    TEST_ASSERT_TRUE(reached > 0.0 && reached < 100.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(reached), x[0]);
     TEST_ASSERT_TRUE(message_count > 0);
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, message_status);
 }
 
+/* The Taylor method sees it where an internal step begins. */
 EACH_METHOD static void test_a_right_hand_side_that_fails_on_the_way_ends_the_step_before(void) {
     double x[2];
     double reached;
+    configure_with(1e-10, 0.25);
     circle.failing_from = 1.0;
     restart(INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE,
@@ -316,6 +323,7 @@ EACH_METHOD static void test_a_right_hand_side_that_fails_at_once_leaves_the_sta
 EACH_METHOD static void test_a_restart_after_a_failure_works(void) {
     double x[2];
     double reached;
+    configure_with(1e-10, 0.25);
     circle.failing_from = 1.0;
     restart(INFINITY);
     TEST_ASSERT_TRUE(integrator_advance(integrator, 2.0, step_limit, &reached, x) != STATUS_OK);

@@ -48,7 +48,7 @@ static void count_message(void *context, enum status status, const char *text) {
 static const double tolerance = 1e-9;
 static const double start[2] = {1.0, 0.0};
 
-void setUp(void) {
+static void begin(const struct integrator_start *start_of, double max_step) {
     static const double absolute[2] = {1e-11, 1e-11};
     const struct ode ode = {.state_count = 2,
                             .rhs = circle_rhs,
@@ -58,14 +58,18 @@ void setUp(void) {
     const struct message_sink sink = {.write = count_message};
     const struct integrator_settings settings = {.method = (enum integrator_method)method,
                                                  .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = absolute};
+                                                 .absolute_tolerances = absolute,
+                                                 .max_step = max_step};
     failing_from = INFINITY;
     message_count = 0;
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-    TEST_ASSERT_EQUAL_INT(
-        STATUS_OK,
-        integrator_restart(integrator, start, &(struct integrator_start){.span = INFINITY}));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, start_of));
+}
+
+/* All methods need many internal steps for an advance of some seconds. */
+void setUp(void) {
+    begin(&(struct integrator_start){.span = INFINITY}, 0.25);
 }
 
 void tearDown(void) {
@@ -182,7 +186,7 @@ EACH_METHOD static void test_times_rise_where_the_right_hand_side_fails(void) {
     failing_from = 2.0;
     begin_watching(0);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, advance(9.0, 1000, &reached, x));
-    TEST_ASSERT_TRUE(reached < 2.0);
+    TEST_ASSERT_TRUE(reached <= 2.0);
     TEST_ASSERT_GREATER_THAN_UINT(5, seen.count);
     for (unsigned k = 1; k < seen.count; k++) {
         TEST_ASSERT_TRUE(seen.times[k] > seen.times[k - 1]);
@@ -226,20 +230,24 @@ EACH_METHOD static void test_the_limit_of_steps_holds(void) {
  */
 
 EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) {
+    const struct integrator_start on = {.span = INFINITY, .goes_on = true};
     double x[2] = {-7.0, -7.0};
     double expected[2];
     double reached;
+    tearDown();
+    begin(&on, 0.0);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 0.5, x));
     TEST_ASSERT_TRUE(x[0] == -7.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(2.0, 100000, &reached, x));
-    const double next = 2.0 + 1e-6;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, x));
+    const double next = 1.0 + 1e-6;
     if (!(integrator_longest_history((enum integrator_method)method) > 0)) {
         TEST_ASSERT_FALSE(integrator_interpolate(integrator, next, x));
         return;
     }
     TEST_ASSERT_TRUE(integrator_interpolate(integrator, next, x));
-    begin_again();
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(2.0, 100000, &reached, expected));
+    tearDown();
+    begin(&on, 0.0);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, expected));
     TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(next, 100000, &reached, expected));
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 100.0, x));

@@ -1,0 +1,263 @@
+/* Steps by Taylor series: which orders they take, how long they are, and where they end. */
+#include "integrator.h"
+
+#include <math.h>
+#include <string.h>
+#include <unity.h>
+
+/* ---- Equations ------------------------------------------------------------------------------ */
+
+/* x1' = x2, x2' = rate x1 + (t / s)^3 */
+static double rate;
+
+static enum status linear_rhs(double t, const double x[], double dx[], void *context) {
+    (void)context;
+    dx[0] = x[1];
+    dx[1] = rate * x[0] + t * t * t;
+    return STATUS_OK;
+}
+
+static enum status linear_series(double t, double unit, int first, int last,
+                                 double row[][SERIES_LENGTH], void *context) {
+    // (t + s unit)^3
+    const double push[4] = {t * t * t, 3.0 * t * t * unit, 3.0 * t * unit * unit,
+                            unit * unit * unit};
+    (void)context;
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
+        row[0][k] = unit / k * row[1][k - 1];
+        row[1][k] = unit / k * (rate * row[0][k - 1] + (k <= 4 ? push[k - 1] : 0.0));
+    }
+    return STATUS_OK;
+}
+
+/* x1' = x1^2, x2' = 0 */
+static enum status square_rhs(double t, const double x[], double dx[], void *context) {
+    (void)t;
+    (void)context;
+    dx[0] = x[0] * x[0];
+    dx[1] = 0.0;
+    return STATUS_OK;
+}
+
+static enum status square_series(double t, double unit, int first, int last,
+                                 double row[][SERIES_LENGTH], void *context) {
+    (void)t;
+    (void)context;
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
+        double sum = 0.0;
+        for (int i = 0; i < k; i++) {
+            sum += row[0][i] * row[0][k - 1 - i];
+        }
+        row[0][k] = unit / k * sum;
+        row[1][k] = 0.0;
+    }
+    return STATUS_OK;
+}
+
+/* ---- Runs ----------------------------------------------------------------------------------- */
+
+static struct integrator *integrator;
+static const double tolerance = 1e-10;
+
+static void create(ode_rhs *rhs, ode_series *series, double max_step) {
+    const struct ode ode = {.state_count = 2, .rhs = rhs, .series = series, .series_row_count = 2};
+    const struct message_sink quiet = {0};
+    const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
+    const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
+                                                 .relative_tolerance = tolerance,
+                                                 .absolute_tolerances = absolute,
+                                                 .max_step = max_step};
+    integrator_destroy(integrator);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+}
+
+static void restart(double x1, double x2, double span, bool goes_on) {
+    const struct integrator_start start = {.span = span, .goes_on = goes_on};
+    const double x[2] = {x1, x2};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, &start));
+}
+
+static void advance(double t, double x[2]) {
+    double reached;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, x));
+    TEST_ASSERT_TRUE(reached == t);
+}
+
+static struct integrator_statistics statistics(void) {
+    struct integrator_statistics found;
+    integrator_get_statistics(integrator, &found);
+    return found;
+}
+
+void setUp(void) {
+    integrator = NULL;
+    rate = -1.0;
+    create(linear_rhs, linear_series, 0.0);
+}
+
+void tearDown(void) {
+    integrator_destroy(integrator);
+}
+
+/* x1 of rate = -1 from rest at 1: cos t + t^3 - 6 t + 6 sin t */
+static double driven_circle(double t) {
+    return cos(t) + t * t * t - 6.0 * t + 6.0 * sin(t);
+}
+
+/* ---- Orders --------------------------------------------------------------------------------- */
+
+/* Its first terms that are not 0 are of the orders 4 and 5. */
+static void test_an_input_that_begins_as_a_cube_is_not_overlooked(void) {
+    double x[2];
+    rate = 0.0;
+    restart(0.0, 0.0, INFINITY, false);
+    advance(1.0, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.05, x[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25, x[1]);
+}
+
+/* Near an equilibrium that repels, terms are within the tolerance, grow, and decrease only later.
+ */
+static void test_terms_that_grow_are_not_taken_for_small_ones(void) {
+    static const double from_rest[] = {1e-30, 1e-20, 1e-14, 1e-12};
+    for (size_t i = 0; i < sizeof from_rest / sizeof from_rest[0]; i++) {
+        double x[2];
+        const double r = 12.0;
+        rate = r * r;
+        restart(from_rest[i], r * from_rest[i], INFINITY, false);
+        advance(0.25, x);
+        // the push (t / s)^3 in closed form: particular solution with zero start
+        const double t = 0.25;
+        const double pushed =
+            6.0 / pow(r, 5) * sinh(r * t) - t * t * t / (r * r) - 6.0 * t / pow(r, 4);
+        const double exact = from_rest[i] * exp(r * t) + pushed;
+        TEST_ASSERT_DOUBLE_WITHIN(4.0 * tolerance * (fabs(exact) + 1e-2) * exp(r * t), exact, x[0]);
+    }
+}
+
+static void test_more_exact_results_take_more_orders(void) {
+    double x[2];
+    restart(1.0, 0.0, INFINITY, false);
+    advance(1e-6, x);
+    const int fewest = statistics().last_order;
+    restart(1.0, 0.0, INFINITY, false);
+    advance(0.5, x);
+    TEST_ASSERT_EQUAL_INT(5, fewest);
+    TEST_ASSERT_GREATER_THAN_INT(8, statistics().last_order);
+    TEST_ASSERT_TRUE(statistics().steps == 2 && statistics().rhs_evaluations == 2);
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, driven_circle(0.5), x[0]);
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static void test_after_a_change_a_step_ends_where_it_is_asked_to(void) {
+    double x[2];
+    restart(1.0, 0.0, INFINITY, false);
+    advance(0.125, x);
+    TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.125);
+    TEST_ASSERT_FALSE(integrator_interpolate(integrator, 0.25, x));
+}
+
+static void test_along_a_solution_a_step_goes_past_the_points(void) {
+    double many[100][2];
+    double alone[2];
+    restart(1.0, 0.0, INFINITY, true);
+    for (int i = 0; i < 100; i++) {
+        advance(1e-3 * (i + 1), many[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(tolerance, driven_circle(1e-3 * (i + 1)), many[i][0]);
+    }
+    TEST_ASSERT_TRUE(statistics().steps == 1);
+    TEST_ASSERT_TRUE(integrator_passed_time(integrator) > 0.5);
+
+    // each of them lies where it would without the others
+    for (int i = 1; i < 100; i++) {
+        restart(1.0, 0.0, INFINITY, true);
+        advance(1e-3, alone);
+        advance(1e-3 * (i + 1), alone);
+        TEST_ASSERT_EQUAL_MEMORY(many[i], alone, sizeof alone);
+    }
+}
+
+static void test_a_step_along_a_solution_has_its_limits(void) {
+    double x[2];
+    restart(1.0, 0.0, 0.25, true);
+    advance(0.125, x);
+    TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.25);
+    create(linear_rhs, linear_series, 0.375);
+    restart(1.0, 0.0, INFINITY, true);
+    advance(0.125, x);
+    TEST_ASSERT_TRUE(integrator_passed_time(integrator) == 0.375);
+    TEST_ASSERT_TRUE(statistics().last_step == 0.375);
+}
+
+static void test_the_longest_step_divides_an_advance_into_equal_parts(void) {
+    double x[2];
+    create(linear_rhs, linear_series, 0.001);
+    restart(1.0, 0.0, INFINITY, false);
+    advance(0.0105, x);
+    TEST_ASSERT_TRUE(statistics().steps == 11);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.0105 / 11.0, statistics().last_step);
+    advance(0.0205, x);
+    TEST_ASSERT_TRUE(statistics().steps == 21);
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, driven_circle(0.0205), x[0]);
+}
+
+static void test_rest_stays_rest(void) {
+    double x[2];
+    create(square_rhs, square_series, 0.0);
+    restart(0.0, 3.0, INFINITY, true);
+    advance(1.0, x);
+    TEST_ASSERT_TRUE(x[0] == 0.0 && x[1] == 3.0);
+}
+
+/* ---- Extremes ------------------------------------------------------------------------------- */
+
+static void test_a_pole_is_not_passed(void) {
+    double x[2];
+    double reached;
+    create(square_rhs, square_series, 0.0);
+    restart(1.0, 0.0, INFINITY, false);
+    TEST_ASSERT_TRUE(integrator_advance(integrator, 2.0, 10000, &reached, x) != STATUS_OK);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, reached);
+    TEST_ASSERT_TRUE(isfinite(x[0]) && x[0] > 1000.0);
+
+    restart(1.0, 0.0, INFINITY, false);
+    advance(0.999, x);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1000.0, x[0]);
+}
+
+/* Terms of high order overflow where the unit is much longer than the motion is quick. */
+static void test_a_unit_in_which_terms_overflow_is_shortened(void) {
+    double x[2];
+    double reached;
+    rate = -1e30;
+    restart(1.0, 0.0, INFINITY, false);
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
+                          integrator_advance(integrator, 1e8, 10, &reached, x));
+    TEST_ASSERT_TRUE(reached > 1e-15 && reached < 1e-13);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, cos(1e15 * reached), x[0]);
+    TEST_ASSERT_TRUE(statistics().failed_steps > 0);
+    TEST_ASSERT_TRUE(statistics().steps == 10);
+}
+
+static void test_values_that_overflow_at_once_are_refused(void) {
+    double x[2];
+    double reached;
+    create(square_rhs, square_series, 0.0);
+    restart(1e200, 0.0, INFINITY, false);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, integrator_advance(integrator, 1.0, 10, &reached, x));
+    TEST_ASSERT_TRUE(reached == 0.0 && x[0] == 1e200);
+}
+
+static void test_shortest_steps_are_exact(void) {
+    for (int decade = -300; decade < -20; decade += 20) {
+        double x[2];
+        const double t = pow(10.0, decade);
+        restart(0.0, 1.0, INFINITY, true);
+        advance(t, x);
+        TEST_ASSERT_TRUE(x[0] == t && x[1] == 1.0);
+        advance(1.5 * t, x);
+        TEST_ASSERT_TRUE(x[0] == 1.5 * t);
+    }
+}
