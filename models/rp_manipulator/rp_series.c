@@ -51,33 +51,46 @@ static void begin(const struct rp_parameters *p, double row[][SERIES_LENGTH]) {
     row[C][0] = cos(row[Q1][0]);
 }
 
+/* Right sides of order n that the efforts give: those of N' and y'. */
+static inline void efforts(const struct series_origin *origin, const struct rp_parameters *p, int n,
+                           double effort[2]) {
+    effort[0] = 0.0;
+    effort[1] = 0.0;
+    if (n < SERIES_INPUT_LENGTH) {
+        effort[0] = origin->inputs[0][n] + p->a * origin->inputs[1][n];
+        effort[1] = origin->inputs[1][n] / p->m2;
+    }
+}
+
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
-    const struct rp_parameters *p = &((const struct rp_values *)origin->values)->parameters;
-    const double fixed_inertia = rp_fixed_inertia(p);
+    // a copy, which no coefficient overwrites
+    const struct rp_parameters p = ((const struct rp_values *)origin->values)->parameters;
     if (first == 0) {
-        begin(p, row);
+        begin(&p, row);
     }
     const double L0 = row[L][0];
-    const double J0 = fixed_inertia + p->m2 * L0 * L0;
+    const double per_J0 = 1.0 / (rp_fixed_inertia(&p) + p.m2 * L0 * L0);
+    const double m1_lc1 = p.m1 * p.lc1;
+    const double a_m2 = p.a * p.m2;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         const int n = k - 1;
         const double h = origin->unit / k;
-        const double tau1 = n < SERIES_INPUT_LENGTH ? origin->inputs[0][n] : 0.0;
-        const double f2 = n < SERIES_INPUT_LENGTH ? origin->inputs[1][n] : 0.0;
         row[Q1][k] = h * row[W][n];
         row[Q2][k] = h * row[V][n];
         row[L][k] = row[Q2][k];
 
+        double effort[2];
+        efforts(origin, &p, n, effort);
         const struct products sum = products_of_order(row, n);
-        const double weight = p->g * (p->m1 * p->lc1 * row[C][n] + p->m2 * sum.L_c);
-        const double N = h * (tau1 + p->a * f2 + p->a * p->m2 * sum.P_w - weight);
-        const double y = h * (f2 / p->m2 + sum.P_w - p->g * row[S][n]);
+        const double weight = p.g * (m1_lc1 * row[C][n] + p.m2 * sum.L_c);
+        const double N = h * (effort[0] + a_m2 * sum.P_w - weight);
+        const double y = h * (effort[1] + sum.P_w - p.g * row[S][n]);
         row[S][k] = h * sum.w_c;
         row[C][k] = -h * sum.w_s;
-        row[W][k] = (N - p->m2 * (L0 * sum.ahead_L_w + sum.ahead_L_P)) / J0;
+        row[W][k] = (N - p.m2 * (L0 * sum.ahead_L_w + sum.ahead_L_P)) * per_J0;
         row[P][k] = L0 * row[W][k] + sum.ahead_L_w;
-        row[V][k] = y + p->a * row[W][k];
+        row[V][k] = y + p.a * row[W][k];
     }
     return STATUS_OK;
 }

@@ -9,11 +9,25 @@ struct clock_time {
     double rest; /* s: what the rounding left over */
 };
 
+/* Exact sum of two doubles (Knuth, The Art of Computer Programming, vol. 2, section 4.2.2). */
+static inline struct clock_time clock_two_sum(double x, double y) {
+    const double s = x + y;
+    const double y_part = s - x;
+    const double x_part = s - y_part;
+    return (struct clock_time){.s = s, .rest = (x - x_part) + (y - y_part)};
+}
+
 /* time + span */
-struct clock_time clock_add(struct clock_time time, double span);
+static inline struct clock_time clock_add(struct clock_time time, double span) {
+    const struct clock_time sum = clock_two_sum(time.s, span);
+    return clock_two_sum(sum.s, sum.rest + time.rest);
+}
 
 /* later - earlier in s, rounded once. */
-double clock_difference(struct clock_time later, struct clock_time earlier);
+static inline double clock_difference(struct clock_time later, struct clock_time earlier) {
+    const struct clock_time difference = clock_two_sum(later.s, -earlier.s);
+    return difference.s + (difference.rest + (later.rest - earlier.rest));
+}
 
 /* How far the communication point of a master may be from the time of the instance for a step of
  * length h > 0 to be followed: min(1e-9 max(|t|, h), h / 100), and never less than the spacing of

@@ -15,20 +15,6 @@ const struct variable *instance_refuse_reference(const struct instance *instance
     return NULL;
 }
 
-void instance_write_field(struct instance *instance, const struct variable *variable,
-                          double value) {
-    if (variable->type != VARIABLE_FLOAT64) {
-        *(int *)instance_field(instance, variable) = (int)value;
-        return;
-    }
-    *(double *)instance_field(instance, variable) = value;
-    if (variable->causality == CAUSALITY_INPUT) {
-        const size_t i = instance_input_index(instance, variable);
-        instance->memory.pending[i].d[0] = value;
-        instance->memory.current[i] = instance->memory.pending[i];
-    }
-}
-
 void instance_set_clock(struct instance *instance, struct clock_time time) {
     instance->state.time = time;
     instance->state.own.time = time.s;

@@ -9,8 +9,8 @@ NONNULL const struct variable *instance_refuse_reference(const struct instance *
                                                          unsigned reference,
                                                          enum variable_type type);
 
-/* The variable with this reference and type; NULL, with a message, if there is none. These three
- * are inline: they run once or more for each value that is set or read. */
+/* The variable with this reference and type; NULL, with a message, if there is none. These and
+ * instance_write_field are inline: they run once or more for each value that is set or read. */
 static inline const struct variable *instance_find(const struct instance *instance,
                                                    unsigned reference, enum variable_type type) {
     const struct variable *variable = variable_find(instance->description, reference);
@@ -33,8 +33,22 @@ static inline size_t instance_input_index(const struct instance *instance,
 }
 
 /* Writes the value; an input is held at it from now on. */
-NONNULL void instance_write_field(struct instance *instance, const struct variable *variable,
-                                  double value);
+static inline void instance_write_field(struct instance *instance, const struct variable *variable,
+                                        double value) {
+    if (variable->causality == CAUSALITY_PARAMETER) {
+        instance->parameters_are_valid = false;
+    }
+    if (variable->type != VARIABLE_FLOAT64) {
+        *(int *)instance_field(instance, variable) = (int)value;
+        return;
+    }
+    *(double *)instance_field(instance, variable) = value;
+    if (variable->causality == CAUSALITY_INPUT) {
+        const size_t i = instance_input_index(instance, variable);
+        instance->memory.pending[i].d[0] = value;
+        instance->memory.current[i] = instance->memory.pending[i];
+    }
+}
 
 NONNULL void instance_set_clock(struct instance *instance, struct clock_time time);
 

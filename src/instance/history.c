@@ -42,8 +42,8 @@ static bool goes_on(const struct instance *instance, double target) {
     const struct instance_memory *memory = &instance->memory;
     const struct instance_state *state = &instance->state;
     const size_t input_count = count_of(instance->model->inputs);
-    return state->has_history && target <= state->span && parameters_are_held(instance) &&
-           inputs_are_held(memory, input_count);
+    return state->has_history && target <= state->span && inputs_are_held(memory, input_count) &&
+           parameters_are_held(instance);
 }
 
 /* Beyond what the internal steps have passed, one more would make the history too long. */
@@ -75,20 +75,28 @@ static struct integrator_start start_of(const struct instance_state *state) {
         .span = state->span, .first_step = state->restart_step, .goes_on = state->restart_goes_on};
 }
 
+/* What the integrator runs with from now on. */
+static void hold(struct instance *instance, struct span span) {
+    memcpy(instance->memory.held + span.offset, instance->memory.values + span.offset, span.size);
+}
+
 static enum status restart(struct instance *instance, struct clock_time end, bool goes_on) {
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
-    const size_t input_count = count_of(instance->model->inputs);
+    const struct model *model = instance->model;
+    const size_t input_count = count_of(model->inputs);
     // the last step gives the length of the first one, unless the parameters have changed
     if (parameters_are_held(instance)) {
         instance_update_next_step(instance);
     } else {
         state->next_step = 0.0;
+        hold(instance, model->parameters);
     }
 
     // hold what is set now
     state->has_history = false; // until the first advance has succeeded
-    memcpy(memory->held, memory->values, instance->model->values_size);
+    hold(instance, model->inputs);
+    hold(instance, model->states);
     memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
     instance_prepare_inputs(instance);
 
@@ -110,8 +118,8 @@ static enum status restart(struct instance *instance, struct clock_time end, boo
     state->restart_goes_on = goes_on;
     instance->history_is_lost = false;
     const struct integrator_start start = start_of(state);
-    return integrator_restart(instance->integrator,
-                              doubles_of(memory->held, instance->model->states), &start);
+    return integrator_restart(instance->integrator, doubles_of(memory->held, model->states),
+                              &start);
 }
 
 /* In the number of internal steps that the state gives. A forged state fails here. */

@@ -44,6 +44,22 @@ static enum status check_bindings(const struct model_description *description,
     return STATUS_OK;
 }
 
+/* An input reads as the value set last, also after a step over which it moved. */
+static void place_values(struct instance *instance) {
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        struct instance_place *place = &instance->places[variable->reference];
+        if (variable->type == VARIABLE_FLOAT64) {
+            place->value = instance_field(instance, variable);
+            place->is_calculated =
+                variable->initial == INITIAL_CALCULATED && variable->owner == VARIABLE_OF_MODEL;
+        }
+        if (variable->causality == CAUSALITY_INPUT) {
+            place->value = instance->memory.pending[instance_input_index(instance, variable)].d;
+        }
+    }
+}
+
 static enum status setup(struct instance *instance) {
     const struct model *model = instance->model;
     const size_t values_size = aligned(model->values_size);
@@ -55,7 +71,9 @@ static enum status setup(struct instance *instance) {
     instance->first_derivatives = calloc(2, values_size);
     instance->u =
         calloc((POLYNOMIAL_NODES + 1 + SERIES_INPUT_LENGTH) * input_count + 1, sizeof(double));
-    if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL) {
+    instance->places = calloc(instance->description->reference_count, sizeof *instance->places);
+    if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL ||
+        instance->places == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
@@ -67,6 +85,7 @@ static enum status setup(struct instance *instance) {
     memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
     memory->current = memory->pending + input_count;
     memory->running = memory->current + input_count;
+    place_values(instance);
 
     if (model->states.size == 0) {
         return STATUS_OK;
@@ -113,6 +132,7 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
+    free(instance->places);
     free(instance->u);
     free(instance->first_derivatives);
     free(instance->memory.block);

@@ -53,6 +53,12 @@ struct instance_memory {
     struct polynomial *running; /* inputs since the last restart */
 };
 
+/* Where the value of a Real lies. */
+struct instance_place {
+    const double *value;
+    bool is_calculated; /* by the model */
+};
+
 struct instance {
     const struct model_description *description;
     const struct model *model;
@@ -60,9 +66,12 @@ struct instance {
     struct instance_state state;
     struct instance_memory memory;
 
-    bool states_are_settable; /* after initialization, too */
-    bool outputs_are_valid;   /* the calculated values belong to the others */
-    bool history_is_lost;     /* the integrator is not where state says: replay first */
+    struct instance_place *places; /* by value reference; value NULL: of no Real */
+
+    bool states_are_settable;  /* after initialization, too */
+    bool outputs_are_valid;    /* the calculated values belong to the others */
+    bool parameters_are_valid; /* they are consistent; false: not known */
+    bool history_is_lost;      /* the integrator is not where state says: replay first */
     struct ode ode;
     struct integrator *integrator;         /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the

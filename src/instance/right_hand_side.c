@@ -26,11 +26,11 @@ static void evaluate_inputs(const struct instance *instance, double t) {
 void instance_prepare_inputs(struct instance *instance) {
     instance->inputs_move =
         instance_inputs_move(instance->memory.running, count_of(instance->model->inputs));
-    evaluate_inputs(instance, 0.0);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        double *coefficients = instance->input_series[i];
-        memset(coefficients, 0, sizeof *instance->input_series);
-        coefficients[0] = instance->u[i];
+        const double value = instance->memory.running[i].d[0];
+        instance->u[i] = value;
+        memset(instance->input_series[i], 0, sizeof *instance->input_series);
+        instance->input_series[i][0] = value;
     }
 }
 

@@ -31,13 +31,17 @@ enum status instance_check_experiment(const struct instance *instance,
     return STATUS_OK;
 }
 
-enum status instance_check_parameters(const struct instance *instance) {
+enum status instance_check_parameters(struct instance *instance) {
+    if (instance->parameters_are_valid) {
+        return STATUS_OK;
+    }
     char text[256]; // written where the parameters are refused
     const enum status status =
         instance->model->check_parameters(instance->memory.values, text, sizeof text);
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "%s", text);
     }
+    instance->parameters_are_valid = status == STATUS_OK;
     return status;
 }
 

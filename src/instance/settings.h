@@ -11,7 +11,7 @@ instance_check_experiment(const struct instance *instance,
                           const struct instance_experiment *experiment);
 
 /* STATUS_OK if the parameters are consistent; otherwise a message says why not. */
-MUST_CHECK NONNULL enum status instance_check_parameters(const struct instance *instance);
+MUST_CHECK NONNULL enum status instance_check_parameters(struct instance *instance);
 
 /* STATUS_OK if the method that is set can integrate the model; otherwise a message says which can.
  */

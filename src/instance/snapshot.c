@@ -75,6 +75,7 @@ enum status instance_save(struct instance *instance, unsigned tag,
 /* Prepares the instance to go on from what was written into its state and memory. */
 static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
+    instance->parameters_are_valid = false;
     instance->history_is_lost = true;
     if (instance->integrator == NULL) {
         return STATUS_OK;

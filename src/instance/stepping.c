@@ -13,7 +13,7 @@
 static enum status refuse_times(const struct instance *instance, double t, double h) {
     const struct instance_experiment *experiment = &instance->state.experiment;
     const struct clock_time now = instance->state.time;
-    if (!isfinite(t) || !isfinite(h) || !(h > 0.0) || !isfinite(t + h)) {
+    if (!(h > 0.0) || !isfinite(t + h)) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
                       "a step of %g s from t = %.17g is refused: a finite time and a step above 0 "
                       "are expected",
@@ -27,7 +27,7 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
         return STATUS_INVALID_TIME;
     }
     const double mismatch = clock_difference((struct clock_time){.s = t}, now);
-    if (!(fabs(mismatch) <= clock_slack(t, h)) || !(mismatch + h > 0.0)) {
+    if (mismatch != 0.0 && (!(fabs(mismatch) <= clock_slack(t, h)) || !(mismatch + h > 0.0))) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
                       "a step from t = %.17g is refused: the instance is at t = %.17g", t, now.s);
         return STATUS_INVALID_TIME;

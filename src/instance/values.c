@@ -5,14 +5,6 @@
 
 #include <math.h>
 
-/* Of a Real. An input reads as the value set last, also after a step over which it moved. */
-static double read_field(struct instance *instance, const struct variable *variable) {
-    if (variable->causality == CAUSALITY_INPUT) {
-        return instance->memory.pending[instance_input_index(instance, variable)].d[0];
-    }
-    return *(const double *)instance_field(instance, variable);
-}
-
 /* What an array is made of, and which variables it is for. */
 enum array { ARRAY_OF_DOUBLES, ARRAY_OF_INTS, ARRAY_OF_INT32, ARRAY_OF_ENUMERATIONS };
 
@@ -117,23 +109,26 @@ enum status instance_set_enumeration(struct instance *instance, const unsigned r
 
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
                               double values[]) {
+    const struct model_description *description = instance->description;
+    const struct instance_place *places = instance->places;
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable = instance_find(instance, references[i], VARIABLE_FLOAT64);
-        if (variable == NULL) {
+        const unsigned reference = references[i];
+        if (reference >= description->reference_count || places[reference].value == NULL) {
+            (void)instance_refuse_reference(instance, reference, VARIABLE_FLOAT64);
             return STATUS_INVALID_ARGUMENT;
         }
-        if (variable->initial == INITIAL_CALCULATED && variable->owner == VARIABLE_OF_MODEL) {
+        if (places[reference].is_calculated && !instance->outputs_are_valid) {
             const enum status status = instance_update_outputs(instance);
             if (status != STATUS_OK) {
                 return status;
             }
         }
-        if (!isfinite(read_field(instance, variable))) {
-            return instance_not_finite(instance, variable->name);
+        if (!isfinite(*places[reference].value)) {
+            return instance_not_finite(instance, variable_of(description, reference)->name);
         }
     }
     for (size_t i = 0; i < count; i++) {
-        values[i] = read_field(instance, variable_of(instance->description, references[i]));
+        values[i] = *places[references[i]].value;
     }
     return STATUS_OK;
 }

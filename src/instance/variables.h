@@ -6,6 +6,7 @@
 #include "message.h"
 #include "model.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -85,11 +86,34 @@ static inline const struct variable *variable_find(const struct model_descriptio
 
 /* Before and during initialization: start values and inputs; later: inputs and tunable parameters.
  */
-bool variable_is_settable(const struct variable *variable, enum phase phase);
+static inline bool variable_is_settable(const struct variable *variable, enum phase phase) {
+    const bool is_input = variable->causality == CAUSALITY_INPUT;
+    switch (phase) {
+    case PHASE_INSTANTIATED:
+    case PHASE_INITIALIZATION:
+        return is_input || variable->initial == INITIAL_EXACT;
+    case PHASE_STEPPING:
+        return is_input || (variable->causality == CAUSALITY_PARAMETER &&
+                            variable->variability == VARIABILITY_TUNABLE);
+    case PHASE_CONTINUOUS_TIME:
+        return is_input && variable->variability == VARIABILITY_CONTINUOUS;
+    case PHASE_COUNT:
+        break;
+    }
+    return false;
+}
 
-/* STATUS_OK, or why value is refused: not finite, or outside [min, max]. Says so through sink. */
-enum status variable_check_value(const struct variable *variable, double value,
-                                 const struct message_sink *sink);
+/* Says through sink why a value is refused. */
+enum status variable_refuse_value(const struct variable *variable, double value,
+                                  const struct message_sink *sink);
+
+/* STATUS_OK, or why value is refused: not finite, or outside [min, max]. Inline: it runs for each
+ * value that is set. */
+static inline enum status variable_check_value(const struct variable *variable, double value,
+                                               const struct message_sink *sink) {
+    const bool is_allowed = value >= variable->min && value <= variable->max && isfinite(value);
+    return is_allowed ? STATUS_OK : variable_refuse_value(variable, value, sink);
+}
 
 const char *variable_type_name(enum variable_type type);
 

@@ -31,12 +31,14 @@ static const double shrinking = 0x1p-20;
 struct taylor {
     struct problem *problem;
     int largest_order;
-    double begin; /* of the series, s since the restart */
-    double unit;  /* of its coefficients, s */
+    double begin;        /* of the series, s since the restart */
+    double unit;         /* of its coefficients, s */
+    double longest_unit; /* s: of the next step of the running advance */
     int order;
-    double passed;  /* s since the restart: where the step ended that goes past requested times;
-                       -INFINITY: there is none */
-    double *weight; /* of each state: 1 over its tolerance */
+    int expected_order; /* of the next step that lands; what it gives does not depend on it */
+    double passed;      /* s since the restart: where the step ended that goes past requested times;
+                           -INFINITY: there is none */
+    double *weight;     /* of each state: 1 over its tolerance */
     double (*row)[SERIES_LENGTH];
 };
 
@@ -77,12 +79,13 @@ static enum status create(struct problem *problem, void **memory) {
 static enum status configure(void *memory) {
     struct taylor *taylor = memory;
     const double e = 2.718281828459045;
-    int order = LEAST_ORDER;
+    int order = 8;
     for (double left = taylor->problem->settings.relative_tolerance;
          left < 1.0 && order < SERIES_LENGTH - 1; left *= e * e) {
         order++;
     }
     taylor->largest_order = order;
+    taylor->expected_order = LEAST_ORDER;
     return STATUS_OK;
 }
 
@@ -129,44 +132,63 @@ static double size_of_terms(const struct taylor *taylor, int order) {
 static double step_of_last_terms(const struct taylor *taylor, double bound) {
     const double before = size_of_terms(taylor, taylor->order - 1);
     const double last = size_of_terms(taylor, taylor->order);
+    const double size = fmax(before, last);
     if (!isfinite(before + last)) {
         return NAN;
     }
-    const double allowed =
-        fmin(pow(before, -1.0 / (taylor->order - 1)), pow(last, -1.0 / taylor->order));
-    return fmin(safety * allowed, bound);
+    // the power that gives less for both
+    const int order = size > 1.0 ? taylor->order - 1 : taylor->order;
+    return fmin(safety * pow(size, -1.0 / order), bound);
 }
 
-/* Adds orders until the terms one unit ahead are within the tolerance and become smaller, or to the
- * largest order. Writes the length of the step, in units, 1 at most; NaN as above. */
-static enum status add_orders(struct taylor *taylor, double *step) {
-    double before = size_of_terms(taylor, taylor->order - 1);
-    double last = size_of_terms(taylor, taylor->order);
-    while (!(before <= 1.0 && last <= before)) {
-        if (taylor->order == taylor->largest_order) {
-            *step = step_of_last_terms(taylor, 1.0);
-            return STATUS_OK;
-        }
-        const enum status status = add_order(taylor);
-        if (status != STATUS_OK) {
-            return status;
+/* Looks for the first two orders whose terms one unit ahead are within the tolerance and become
+ * smaller; adds orders to find them. Writes the length of the step, in units: 1, or what the
+ * largest order allows, 1 at most; NaN as above. */
+static enum status find_order(struct taylor *taylor, double *step) {
+    int order = LEAST_ORDER;
+    double before = size_of_terms(taylor, order - 1);
+    double last = size_of_terms(taylor, order);
+    while (!(before <= 1.0 && last <= before) && order < taylor->largest_order) {
+        order++;
+        if (order > taylor->order) {
+            const enum status status = add_order(taylor);
+            if (status != STATUS_OK) {
+                return status;
+            }
         }
         before = last;
-        last = size_of_terms(taylor, taylor->order);
+        last = size_of_terms(taylor, order);
     }
-    *step = 1.0;
+    taylor->order = order;
+    taylor->expected_order = order;
+    *step = before <= 1.0 && last <= before ? 1.0 : step_of_last_terms(taylor, 1.0);
     return STATUS_OK;
 }
 
-/* The state at begin + s unit. */
-static void evaluate(const struct taylor *taylor, double s, double x[]) {
-    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
-        const double *row = taylor->row[i];
-        double sum = row[taylor->order];
-        for (int k = taylor->order - 1; k >= 0; k--) {
-            sum = sum * s + row[k];
+/* The state at begin + s unit. n: the number of states; where it is a constant all values stay in
+ * registers. */
+ALWAYS_INLINE void evaluate_of(const struct taylor *taylor, double s, size_t n, double x[]) {
+    for (size_t i = 0; i < n; i++) {
+        x[i] = taylor->row[i][taylor->order];
+    }
+    for (int k = taylor->order - 1; k >= 0; k--) {
+        for (size_t i = 0; i < n; i++) {
+            x[i] = x[i] * s + taylor->row[i][k];
         }
-        x[i] = sum;
+    }
+}
+
+static void evaluate(const struct taylor *taylor, double s, double x[]) {
+    double four[4];
+    if (taylor->problem->ode.state_count == 4) {
+        if (s == 1.0) {
+            evaluate_of(taylor, 1.0, 4, four); // a plain sum
+        } else {
+            evaluate_of(taylor, s, 4, four);
+        }
+        memcpy(x, four, sizeof four);
+    } else {
+        evaluate_of(taylor, s, taylor->problem->ode.state_count, x);
     }
 }
 
@@ -175,17 +197,18 @@ static void evaluate(const struct taylor *taylor, double s, double x[]) {
 /* Longest step from the time t on, s. */
 static double limit(const struct problem *problem, double t) {
     const double max_step = problem->settings.max_step;
-    return fmin(problem->span - t, max_step > 0.0 ? max_step : INFINITY);
+    const double left = problem->span - t;
+    return max_step > 0.0 && max_step < left ? max_step : left;
 }
 
 /* Begins the series of a step at the state x, the orders of which depend on is_long; writes the
  * length of the step in units. */
 static enum status expand_in(struct taylor *taylor, double unit, double t, bool is_long,
                              const double x[], double *step) {
-    const int first_orders = is_long ? taylor->largest_order : LEAST_ORDER;
+    const int first_orders = is_long ? taylor->largest_order : taylor->expected_order;
     const enum status status = begin(taylor, t, unit, x, first_orders);
     if (status != STATUS_OK || !is_long) {
-        return status != STATUS_OK ? status : add_orders(taylor, step);
+        return status != STATUS_OK ? status : find_order(taylor, step);
     }
     *step = step_of_last_terms(taylor, fmin(most_units, limit(taylor->problem, t) / unit));
     return STATUS_OK;
@@ -196,12 +219,15 @@ static enum status expand_in(struct taylor *taylor, double unit, double t, bool 
  * length of the step in units. */
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], double *step, struct method_work *work) {
-    for (double unit = length; unit >= DBL_MIN; unit *= shrinking) {
+    const double first = taylor->longest_unit < length ? taylor->longest_unit : length;
+    taylor->longest_unit = INFINITY;
+    for (double unit = first; unit >= DBL_MIN; unit *= shrinking) {
         const enum status status = expand_in(taylor, unit, t, is_long, x, step);
         if (status != STATUS_OK || !isnan(*step)) {
             return status;
         }
         work->failed_steps++;
+        taylor->longest_unit = unit; // the next step need not begin from the whole length again
     }
     return STATUS_NOT_FINITE;
 }
@@ -211,8 +237,8 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
 static enum status take_step(struct taylor *taylor, double now, double t, bool is_long, double x[],
                              double *end, struct method_work *work) {
     // parts of equal length leave no sliver at the end; nor does rounding
-    const double parts = ceil((t - now) / limit(taylor->problem, now) * (1.0 - 1e-14));
-    const double length = parts > 1.0 ? (t - now) / parts : t - now;
+    const double parts = (t - now) / limit(taylor->problem, now) * (1.0 - 1e-14);
+    const double length = parts > 1.0 ? (t - now) / ceil(parts) : t - now;
     double step;
     const enum status status = expand(taylor, now, length, is_long, x, &step, work);
     if (status != STATUS_OK) {
@@ -238,6 +264,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     bool is_long = problem->goes_on && problem->reached == 0.0;
     memcpy(x, begin_x, problem->ode.state_count * sizeof(double));
     taylor->passed = -INFINITY;
+    taylor->longest_unit = INFINITY;
     work->internal = problem->reached;
     *stopped_at = problem->reached;
     while (*stopped_at < t) {

@@ -10,7 +10,7 @@
 /* ---- What is refused ------------------------------------------------------------------------ */
 
 static void test_methods_that_do_not_exist_are_refused(void) {
-    static const fmi2Integer wrong[] = {0, 4, -1, INT_MAX, INT_MIN};
+    static const fmi2Integer wrong[] = {0, 5, -1, INT_MAX, INT_MIN};
     const fmi2ValueReference reference = RP_MANIPULATOR_solver_method;
     const double real = 2.0;
     const fmi2Component c = fmu_instantiate(&messages, false);
@@ -56,9 +56,9 @@ static void test_both_are_fixed_after_initialization(void) {
 
 EACH_METHOD static void test_the_order_is_one_of_the_method(void) {
     static const int highest[FMU_METHODS] = {
-        [FMU_CVODE_ADAMS] = 12, [FMU_CVODE_BDF] = 5, [FMU_ERK] = 5};
+        [FMU_CVODE_ADAMS] = 12, [FMU_CVODE_BDF] = 5, [FMU_ERK] = 5, [FMU_TAYLOR] = 31};
     static const int lowest_of_last[FMU_METHODS] = {
-        [FMU_CVODE_ADAMS] = 6, [FMU_CVODE_BDF] = 3, [FMU_ERK] = 5};
+        [FMU_CVODE_ADAMS] = 6, [FMU_CVODE_BDF] = 3, [FMU_ERK] = 5, [FMU_TAYLOR] = 12};
     const fmi2Component c = fmu_instantiate(&messages, false);
     fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
     fmu_set(c, RP_MANIPULATOR_dq1, 2.0);
@@ -100,7 +100,10 @@ EACH_METHOD static void test_a_reset_leaves_nothing_of_what_failed(void) {
         fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
         fmu_set(c, failures[i].reference, failures[i].value);
         fmu_initialize(c, 0.0, 0.0);
-        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, 0.0, failures[i].length, fmi2True));
+        // solvers square their step; the Taylor method has no step that is too short
+        const bool is_done = method == FMU_TAYLOR && failures[i].length < 1e-100;
+        TEST_ASSERT_EQUAL_INT(is_done ? fmi2OK : fmi2Discard,
+                              fmu.DoStep(c, 0.0, failures[i].length, fmi2True));
         TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
         fmu_set_integer(c, RP_MANIPULATOR_solver_method, method);
         TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(c, 0, &again));
@@ -109,7 +112,8 @@ EACH_METHOD static void test_a_reset_leaves_nothing_of_what_failed(void) {
     }
 }
 
-/* CVODE goes past communication points with held inputs; the Runge-Kutta method ends there. */
+/* CVODE goes past communication points with held inputs, the Taylor method too, from a restart for
+ * each step; the Runge-Kutta method ends there. */
 EACH_METHOD static void test_internal_steps_over_communication_points(void) {
     enum { STEPS = 1000 };
     const double h = 1.0 / 1024.0;
@@ -123,7 +127,8 @@ EACH_METHOD static void test_internal_steps_over_communication_points(void) {
         TEST_ASSERT_EQUAL_INT(STEPS, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
     } else {
         TEST_ASSERT_LESS_THAN_INT(STEPS, steps);
-        TEST_ASSERT_EQUAL_INT(1, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
+        TEST_ASSERT_EQUAL_INT(method == FMU_TAYLOR ? steps : 1,
+                              fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
         TEST_ASSERT_TRUE(fmu_get(c, RP_MANIPULATOR_solver_last_step) > h);
     }
 }

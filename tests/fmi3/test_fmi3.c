@@ -228,7 +228,7 @@ static void test_types(void) {
     TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt64(c, &method, 1, &item, 1));
     TEST_ASSERT_EQUAL_INT(3, item);
 
-    static const fmi3Int64 no_items[] = {0, 4, -1, INT64_MAX, INT64_MIN, (INT64_C(1) << 32) + 1};
+    static const fmi3Int64 no_items[] = {0, 5, -1, INT64_MAX, INT64_MIN, (INT64_C(1) << 32) + 1};
     for (size_t i = 0; i < FMU3_COUNT(no_items); i++) {
         TEST_ASSERT_EQUAL_INT(fmi3Discard, fmu3.SetInt64(c, &method, 1, &no_items[i], 1));
     }

@@ -287,7 +287,8 @@ EACH_METHOD static void test_outputs_follow_moving_inputs(void) {
     for (int i = 0; i < 10; i++) {
         fmu3_step(instance, 0.05 * i, 0.05);
     }
-    TEST_ASSERT_GREATER_THAN_UINT(60, importer.updates);
+    // four times for inputs and once at least for outputs in each step
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT(50, importer.updates);
     TEST_ASSERT_TRUE(largest_error < 1e-3); // of the cubic
 }
 

@@ -84,7 +84,7 @@ void fmu_set_integer(fmi2Component component, fmi2ValueReference reference, fmi2
 fmi2Integer fmu_get_integer(fmi2Component component, fmi2ValueReference reference);
 
 /* Values of solver_method. */
-enum { FMU_CVODE_ADAMS = 1, FMU_CVODE_BDF = 2, FMU_ERK = 3, FMU_METHODS };
+enum { FMU_CVODE_ADAMS = 1, FMU_CVODE_BDF = 2, FMU_ERK = 3, FMU_TAYLOR = 4, FMU_METHODS };
 
 /* All variables, each in the place of its row in fmu_variables. */
 struct fmu_values {

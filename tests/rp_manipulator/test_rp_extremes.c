@@ -100,9 +100,15 @@ EACH_METHOD static void test_the_state_is_that_of_the_time_reached(void) {
     set(RP_MANIPULATOR_g, -9e-20);
     initialize();
     const enum status status = instance_do_step(instance, 0.0, 4e209);
-    // the arm is so long that it does not move: only the Runge-Kutta method finds that
+    // the arm is so long that it does not move: only the Runge-Kutta method finds that; the Taylor
+    // method gets as far as its limit of steps lets it
+    const double reached = instance_time(instance);
     TEST_ASSERT_EQUAL_INT(method == INTEGRATOR_ERK ? SEVERITY_NONE : SEVERITY_DISCARD,
                           status_severity(status));
-    TEST_ASSERT_EQUAL_DOUBLE(status == STATUS_OK ? 4e209 : 0.0, instance_time(instance));
+    if (method == INTEGRATOR_TAYLOR) {
+        TEST_ASSERT_TRUE(reached > 0.0 && reached < 4e209);
+    } else {
+        TEST_ASSERT_EQUAL_DOUBLE(status == STATUS_OK ? 4e209 : 0.0, reached);
+    }
     TEST_ASSERT_TRUE(isfinite(get(RP_MANIPULATOR_q1)) && isfinite(get(RP_MANIPULATOR_q2)));
 }
