@@ -28,7 +28,7 @@ struct integrator;
     X(INTEGRATOR_CVODE_BDF, integrator_cvode_bdf)                                                  \
     /* explicit Runge-Kutta of order 5 (ARKODE's ERKStep) */                                       \
     X(INTEGRATOR_ERK, integrator_erk)                                                              \
-    /* Taylor series of orders 5 to 31 */                                                          \
+    /* Taylor series of orders 5 to 25 */                                                          \
     X(INTEGRATOR_TAYLOR, integrator_taylor)
 
 #define INTEGRATOR_METHOD_CODE(code, symbol) code,

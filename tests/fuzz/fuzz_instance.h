@@ -100,7 +100,7 @@ void fuzz_assert_written(fmi2Status status, const double values[], size_t count,
 
 /* ---- After an error -------------------------------------------------------------------------- */
 
-enum { FUZZ_RUN_VARIANTS = 6 };
+enum { FUZZ_RUN_VARIANTS = 8 };
 
 /* fmi2Reset makes the instance equal to a fresh one of its kind: same bytes when serialized, same
  * bits in a run. Resets it again at the end. */

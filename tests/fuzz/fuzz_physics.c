@@ -82,9 +82,10 @@ struct balance {
 
 /* As on the model's page: the integrator's tolerance from the requested one. */
 static double effective_tolerance(const struct fuzz_values *values, double tolerance) {
-    const bool is_erk = fuzz_integer_value(values, RP_MANIPULATOR_solver_method) == 3;
+    static const double divisors[] = {0.0, 500.0, 500.0, 100.0, 10.0}; // by solver_method
+    const int method = fuzz_integer_value(values, RP_MANIPULATOR_solver_method);
     const double used = fmin(tolerance, 1e-4); // of what an experiment asks for
-    const double effective = fmin(fmax(used / (is_erk ? 100.0 : 500.0), 1e-14), 1e-2);
+    const double effective = fmin(fmax(used / divisors[method], 1e-14), 1e-2);
     const double told = VALUE(values, effective_relative_tolerance);
     if (!(fabs(told - effective) <= 1e-12 * effective)) {
         fuzz_fail("the effective tolerance is %g, not %g", told, effective);

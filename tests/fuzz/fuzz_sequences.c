@@ -11,7 +11,7 @@ enum { MAX_OPERATIONS = 150 };
 static void start_stepping(struct fuzz_session *session, struct fuzz_instance *instance) {
     struct fuzz_input *input = session->input;
     const fmi2ValueReference method_reference = RP_MANIPULATOR_solver_method;
-    const fmi2Integer method = 1 + (fmi2Integer)fuzz_below(input, 3);
+    const fmi2Integer method = 1 + (fmi2Integer)fuzz_below(input, 4);
     const fmi2ValueReference states[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2, RP_MANIPULATOR_dq1,
                                          RP_MANIPULATOR_dq2};
     double values[4];

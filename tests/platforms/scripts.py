@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 MODEL_EXCHANGE, CO_SIMULATION = 0, 1
-METHODS = (1, 2, 3)  # cvode_adams, cvode_bdf, erk
+METHODS = (1, 2, 3, 4)  # cvode_adams, cvode_bdf, erk, taylor
+WITH_SERIES = ("RPManipulator",)  # the models that taylor can integrate
 STEPS = 200
 
 
@@ -131,13 +132,13 @@ def input_values(model: Model, step: int, shift: int = 0) -> list[float]:
 CHANGED: dict[str, dict[str, float | list[int]]] = {
     "RPManipulator": {
         "m2": 1.25, "a": 0.15, "q1": 0.3, "q2": 0.1, "dq1": -0.4, "dq2": 0.2,
-        "solver_method": [1, 2, 3],
+        "solver_method": [1, 2, 3, 4],
     },
     "RPController": {
         "Ki1": 20.0, "Ki2": 10.0, "tau1_max": 300.0, "f2_max": 200.0, "integral1": 0.01,
-        "mode": [1, 2, 3], "solver_method": [1, 2, 3],
+        "mode": [1, 2, 3, 3], "solver_method": [1, 2, 3, 1],
     },
-    "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3]},
+    "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3, 1]},
 }  # fmt: skip
 
 # parameters that are allowed one by one, and inconsistent together

@@ -17,7 +17,7 @@ from tests.support.cosim_project import load as load_scenario
 from tests.support.cosim_project import names_of
 from tests.support.paths import ROOT
 
-METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3}
+METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 SCENARIOS = names_of("rp_manipulator")
 JUMPS = [10.0**exponent for exponent in range(-12, 4)]  # relative to the input
 JUMP_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
