@@ -5,6 +5,9 @@
 
 #include <stdio.h>
 
+const char *const method_names[METHODS] = {
+    [CVODE_ADAMS] = "cvode_adams", [CVODE_BDF] = "cvode_bdf", [ERK] = "erk", [TAYLOR] = "taylor"};
+
 static const fmi2ValueReference states_of[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
 static const fmi2ValueReference inputs_of[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
