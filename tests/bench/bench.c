@@ -11,8 +11,9 @@
 #include <string.h>
 
 static const char usage[] =
-    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 [--repeats N] "
-    "[--quick] [--json FILE] [--only GROUP[,GROUP...]]";
+    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 "
+    "RPManipulator.so-with-idle-integrator [--repeats N] [--quick] [--json FILE] "
+    "[--only GROUP[,GROUP...]]";
 
 static const struct {
     const char *name;
@@ -23,6 +24,8 @@ static const struct {
     {"step-size", measure_step_sizes},
     {"instances", measure_instances},
     {"threads", measure_threads},
+    {"energy", measure_energy},
+    {"instance", measure_instance},
     {"calls", measure_calls},
     {"life", measure_life},
 };
@@ -35,8 +38,8 @@ static void choose(char *list, bool chosen[GROUPS]) {
         while (i < GROUPS && strcmp(groups[i].name, name) != 0) {
             i++;
         }
-        require(i < GROUPS, "no such group: steps precision step-size instances threads calls "
-                            "life");
+        require(i < GROUPS, "no such group: steps precision step-size instances threads energy "
+                            "instance calls life");
         chosen[i] = true;
     }
 }
@@ -46,8 +49,8 @@ int main(int count, char **arguments) {
     const char *json = NULL;
     bool all = true;
     bool chosen[GROUPS] = {false};
-    require(count >= 3, usage);
-    for (int i = 3; i < count; i++) {
+    require(count >= 4, usage);
+    for (int i = 4; i < count; i++) {
         const bool has_value = i + 1 < count;
         if (strcmp(arguments[i], "--quick") == 0) {
             bench.quick = true;
@@ -66,6 +69,8 @@ int main(int count, char **arguments) {
     require(fmu_library_open(arguments[1], &bench.fmu) != NULL, "the FMU cannot be loaded");
     require(fmu3_library_open(arguments[2], &bench.fmu3) != NULL,
             "the FMU of FMI 3.0 cannot be loaded");
+    require(fmu_library_open(arguments[3], &bench.idle) != NULL,
+            "the FMU with an integrator that returns at once cannot be loaded");
 
     report_open(&bench.report, json, bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {

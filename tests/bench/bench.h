@@ -9,6 +9,7 @@
 struct bench {
     struct fmu_functions fmu;
     struct fmu3_functions fmu3;
+    struct fmu_functions idle; /* the FMU with idle_integrator.c */
     struct report report;
     int repeats;
     bool quick; /* little of everything: shows that it works, the figures mean nothing */
@@ -24,6 +25,12 @@ void measure_step_sizes(struct bench *bench);
 /* instances.c: many instances stepped in turn, two threads with an instance each */
 void measure_instances(struct bench *bench);
 void measure_threads(struct bench *bench);
+
+/* energy.c: how the energy of a motion without losses drifts */
+void measure_energy(struct bench *bench);
+
+/* instance_alone.c: a step without the time of its integrator */
+void measure_instance(struct bench *bench);
 
 /* calls.c: each call by itself, and from fmi2Instantiate to fmi2FreeInstance */
 void measure_calls(struct bench *bench);
