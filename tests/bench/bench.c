@@ -19,15 +19,11 @@ static const struct {
     const char *name;
     void (*measure)(struct bench *bench);
 } groups[] = {
-    {"steps", measure_steps},
-    {"precision", measure_precision},
-    {"step-size", measure_step_sizes},
-    {"instances", measure_instances},
-    {"threads", measure_threads},
-    {"energy", measure_energy},
-    {"instance", measure_instance},
-    {"calls", measure_calls},
-    {"life", measure_life},
+    {"steps", measure_steps},         {"free-motion", measure_free_motion},
+    {"precision", measure_precision}, {"step-size", measure_step_sizes},
+    {"instances", measure_instances}, {"threads", measure_threads},
+    {"energy", measure_energy},       {"instance", measure_instance},
+    {"calls", measure_calls},         {"life", measure_life},
 };
 enum { GROUPS = sizeof groups / sizeof groups[0] };
 
@@ -38,8 +34,9 @@ static void choose(char *list, bool chosen[GROUPS]) {
         while (i < GROUPS && strcmp(groups[i].name, name) != 0) {
             i++;
         }
-        require(i < GROUPS, "no such group: steps precision step-size instances threads energy "
-                            "instance calls life");
+        require(i < GROUPS,
+                "no such group: steps free-motion precision step-size instances threads "
+                "energy instance calls life");
         chosen[i] = true;
     }
 }

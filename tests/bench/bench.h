@@ -15,8 +15,9 @@ struct bench {
     bool quick; /* little of everything: shows that it works, the figures mean nothing */
 };
 
-/* steps.c: communication steps against the plain loop and MuJoCo */
+/* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors */
 void measure_steps(struct bench *bench);
+void measure_free_motion(struct bench *bench);
 
 /* sweeps.c: error and time over the tolerance, time over the communication step size */
 void measure_precision(struct bench *bench);

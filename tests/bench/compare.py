@@ -60,6 +60,7 @@ OTHERS = (
 METHODS = {"erk": 3, "cvode_adams": 1, "taylor": 4}
 ROUNDING = 1e-14  # an error that no peer need stay below
 DRIFT_TOLERANCE = 1e-14
+TURNS = 5  # of free motion in a round: its targets are near, and bench and the peers take turns
 
 
 @dataclass
@@ -134,7 +135,7 @@ def make_peers(own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool)
     ]
     python_plant = ("Python plant of pythonfmu, by fmpy", partial(run_co_simulation, plant))
     bindings = ("MuJoCo RK4, by its Python bindings", run_mujoco)
-    peers = []  # those of free motion first: they are the last in bench
+    peers = []
     for bound, work in FREE.items():
         # scipy and fmpy do not come within 1e-14
         peers += [tuned(Peer(name, run, work, 0.0), bound)
@@ -163,19 +164,22 @@ def make_peers(own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool)
 
 
 def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int) -> list[dict]:
-    """Rounds of bench's communication steps and all peers; rows with medians over the rounds."""
+    """Rounds of bench's communication steps and all peers; rows with medians over the turns."""
     values = defaultdict(lambda: defaultdict(list))  # of a row's key: of each figure
     rows = {}
-    for number in range(rounds):
-        print(f"round {number + 1} of {rounds}", file=sys.stderr)
-        c_rows = run_bench(program, "--only", "steps", "--repeats", str(repeats))["rows"]
+    free = [peer for peer in peers if peer.work in FREE.values()]
+    others = [peer for peer in peers if peer not in free]
+    turns = [("steps", others), *[("free-motion", free)] * TURNS] * rounds
+    for number, (group, group_peers) in enumerate(turns):
+        print(f"turn {number + 1} of {len(turns)}", file=sys.stderr)
+        c_rows = run_bench(program, "--only", group, "--repeats", str(repeats))["rows"]
         for row in c_rows:
             key = (row["group"], row["work"], row["run"])
             rows[key] = row
             for figure in ("us", "ratio"):
                 if figure in row:
                     values[key][figure].append(row[figure])
-        for peer in peers:
+        for peer in group_peers:
             us, error = once(peer)
             key = (peer.group, peer.work.name, peer.name, peer.tolerance)
             rows[key] = {
@@ -260,7 +264,7 @@ def main() -> None:
         folder = Path(name)
         own = LoadedFmu(options.fmu, folder / "own")
         plant = LoadedFmu(build_python_plant(folder), folder / "plant")
-        first = run_bench(program, "--only", "steps", "--repeats", "1")
+        first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
         peers = make_peers(own, plant, first["rows"], options.quick)
         rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
     print("sweeps, instances, threads, energy, calls", file=sys.stderr)

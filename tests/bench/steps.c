@@ -191,8 +191,8 @@ static void measure_work(struct bench *bench, const struct work *work) {
 }
 
 /* Every solver at its own largest tolerance, MuJoCo at its largest step, with that error. */
-static void measure_free_motion(struct bench *bench, struct race *race, const char *work,
-                                double bound) {
+static void measure_with_error(struct bench *bench, struct race *race, const char *work,
+                               double bound) {
     struct problem *problem = problem_create(2.0, 1, INPUTS_ZERO, 0.0);
     for (int run = 0; run < race->count; run++) {
         race_tune(&race->runs[run], &bench->fmu, problem, bound);
@@ -206,16 +206,18 @@ void measure_steps(struct bench *bench) {
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
         measure_work(bench, &table[i]);
     }
+}
 
+void measure_free_motion(struct bench *bench) {
     struct race race = {0};
     race_add_usual(&race, &bench->fmu, 1e-8);
     add_mujoco(&race, 0);
     // a method of first order needs millions of steps for this
     race.count -= mujoco_available() ? 1 : 0;
-    measure_free_motion(bench, &race, "one step of 2 s, free motion, error <= 1e-8", 1e-8);
+    measure_with_error(bench, &race, "one step of 2 s, free motion, error <= 1e-8", 1e-8);
 
     // the others here do not come so near
     struct race exact = {0};
     race_add(&exact, (struct run){.name = "taylor", .solver = FMU, .method = TAYLOR});
-    measure_free_motion(bench, &exact, "one step of 2 s, free motion, error <= 1e-14", 1e-14);
+    measure_with_error(bench, &exact, "one step of 2 s, free motion, error <= 1e-14", 1e-14);
 }
