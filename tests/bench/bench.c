@@ -11,20 +11,19 @@
 #include <string.h>
 
 static const char usage[] =
-    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 [--repeats N] "
-    "[--quick] [--json FILE] [--only GROUP[,GROUP...]]";
+    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 "
+    "RPManipulator.so-with-idle-integrator [--repeats N] [--quick] [--json FILE] "
+    "[--only GROUP[,GROUP...]]";
 
 static const struct {
     const char *name;
     void (*measure)(struct bench *bench);
 } groups[] = {
-    {"steps", measure_steps},
-    {"precision", measure_precision},
-    {"step-size", measure_step_sizes},
-    {"instances", measure_instances},
-    {"threads", measure_threads},
-    {"calls", measure_calls},
-    {"life", measure_life},
+    {"steps", measure_steps},         {"free-motion", measure_free_motion},
+    {"precision", measure_precision}, {"step-size", measure_step_sizes},
+    {"instances", measure_instances}, {"threads", measure_threads},
+    {"energy", measure_energy},       {"instance", measure_instance},
+    {"calls", measure_calls},         {"life", measure_life},
 };
 enum { GROUPS = sizeof groups / sizeof groups[0] };
 
@@ -35,8 +34,9 @@ static void choose(char *list, bool chosen[GROUPS]) {
         while (i < GROUPS && strcmp(groups[i].name, name) != 0) {
             i++;
         }
-        require(i < GROUPS, "no such group: steps precision step-size instances threads calls "
-                            "life");
+        require(i < GROUPS,
+                "no such group: steps free-motion precision step-size instances threads "
+                "energy instance calls life");
         chosen[i] = true;
     }
 }
@@ -46,8 +46,8 @@ int main(int count, char **arguments) {
     const char *json = NULL;
     bool all = true;
     bool chosen[GROUPS] = {false};
-    require(count >= 3, usage);
-    for (int i = 3; i < count; i++) {
+    require(count >= 4, usage);
+    for (int i = 4; i < count; i++) {
         const bool has_value = i + 1 < count;
         if (strcmp(arguments[i], "--quick") == 0) {
             bench.quick = true;
@@ -66,6 +66,8 @@ int main(int count, char **arguments) {
     require(fmu_library_open(arguments[1], &bench.fmu) != NULL, "the FMU cannot be loaded");
     require(fmu3_library_open(arguments[2], &bench.fmu3) != NULL,
             "the FMU of FMI 3.0 cannot be loaded");
+    require(fmu_library_open(arguments[3], &bench.idle) != NULL,
+            "the FMU with an integrator that returns at once cannot be loaded");
 
     report_open(&bench.report, json, bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {

@@ -8,11 +8,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const struct {
-    enum method method;
-    const char *name;
-} methods[] = {{CVODE_ADAMS, "cvode_adams"}, {CVODE_BDF, "cvode_bdf"}, {ERK, "erk"}};
-
 /* Times of each call, s, with the clock's own cost taken off. */
 struct calls {
     size_t count;
@@ -79,9 +74,9 @@ void measure_calls(struct bench *bench) {
     require(states != NULL && calls.set != NULL && calls.step != NULL && calls.get != NULL,
             "no memory");
     printf("\neach call by itself, medians; 1 ms steps, inputs changing\n");
-    for (size_t i = 0; i < 3; i++) {
-        const double error = time_calls(&bench->fmu, problem, methods[i].method, states, &calls);
-        report_calls(&bench->report, methods[i].name, &calls, error);
+    for (enum method method = FIRST_METHOD; method < METHODS; method++) {
+        const double error = time_calls(&bench->fmu, problem, method, states, &calls);
+        report_calls(&bench->report, method_names[method], &calls, error);
     }
     free(calls.get);
     free(calls.step);
@@ -93,30 +88,31 @@ void measure_calls(struct bench *bench) {
 void measure_life(struct bench *bench) {
     enum { LIVES = 100 };
     struct problem *problem = problem_create(1e-3, 1, INPUTS_CHANGING, 0.0);
-    double us[3][MOST_REPEATS];
+    double us[METHODS][MOST_REPEATS];
     printf("\nfrom fmi2Instantiate over initialization to fmi2FreeInstance\n");
     for (int repeat = 0; repeat < bench->repeats; repeat++) {
-        for (size_t i = 0; i < 3; i++) {
+        for (enum method method = FIRST_METHOD; method < METHODS; method++) {
             const double begin = processor_time();
             for (int life = 0; life < LIVES; life++) {
-                bench->fmu.FreeInstance(fmu_start(&bench->fmu, problem, methods[i].method, 1e-8));
+                bench->fmu.FreeInstance(fmu_start(&bench->fmu, problem, method, 1e-8));
             }
-            us[i][repeat] = 1e6 * (processor_time() - begin) / LIVES;
+            us[method][repeat] = 1e6 * (processor_time() - begin) / LIVES;
         }
     }
-    for (size_t i = 0; i < 3; i++) {
+    for (enum method method = FIRST_METHOD; method < METHODS; method++) {
         double state[4];
         const size_t before = mallinfo2().uordblks;
-        fmi2Component c = fmu_start(&bench->fmu, problem, methods[i].method, 1e-8);
+        fmi2Component c = fmu_start(&bench->fmu, problem, method, 1e-8);
         fmu_step(&bench->fmu, c, problem, 0, state);
         const double kib = (double)(mallinfo2().uordblks - before) / 1024.0;
         bench->fmu.FreeInstance(c);
-        const double life = median(us[i], bench->repeats);
-        report_row(&bench->report, "life", "instantiate to free", methods[i].name);
-        printf("  %-12s %6.1f us", methods[i].name, life);
+        const double life = median(us[method], bench->repeats);
+        report_row(&bench->report, "life", "instantiate to free", method_names[method]);
+        printf("  %-12s %6.1f us", method_names[method], life);
         report_judged(&bench->report, "us", life, (struct target){AT_MOST, 30.0});
         report_row_end(&bench->report);
-        report_row(&bench->report, "life", "memory of an instance after a step", methods[i].name);
+        report_row(&bench->report, "life", "memory of an instance after a step",
+                   method_names[method]);
         printf("; memory after a step %5.1f KiB", kib);
         report_judged(&bench->report, "kib", kib, (struct target){AT_MOST, 32.0});
         report_row_end(&bench->report);

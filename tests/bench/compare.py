@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import shutil
 import statistics
 import subprocess
@@ -17,16 +18,18 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from arm import Work
+import numpy as np
+from arm import MOTIONS, Work
 from peers import (
     LoadedFmu,
     Run,
     build_python_plant,
+    follow,
     run_co_simulation,
     run_dop853,
     run_heyoka,
@@ -37,13 +40,27 @@ from plots import draw
 from table import markdown
 
 ROOT = Path(__file__).resolve().parents[2]
-BOUND = 1e-8  # of the error in free motion
-FREE = Work(f"one step of 2 s, free motion, error <= {BOUND:.0e}".replace("-0", "-"), 2.0, 1, False)
+FREE = {
+    bound: Work(f"one step of 2 s, free motion, error <= {text}", 2.0, 1, "zero")
+    for bound, text in ((1e-8, "1e-8"), (1e-14, "1e-14"))
+}
 CHANGING = (
-    Work("1 ms steps, inputs changing", 1e-3, 2000, True),
-    Work("10 ms steps, inputs changing", 1e-2, 200, True),
+    Work("1 ms steps, inputs changing", 1e-3, 2000, "changing"),
+    Work("10 ms steps, inputs changing", 1e-2, 200, "changing"),
+    Work("0.1 s steps, inputs changing", 0.1, 20, "changing"),
 )
-SWEPT = "one step of 2 s, free motion"  # the name that bench gives its sweep
+SWEPT = (*CHANGING[:2], Work("one step of 2 s, free motion", 2.0, 1, "zero"))
+OTHERS = (
+    Work("1 ms steps, inputs constant", 1e-3, 2000, "constant"),
+    Work("10 ms steps, inputs constant", 1e-2, 200, "constant"),
+    Work("1 ms steps, inputs changing, tolerance 1e-5", 1e-3, 2000, "changing"),
+    Work("1 ms steps, inputs changing, tolerance 1e-11", 1e-3, 2000, "changing"),
+    Work("one step of 2 s, inputs constant", 2.0, 1, "constant"),
+)
+METHODS = {"erk": 3, "cvode_adams": 1, "taylor": 4}
+ROUNDING = 1e-14  # an error that no peer need stay below
+DRIFT_TOLERANCE = 1e-14
+TURNS = 5  # of free motion in a round: its targets are near, and bench and the peers take turns
 
 
 @dataclass
@@ -55,6 +72,7 @@ class Peer:
     work: Work
     tolerance: float
     group: str = "steps"
+    against: dict[str, float | None] = field(default_factory=dict)  # run of bench: largest ratio
 
 
 def once(peer: Peer) -> tuple[float, float]:
@@ -67,9 +85,13 @@ def once(peer: Peer) -> tuple[float, float]:
 
 
 def tuned(peer: Peer, bound: float) -> Peer:
-    """The peer at its largest tolerance, in quarters of decades, with an error within the bound."""
+    """The peer at its largest tolerance, in quarters of decades, with an error within the bound.
+
+    All tolerances below it, to a ten-thousandth of the bound, are within the bound, too.
+    """
     best = None
-    for quarter in range(-52, -11):
+    lowest = max(1e-4 * bound, sys.float_info.epsilon)
+    for quarter in range(math.ceil(4.0 * math.log10(lowest) - 1e-6), -11):
         peer.tolerance = 10.0 ** (quarter / 4)
         if peer.work.error(peer.run(peer.work, peer.tolerance)[1]) > bound:
             break
@@ -93,49 +115,71 @@ def find(rows: list[dict], work: str, run: str) -> dict:
     return next(row for row in rows if (row["work"], row["run"]) == (work, run))
 
 
+def heyoka_like(run: str, work: Work, first: list[dict]) -> Peer:
+    """heyoka with an error no larger than that of a run of bench, or ROUNDING."""
+    peer = Peer(f"heyoka, error no larger than {run}'s", run_heyoka, work, 0.0)
+    peer.against[run] = None
+    return tuned(peer, max(find(first, work.name, run)["error"], ROUNDING))
+
+
 def make_peers(own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool) -> list[Peer]:
-    """All peers at their tolerances; first: rows of bench, to know how exact erk is."""
-    model_exchange = partial(run_model_exchange, own)
+    """All peers at their tolerances; first: rows of bench, to know how exact its runs are."""
     swept = [
         ("heyoka", run_heyoka),
         ("scipy DOP853", run_dop853),
-        ("model exchange, CVode of fmpy", model_exchange),
+        ("model exchange, CVode of fmpy", partial(run_model_exchange, own)),
     ]
     driven = [
-        ("erk, by fmpy", partial(run_co_simulation, own, method=3)),
-        ("cvode_adams, by fmpy", partial(run_co_simulation, own, method=1)),
-        ("Python plant of pythonfmu, by fmpy", partial(run_co_simulation, plant)),
+        (f"{name}, by fmpy", partial(run_co_simulation, own, method=method))
+        for name, method in METHODS.items()
     ]
+    python_plant = ("Python plant of pythonfmu, by fmpy", partial(run_co_simulation, plant))
+    bindings = ("MuJoCo RK4, by its Python bindings", run_mujoco)
     peers = []
+    for bound, work in FREE.items():
+        # scipy and fmpy do not come within 1e-14
+        peers += [tuned(Peer(name, run, work, 0.0), bound)
+                  for name, run in (swept if bound == 1e-8 else swept[:1])]  # fmt: skip
+        heyoka = next(peer for peer in peers if peer.work is work and peer.name == "heyoka")
+        heyoka.against = {"erk": 8.0, "taylor": 0.9} if bound == 1e-8 else {"taylor": 0.9}
+        for name, method in (("erk", 3), ("taylor", 4)):
+            if name in heyoka.against:
+                tolerance = find(first, work.name, name)["tolerance"]
+                run = partial(run_co_simulation, own, method=method)
+                peers.append(Peer(f"{name}, by fmpy", run, work, tolerance))
+    peers.append(heyoka_like("erk", FREE[1e-8], first))
+    peers.append(heyoka_like("taylor", FREE[1e-8], first))
+    peers.append(Peer(*python_plant, FREE[1e-8], 1e-8))
     for work in CHANGING:
-        for name, run in [*swept, *driven, ("MuJoCo RK4, by its Python bindings", run_mujoco)]:
+        for name, run in (*swept, *driven, python_plant, bindings):
             peers.append(Peer(name, run, work, 1e-8))
-    peers += [tuned(Peer(name, run, FREE, 0.0), BOUND) for name, run in swept]
-    erk = find(first, FREE.name, "erk")
-    peers.append(tuned(Peer("heyoka, error no larger than erk's", run_heyoka, FREE, 0.0),
-                       erk["error"]))  # fmt: skip
-    peers.append(Peer(driven[0][0], driven[0][1], FREE, erk["tolerance"]))
-    peers.append(Peer(driven[2][0], driven[2][1], FREE, 1e-8))
-    for work in (*CHANGING, Work(SWEPT, FREE.step, FREE.steps, FREE.changing)):
-        for exponent in range(-4, -13, -4 if quick else -1):
-            peers += [Peer(name, run, work, 10.0**exponent, "precision") for name, run in swept]
+    for work in (*CHANGING, *OTHERS):
+        peers.append(heyoka_like("taylor", work, first))
+    for work in SWEPT:
+        for exponent in range(-4, -16, -4 if quick else -1):
+            # scipy and fmpy refuse finer tolerances than 1e-12, or work no better at them
+            peers += [Peer(name, run, work, 10.0**exponent, "precision")
+                      for name, run in (swept if exponent >= -12 else swept[:1])]  # fmt: skip
     return peers
 
 
 def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int) -> list[dict]:
-    """Rounds of bench's communication steps and all peers; rows with medians over the rounds."""
+    """Rounds of bench's communication steps and all peers; rows with medians over the turns."""
     values = defaultdict(lambda: defaultdict(list))  # of a row's key: of each figure
     rows = {}
-    for number in range(rounds):
-        print(f"round {number + 1} of {rounds}", file=sys.stderr)
-        c_rows = run_bench(program, "--only", "steps", "--repeats", str(repeats))["rows"]
+    free = [peer for peer in peers if peer.work in FREE.values()]
+    others = [peer for peer in peers if peer not in free]
+    turns = [("steps", others), *[("free-motion", free)] * TURNS] * rounds
+    for number, (group, group_peers) in enumerate(turns):
+        print(f"turn {number + 1} of {len(turns)}", file=sys.stderr)
+        c_rows = run_bench(program, "--only", group, "--repeats", str(repeats))["rows"]
         for row in c_rows:
             key = (row["group"], row["work"], row["run"])
             rows[key] = row
             for figure in ("us", "ratio"):
                 if figure in row:
                     values[key][figure].append(row[figure])
-        for peer in peers:
+        for peer in group_peers:
             us, error = once(peer)
             key = (peer.group, peer.work.name, peer.name, peer.tolerance)
             rows[key] = {
@@ -145,26 +189,39 @@ def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int
             }  # fmt: skip
             values[key]["us"].append(us)
             if peer.group == "steps":
-                plain = find(c_rows, peer.work.name, "plain loop")["us"]
-                values[key]["ratio"].append(us / plain)
-                if peer.work is FREE and peer.name.startswith("heyoka"):
-                    against = ("against", FREE.name, f"erk to {peer.name}")
-                    erk = find(c_rows, FREE.name, "erk")
-                    values[against]["ratio"].append(erk["us"] / us)
-                    rows[against] = dict(zip(("group", "work", "run"), against, strict=True))
-                    rows[against] |= {"error": erk["error"], "error_of_peer": error}
+                first = next(row for row in c_rows if row["work"] == peer.work.name)
+                values[key]["ratio"].append(us / first["us"])
+            for run, limit in peer.against.items():
+                of_bench = find(c_rows, peer.work.name, run)
+                key = ("against", peer.work.name, f"{run} to {peer.name}")
+                values[key]["ratio"].append(of_bench["us"] / us)
+                rows[key] = dict(zip(("group", "work", "run"), key, strict=True))
+                rows[key] |= {"error": of_bench["error"], "error_of_peer": error}
+                if limit is not None:
+                    rows[key] |= {"judged": "ratio", "comparison": "<=", "limit": limit}
     for key, row in rows.items():
         row |= {figure: statistics.median(list_) for figure, list_ in values[key].items()}
-    judge(rows[("against", FREE.name, "erk to heyoka")], 8.0)
-    for row in rows.values():
         if "judged" in row:
-            judge(row, row["limit"])
+            row["met"] = row[row["judged"]] <= row["limit"]
     return list(rows.values())
 
 
-def judge(row: dict, limit: float) -> None:
-    """Compare the row's ratio with the largest that it may be."""
-    row |= {"judged": "ratio", "comparison": "<=", "limit": limit, "met": row["ratio"] <= limit}
+def drift_rows(steps: int) -> list[dict]:
+    """heyoka's drift of the energy, in rows as those of bench's energy.c."""
+    rows = []
+    for motion in MOTIONS:
+        seconds, states = follow(motion, DRIFT_TOLERANCE, steps)
+        total, scale = motion.energy(np.vstack((motion.start, states)))
+        drift = (np.abs(total - total[0]) / np.maximum.accumulate(scale))[1:]
+        ends = sorted({math.ceil(10.0 ** (k / 8)) for k in range(8 * 6)} | {steps})
+        ends = [end for end in ends if end <= steps]
+        for begin, end in zip([0, *ends[:-1]], ends, strict=True):
+            rows.append({
+                "group": "energy", "work": motion.name, "run": "heyoka", "steps": end,
+                "drift": drift[begin:end].max(), "largest": drift[:end].max(),
+                "at_end": drift[end - 1], "us": 1e6 * seconds / steps, "end_q1": states[end - 1, 0],
+            })  # fmt: skip
+    return rows
 
 
 def with_figures(page: str, tables: str) -> str:
@@ -183,6 +240,9 @@ def main() -> None:
                         default=build / "fmu/RPManipulator/RPManipulator.so")  # fmt: skip
     parser.add_argument("--library-fmi3", type=Path,
                         default=build / "fmu/RPManipulator/fmi3/RPManipulator.so")  # fmt: skip
+    parser.add_argument("--library-idle", type=Path,
+                        default=build / "tests/bench/idle/RPManipulator.so",
+                        help="the FMU with an integrator that returns at once")  # fmt: skip
     parser.add_argument("--fmu", type=Path, default=build / "RPManipulator.fmu")
     parser.add_argument("--output", type=Path, default=build / "report/benchmark")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
@@ -190,24 +250,25 @@ def main() -> None:
     parser.add_argument("--readme", action="store_true", help="put it all into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
-    for path in (options.bench, options.library, options.library_fmi3, options.fmu):
+    libraries = (options.library, options.library_fmi3, options.library_idle)
+    for path in (options.bench, *libraries, options.fmu):
         if not path.exists():
             sys.exit(f"{path}: no such file. Build it and run this with\n"
                      "    ./setup.sh --dev && cmake --preset default && "
                      "cmake --build build --target benchmark")  # fmt: skip
     options.output.mkdir(parents=True, exist_ok=True)
-    program = [str(options.bench), str(options.library), str(options.library_fmi3)]
+    program = [str(path) for path in (options.bench, *libraries)]
     small = ["--quick"] if options.quick else []
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         own = LoadedFmu(options.fmu, folder / "own")
         plant = LoadedFmu(build_python_plant(folder), folder / "plant")
-        first = run_bench(program, "--only", "steps", "--repeats", "1")
+        first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
         peers = make_peers(own, plant, first["rows"], options.quick)
         rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
-    print("sweeps, instances, threads, calls", file=sys.stderr)
-    others = "precision,step-size,instances,threads,calls,life"
+    print("sweeps, instances, threads, energy, calls", file=sys.stderr)
+    others = "precision,step-size,instances,threads,energy,instance,calls,life"
     rest = run_bench(program, *small, "--only", others, "--repeats", str(options.repeats))
     machine = first["machine"] | {
         name: version(name) for name in ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")
@@ -216,7 +277,7 @@ def main() -> None:
         "machine": machine | {"python": sys.version.split()[0]},
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": rows + rest["rows"],
+        "rows": rows + rest["rows"] + drift_rows(10_000 if options.quick else 1_000_000),
     }
     (options.output / "benchmark.json").write_text(json.dumps(result, indent=1) + "\n")
     text = markdown(result)

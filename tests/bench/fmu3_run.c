@@ -20,12 +20,14 @@ static void log_text(fmi3InstanceEnvironment environment, fmi3Status status, fmi
 static fmi3Instance start(const struct fmu3_functions *fmu, const struct problem *problem,
                           enum method method, double tolerance) {
     static const fmi3ValueReference solver_method = RP_MANIPULATOR_solver_method;
+    static const fmi3ValueReference g = RP_MANIPULATOR_g;
     const fmi3Int64 chosen = method;
     fmi3Instance c =
         fmu->InstantiateCoSimulation("bench", RP_MANIPULATOR_TOKEN_FMI3, "", false, false, false,
                                      false, NULL, 0, NULL, log_text, NULL);
     require(c != NULL, "not instantiated");
     require(fmu->SetFloat64(c, states_of, 4, problem->start, 4) == fmi3OK &&
+                fmu->SetFloat64(c, &g, 1, &problem->g, 1) == fmi3OK &&
                 fmu->SetInt64(c, &solver_method, 1, &chosen, 1) == fmi3OK &&
                 fmu->EnterInitializationMode(c, true, tolerance, 0.0, false, 0.0) == fmi3OK &&
                 fmu->ExitInitializationMode(c) == fmi3OK,

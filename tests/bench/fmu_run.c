@@ -5,6 +5,9 @@
 
 #include <stdio.h>
 
+const char *const method_names[METHODS] = {
+    [CVODE_ADAMS] = "cvode_adams", [CVODE_BDF] = "cvode_bdf", [ERK] = "erk", [TAYLOR] = "taylor"};
+
 static const fmi2ValueReference states_of[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
 static const fmi2ValueReference inputs_of[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
@@ -23,11 +26,13 @@ static const fmi2CallbackFunctions callbacks = {.logger = log_text};
 fmi2Component fmu_start(const struct fmu_functions *fmu, const struct problem *problem,
                         enum method method, double tolerance) {
     static const fmi2ValueReference solver_method = RP_MANIPULATOR_solver_method;
+    static const fmi2ValueReference g = RP_MANIPULATOR_g;
     const int chosen = (int)method;
     fmi2Component c =
         fmu->Instantiate("bench", fmi2CoSimulation, RP_MANIPULATOR_GUID, "", &callbacks, 0, 0);
     require(c != NULL, "not instantiated");
     require(fmu->SetReal(c, states_of, 4, problem->start) == fmi2OK &&
+                fmu->SetReal(c, &g, 1, &problem->g) == fmi2OK &&
                 fmu->SetInteger(c, &solver_method, 1, &chosen) == fmi2OK &&
                 fmu->SetupExperiment(c, 1, tolerance, 0.0, 0, 0.0) == fmi2OK &&
                 fmu->EnterInitializationMode(c) == fmi2OK &&

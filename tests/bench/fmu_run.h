@@ -6,7 +6,8 @@
 #include "problem.h"
 
 /* The items of solver_method. */
-enum method { CVODE_ADAMS = 1, CVODE_BDF, ERK };
+enum method { CVODE_ADAMS = 1, FIRST_METHOD = CVODE_ADAMS, CVODE_BDF, ERK, TAYLOR, METHODS };
+extern const char *const method_names[METHODS];
 
 struct fmu_counts {
     double effective_tolerance;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import matplotlib
@@ -16,6 +17,7 @@ STYLES = {
     "cvode_adams": ("tab:blue", "o", "-"),
     "cvode_bdf": ("tab:purple", "s", "-"),
     "erk": ("tab:red", "D", "-"),
+    "taylor": ("deeppink", "o", "-"),
     "plain loop": ("black", "o", "--"),
     "MuJoCo RK4": ("tab:green", "^", "--"),
     "MuJoCo implicitfast": ("tab:olive", "v", "--"),
@@ -27,6 +29,7 @@ LABELS = {
     "cvode_adams": "FMU, cvode_adams",
     "cvode_bdf": "FMU, cvode_bdf",
     "erk": "FMU, erk",
+    "taylor": "FMU, taylor",
     "plain loop": "plain CVODE loop",
     "heyoka": "heyoka (called from Python)",
     "model exchange, CVode of fmpy": "FMU as model exchange, CVode of fmpy",
@@ -90,7 +93,7 @@ def step_size(rows: list[dict]) -> Figure:
         1, len(kinds), figsize=(11, 5), sharey=True, layout="constrained"
     )
     for axes, kind in zip(all_axes, kinds, strict=True):
-        for run in ("plain loop", "cvode_bdf", "cvode_adams", "erk"):
+        for run in ("plain loop", "cvode_bdf", "cvode_adams", "erk", "taylor"):
             points = [(row["step"], row["us"]) for row in rows
                       if row["run"] == run and row["work"].endswith(kind)]  # fmt: skip
             curve(axes, run, *zip(*points, strict=True))
@@ -98,20 +101,22 @@ def step_size(rows: list[dict]) -> Figure:
         axes.set_yscale("log")
         frame(axes, f"{kind.capitalize()}, tolerance 1e-8", "communication step size, s", "")
     all_axes[0].set_ylabel("time of a communication step, us")
-    legend_below(figure, list(all_axes), 4)
+    legend_below(figure, list(all_axes), 5)
     return figure
 
 
 def instances(rows: list[dict]) -> Figure:
     """Time of a step over the number of instances stepped in turn."""
     rows = [row for row in rows if row["group"] == "instances"]
-    figure, axes = plt.subplots(figsize=(7, 4.6), layout="constrained")
+    limits = {row["run"]: row["limit"] for row in rows if "limit" in row}
+    figure, axes = plt.subplots(figsize=(7, 4.8), layout="constrained")
     for run in dict.fromkeys(row["run"] for row in rows):
         points = [(row["instances"], row["us"]) for row in rows if row["run"] == run]
         x, y = zip(*points, strict=True)
         curve(axes, run, x, y)
-        axes.plot(x, [y[0] + 2.0] * len(x), ":", color=STYLES[run][0], linewidth=1.2,
-                  label=f"{run}: one alone + 2 us, the target")  # fmt: skip
+        if run in limits:
+            axes.plot(x, [y[0] + limits[run]] * len(x), ":", color=STYLES[run][0], linewidth=1.2,
+                      label=f"{run}: one alone + {limits[run]:g} us, the target")  # fmt: skip
     axes.set_xscale("log")
     axes.set_ylim(bottom=0.0)
     frame(axes, "Instances stepped by 1 ms in turn, inputs changing", "number of instances",
@@ -120,10 +125,31 @@ def instances(rows: list[dict]) -> Figure:
     return figure
 
 
+def energy_drift(rows: list[dict]) -> Figure:
+    """Drift of the energy over the number of steps, in motions without losses."""
+    rows = [row for row in rows if row["group"] == "energy"]
+    works = list(dict.fromkeys(row["work"] for row in rows))
+    figure, all_axes = plt.subplots(
+        1, len(works), figsize=(11, 5), sharey=True, layout="constrained"
+    )
+    for axes, work in zip(all_axes, works, strict=True):
+        for run in ("MuJoCo RK4", "heyoka", "cvode_adams", "erk", "taylor"):
+            points = [(row["steps"], row["drift"] or math.nan) for row in rows
+                      if (row["work"], row["run"]) == (work, run)]  # fmt: skip
+            if points:
+                curve(axes, run, *zip(*points, strict=True))
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        frame(axes, work[0].upper() + work[1:], "steps of 1 ms", "")
+    all_axes[0].set_ylabel("|energy - energy at the start|, relative")
+    legend_below(figure, list(all_axes), 5)
+    return figure
+
+
 def draw(rows: list[dict], folder: Path) -> list[Path]:
     """Write all plots as PNG; their paths."""
     paths = []
-    for plot in (precision, step_size, instances):
+    for plot in (precision, step_size, instances, energy_drift):
         figure = plot(rows)
         paths.append(folder / f"{plot.__name__}.png")
         figure.savefig(paths[-1], dpi=130)

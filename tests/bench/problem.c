@@ -63,18 +63,36 @@ static void solve(struct problem *problem) {
     }
 }
 
-struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift) {
+static struct problem *create(double step, int steps, enum problem_inputs kind,
+                              const double start[4], double g) {
     struct problem *problem = calloc(1, sizeof *problem);
     require(problem != NULL, "no memory");
     *problem = (struct problem){.step = step,
                                 .steps = steps,
                                 .kind = kind,
-                                .start = {0.3 + shift, 0.2 + shift, 0.0, 0.0},
                                 .inputs = calloc((size_t)steps, sizeof problem->inputs[0]),
-                                .reference = calloc((size_t)steps, sizeof problem->reference[0])};
-    require(problem->inputs != NULL && problem->reference != NULL, "no memory");
+                                .g = g};
+    require(problem->inputs != NULL, "no memory");
+    memcpy(problem->start, start, sizeof problem->start);
+    return problem;
+}
+
+struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift) {
+    const double start[4] = {0.3 + shift, 0.2 + shift, 0.0, 0.0};
+    struct problem *problem = create(step, steps, kind, start, problem_parameters.g);
+    problem->reference = calloc((size_t)steps, sizeof problem->reference[0]);
+    require(problem->reference != NULL, "no memory");
     sample_inputs(problem);
     solve(problem);
+    return problem;
+}
+
+struct problem *problem_create_without_reference(double step, int steps, const double start[4],
+                                                 const double u[2], double g) {
+    struct problem *problem = create(step, steps, INPUTS_CONSTANT, start, g);
+    for (int i = 0; i < steps; i++) {
+        memcpy(problem->inputs[i], u, sizeof problem->inputs[i]);
+    }
     return problem;
 }
 

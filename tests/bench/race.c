@@ -19,7 +19,8 @@ static double run_once(const struct run *run, const struct fmu_functions *fmu,
     case PLAIN_LOOP:
         return plain_loop_run(problem, run->tolerance, states);
     case FMU:
-        return fmu_run(fmu, problem, run->method, run->tolerance, states, counts);
+        return fmu_run(run->fmu != NULL ? run->fmu : fmu, problem, run->method, run->tolerance,
+                       states, counts);
     case FMU3:
         return fmu3_run(run->fmu3, problem, run->method, run->tolerance, states, counts);
     case MUJOCO:
@@ -37,10 +38,8 @@ void race_add_usual(struct race *race, const struct fmu_functions *fmu, double t
     race_add(race, (struct run){.name = "plain loop",
                                 .solver = PLAIN_LOOP,
                                 .tolerance = counts.effective_tolerance});
-    static const char *const names[] = {
-        [CVODE_ADAMS] = "cvode_adams", [CVODE_BDF] = "cvode_bdf", [ERK] = "erk"};
-    for (enum method method = CVODE_ADAMS; method <= ERK; method++) {
-        race_add(race, (struct run){.name = names[method],
+    for (enum method method = FIRST_METHOD; method < METHODS; method++) {
+        race_add(race, (struct run){.name = method_names[method],
                                     .solver = FMU,
                                     .method = method,
                                     .tolerance = tolerance});
@@ -152,7 +151,8 @@ void race_tune(struct run *run, const struct fmu_functions *fmu, const struct pr
         }
     } else {
         double best = 0.0;
-        for (int quarter = -48; quarter <= -12; quarter++) {
+        const int first = (int)lround(4.0 * log10(fmax(1e-4 * bound, 1e-14)));
+        for (int quarter = first; quarter <= -12; quarter++) {
             run->tolerance = pow(10.0, quarter / 4.0);
             run_once(run, fmu, problem, states, &counts);
             if (problem_error(problem, states) > bound) {

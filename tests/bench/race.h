@@ -17,6 +17,7 @@ struct run {
     double tolerance;   /* of the plain loop, or requested from an FMU */
     enum mujoco_integrator integrator;
     int substeps;                      /* of MuJoCo in a communication step */
+    const struct fmu_functions *fmu;   /* of FMU, where it is not that of the race */
     const struct fmu3_functions *fmu3; /* of FMU3: the FMU of FMI 3.0 */
 };
 
@@ -49,8 +50,8 @@ double race_ratio(const struct race *race, int run, int peer);
 void race_report(const struct race *race, struct report *report, const char *group,
                  const char *work, const struct problem *problem, const struct target *targets);
 
-/* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to 1e-12
- * is above the bound. MuJoCo: sets the substeps instead. */
+/* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to a
+ * ten-thousandth of the bound, or 1e-14, is above the bound. MuJoCo: sets the substeps instead. */
 void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
                double bound);
 

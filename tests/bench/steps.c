@@ -2,23 +2,65 @@
 
 #include "race.h"
 
+#include <string.h>
+
 static const struct work {
     const char *name;
     double step; /* s */
     int steps;
     enum problem_inputs inputs;
     double tolerance;
-    double adams; /* largest ratios to the plain loop, 0: no target */
-    double erk;
 } table[] = {
-    {"1 ms steps, inputs changing", 1e-3, 2000, INPUTS_CHANGING, 1e-8, 0.5, 0.15},
-    {"10 ms steps, inputs changing", 1e-2, 200, INPUTS_CHANGING, 1e-8, 0.5, 0.2},
-    {"1 ms steps, inputs constant", 1e-3, 2000, INPUTS_CONSTANT, 1e-8, 0.6, 0.0},
-    {"10 ms steps, inputs constant", 1e-2, 200, INPUTS_CONSTANT, 1e-8, 0.0, 0.0},
-    {"1 ms steps, inputs changing, tolerance 1e-5", 1e-3, 2000, INPUTS_CHANGING, 1e-5, 0.0, 0.0},
-    {"1 ms steps, inputs changing, tolerance 1e-11", 1e-3, 2000, INPUTS_CHANGING, 1e-11, 0.0, 0.0},
-    {"one step of 2 s, inputs constant", 2.0, 1, INPUTS_CONSTANT, 1e-8, 0.0, 0.0},
+    {"1 ms steps, inputs changing", 1e-3, 2000, INPUTS_CHANGING, 1e-8},
+    {"10 ms steps, inputs changing", 1e-2, 200, INPUTS_CHANGING, 1e-8},
+    {"0.1 s steps, inputs changing", 0.1, 20, INPUTS_CHANGING, 1e-8},
+    {"1 ms steps, inputs constant", 1e-3, 2000, INPUTS_CONSTANT, 1e-8},
+    {"10 ms steps, inputs constant", 1e-2, 200, INPUTS_CONSTANT, 1e-8},
+    {"1 ms steps, inputs changing, tolerance 1e-5", 1e-3, 2000, INPUTS_CHANGING, 1e-5},
+    {"1 ms steps, inputs changing, tolerance 1e-11", 1e-3, 2000, INPUTS_CHANGING, 1e-11},
+    {"one step of 2 s, inputs constant", 2.0, 1, INPUTS_CONSTANT, 1e-8},
 };
+
+/* Times of two runs that are compared. Those with the plain loop are shown in the row of the run.
+ */
+static const struct ratio {
+    const char *work;
+    const char *run;
+    const char *peer;
+    double most; /* the largest that the ratio may be; 0: no target */
+} ratios[] = {
+    {"1 ms steps, inputs changing", "cvode_adams", "plain loop", 0.5},
+    {"1 ms steps, inputs changing", "erk", "plain loop", 0.15},
+    {"1 ms steps, inputs changing", "taylor", "plain loop", 0.04},
+    {"1 ms steps, inputs changing", "taylor", "erk", 0.42},
+    {"1 ms steps, inputs changing", "erk", "MuJoCo RK4", 0.2},
+    {"1 ms steps, inputs changing", "taylor", "MuJoCo RK4", 0.13},
+    {"10 ms steps, inputs changing", "cvode_adams", "plain loop", 0.5},
+    {"10 ms steps, inputs changing", "erk", "plain loop", 0.2},
+    {"10 ms steps, inputs changing", "taylor", "erk", 0.42},
+    {"10 ms steps, inputs changing", "erk", "MuJoCo RK4", 0.0},
+    {"10 ms steps, inputs changing", "taylor", "MuJoCo RK4", 0.0},
+    {"0.1 s steps, inputs changing", "taylor", "erk", 0.2},
+    {"0.1 s steps, inputs changing", "taylor", "MuJoCo RK4", 0.0},
+    {"1 ms steps, inputs constant", "cvode_adams", "plain loop", 0.6},
+    {"1 ms steps, inputs constant", "taylor", "cvode_adams", 0.95},
+    {"10 ms steps, inputs constant", "taylor", "cvode_adams", 0.45},
+    {"one step of 2 s, inputs constant", "taylor", "erk", 0.0},
+};
+enum { RATIOS = sizeof ratios / sizeof ratios[0] };
+
+/* In steps of 1 ms. */
+static const double largest_error_of_taylor = 1e-12;
+
+/* Compared with MuJoCo, and errors with that of the plain loop. */
+static bool is_judged(const struct work *work) {
+    return work->tolerance == 1e-8 && work->inputs == INPUTS_CHANGING;
+}
+
+/* Also through FMI 3.0. */
+static bool is_usual(const struct work *work) {
+    return work->tolerance == 1e-8 && work->steps > 1;
+}
 
 static void add_mujoco(struct race *race, int substeps) {
     static const char *const names[] = {
@@ -32,15 +74,20 @@ static void add_mujoco(struct race *race, int substeps) {
 }
 
 /* The same FMU of FMI 3.0. */
+static const struct {
+    const char *name;
+    enum method method;
+    double most; /* ratio to the FMU of FMI 2.0 with this method; 0: no target */
+} fmi3_runs[] = {{"cvode_adams, FMI 3.0", CVODE_ADAMS, 1.05},
+                 {"erk, FMI 3.0", ERK, 1.05},
+                 {"taylor, FMI 3.0", TAYLOR, 0.0}};
+enum { FMI3_RUNS = sizeof fmi3_runs / sizeof fmi3_runs[0] };
+
 static void add_fmi3(struct race *race, const struct fmu3_functions *fmu3, double tolerance) {
-    static const struct {
-        const char *name;
-        enum method method;
-    } added[] = {{"cvode_adams, FMI 3.0", CVODE_ADAMS}, {"erk, FMI 3.0", ERK}};
-    for (size_t i = 0; i < sizeof added / sizeof added[0]; i++) {
-        race_add(race, (struct run){.name = added[i].name,
+    for (size_t i = 0; i < FMI3_RUNS; i++) {
+        race_add(race, (struct run){.name = fmi3_runs[i].name,
                                     .solver = FMU3,
-                                    .method = added[i].method,
+                                    .method = fmi3_runs[i].method,
                                     .tolerance = tolerance,
                                     .fmu3 = fmu3});
     }
@@ -50,80 +97,127 @@ static struct target at_most(double limit) {
     return (struct target){limit > 0.0 ? AT_MOST : NO_TARGET, limit};
 }
 
-/* A run against another one of the same race. */
-static void report_against(const struct race *race, struct report *report, const char *work,
-                           const char *name_of_run, const char *peer, struct target target) {
-    const int run = race_find(race, name_of_run);
-    const double ratio = race_ratio(race, run, race_find(race, peer));
+/* A run against another one of the same race, if that is there. */
+static void report_against(const struct race *race, struct report *report,
+                           const struct ratio *against) {
+    const int run = race_find(race, against->run);
+    const int peer = race_find(race, against->peer);
+    if (peer < 0) {
+        return;
+    }
+    const double ratio = race_ratio(race, run, peer);
     char name[64];
-    snprintf(name, sizeof name, "%s to %s", name_of_run, peer);
-    report_row(report, "against", work, name);
+    snprintf(name, sizeof name, "%s to %s", against->run, against->peer);
+    report_row(report, "against", against->work, name);
     report_number(report, "error", race->error[run]);
     printf("  %-36s %7.3f", name, ratio);
-    report_judged(report, "ratio", ratio, target);
+    report_judged(report, "ratio", ratio, at_most(against->most));
     printf("\n");
     report_row_end(report);
 }
 
-/* The error of the plain loop bounds that of erk. */
-static void report_error(const struct race *race, struct report *report, const char *work) {
-    const double ratio = race->error[race_find(race, "erk")] / race->error[0];
-    report_row(report, "against", work, "error of erk to that of the plain loop");
-    printf("  error of erk to that of the plain loop %.1e", ratio);
-    report_judged(report, "ratio", ratio, (struct target){AT_MOST, 1.0});
+/* The error of the plain loop bounds that of a method. */
+static void report_error(const struct race *race, struct report *report, const char *work,
+                         enum method method) {
+    const double ratio = race->error[race_find(race, method_names[method])] / race->error[0];
+    char name[64];
+    snprintf(name, sizeof name, "error of %s to that of the plain loop", method_names[method]);
+    report_row(report, "against", work, name);
+    printf("  %s %.1e", name, ratio);
+    report_judged(report, "ratio", ratio, at_most(1.0));
     printf("\n");
     report_row_end(report);
+}
+
+static void report_error_of_taylor(const struct race *race, struct report *report,
+                                   const char *work) {
+    const double error = race->error[race_find(race, method_names[TAYLOR])];
+    report_row(report, "against", work, "error of taylor");
+    printf("  error of taylor %.1e", error);
+    report_judged(report, "error", error, at_most(largest_error_of_taylor));
+    printf("\n");
+    report_row_end(report);
+}
+
+/* All comparisons with others than the plain loop. */
+static void report_comparisons(const struct race *race, struct report *report,
+                               const struct work *work) {
+    if (is_judged(work)) {
+        if (work->step == 1e-3) {
+            report_error_of_taylor(race, report, work->name);
+        }
+        report_error(race, report, work->name, ERK);
+        report_error(race, report, work->name, TAYLOR);
+    }
+    for (size_t i = 0; is_usual(work) && i < FMI3_RUNS; i++) {
+        const struct ratio ratio = {.work = work->name,
+                                    .run = fmi3_runs[i].name,
+                                    .peer = method_names[fmi3_runs[i].method],
+                                    .most = fmi3_runs[i].most};
+        report_against(race, report, &ratio);
+    }
+    for (size_t i = 0; i < RATIOS; i++) {
+        if (strcmp(ratios[i].work, work->name) == 0 && race_find(race, ratios[i].peer) != 0) {
+            report_against(race, report, &ratios[i]);
+        }
+    }
+}
+
+static void report_work(const struct race *race, struct report *report, const struct work *work,
+                        const struct problem *problem) {
+    struct target targets[MOST_RUNS] = {{NO_TARGET, 0.0}};
+    for (size_t i = 0; i < RATIOS; i++) {
+        if (strcmp(ratios[i].work, work->name) == 0 && race_find(race, ratios[i].peer) == 0) {
+            targets[race_find(race, ratios[i].run)] = at_most(ratios[i].most);
+        }
+    }
+    race_report(race, report, "steps", work->name, problem, targets);
+    report_comparisons(race, report, work);
+}
+
+static void measure_work(struct bench *bench, const struct work *work) {
+    struct problem *problem = problem_create(work->step, work->steps, work->inputs, 0.0);
+    struct race race = {0};
+    race_add_usual(&race, &bench->fmu, work->tolerance);
+    if (is_judged(work)) {
+        add_mujoco(&race, 1);
+    }
+    if (is_usual(work)) {
+        add_fmi3(&race, &bench->fmu3, work->tolerance);
+    }
+    race_run(&race, &bench->fmu, problem, bench->repeats);
+    report_work(&race, &bench->report, work, problem);
+    problem_destroy(problem);
 }
 
 /* Every solver at its own largest tolerance, MuJoCo at its largest step, with that error. */
-static void measure_free_motion(struct bench *bench) {
-    static const double bound = 1e-8;
-    static const char *const work = "one step of 2 s, free motion, error <= 1e-8";
+static void measure_with_error(struct bench *bench, struct race *race, const char *work,
+                               double bound) {
     struct problem *problem = problem_create(2.0, 1, INPUTS_ZERO, 0.0);
-    struct race race = {0};
-    race_add_usual(&race, &bench->fmu, 1e-8);
-    add_mujoco(&race, 0);
-    // a method of first order needs millions of steps for this
-    race.count -= mujoco_available() ? 1 : 0;
-    for (int run = 0; run < race.count; run++) {
-        race_tune(&race.runs[run], &bench->fmu, problem, bound);
+    for (int run = 0; run < race->count; run++) {
+        race_tune(&race->runs[run], &bench->fmu, problem, bound);
     }
-    race_run(&race, &bench->fmu, problem, bench->repeats);
-    race_report(&race, &bench->report, "steps", work, problem, NULL);
+    race_run(race, &bench->fmu, problem, bench->repeats);
+    race_report(race, &bench->report, "steps", work, problem, NULL);
     problem_destroy(problem);
 }
 
 void measure_steps(struct bench *bench) {
     for (size_t i = 0; i < sizeof table / sizeof table[0]; i++) {
-        const struct work *work = &table[i];
-        const bool is_usual = work->tolerance == 1e-8 && work->steps > 1;
-        const bool judged = work->tolerance == 1e-8 && work->inputs == INPUTS_CHANGING;
-        struct problem *problem = problem_create(work->step, work->steps, work->inputs, 0.0);
-        struct race race = {0};
-        race_add_usual(&race, &bench->fmu, work->tolerance);
-        if (judged) {
-            add_mujoco(&race, 1);
-        }
-        if (is_usual) {
-            add_fmi3(&race, &bench->fmu3, work->tolerance);
-        }
-        race_run(&race, &bench->fmu, problem, bench->repeats);
-        const struct target targets[MOST_RUNS] = {
-            [CVODE_ADAMS] = at_most(work->adams), [ERK] = at_most(work->erk)};
-        race_report(&race, &bench->report, "steps", work->name, problem, targets);
-        if (judged) {
-            report_error(&race, &bench->report, work->name);
-        }
-        if (is_usual) {
-            report_against(&race, &bench->report, work->name, "cvode_adams, FMI 3.0", "cvode_adams",
-                           at_most(1.05));
-            report_against(&race, &bench->report, work->name, "erk, FMI 3.0", "erk", at_most(1.05));
-        }
-        if (judged && mujoco_available()) {
-            report_against(&race, &bench->report, work->name, "erk", "MuJoCo RK4",
-                           at_most(work->step == 1e-3 ? 0.2 : 0.0));
-        }
-        problem_destroy(problem);
+        measure_work(bench, &table[i]);
     }
-    measure_free_motion(bench);
+}
+
+void measure_free_motion(struct bench *bench) {
+    struct race race = {0};
+    race_add_usual(&race, &bench->fmu, 1e-8);
+    add_mujoco(&race, 0);
+    // a method of first order needs millions of steps for this
+    race.count -= mujoco_available() ? 1 : 0;
+    measure_with_error(bench, &race, "one step of 2 s, free motion, error <= 1e-8", 1e-8);
+
+    // the others here do not come so near
+    struct race exact = {0};
+    race_add(&exact, (struct run){.name = "taylor", .solver = FMU, .method = TAYLOR});
+    measure_with_error(bench, &exact, "one step of 2 s, free motion, error <= 1e-14", 1e-14);
 }

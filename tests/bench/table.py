@@ -37,7 +37,7 @@ def steps(rows: list[dict]) -> list[str]:
     works = dict.fromkeys(row["work"] for row in rows if row["group"] == "steps")
     for work in works:
         cells = [
-            [row["run"], number(row.get("us")), number(row["ratio"]), error(row), result(row)]
+            [row["run"], number(row.get("us")), number(row.get("ratio")), error(row), result(row)]
             for group in ("steps", "against")
             for row in rows
             if (row["group"], row["work"]) == (group, work)
@@ -80,6 +80,30 @@ def threads(rows: list[dict]) -> list[str]:
     return ["**Two threads with an instance each, 1 ms steps**", "", *lines(header, cells)]
 
 
+def energy(rows: list[dict]) -> list[str]:
+    """Drift of the energy in motions without losses."""
+    last = {(row["work"], row["run"]): row for row in rows if row["group"] == "energy"}
+    text = []
+    for work in dict.fromkeys(work for work, _ in last):
+        mine = [row for row in last.values() if row["work"] == work]
+        cells = [[row["run"], number(row["us"]), f"{row['largest']:.1e}", f"{row['at_end']:.1e}"]
+                 for row in mine]  # fmt: skip
+        header = ["", "us a step", "largest drift", "drift at the end"]
+        title = f"**Drift of the energy over {mine[0]['steps']:.0f} steps of 1 ms, {work}**"
+        text += [title, "", *lines(header, cells)]
+    return text
+
+
+def instance(rows: list[dict]) -> list[str]:
+    """A step of the instance with an integrator that returns at once."""
+    cells = [
+        [row["work"], number(row["us"]), number(row["ratio"])]
+        for row in rows if row["group"] == "instance"
+    ]  # fmt: skip
+    return ["**The instance with an integrator that returns at once**", "",
+            *lines(["", "us a step", "share of a step with taylor"], cells)]  # fmt: skip
+
+
 def calls(rows: list[dict]) -> list[str]:
     """Each call by itself."""
     cells = [
@@ -116,5 +140,5 @@ def markdown(report: dict) -> str:
         f"{machine['python']}, {versions}. {missed} of the targets missed.",
         "",
     ]
-    parts = (steps, instances, threads, calls, life)
+    parts = (steps, instances, threads, energy, instance, calls, life)
     return "\n".join(head + [line for part in parts for line in part(rows)])
