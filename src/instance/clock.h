@@ -4,6 +4,9 @@
 #ifndef CLOCK_H
 #define CLOCK_H
 
+#include <float.h>
+#include <math.h>
+
 struct clock_time {
     double s;    /* s: the time, rounded to double */
     double rest; /* s: what the rounding left over */
@@ -29,9 +32,14 @@ static inline double clock_difference(struct clock_time later, struct clock_time
     return difference.s + (difference.rest + (later.rest - earlier.rest));
 }
 
+/* Of doubles at t, at most. */
+static inline double clock_spacing(double t) {
+    return DBL_EPSILON * fabs(t);
+}
+
 /* How far the communication point of a master may be from the time of the instance for a step of
- * length h > 0 to be followed: min(1e-9 max(|t|, h), h / 100), and never less than the spacing of
- * doubles at t. s. */
+ * length h > 0 to be followed: min(1e-9 max(|t|, h), h / 100), and never less than clock_spacing.
+ * s. */
 double clock_slack(double t, double h);
 
 #endif

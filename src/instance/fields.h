@@ -35,18 +35,19 @@ static inline size_t instance_input_index(const struct instance *instance,
 /* Writes the value; an input is held at it from now on. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
-    if (variable->causality == CAUSALITY_PARAMETER) {
-        instance->parameters_are_valid = false;
-    }
-    if (variable->type != VARIABLE_FLOAT64) {
-        *(int *)instance_field(instance, variable) = (int)value;
-        return;
-    }
-    *(double *)instance_field(instance, variable) = value;
+    void *field = instance_field(instance, variable);
     if (variable->causality == CAUSALITY_INPUT) {
         const size_t i = instance_input_index(instance, variable);
         instance->memory.pending[i].d[0] = value;
         instance->memory.current[i] = instance->memory.pending[i];
+        *(double *)field = value;
+        return;
+    }
+    instance->parameters_are_valid &= variable->causality != CAUSALITY_PARAMETER;
+    if (variable->type == VARIABLE_FLOAT64) {
+        *(double *)field = value;
+    } else {
+        *(int *)field = (int)value;
     }
 }
 

@@ -9,14 +9,9 @@
  * comparison: the span of the integrator ends with the step that they are for. */
 static bool inputs_are_held(const struct instance_memory *memory, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        const double *next = memory->pending[i].d;
-        if (next[0] != memory->running[i].d[0]) {
+        const struct polynomial *next = &memory->pending[i];
+        if (next->d[0] != memory->running[i].d[0] || polynomial_moves(next)) {
             return false;
-        }
-        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
-            if (next[k] != 0.0) {
-                return false;
-            }
         }
     }
     return true;
@@ -75,9 +70,13 @@ static struct integrator_start start_of(const struct instance_state *state) {
         .span = state->span, .first_step = state->restart_step, .goes_on = state->restart_goes_on};
 }
 
-/* What the integrator runs with from now on. */
+/* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
 static void hold(struct instance *instance, struct span span) {
-    memcpy(instance->memory.held + span.offset, instance->memory.values + span.offset, span.size);
+    const double *from = doubles_of(instance->memory.values, span);
+    double *to = doubles_of(instance->memory.held, span);
+    for (size_t i = 0; i < count_of(span); i++) {
+        to[i] = from[i];
+    }
 }
 
 static enum status restart(struct instance *instance, struct clock_time end, bool goes_on) {
@@ -90,7 +89,8 @@ static enum status restart(struct instance *instance, struct clock_time end, boo
         instance_update_next_step(instance);
     } else {
         state->next_step = 0.0;
-        hold(instance, model->parameters);
+        memcpy(memory->held + model->parameters.offset, memory->values + model->parameters.offset,
+               model->parameters.size);
     }
 
     // hold what is set now

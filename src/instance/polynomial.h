@@ -2,12 +2,20 @@
 #ifndef POLYNOMIAL_H
 #define POLYNOMIAL_H
 
+#include <stdbool.h>
+
 enum { POLYNOMIAL_DEGREE = 3 };
 
 /* d[k]: the k-th derivative at the origin, in the unit of the input over s^k. */
 struct polynomial {
     double d[POLYNOMIAL_DEGREE + 1];
 };
+
+/* It is not constant. */
+static inline bool polynomial_moves(const struct polynomial *polynomial) {
+    const double *d = polynomial->d;
+    return d[1] != 0.0 || d[2] != 0.0 || d[3] != 0.0;
+}
 
 /* Value at time t (s) after the origin. */
 double polynomial_value(const struct polynomial *polynomial, double t);

@@ -1,20 +1,7 @@
 #include "right_hand_side.h"
 
-#include <string.h>
-
 _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
                "the series of an input is its polynomial");
-
-bool instance_inputs_move(const struct polynomial inputs[], size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
-            if (inputs[i].d[k] != 0.0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
 
 static void evaluate_inputs(const struct instance *instance, double t) {
     const size_t input_count = count_of(instance->model->inputs);
@@ -24,13 +11,14 @@ static void evaluate_inputs(const struct instance *instance, double t) {
 }
 
 void instance_prepare_inputs(struct instance *instance) {
-    instance->inputs_move =
-        instance_inputs_move(instance->memory.running, count_of(instance->model->inputs));
+    instance->inputs_move = false;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const double value = instance->memory.running[i].d[0];
-        instance->u[i] = value;
-        memset(instance->input_series[i], 0, sizeof *instance->input_series);
-        instance->input_series[i][0] = value;
+        const struct polynomial *input = &instance->memory.running[i];
+        double *series = instance->input_series[i];
+        instance->inputs_move |= polynomial_moves(input);
+        instance->u[i] = input->d[0];
+        series[0] = input->d[0];
+        series[1] = series[2] = series[3] = 0.0;
     }
 }
 

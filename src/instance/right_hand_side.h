@@ -5,9 +5,6 @@
 
 #include "internals.h"
 
-/* The inputs of a restart change over time: a derivative of one of them is not 0. */
-bool instance_inputs_move(const struct polynomial inputs[], size_t count);
-
 /* After a restart: inputs that are held are evaluated once, not at every call. */
 NONNULL void instance_prepare_inputs(struct instance *instance);
 

@@ -27,7 +27,8 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
         return STATUS_INVALID_TIME;
     }
     const double mismatch = clock_difference((struct clock_time){.s = t}, now);
-    if (mismatch != 0.0 && (!(fabs(mismatch) <= clock_slack(t, h)) || !(mismatch + h > 0.0))) {
+    const bool is_there = fabs(mismatch) <= clock_spacing(t) || fabs(mismatch) <= clock_slack(t, h);
+    if (!is_there || !(mismatch + h > 0.0)) {
         message_write(&instance->sink, STATUS_INVALID_TIME,
                       "a step from t = %.17g is refused: the instance is at t = %.17g", t, now.s);
         return STATUS_INVALID_TIME;
@@ -84,18 +85,16 @@ static void place_inputs(struct instance *instance, double elapsed) {
 /* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
 static void end_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
-    const size_t input_count = count_of(instance->model->inputs);
     double *u = doubles_of(memory->values, instance->model->inputs);
-    if (!instance_inputs_move(memory->pending, input_count)) {
-        for (size_t i = 0; i < input_count; i++) {
-            memory->current[i] = memory->pending[i];
-            u[i] = memory->pending[i].d[0];
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        struct polynomial *pending = &memory->pending[i];
+        if (polynomial_moves(pending)) {
+            memory->current[i] = polynomial_shifted(pending, elapsed);
+            *pending = (struct polynomial){{pending->d[0]}};
+        } else {
+            memory->current[i] = *pending;
         }
-        return;
-    }
-    place_inputs(instance, elapsed);
-    for (size_t i = 0; i < input_count; i++) {
-        memory->pending[i] = (struct polynomial){{memory->pending[i].d[0]}};
+        u[i] = memory->current[i].d[0];
     }
 }
 

@@ -35,11 +35,10 @@ ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum 
     return array == ARRAY_OF_INT32 ? VARIABLE_INT32 : VARIABLE_ENUMERATION;
 }
 
-static bool is_settable(const struct instance *instance, const struct variable *variable) {
-    const size_t from_states = variable->offset - instance->model->states.offset;
+static inline bool is_settable(const struct instance *instance, const struct variable *variable) {
     return variable_is_settable(variable, instance->state.phase) ||
            (instance->states_are_settable && variable->owner == VARIABLE_OF_MODEL &&
-            from_states < instance->model->states.size);
+            variable->offset - instance->model->states.offset < instance->model->states.size);
 }
 
 ALWAYS_INLINE const struct variable *find_settable(const struct instance *instance,

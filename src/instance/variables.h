@@ -87,20 +87,14 @@ static inline const struct variable *variable_find(const struct model_descriptio
 /* Before and during initialization: start values and inputs; later: inputs and tunable parameters.
  */
 static inline bool variable_is_settable(const struct variable *variable, enum phase phase) {
-    const bool is_input = variable->causality == CAUSALITY_INPUT;
-    switch (phase) {
-    case PHASE_INSTANTIATED:
-    case PHASE_INITIALIZATION:
-        return is_input || variable->initial == INITIAL_EXACT;
-    case PHASE_STEPPING:
-        return is_input || (variable->causality == CAUSALITY_PARAMETER &&
-                            variable->variability == VARIABILITY_TUNABLE);
-    case PHASE_CONTINUOUS_TIME:
-        return is_input && variable->variability == VARIABILITY_CONTINUOUS;
-    case PHASE_COUNT:
-        break;
+    if (variable->causality == CAUSALITY_INPUT) {
+        return phase != PHASE_CONTINUOUS_TIME || variable->variability == VARIABILITY_CONTINUOUS;
     }
-    return false;
+    if (phase == PHASE_INSTANTIATED || phase == PHASE_INITIALIZATION) {
+        return variable->initial == INITIAL_EXACT;
+    }
+    return phase == PHASE_STEPPING && variable->causality == CAUSALITY_PARAMETER &&
+           variable->variability == VARIABILITY_TUNABLE;
 }
 
 /* Says through sink why a value is refused. */
