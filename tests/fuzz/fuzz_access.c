@@ -59,7 +59,7 @@ void fuzz_call_SetInteger(struct fuzz_session *session, struct fuzz_instance *in
             values[i] > FUZZ_MAX_INTERNAL_STEPS) {
             values[i] = FUZZ_MAX_INTERNAL_STEPS;
         } else if (references[i] == RP_MANIPULATOR_solver_method && values[i] > 0) {
-            values[i] %= 5;
+            values[i] %= FUZZ_METHODS + 2;
         }
     }
     FUZZ_CHECKED(instance, SetInteger, references, count, values);

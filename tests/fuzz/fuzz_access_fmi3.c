@@ -82,7 +82,7 @@ static void call_GetInt64(struct fuzz_session *session, struct fuzz_instance *in
     const fmi2Status status =
         FUZZ_FMI3_CALL(instance, true, GetInt64, references, count, values, size);
     for (size_t i = 0; i < size && status == fmi2OK; i++) {
-        if (values[i] < 1 || values[i] > 3) {
+        if (values[i] < 1 || values[i] > FUZZ_METHODS) {
             fuzz_fail("fmi3GetInt64 returns the item %lld", (long long)values[i]);
         }
     }
@@ -100,8 +100,8 @@ static void call_SetInt64(struct fuzz_session *session, struct fuzz_instance *in
     for (size_t i = 0; i < size; i++) {
         const unsigned selector = fuzz_byte(session->input);
         values[i] =
-            selector < 224 ? (fmi3Int64)(selector % 5) : (fmi3Int64)fuzz_word(session->input);
-        are_items = are_items && values[i] >= 1 && values[i] <= 3;
+            selector < 224 ? (fmi3Int64)(selector % 6) : (fmi3Int64)fuzz_word(session->input);
+        are_items = are_items && values[i] >= 1 && values[i] <= FUZZ_METHODS;
     }
     if (FUZZ_FMI3_CHECKED(instance, SetInt64, references, count, values, size) == fmi2OK &&
         !are_items) {

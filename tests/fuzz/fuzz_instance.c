@@ -350,13 +350,13 @@ static void make_run(struct fuzz_instance *instance, unsigned variant, struct ru
     const fmi2ValueReference starts[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_dq2, RP_MANIPULATOR_m2};
     const double values[] = {-1.0, 0.25, 1.5};
     const fmi2ValueReference method = RP_MANIPULATOR_solver_method;
-    const fmi2Integer method_value = 1 + (fmi2Integer)(variant % 4);
+    const fmi2Integer method_value = 1 + (fmi2Integer)(variant % FUZZ_METHODS);
     serialize(instance, run);
-    if (variant < 4) {
+    if (variant < FUZZ_METHODS) {
         require(FUZZ_CHECKED(instance, SetReal, starts, FUZZ_COUNT(starts), values), "fmi2SetReal");
     }
     require(FUZZ_CHECKED(instance, SetInteger, &method, 1, &method_value), "fmi2SetInteger");
-    require(fuzz_initialize(instance, variant < 4 ? 0.0 : 1e-6, variant < 4 ? 0.0 : 1000.0),
+    require(fuzz_initialize(instance, variant < FUZZ_METHODS ? 0.0 : 1e-6, variant < FUZZ_METHODS ? 0.0 : 1000.0),
             "the initialization");
     if (instance->kind == fmi2CoSimulation) {
         run_co_simulation(instance, run);

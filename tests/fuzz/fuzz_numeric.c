@@ -72,7 +72,7 @@ static void decode(struct fuzz_input *input, struct simulation *simulation) {
     memset(simulation, 0, sizeof *simulation);
     const bool is_moderate = fuzz_below(input, 4) != 3;
     simulation->is_moderate = is_moderate;
-    simulation->method = 1 + (fmi2Integer)fuzz_below(input, 4);
+    simulation->method = 1 + (fmi2Integer)fuzz_below(input, FUZZ_METHODS);
     simulation->tolerance = fuzz_magnitude(input, 1e-14, 1e-2);
     simulation->max_step = fuzz_below(input, 8) == 7 ? fuzz_magnitude(input, 1e-6, 10.0) : 0.0;
     simulation->start = fuzz_below(input, 8) == 7 ? signed_magnitude(input, true) : 0.0;
@@ -236,7 +236,7 @@ void fuzz_target_run(struct fuzz_input *input) {
             fuzz_assert_same(&first.values[i], &second.values[i],
                              "a simulation repeated after fmi2Reset");
         }
-        fuzz_assert_as_new(instance, (unsigned)simulation.method + 3);
+        fuzz_assert_as_new(instance, (unsigned)simulation.method + FUZZ_METHODS - 1);
     }
     fuzz_instance_free(instance);
 }

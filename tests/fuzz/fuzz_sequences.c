@@ -11,7 +11,7 @@ enum { MAX_OPERATIONS = 150 };
 static void start_stepping(struct fuzz_session *session, struct fuzz_instance *instance) {
     struct fuzz_input *input = session->input;
     const fmi2ValueReference method_reference = RP_MANIPULATOR_solver_method;
-    const fmi2Integer method = 1 + (fmi2Integer)fuzz_below(input, 4);
+    const fmi2Integer method = 1 + (fmi2Integer)fuzz_below(input, FUZZ_METHODS);
     const fmi2ValueReference states[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2, RP_MANIPULATOR_dq1,
                                          RP_MANIPULATOR_dq2};
     double values[4];
@@ -22,7 +22,7 @@ static void start_stepping(struct fuzz_session *session, struct fuzz_instance *i
     }
     FUZZ_CHECKED(instance, SetReal, states, FUZZ_COUNT(states), values);
     const double tolerance = fuzz_below(input, 2) == 0 ? 0.0 : fuzz_magnitude(input, 1e-14, 1.0);
-    const double start_time = fuzz_below(input, 4) != 0 ? 0.0 : fuzz_real(input);
+    const double start_time = fuzz_below(input, FUZZ_METHODS) != 0 ? 0.0 : fuzz_real(input);
     if (fuzz_initialize(instance, tolerance, start_time) == fmi2OK &&
         instance->kind == fmi2ModelExchange && fuzz_below(input, 2) == 0) {
         FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode);

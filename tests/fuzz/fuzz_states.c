@@ -47,7 +47,7 @@ static void step_with_efforts(struct fuzz_instance *instance, unsigned base) {
  * kinds, new, in initialization mode, terminated and in the error state. */
 static void bring_to_base(struct fuzz_instance *instance, unsigned base) {
     const fmi2ValueReference method_reference = RP_MANIPULATOR_solver_method;
-    const fmi2Integer method = 1 + (fmi2Integer)(base % 4);
+    const fmi2Integer method = 1 + (fmi2Integer)(base % FUZZ_METHODS);
     require(FUZZ_CHECKED(instance, SetInteger, &method_reference, 1, &method), "fmi2SetInteger");
     if (base == 0) {
         return;
