@@ -59,6 +59,21 @@ def test_random_motions_keep_the_tolerance(loaded: LoadedFmu, exact: Exact) -> N
 
 
 @each_tolerance
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("dq1", [0.0, 1e-9, 5.0])
+def test_inputs_whose_first_derivatives_vanish(
+    loaded: LoadedFmu, exact: Exact, tolerance: float, order: int, dq1: float
+) -> None:
+    grows = tuple(60.0 if k == order else 0.0 for k in range(4))
+    for parameters in (WEIGHTLESS, (2.0, 1.0, 0.1, 0.05, 0.5, 0.25, 0.0, 0.0)):
+        for tau1, f2 in ((grows, (0.0,) * 4), ((0.0,) * 4, grows), (grows, grows)):
+            start = (0.3, 0.1, dq1, 0.0)
+            moved = case(start, (0.5, 1.0), tolerance, parameters, tau1, f2)
+            outcome = judge(loaded, exact, moved)
+            assert outcome.error <= outcome.allowed
+
+
+@each_tolerance
 @pytest.mark.parametrize("deviation", [0.0, 1e-15, 1e-12, 1e-9, 1e-6])
 def test_starts_beside_the_upright_equilibrium(
     loaded: LoadedFmu, exact: Exact, tolerance: float, deviation: float
@@ -70,6 +85,23 @@ def test_starts_beside_the_upright_equilibrium(
         held = (9.81, 0.0, 0.0, 0.0)  # the weight of link 2
         outcome = judge(loaded, exact, case(start, (h,) * 5, tolerance, parameters, f2=held))
         assert outcome.error <= outcome.allowed
+
+
+@each_tolerance
+def test_a_turn_that_the_efforts_keep_even_at_first(
+    loaded: LoadedFmu, exact: Exact, tolerance: float
+) -> None:
+    """The efforts suit q1 = w t, L = L0 + b t^3 but for the order 5 of the momentum: of the states,
+    the orders 4 and 5 vanish and the order 6 does not.
+    """
+    m2, w, L0, b = 1.0, 3.0, 0.3, 0.7
+    parameters = (0.0, m2, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0)
+    tau1 = (0.0, 0.0, 12.0 * m2 * w * b * L0, 0.0)
+    f2 = (-m2 * w**2 * L0, 6.0 * m2 * b, 0.0, -6.0 * m2 * w**2 * b)
+    for h in (0.01, 0.1, 0.4, 1.0):
+        turn = case((0.0, L0, w, 0.0), (h,), tolerance, parameters, tau1, f2)
+        outcome = judge(loaded, exact, turn)
+        assert outcome.error <= outcome.allowed, h
 
 
 def test_rest_stays_rest(loaded: LoadedFmu) -> None:
