@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
+import numpy as np
 import pytest
 
+from tests.rp_manipulator.random_motions import random_case, simulate
 from tests.support.cosim_project import load
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
@@ -27,6 +29,7 @@ SCENARIOS = {
     "RPController": ["controller_computed_torque", "controller_limited_integral"],
     "RPTrajectory": ["arc_near_joint", "point_to_point_joint"],
 }
+METHODS = {"RPManipulator": (1, 2, 3, 4), "RPController": (1, 2, 3), "RPTrajectory": (1, 2, 3)}
 STEPS = 250  # of each scenario
 
 # of the C runtime of mingw, which is linked statically: they look at bits
@@ -87,7 +90,7 @@ def trace(loaded: LoadedFmu, name: str, method: int) -> Iterator[bytes]:
 def assert_same_bits(built: LoadedFmu, rebuilt: LoadedFmu) -> None:
     """Of every value in every scenario with every method, of states and messages."""
     for scenario in SCENARIOS[built.description.modelName]:
-        for method in (1, 2, 3):
+        for method in METHODS[built.description.modelName]:
             expected = list(trace(built, scenario, method))
             assert len(set(expected)) > STEPS / 2  # it moves
             assert list(trace(rebuilt, scenario, method)) == expected, (scenario, method)
@@ -213,6 +216,43 @@ def test_a_plain_compiler_gives_the_same_bits(
     unpacked = Path(shutil.copytree(built[build.fmu].folder, tmp_path / "unpacked"))
     shutil.copy(library, unpacked / "binaries" / "linux64" / f"{build.fmu}.so")
     assert_same_bits(built[build.fmu], LoadedFmu(unpacked, unpacked))
+
+
+# what a step by the Taylor series runs through
+TAYLOR_FILES = ("clock", "method_taylor", "musl_*", "polynomial", "right_hand_side", "rp_*")
+
+
+def random_motions(loaded: LoadedFmu) -> list[bytes]:
+    """States of motions by the Taylor series, with cubic inputs."""
+    random = np.random.default_rng(5)
+    return [simulate(loaded, random_case(random)).tobytes() for _ in range(200)]
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("option", ["-O2", "-O3"])
+@each([Build("RPManipulator", "gcc", ("-O1", "-fPIC"))])
+def test_every_optimizer_gives_the_same_series(
+    build: Build,
+    library: Path,
+    built: dict[str, LoadedFmu],
+    releases: dict[str, Path],
+    tmp_path: Path,
+    compiler: str,
+    option: str,
+) -> None:
+    sources = releases[build.fmu] / "sources"
+    files = sorted(path for name in TAYLOR_FILES for path in sources.glob(f"{name}.c"))
+    assert {"method_taylor.c", "rp_series.c", "musl_sin.c"} <= {path.name for path in files}
+    objects = tmp_path / "objects"
+    shutil.copytree(library.parent, objects, ignore=shutil.ignore_patterns("*.library"))
+    compiled(compiler, (option, "-fPIC"), files, objects)
+    unpacked = Path(shutil.copytree(built[build.fmu].folder, tmp_path / "unpacked"))
+    target = unpacked / "binaries" / "linux64" / f"{build.fmu}.so"
+    run(compiler, "-shared", "-o", target, *sorted(objects.glob("*.o")))
+    rebuilt = LoadedFmu(unpacked, unpacked)
+    assert random_motions(rebuilt) == random_motions(built[build.fmu])
+    for scenario in SCENARIOS[build.fmu]:
+        assert list(trace(rebuilt, scenario, 4)) == list(trace(built[build.fmu], scenario, 4))
 
 
 def symbols(text: str) -> set[str]:

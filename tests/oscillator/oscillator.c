@@ -1,5 +1,7 @@
 #include "oscillator.h"
 
+#include "jet.h"
+
 #include <math.h>
 #include <stdio.h>
 
@@ -25,20 +27,24 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-/* x' = v, v' = -omega^2 x + gain u, order by order. */
+enum row { X, V, A, ROWS };
+
+/* x' = v, v' = a = -omega^2 x + gain u, order by order. */
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
     const struct oscillator_values *values = origin->values;
-    for (int k = first > 0 ? first : 1; k <= last; k++) {
-        const double u = k <= SERIES_INPUT_LENGTH ? origin->inputs[0][k - 1] : 0.0;
-        const double a = -values->omega * values->omega * row[0][k - 1] + values->gain * u;
-        row[0][k] = origin->unit / k * row[1][k - 1];
-        row[1][k] = origin->unit / k * a;
+    for (int k = first; k <= last; k++) {
+        if (k > 0) {
+            row[X][k] = jet_integral(row[V], origin->unit, k);
+            row[V][k] = jet_integral(row[A], origin->unit, k);
+        }
+        row[A][k] =
+            -values->omega * values->omega * row[X][k] + values->gain * jet_input(origin, 0, k);
     }
     return STATUS_OK;
 }
 
-static const struct series series = {.row_count = 2, .extend = extend};
+static const struct series series = {.row_count = ROWS, .extend = extend};
 
 static enum status outputs(void *values_pointer, double t) {
     struct oscillator_values *values = values_pointer;

@@ -1,0 +1,87 @@
+/* Steps by Taylor series in which orders are missing: x' = p t^(p-1) x^2 from x = 1 at t = 0, with
+ * the solution 1 / (1 - t^p), which has the powers 0, p, 2 p, 3 p ... of time and none between. */
+#include "integrator.h"
+
+#include <math.h>
+#include <unity.h>
+
+static int power;
+static struct integrator *integrator;
+
+static enum status rhs(double t, const double x[], double dx[], void *context) {
+    (void)context;
+    dx[0] = power * pow(t, power - 1) * x[0] * x[0];
+    return STATUS_OK;
+}
+
+/* Coefficient k of p (t + s unit)^(p-1). */
+static double factor(double t, double unit, int k) {
+    double value = power;
+    for (int i = 0; i < k; i++) {
+        value *= unit * (power - 1 - i) / (i + 1);
+    }
+    return k < power ? value * pow(t, power - 1 - k) : 0.0;
+}
+
+static double product(const double x[], const double y[], int k) {
+    double sum = 0.0;
+    for (int i = 0; i <= k; i++) {
+        sum += x[i] * y[k - i];
+    }
+    return sum;
+}
+
+enum row { X, SQUARE, FACTOR, ROWS };
+
+static enum status series(double t, double unit, int first, int last, double row[][SERIES_LENGTH],
+                          void *context) {
+    (void)context;
+    for (int k = first; k <= last; k++) {
+        if (k > 0) {
+            row[X][k] = unit / k * product(row[FACTOR], row[SQUARE], k - 1);
+        }
+        row[SQUARE][k] = product(row[X], row[X], k);
+        row[FACTOR][k] = factor(t, unit, k);
+    }
+    return STATUS_OK;
+}
+
+void setUp(void) {
+    const struct ode ode = {
+        .state_count = 1, .rhs = rhs, .series = series, .series_row_count = ROWS};
+    const struct message_sink quiet = {0};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
+}
+
+void tearDown(void) {
+    integrator_destroy(integrator);
+}
+
+/* Steps towards the pole at 1; a start error grows with x^2. */
+static void assert_solution(double tolerance, bool goes_on) {
+    const double absolute = 1e-2 * tolerance;
+    const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
+                                                 .relative_tolerance = tolerance,
+                                                 .absolute_tolerances = &absolute};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    for (int i = 1; i < 10; i++) {
+        const double begin = 1.0;
+        const double t = 0.1 * i;
+        const double exact = 1.0 / (1.0 - pow(t, power));
+        const struct integrator_start start = {.span = INFINITY, .goes_on = goes_on};
+        double reached, x;
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, &begin, &start));
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, &x));
+        TEST_ASSERT_DOUBLE_WITHIN(4.0 * tolerance * exact * exact, exact, x);
+    }
+}
+
+/* The largest order, which the tolerance determines, is odd for some of them and even for others.
+ */
+static void test_every_second_order_is_missing(void) {
+    power = 2;
+    for (double tolerance = 1e-3; tolerance > 5e-14; tolerance /= 2.0) {
+        assert_solution(tolerance, false);
+        assert_solution(tolerance, true);
+    }
+}
