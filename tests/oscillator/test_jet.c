@@ -16,7 +16,7 @@ typedef double jet[SERIES_LENGTH];
 static void assert_close(double expected, double actual, double bound, int k) {
     char message[32];
     snprintf(message, sizeof message, "order %d", k);
-    TEST_ASSERT_TRUE_MESSAGE(isfinite(expected) && fabs(actual - expected) <= bound, message);
+    TEST_ASSERT_TRUE_MESSAGE(fabs(actual - expected) <= bound, message);
 }
 
 /* exp(rate t) */
@@ -29,7 +29,11 @@ static void exponential(double rate, jet x) {
 
 /* 1 / k! */
 static double reciprocal_factorial(int k) {
-    return 1.0 / tgamma(k + 1.0);
+    double value = 1.0;
+    for (int i = 2; i <= k; i++) {
+        value /= i;
+    }
+    return value;
 }
 
 static void test_product_of_exponentials(void) {
