@@ -112,6 +112,7 @@ class Exact:
         """States at the communication points, (steps + 1, 4), from the start plus an offset.
 
         Time is in a unit that makes speeds 1 at most: heyoka measures errors by the largest state.
+        Its steps are limited: it takes their length from its last two orders, which may be zero.
         """
         start = np.array(case.start, real) + offset
         unit = np.exp2(-np.ceil(np.log2(np.maximum(np.max(np.abs(start[2:])), real(1)))))
@@ -123,7 +124,8 @@ class Exact:
         for h, inputs in zip(case.steps, case.inputs, strict=True):
             integrator.time = real(0)
             integrator.pars[8:] = (inputs * unit ** np.arange(2, 6, dtype=real)).reshape(-1)
-            outcome = integrator.propagate_until(real(h) / unit, max_steps=MOST_STEPS)[0]
+            end = real(h) / unit
+            outcome = integrator.propagate_until(end, max_delta_t=end / 8, max_steps=MOST_STEPS)[0]
             assert outcome == hy.taylor_outcome.time_limit, (outcome, case)
             found.append(integrator.state / scale)
         return np.array(found)
