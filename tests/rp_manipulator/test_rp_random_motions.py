@@ -74,6 +74,20 @@ def test_inputs_whose_first_derivatives_vanish(
 
 
 @each_tolerance
+@pytest.mark.parametrize("a", [0.0, 0.1])
+def test_constant_efforts_from_rest_with_link_2_at_the_joint(
+    loaded: LoadedFmu, exact: Exact, tolerance: float, a: float
+) -> None:
+    """From L = 0 the solution has the powers 1, 2, 5, 6, 9, 10 ... of time and none between."""
+    parameters = (2.0, 1.0, 0.1, 0.05, 0.0, 0.25, a, 0.0)
+    held = (5.0, 0.0, 0.0, 0.0)
+    for h in (0.01, 0.1, 1.0):
+        start = case((0.0, 0.0, 0.0, 0.0), (h, h), tolerance, parameters, held, held)
+        outcome = judge(loaded, exact, start)
+        assert outcome.error <= outcome.allowed, h
+
+
+@each_tolerance
 @pytest.mark.parametrize("deviation", [0.0, 1e-15, 1e-12, 1e-9, 1e-6])
 def test_starts_beside_the_upright_equilibrium(
     loaded: LoadedFmu, exact: Exact, tolerance: float, deviation: float
