@@ -7,6 +7,7 @@
 #include "each_method.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
+#include "snapshot.h"
 #include "stepping.h"
 #include "values.h"
 
@@ -20,6 +21,8 @@ static struct instance *instance;
 /* The oscillator, with a note of how far the integrator has gone. */
 static double latest; /* s: latest time that the right-hand side was evaluated at */
 
+static unsigned series_begun;
+
 static enum status watched_rhs(const void *values, double t, const double x[], const double u[],
                                double dx[]) {
     latest = fmax(latest, t);
@@ -29,6 +32,7 @@ static enum status watched_rhs(const void *values, double t, const double x[], c
 static enum status watched_extend(const struct series_origin *origin, int first, int last,
                                   double row[][SERIES_LENGTH]) {
     latest = fmax(latest, origin->t);
+    series_begun += first == 0 ? 1 : 0;
     return oscillator_model.series->extend(origin, first, last, row);
 }
 
@@ -235,6 +239,29 @@ EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
         // a series is evaluated where a step begins
         TEST_ASSERT_TRUE(method == INTEGRATOR_TAYLOR || latest >= stops[i] * (1.0 - 1e-12));
         TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(instance, OSCILLATOR_X));
+    }
+}
+
+/* The Taylor method keeps one internal step: wherever the instance is restored, it is calculated
+ * once more at most. The other methods have no series. */
+EACH_METHOD static void test_a_rollback_repeats_one_series_at_most(void) {
+    struct instance_snapshot *snapshot = NULL;
+    double expected[2];
+    double states[2];
+    initialize(instance, 0.0);
+    for (int i = 0; i < 400; i++) {
+        const double t = instance_time(instance);
+        ASSERT_OK(instance_save(instance, 0, &snapshot));
+        unsigned begun = series_begun;
+        ASSERT_OK(instance_do_step(instance, t, 0.0078125));
+        get_states(instance, expected);
+        const unsigned once = series_begun - begun;
+        ASSERT_OK(instance_restore(instance, snapshot));
+        begun = series_begun;
+        ASSERT_OK(instance_do_step(instance, t, 0.0078125));
+        get_states(instance, states);
+        TEST_ASSERT_TRUE(series_begun - begun <= once + 1);
+        TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
     }
 }
 
