@@ -57,21 +57,23 @@ void tearDown(void) {
     integrator_destroy(integrator);
 }
 
-/* The same beside a small exponential function, whose terms stand where those of x are missing. */
-static enum status rhs_of_two(double t, const double x[], double dx[], void *context) {
+/* The same beside a small exponential function, whose terms stand where those of x are missing, and
+ * the time itself, whose term is larger than all others. */
+static enum status rhs_of_three(double t, const double x[], double dx[], void *context) {
     dx[1] = x[1];
+    dx[2] = 1.0;
     return rhs(t, x, dx, context);
 }
 
-static enum status series_of_two(double t, double unit, int first, int last,
-                                 double row[][SERIES_LENGTH], void *context) {
-    // the states come first: x, the exponential function, then what x needs
+static enum status series_of_three(double t, double unit, int first, int last,
+                                   double row[][SERIES_LENGTH], void *context) {
     static double own[ROWS][SERIES_LENGTH];
     for (int k = first; k <= last; k++) {
         if (k == 0) {
             own[X][0] = row[0][0];
         } else {
             row[1][k] = unit / k * row[1][k - 1];
+            row[2][k] = k == 1 ? unit : 0.0;
         }
         (void)series(t, unit, k, k, own, context);
         row[0][k] = own[X][k];
@@ -80,11 +82,11 @@ static enum status series_of_two(double t, double unit, int first, int last,
 }
 
 static void test_orders_that_nearly_vanish(void) {
-    const double absolute[2] = {1e-12, 1e-12};
+    const double absolute[3] = {1e-12, 1e-12, 1e-12};
     const struct integrator_settings settings = {
         .method = INTEGRATOR_TAYLOR, .relative_tolerance = 1e-10, .absolute_tolerances = absolute};
     const struct ode ode = {
-        .state_count = 2, .rhs = rhs_of_two, .series = series_of_two, .series_row_count = 2};
+        .state_count = 3, .rhs = rhs_of_three, .series = series_of_three, .series_row_count = 3};
     const struct message_sink quiet = {0};
     const struct integrator_start start = {.span = INFINITY};
     power = 5;
@@ -92,9 +94,9 @@ static void test_orders_that_nearly_vanish(void) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
     for (double small = 1e-15; small < 1e-6; small *= 4.0) {
-        const double begin[2] = {1.0, small};
+        const double begin[3] = {1.0, small, 0.0};
         double reached;
-        double x[2];
+        double x[3];
         TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, begin, &start));
         TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, 0.5, 1000, &reached, x));
         TEST_ASSERT_DOUBLE_WITHIN(4e-10, 1.0 / (1.0 - 0.03125), x[0]);
