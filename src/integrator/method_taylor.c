@@ -3,7 +3,8 @@
  *
  * The unit of time of a series is the way to the requested time. Orders are added until the terms
  * one unit ahead are within the tolerance; the step lands there, and the state is the sum of the
- * coefficients. Where the largest order is not enough, a step is as long as this order allows.
+ * coefficients. Where the largest order is not enough, a step is as long as this order allows. At
+ * its end the polynomial must fit the equations.
  *
  * Where a restart goes on along the solution, its first step has the largest order and all the
  * length that this allows. The requested times in it are values of one polynomial. */
@@ -26,8 +27,9 @@ static const double safety = 0.9;
  * longer may have underflowed. */
 static const double most_units = 1000.0;
 
-/* Where a term overflows, the next unit over the one before. */
+/* The next unit over the one before: where a term overflows, and in the step after that. */
 static const double shrinking = 0x1p-20;
+static const double growing = 16.0;
 
 struct taylor {
     struct problem *problem;
@@ -43,18 +45,20 @@ struct taylor {
     double size[SERIES_LENGTH]; /* of the terms of each order from 1 on */
     double *weight;             /* of each state: 1 over its tolerance */
     double (*row)[SERIES_LENGTH];
+    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static size_t memory_size(const struct ode *ode) {
-    const size_t padding = 4 * _Alignof(max_align_t);
+    const size_t padding = 5 * _Alignof(max_align_t);
     return sizeof(struct taylor) + padding + ode->state_count * sizeof(double) +
-           ode->series_row_count * sizeof(double[SERIES_LENGTH]);
+           2 * ode->series_row_count * sizeof(double[SERIES_LENGTH]);
 }
 
 static void destroy(void *memory) {
     struct taylor *taylor = memory;
+    reserve_free(taylor->end_row);
     reserve_free(taylor->row);
     reserve_free(taylor->weight);
     reserve_free(taylor);
@@ -69,7 +73,8 @@ static enum status create(struct problem *problem, void **memory) {
     taylor->problem = problem;
     taylor->weight = reserve_calloc(problem->ode.state_count, sizeof *taylor->weight);
     taylor->row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->row);
-    if (taylor->weight == NULL || taylor->row == NULL) {
+    taylor->end_row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->end_row);
+    if (taylor->weight == NULL || taylor->row == NULL || taylor->end_row == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
     }
@@ -140,49 +145,9 @@ static void note_sizes(struct taylor *taylor, int last) {
     taylor->noted_order = last;
 }
 
-/* Every second one of the sizes to this order is near a geometric sequence. Every second one,
- * because a motion near rest has its positions in the even orders and its velocities in the odd
- * ones. */
-static bool is_regular(const struct taylor *taylor, int order) {
-    const double *size = taylor->size;
-    const double ends = size[order - 4] * size[order];
-    const double middle = size[order - 2] * size[order - 2];
-    return ends > 1e-3 * middle && ends < 1e3 * middle;
-}
-
-/* How many of the newest orders show what the next ones will be: two, but five where these are not
- * regular. In the series of a motion from rest orders vanish, or nearly so (all but 4, 5, 9, 10,
- * 14 ... under an effort that grows with t^3); there two small terms say nothing. */
-static int newest_orders(const struct taylor *taylor, int order) {
-    const bool are_regular =
-        is_regular(taylor, order) && (order == LEAST_ORDER || is_regular(taylor, order - 1));
-    return are_regular ? 2 : 5;
-}
-
-static double larger(double a, double b) {
-    return a > b ? a : b;
-}
-
-/* The terms of the newest orders, one unit ahead, are within the tolerance and become smaller. */
+/* The terms of two orders, one unit ahead, are within the tolerance and become smaller. */
 static bool has_converged(const struct taylor *taylor, int order) {
-    const double *size = taylor->size;
-    if (newest_orders(taylor, order) == 2) {
-        return size[order - 1] <= 1.0 && size[order] <= size[order - 1];
-    }
-    const double newest = larger(size[order - 1], size[order]);
-    const double before = larger(larger(size[order - 4], size[order - 3]), size[order - 2]);
-    return before <= 1.0 && newest <= before;
-}
-
-/* A motion that is mainly one of order k > 1 meets itself in products of the orders 2 k + 1 and
- * 3 k + 2: until then its terms are no measure of the next. */
-static int least_order(const struct taylor *taylor) {
-    int main_order = 1;
-    for (int k = 2; k <= LEAST_ORDER; k++) {
-        main_order = taylor->size[k] > taylor->size[main_order] ? k : main_order;
-    }
-    const int least = main_order > 1 ? 3 * (main_order + 1) : LEAST_ORDER;
-    return least < taylor->largest_order ? least : taylor->largest_order;
+    return taylor->size[order - 1] <= 1.0 && taylor->size[order] <= taylor->size[order - 1];
 }
 
 /* Near log2 x, for x >= 0. */
@@ -192,24 +157,18 @@ static int exponent_of(double x) {
     return (int)(bits >> 52) - 1023;
 }
 
-/* The length of a step, in units, at whose end the terms of all the newest orders are within the
+/* The length of a step, in units, at whose end the terms of the last two orders are within the
  * tolerance, and the bound at most; NaN where a term is not finite. */
 static double step_of_last_terms(const struct taylor *taylor, double bound) {
     const int last = taylor->order;
-    const int first = last + 1 - newest_orders(taylor, last);
-    double sum = 0.0;
-    int limiting = last;
-    for (int k = last; k >= first; k--) {
-        sum += taylor->size[k];
-        // log2 of the size over the order is larger
-        if (exponent_of(taylor->size[k]) * limiting > exponent_of(taylor->size[limiting]) * k) {
-            limiting = k;
-        }
-    }
-    if (!isfinite(sum)) {
+    const double *size = taylor->size;
+    if (!isfinite(size[last - 1] + size[last])) {
         return NAN;
     }
-    const double step = safety * pow(taylor->size[limiting], -1.0 / limiting);
+    // where log2 of the size over the order is larger
+    const bool is_last = exponent_of(size[last]) * (last - 1) > exponent_of(size[last - 1]) * last;
+    const int limiting = is_last ? last : last - 1;
+    const double step = safety * pow(size[limiting], -1.0 / limiting);
     return step < bound ? step : bound;
 }
 
@@ -218,10 +177,7 @@ static double step_of_last_terms(const struct taylor *taylor, double bound) {
  * tolerance where some steps have one order more. Writes the length of the step, in units: 1, or
  * what the largest order allows, 1 at most; NaN as above. */
 static enum status find_order(struct taylor *taylor, double *step) {
-    note_sizes(taylor, LEAST_ORDER);
-    int order = least_order(taylor);
-    order += 1 - order % 2;
-    for (;; order += 2) {
+    for (int order = LEAST_ORDER;; order += 2) {
         if (order > taylor->order) {
             const enum status status = add_orders(taylor, order);
             if (status != STATUS_OK) {
@@ -232,7 +188,6 @@ static enum status find_order(struct taylor *taylor, double *step) {
         const bool is_enough = has_converged(taylor, order);
         if (is_enough || order == taylor->largest_order) {
             taylor->order = order;
-            taylor->expected_order = order;
             *step = is_enough ? 1.0 : step_of_last_terms(taylor, 1.0);
             return STATUS_OK;
         }
@@ -263,6 +218,64 @@ static void evaluate(const struct taylor *taylor, double s, double x[]) {
         memcpy(x, four, sizeof four);
     } else {
         evaluate_of(taylor, s, taylor->problem->ode.state_count, x);
+    }
+}
+
+/* ---- Check ---------------------------------------------------------------------------------- */
+
+/* Writes by how much the polynomial misses the equations at begin + s unit: the difference of its
+ * derivative from theirs, in tolerances per step. That is about the order of the first term left
+ * out times its size. Small terms prove nothing, because orders of a series may vanish: a motion
+ * from rest can have the orders 3, 4, 11, 12, 19 ... and none between. */
+static enum status measure_defect(struct taylor *taylor, double s, double *defect) {
+    const size_t n = taylor->problem->ode.state_count;
+    for (size_t i = 0; i < n; i++) {
+        const double *row = taylor->row[i];
+        double sum = row[taylor->order];
+        for (int k = taylor->order - 1; k >= 0; k--) {
+            sum = sum * s + row[k];
+        }
+        taylor->end_row[i][0] = sum;
+    }
+    const enum status status = problem_series(taylor->problem, taylor->begin + s * taylor->unit,
+                                              taylor->unit, 0, 1, taylor->end_row);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    *defect = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        const double *row = taylor->row[i];
+        double derivative = taylor->order * row[taylor->order];
+        for (int k = taylor->order - 1; k > 0; k--) {
+            derivative = derivative * s + k * row[k];
+        }
+        const double rounding = 64.0 * DBL_EPSILON * fabs(derivative);
+        const double missed = fabs(taylor->end_row[i][1] - derivative) - rounding;
+        *defect += missed <= 0.0 ? 0.0 : s * missed * taylor->weight[i];
+    }
+    return STATUS_OK;
+}
+
+/* Adds orders until the polynomial fits the equations at the end of the step, or shortens it. */
+static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
+                            struct method_work *work) {
+    for (;;) {
+        double defect;
+        enum status status = measure_defect(taylor, *step, &defect);
+        if (status != STATUS_OK || defect <= taylor->order + 1) {
+            return status;
+        }
+        if (*step == 1.0 && !is_long && taylor->order < taylor->largest_order) {
+            status = add_orders(taylor, taylor->order + 2);
+            if (status != STATUS_OK) {
+                return status;
+            }
+        } else if (taylor->begin + 0.5 * *step * taylor->unit > taylor->begin) {
+            *step *= 0.5;
+            work->failed_steps++;
+        } else {
+            return isfinite(defect) ? STATUS_NO_CONVERGENCE : STATUS_NOT_FINITE;
+        }
     }
 }
 
@@ -300,14 +313,14 @@ static enum status expand_in(struct taylor *taylor, double unit, double t, bool 
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], double *step, struct method_work *work) {
     const double first = taylor->longest_unit < length ? taylor->longest_unit : length;
-    taylor->longest_unit = INFINITY;
     for (double unit = first; unit >= DBL_MIN; unit *= shrinking) {
         const enum status status = expand_in(taylor, unit, t, is_long, x, step);
         if (status != STATUS_OK || !isnan(*step)) {
+            // the next step need not begin from the whole length again
+            taylor->longest_unit = unit < length ? growing * unit : INFINITY;
             return status;
         }
         work->failed_steps++;
-        taylor->longest_unit = unit; // the next step need not begin from the whole length again
     }
     return STATUS_NOT_FINITE;
 }
@@ -320,10 +333,14 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     const double parts = (t - now) / limit(taylor->problem, now) * (1.0 - 1e-14);
     const double length = parts > 1.0 ? (t - now) / ceil(parts) : t - now;
     double step;
-    const enum status status = expand(taylor, now, length, is_long, x, &step, work);
+    enum status status = expand(taylor, now, length, is_long, x, &step, work);
+    if (status == STATUS_OK) {
+        status = fit_step(taylor, is_long, &step, work);
+    }
     if (status != STATUS_OK) {
         return status;
     }
+    taylor->expected_order = is_long ? taylor->expected_order : taylor->order;
     const bool lands = step == 1.0 && taylor->unit == t - now;
     *end = lands ? t : now + step * taylor->unit;
     if (!(*end > now)) {

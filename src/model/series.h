@@ -21,8 +21,6 @@ struct series_origin {
     const double (*inputs)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
 };
 
-/* Of the states of a solution no more than four orders in turn may vanish while further ones do
- * not: the method looks at five. */
 struct series {
     /* Rows that extend writes: the states in their order, then whatever it needs of other
      * quantities. */

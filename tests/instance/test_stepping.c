@@ -260,7 +260,8 @@ EACH_METHOD static void test_a_rollback_repeats_one_series_at_most(void) {
         begun = series_begun;
         ASSERT_OK(instance_do_step(instance, t, 0.0078125));
         get_states(instance, states);
-        TEST_ASSERT_TRUE(series_begun - begun <= once + 1);
+        // one at its begin, and one at its end for the check
+        TEST_ASSERT_TRUE(series_begun - begun <= once + 2);
         TEST_ASSERT_EQUAL_MEMORY(expected, states, sizeof states);
     }
 }
