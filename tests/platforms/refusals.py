@@ -8,7 +8,6 @@ from tests.platforms.scripts import (
     INCONSISTENT,
     METHODS,
     MODEL_EXCHANGE,
-    WITH_SERIES,
     Model,
     Script,
     Variable,
@@ -150,7 +149,7 @@ def accesses(script: Refusals) -> None:
     script.refuse("SetReal", calculated.reference, bits(1.0))
     script.refuse("SetReal", model["time"].reference, bits(1.0))
     script.at_step("SetReal", fixed.reference, bits(1.0))
-    for wrong in (-1, 0, 4, 2147483647, -2147483648):
+    for wrong in (-1, 0, METHODS[-1] + 1, 2147483647, -2147483648):
         script.refuse("SetInteger", number.reference, wrong, expect="Discard")
     for digits in NOT_FINITE:
         script.refuse("SetReal", parameter.reference, digits, expect="Discard")
@@ -202,8 +201,8 @@ def too_many_steps(script: Refusals) -> None:
     for method in METHODS:
         script.call("SetInteger", PLACE, model["max_internal_steps"].reference, 2)
         script.call("SetInteger", PLACE, model["solver_method"].reference, method)
-        if method == METHODS[-1] and model.name not in WITH_SERIES:
-            script.call("SetupExperiment", PLACE, 0, bits(0.0), bits(0.0), 0, bits(0.0))
+        if method not in model.methods:
+            script.call("SetupExperiment", PLACE, "-", bits(0.0), "-")
             script.call("EnterInitializationMode", PLACE)
             script.call("ExitInitializationMode", PLACE, expect="Error")
             script.call("Reset", PLACE)

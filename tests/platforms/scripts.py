@@ -12,7 +12,7 @@ from pathlib import Path
 
 MODEL_EXCHANGE, CO_SIMULATION = 0, 1
 METHODS = (1, 2, 3, 4)  # cvode_adams, cvode_bdf, erk, taylor
-WITH_SERIES = ("RPManipulator",)  # the models that taylor can integrate
+WITH_SERIES = ("RPManipulator",)  # the models that taylor, the last method, can integrate
 STEPS = 200
 
 
@@ -58,6 +58,11 @@ class Model:
     @property
     def integers(self) -> list[int]:
         return [v.reference for v in self.variables if v.kind != "Real"]
+
+    @property
+    def methods(self) -> tuple[int, ...]:
+        """The solver methods that can integrate this model."""
+        return METHODS if self.name in WITH_SERIES else METHODS[:-1]
 
     @property
     def inputs(self) -> list[int]:
