@@ -46,13 +46,15 @@ struct taylor {
     double *weight;             /* of each state: 1 over its tolerance */
     double (*row)[SERIES_LENGTH];
     double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step */
+    double *end_x;                    /* the state there */
+    double *end_dx; /* the derivative of the polynomial there, by s, which counts units */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static size_t memory_size(const struct ode *ode) {
     const size_t padding = 5 * _Alignof(max_align_t);
-    return sizeof(struct taylor) + padding + ode->state_count * sizeof(double) +
+    return sizeof(struct taylor) + padding + 3 * ode->state_count * sizeof(double) +
            2 * ode->series_row_count * sizeof(double[SERIES_LENGTH]);
 }
 
@@ -71,13 +73,16 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     taylor->problem = problem;
-    taylor->weight = reserve_calloc(problem->ode.state_count, sizeof *taylor->weight);
+    const size_t n = problem->ode.state_count;
+    taylor->weight = reserve_calloc(3 * n, sizeof *taylor->weight);
     taylor->row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->row);
     taylor->end_row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->end_row);
     if (taylor->weight == NULL || taylor->row == NULL || taylor->end_row == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
     }
+    taylor->end_x = taylor->weight + n;
+    taylor->end_dx = taylor->weight + 2 * n;
     *memory = taylor;
     return STATUS_OK;
 }
@@ -87,7 +92,7 @@ static enum status create(struct problem *problem, void **memory) {
 static enum status configure(void *memory) {
     struct taylor *taylor = memory;
     const double e = 2.718281828459045;
-    int order = 8;
+    int order = 8; // at a tolerance of 1
     for (double left = taylor->problem->settings.relative_tolerance;
          left < 1.0 && order < SERIES_LENGTH - 1; left *= e * e) {
         order++;
@@ -107,7 +112,8 @@ static enum status restart(void *memory, const double x[]) {
 /* ---- Series --------------------------------------------------------------------------------- */
 
 /* Begins the series at the state x, with the orders from 0 to last. */
-static enum status begin(struct taylor *taylor, double t, double unit, const double x[], int last) {
+static enum status begin_series(struct taylor *taylor, double t, double unit, const double x[],
+                                int last) {
     const struct integrator_settings *settings = &taylor->problem->settings;
     for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
         taylor->row[i][0] = x[i];
@@ -121,7 +127,7 @@ static enum status begin(struct taylor *taylor, double t, double unit, const dou
     return problem_series(taylor->problem, t, unit, 0, last, taylor->row);
 }
 
-/* To this last one. */
+/* Goes on with the series, to the order last. */
 static enum status add_orders(struct taylor *taylor, int last) {
     const int first = taylor->order + 1;
     taylor->order = last;
@@ -194,48 +200,60 @@ static enum status find_order(struct taylor *taylor, double *step) {
     }
 }
 
-/* The state at begin + s unit. n: the number of states; where it is a constant all values stay in
- * registers. */
-ALWAYS_INLINE void evaluate_of(const struct taylor *taylor, double s, size_t n, double x[]) {
+/* The state at begin + s unit and, unless NULL, its derivative by s. n: the number of states. */
+ALWAYS_INLINE void evaluate_of(const struct taylor *taylor, double s, size_t n, double x[],
+                               double dx[]) {
     for (size_t i = 0; i < n; i++) {
         x[i] = taylor->row[i][taylor->order];
+        if (dx != NULL) {
+            dx[i] = 0.0;
+        }
     }
     for (int k = taylor->order - 1; k >= 0; k--) {
         for (size_t i = 0; i < n; i++) {
+            if (dx != NULL) {
+                dx[i] = dx[i] * s + x[i];
+            }
             x[i] = x[i] * s + taylor->row[i][k];
         }
     }
 }
 
-static void evaluate(const struct taylor *taylor, double s, double x[]) {
-    double four[4];
-    if (taylor->problem->ode.state_count == 4) {
-        if (s == 1.0) {
-            evaluate_of(taylor, 1.0, 4, four); // a plain sum
-        } else {
-            evaluate_of(taylor, s, 4, four);
-        }
-        memcpy(x, four, sizeof four);
+/* Where the number of states is a constant, and s = 1 is one, values stay in registers and the
+ * products are left out: a quarter of a step of two joints. */
+static void evaluate(const struct taylor *taylor, double s, double x[], double dx[]) {
+    double four_x[4];
+    double four_dx[4];
+    const size_t n = taylor->problem->ode.state_count;
+    if (n != 4) {
+        evaluate_of(taylor, s, n, x, dx);
+        return;
+    }
+    if (dx == NULL) {
+        evaluate_of(taylor, s, 4, four_x, NULL);
+    } else if (s == 1.0) {
+        evaluate_of(taylor, 1.0, 4, four_x, four_dx);
     } else {
-        evaluate_of(taylor, s, taylor->problem->ode.state_count, x);
+        evaluate_of(taylor, s, 4, four_x, four_dx);
+    }
+    memcpy(x, four_x, sizeof four_x);
+    if (dx != NULL) {
+        memcpy(dx, four_dx, sizeof four_dx);
     }
 }
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
-/* Writes by how much the polynomial misses the equations at begin + s unit: the difference of its
- * derivative from theirs, in tolerances per step. That is about the order of the first term left
- * out times its size. Small terms prove nothing, because orders of a series may vanish: a motion
- * from rest can have the orders 3, 4, 11, 12, 19 ... and none between. */
+/* Writes the state at begin + s unit to end_x, and by how much the polynomial misses the equations
+ * there: the difference of its derivative from theirs, in tolerances per step. That is about the
+ * order of the first term left out times its size. Small terms prove nothing, because orders of a
+ * series may vanish: a motion from rest can have the orders 3, 4, 11, 12, 19 ... and none between.
+ */
 static enum status measure_defect(struct taylor *taylor, double s, double *defect) {
     const size_t n = taylor->problem->ode.state_count;
+    evaluate(taylor, s, taylor->end_x, taylor->end_dx);
     for (size_t i = 0; i < n; i++) {
-        const double *row = taylor->row[i];
-        double sum = row[taylor->order];
-        for (int k = taylor->order - 1; k >= 0; k--) {
-            sum = sum * s + row[k];
-        }
-        taylor->end_row[i][0] = sum;
+        taylor->end_row[i][0] = taylor->end_x[i];
     }
     const enum status status = problem_series(taylor->problem, taylor->begin + s * taylor->unit,
                                               taylor->unit, 0, 1, taylor->end_row);
@@ -244,11 +262,7 @@ static enum status measure_defect(struct taylor *taylor, double s, double *defec
     }
     *defect = 0.0;
     for (size_t i = 0; i < n; i++) {
-        const double *row = taylor->row[i];
-        double derivative = taylor->order * row[taylor->order];
-        for (int k = taylor->order - 1; k > 0; k--) {
-            derivative = derivative * s + k * row[k];
-        }
+        const double derivative = taylor->end_dx[i];
         const double rounding = 64.0 * DBL_EPSILON * fabs(derivative);
         const double missed = fabs(taylor->end_row[i][1] - derivative) - rounding;
         *defect += missed <= 0.0 ? 0.0 : s * missed * taylor->weight[i];
@@ -282,28 +296,28 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
 /* ---- Steps ---------------------------------------------------------------------------------- */
 
 /* Longest step from the time t on, s. */
-static double limit(const struct problem *problem, double t) {
+static double longest_step(const struct problem *problem, double t) {
     const double max_step = problem->settings.max_step;
     const double left = problem->span - t;
     return max_step > 0.0 && max_step < left ? max_step : left;
 }
 
-static double longest_in_units(const struct problem *problem, double t, double unit) {
-    const double longest = limit(problem, t) / unit;
+static double longest_step_in_units(const struct problem *problem, double t, double unit) {
+    const double longest = longest_step(problem, t) / unit;
     return longest < most_units ? longest : most_units;
 }
 
 /* Begins the series of a step at the state x, the orders of which depend on is_long; writes the
  * length of the step in units. */
-static enum status expand_in(struct taylor *taylor, double unit, double t, bool is_long,
-                             const double x[], double *step) {
+static enum status expand_with_unit(struct taylor *taylor, double unit, double t, bool is_long,
+                                    const double x[], double *step) {
     const int first_orders = is_long ? taylor->largest_order : taylor->expected_order;
-    const enum status status = begin(taylor, t, unit, x, first_orders);
+    const enum status status = begin_series(taylor, t, unit, x, first_orders);
     if (status != STATUS_OK || !is_long) {
         return status != STATUS_OK ? status : find_order(taylor, step);
     }
     note_sizes(taylor, taylor->order);
-    *step = step_of_last_terms(taylor, longest_in_units(taylor->problem, t, unit));
+    *step = step_of_last_terms(taylor, longest_step_in_units(taylor->problem, t, unit));
     return STATUS_OK;
 }
 
@@ -314,7 +328,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
                           const double x[], double *step, struct method_work *work) {
     const double first = taylor->longest_unit < length ? taylor->longest_unit : length;
     for (double unit = first; unit >= DBL_MIN; unit *= shrinking) {
-        const enum status status = expand_in(taylor, unit, t, is_long, x, step);
+        const enum status status = expand_with_unit(taylor, unit, t, is_long, x, step);
         if (status != STATUS_OK || !isnan(*step)) {
             // the next step need not begin from the whole length again
             taylor->longest_unit = unit < length ? growing * unit : INFINITY;
@@ -330,7 +344,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
 static enum status take_step(struct taylor *taylor, double now, double t, bool is_long, double x[],
                              double *end, struct method_work *work) {
     // parts of equal length leave no sliver at the end; nor does rounding
-    const double parts = (t - now) / limit(taylor->problem, now) * (1.0 - 1e-14);
+    const double parts = (t - now) / longest_step(taylor->problem, now) * (1.0 - 1e-14);
     const double length = parts > 1.0 ? (t - now) / ceil(parts) : t - now;
     double step;
     enum status status = expand(taylor, now, length, is_long, x, &step, work);
@@ -346,7 +360,11 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     if (!(*end > now)) {
         return STATUS_NO_CONVERGENCE;
     }
-    evaluate(taylor, *end > t ? (t - now) / taylor->unit : step, x);
+    if (*end > t) {
+        evaluate(taylor, (t - now) / taylor->unit, x, NULL);
+    } else {
+        memcpy(x, taylor->end_x, taylor->problem->ode.state_count * sizeof(double));
+    }
     work->steps++;
     work->last_order = taylor->order;
     work->last_step = *end - now;
@@ -395,7 +413,7 @@ static bool interpolate(void *memory, double t, double x[]) {
     if (t > taylor->passed) {
         return false;
     }
-    evaluate(taylor, (t - taylor->begin) / taylor->unit, x);
+    evaluate(taylor, (t - taylor->begin) / taylor->unit, x, NULL);
     return true;
 }
 
