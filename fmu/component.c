@@ -235,9 +235,13 @@ enum component_status component_begin(struct component *component, const struct 
     component->kind = kind;
     log_always(component, logging_on ? ~0u : adapter->always_logged);
     const struct message_sink sink = {.write = log_instance_text, .context = component};
-    return instance_create(&model_description, &sink, &component->instance) == STATUS_OK
-               ? COMPONENT_OK
-               : COMPONENT_ERROR;
+    if (instance_create(&model_description, &sink, &component->instance) != STATUS_OK) {
+        return COMPONENT_ERROR;
+    }
+    if (kind == KIND_MODEL_EXCHANGE) {
+        instance_integrate_outside(component->instance);
+    }
+    return COMPONENT_OK;
 }
 
 void component_end(struct component *component) {

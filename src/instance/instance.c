@@ -175,23 +175,32 @@ enum status instance_enter_initialization(struct instance *instance) {
     return STATUS_OK;
 }
 
+static enum status setup_integrator(struct instance *instance) {
+    enum status status = instance_check_method(instance);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    instance_report_tolerance(instance);
+    status = instance_configure_integrator(instance);
+    if (status != STATUS_OK) {
+        message_write(&instance->sink, status, "initialization failed: %s", status_text(status));
+    }
+    return status;
+}
+
 enum status instance_exit_initialization(struct instance *instance) {
     enum status status = instance_check_parameters(instance);
-    if (status == STATUS_OK) {
-        status = instance_check_method(instance);
-    }
-    if (status == STATUS_OK && instance->integrator != NULL) {
-        instance_report_tolerance(instance);
-        status = instance_configure_integrator(instance);
-        if (status != STATUS_OK) {
-            message_write(&instance->sink, status, "initialization failed: %s",
-                          status_text(status));
-        }
+    if (status == STATUS_OK && instance_has_integrator(instance)) {
+        status = setup_integrator(instance);
     }
     if (status == STATUS_OK) {
         instance->state.phase = PHASE_STEPPING;
     }
     return status;
+}
+
+void instance_integrate_outside(struct instance *instance) {
+    instance->is_integrated_outside = true;
 }
 
 void instance_allow_setting_states(struct instance *instance) {

@@ -60,6 +60,9 @@ MUST_CHECK NONNULL enum status instance_enter_initialization(struct instance *in
 /* Ends initialization. Inconsistent parameters are refused. */
 MUST_CHECK NONNULL enum status instance_exit_initialization(struct instance *instance);
 
+/* Integration from outside (Model Exchange): no integrator is set up, so that none is refused. */
+NONNULL void instance_integrate_outside(struct instance *instance);
+
 /* From now on states may be set after initialization, too, as inputs are. */
 NONNULL void instance_allow_setting_states(struct instance *instance);
 

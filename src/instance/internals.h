@@ -68,6 +68,7 @@ struct instance {
 
     struct instance_place *places; /* by value reference; value NULL: of no Real */
 
+    bool is_integrated_outside;
     bool states_are_settable;  /* after initialization, too */
     bool outputs_are_valid;    /* the calculated values belong to the others */
     bool parameters_are_valid; /* they are consistent; false: not known */
@@ -88,6 +89,11 @@ struct instance {
 
 static inline size_t count_of(struct span span) {
     return span.size / sizeof(double);
+}
+
+/* It integrates its states itself. */
+static inline bool instance_has_integrator(const struct instance *instance) {
+    return instance->integrator != NULL && !instance->is_integrated_outside;
 }
 
 /* The doubles at a span of a value structure. */

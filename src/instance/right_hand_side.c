@@ -17,8 +17,10 @@ void instance_prepare_inputs(struct instance *instance) {
         double *series = instance->input_series[i];
         instance->inputs_move |= polynomial_moves(input);
         instance->u[i] = input->d[0];
-        series[0] = input->d[0];
-        series[1] = series[2] = series[3] = 0.0;
+        series[0] = input->d[0]; // all there is, unless inputs move
+        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
+            series[k] = 0.0;
+        }
     }
 }
 

@@ -83,16 +83,17 @@ static struct integrator_settings settings_of(const struct instance *instance) {
 
 enum status instance_check_method(const struct instance *instance) {
     const enum integrator_method method = (enum integrator_method)instance->state.own.solver_method;
-    if (instance->integrator == NULL || integrator_is_possible(method, &instance->ode)) {
+    if (integrator_is_possible(method, &instance->ode)) {
         return STATUS_OK;
     }
     message_write(
         &instance->sink, STATUS_INVALID_PARAMETERS,
-        "solver_method = %d (%s) is refused: %s has no Taylor series. %s is for any model, "
-        "%s for a stiff one, %s for inputs that change in each step",
+        "solver_method = %d (%s) is refused: %s has no Taylor series. %d (%s) is for any model, "
+        "%d (%s) for a stiff one, %d (%s) for inputs that change in each step",
         (int)method, integrator_method_name(method), instance->description->name,
-        integrator_method_name(INTEGRATOR_CVODE_ADAMS),
-        integrator_method_name(INTEGRATOR_CVODE_BDF), integrator_method_name(INTEGRATOR_ERK));
+        INTEGRATOR_CVODE_ADAMS, integrator_method_name(INTEGRATOR_CVODE_ADAMS),
+        INTEGRATOR_CVODE_BDF, integrator_method_name(INTEGRATOR_CVODE_BDF), INTEGRATOR_ERK,
+        integrator_method_name(INTEGRATOR_ERK));
     return STATUS_INVALID_PARAMETERS;
 }
 

@@ -63,8 +63,8 @@ struct integrator_settings {
 /* Totals since integrator_configure, and the last internal step. */
 struct integrator_statistics {
     int64_t steps;           /* internal steps */
-    int64_t rhs_evaluations; /* calls of the right-hand side */
-    int64_t failed_steps;    /* attempts that the error test or the iteration refused */
+    int64_t rhs_evaluations; /* calls of the right-hand side, or series begun */
+    int64_t failed_steps;    /* attempts that were refused */
     int64_t restarts;
     double last_step; /* s: length of the last internal step */
     int last_order;   /* its order */

@@ -8,7 +8,7 @@
 /* What an advance did. */
 struct method_work {
     int64_t steps;        /* internal steps */
-    int64_t failed_steps; /* attempts that the error test or the iteration refused */
+    int64_t failed_steps; /* attempts that the method refused */
     int last_order;       /* of the last internal step; 0: there was none */
     double last_step;     /* its length, s */
     double internal;      /* where it ended, s since the restart */

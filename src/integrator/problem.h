@@ -15,7 +15,7 @@ struct problem {
     bool goes_on;             /* as in struct integrator_start */
     double reached;           /* where the last advance ended; 0 after a restart */
     double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
-    int64_t evaluation_count; /* calls of the right-hand side */
+    int64_t evaluation_count; /* calls of the right-hand side; series begun */
     integrator_observer *observer; /* NULL: none */
     void *observer_context;
 };

@@ -33,8 +33,8 @@ struct model {
     enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
                             double J[]);
 
-    /* The Taylor series of the states; NULL: the model offers none. With it the right-hand side has
-     * all derivatives at every time within a step, or the series says where it has not. */
+    /* The Taylor series of the states; NULL: the model offers none. Only a model whose right-hand
+     * side has all derivatives everywhere may offer one. */
     const struct series *series;
 
     /* Writes all calculated fields of values from its parameters, inputs and states at time t. */

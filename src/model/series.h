@@ -22,8 +22,8 @@ struct series_origin {
 };
 
 struct series {
-    /* Rows that extend writes: the states in their order, then whatever it needs of other
-     * quantities. */
+    /* Rows that extend writes: the states in their order, then other quantities: what it needs
+     * itself, and functions of the motion that others want to follow over a step. */
     size_t row_count;
 
     /* Writes the coefficients of the orders first to last (< SERIES_LENGTH) of all rows, from those

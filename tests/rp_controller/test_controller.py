@@ -17,6 +17,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
 
 from cosim import reference
@@ -309,6 +310,23 @@ def test_unknown_modes_are_refused(loaded: LoadedFmu) -> None:
         for mode in (0, 4):
             status = status_of(instance.fmi.setInteger, [loaded.references["mode"]], [mode])
             assert status == DISCARD and "mode" in instance.messages[-1].text
+
+
+def test_the_taylor_method_is_refused_where_the_fmu_integrates(loaded: LoadedFmu) -> None:
+    references = [loaded.references["solver_method"]]
+    with Instance(loaded) as instance:
+        instance.fmi.setInteger(references, [4])
+        instance.fmi.setupExperiment()
+        instance.fmi.enterInitializationMode()
+        assert status_of(instance.fmi.exitInitializationMode) == ERROR
+        text = instance.messages[-1].text
+        assert "solver_method = 4 (taylor) is refused: RPController has no Taylor series" in text
+        assert all(name in text for name in ("1 (cvode_adams)", "2 (cvode_bdf)", "3 (erk)"))
+    with Instance(loaded, kind=FMU2Model) as instance:
+        instance.fmi.setInteger(references, [4])
+        instance.fmi.setupExperiment()
+        instance.fmi.enterInitializationMode()
+        assert status_of(instance.fmi.exitInitializationMode) == OK
 
 
 def test_mode_changes_between_steps(loaded: LoadedFmu) -> None:
