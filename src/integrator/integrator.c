@@ -37,8 +37,9 @@ double integrator_tolerance_fraction(enum integrator_method method) {
     return methods[method]->tolerance_fraction;
 }
 
-int64_t integrator_longest_history(enum integrator_method method) {
-    return methods[method]->longest_history;
+int64_t integrator_longest_history(enum integrator_method method, bool has_events) {
+    return has_events ? methods[method]->longest_history_with_events
+                      : methods[method]->longest_history;
 }
 
 bool integrator_is_possible(enum integrator_method method, const struct ode *ode) {
@@ -70,7 +71,8 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->absolute_tolerances = created->values;
     created->reached_x = created->values + n;
     created->x = created->values + 2 * n;
-    if (!reserve_create(&created->reserve, reserve_size(ode))) {
+    if (!reserve_create(&created->reserve, reserve_size(ode)) ||
+        !location_create(&created->problem.ode, &created->problem.location)) {
         integrator_destroy(created);
         return STATUS_OUT_OF_MEMORY;
     }
@@ -93,6 +95,7 @@ void integrator_destroy(struct integrator *integrator) {
     }
     destroy_method(integrator);
     reserve_destroy(&integrator->reserve);
+    location_destroy(&integrator->problem.location);
     free(integrator);
 }
 
@@ -144,7 +147,8 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     problem->reached = 0.0;
     problem->failed_at = -INFINITY;
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));
-    return integrator->method->restart(integrator->memory, x);
+    const enum status status = location_restart(&problem->location, start->indicators, x);
+    return status == STATUS_OK ? integrator->method->restart(integrator->memory, x) : status;
 }
 
 double integrator_next_step(const struct integrator *integrator) {
@@ -214,7 +218,7 @@ static void copy_state(const struct integrator *integrator, double x[]) {
     memcpy(x, integrator->reached_x, integrator->problem.ode.state_count * sizeof(double));
 }
 
-bool integrator_interpolate(struct integrator *integrator, double t, double x[]) {
+static bool interpolate(struct integrator *integrator, double t, double x[]) {
     if (!can_interpolate(integrator, t)) {
         return false;
     }
@@ -223,15 +227,27 @@ bool integrator_interpolate(struct integrator *integrator, double t, double x[])
     return true;
 }
 
+bool integrator_interpolate(struct integrator *integrator, double t, double x[]) {
+    return t < integrator->problem.location.time && interpolate(integrator, t, x);
+}
+
 enum status integrator_advance(struct integrator *integrator, double t, int64_t max_steps,
                                double *reached, double x[]) {
+    // an event that an internal step has passed already comes first
+    const double event = integrator->problem.location.time;
+    const double target = event < t ? event : t;
     enum status status = STATUS_OK;
-    if (!integrator_interpolate(integrator, t, x)) {
-        status = advance(integrator, t, max_steps);
+    if (!interpolate(integrator, target, x)) {
+        status = advance(integrator, target, max_steps);
         copy_state(integrator, x);
     }
     *reached = integrator->problem.reached;
     return status;
+}
+
+const bool *integrator_event(const struct integrator *integrator) {
+    const struct location *location = &integrator->problem.location;
+    return location->time == integrator->problem.reached ? location->fired : NULL;
 }
 
 void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,

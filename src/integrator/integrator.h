@@ -47,7 +47,7 @@ double integrator_tolerance_fraction(enum integrator_method method);
 /* Internal steps after which the integrator is to be restarted though nothing has changed, the most
  * that a replay repeats; 0: the method has no history, each advance starts fresh, and a restart
  * between two of them changes nothing. */
-int64_t integrator_longest_history(enum integrator_method method);
+int64_t integrator_longest_history(enum integrator_method method, bool has_events);
 
 /* Whether the method can integrate the ode: all but INTEGRATOR_TAYLOR can, which needs its series.
  */
@@ -93,6 +93,8 @@ struct integrator_start {
                           known */
     bool goes_on; /* the solution is the one that was integrated up to here: further advances are
                      likely */
+    const struct indicator *indicators; /* those of the ode until the next restart; they must stay.
+                                           NULL: no events are looked for */
 };
 
 /* Starts from x at time 0 with no history. */
@@ -123,14 +125,18 @@ MUST_CHECK NONNULL bool integrator_interpolate(struct integrator *integrator, do
 /* Integrates to the time t, not before the one of the last call, in max_steps (>= 1) internal steps
  * at most, and writes the state there to x.
  * Where that fails (STATUS_TOO_MANY_STEPS, STATUS_NO_CONVERGENCE, STATUS_NOT_FINITE), *reached <= t
- * is the last time with a valid state and x that state; on success *reached is t, or where the
- * observer ended the advance.
+ * is the last time with a valid state and x that state; on success *reached is t, or where an event
+ * or the observer ended the advance.
  *
  * Deterministic: after a restart, results depend only on its arguments and the first t, which
- * bounds the first internal step. With a history, stops at further times do not matter, as long as
- * it is not longer than integrator_longest_history. */
+ * bounds the first internal step, unless the restart has events and goes on. With a history, stops
+ * at further times do not matter, as long as it is not longer than integrator_longest_history. */
 MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
                                                   int64_t max_steps, double *reached, double x[]);
+
+/* Where the last advance ended at an event: which indicators are at 0, one flag each; otherwise
+ * NULL. The next call must be a restart. */
+NONNULL const bool *integrator_event(const struct integrator *integrator);
 
 NONNULL void integrator_get_statistics(const struct integrator *integrator,
                                        struct integrator_statistics *statistics);

@@ -12,7 +12,7 @@ struct method_work {
     int last_order;       /* of the last internal step; 0: there was none */
     double last_step;     /* its length, s */
     double internal;      /* where it ended, s since the restart */
-    bool is_cut_short;    /* by the observer */
+    bool is_cut_short;    /* by an event or the observer */
 };
 
 struct method {
@@ -25,6 +25,7 @@ struct method {
 
     /* integrator_longest_history */
     int64_t longest_history;
+    int64_t longest_history_with_events;
 
     /* Needs the series of the ode. */
     bool needs_series;
@@ -46,7 +47,8 @@ struct method {
     /* Integrates from problem->reached, where the state is begin_x, to t in max_steps internal
      * steps at most. Writes the last valid time to *stopped_at, also on failure, and the state
      * there to x. Where problem->observer is not NULL, asks it (problem_ends_at) about each
-     * internal step that ends between problem->reached and t. */
+     * internal step that ends between problem->reached and t. Where problem->location is active,
+     * searches each internal step, and ends at an event up to t. */
     enum status (*advance)(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work);
 

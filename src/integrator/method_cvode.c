@@ -30,6 +30,7 @@ struct cvode {
     SUNMatrix jacobian;                /* of BDF */
     SUNLinearSolver linear_solver;     /* of BDF */
     struct small_vector_terms columns; /* of the last internal step; count 0: not known */
+    enum status search_status;         /* of the last search for an event */
     struct method_work counted;        /* since the restart, up to the last advance */
 };
 
@@ -180,6 +181,7 @@ static enum status restart(void *memory, const double x[]) {
     struct cvode *cvode = memory;
     sundials_set_state(&cvode->base, x);
     cvode->counted = (struct method_work){0};
+    cvode->search_status = STATUS_OK;
     return status_of_flag(cvode->base.problem, CVodeReInit(cvode->solver, 0.0, cvode->base.x));
 }
 
@@ -205,11 +207,34 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
-/* Takes the internal steps to t, which CVode in normal mode would take, one by one and asks the
- * observer about each that changes the time. */
+/* Searches the last internal step for an event. */
+static enum status search(struct cvode *cvode, double begin, double end) {
+    struct problem *problem = cvode->base.problem;
+    struct step_polynomial *step = &problem->location.step;
+    struct small_vector_terms *columns = &cvode->columns;
+    small_vector_note_terms(cvode->base.work, columns);
+    const int flag = CVodeGetDky(cvode->solver, end, 0, cvode->base.work);
+    small_vector_note_terms(cvode->base.work, NULL);
+    if (flag != CV_SUCCESS) {
+        return status_of_flag(problem, flag);
+    }
+    step->begin = begin;
+    step->end = end;
+    step->is_from_end = true;
+    step->degree = columns->count - 1;
+    for (size_t i = 0; i < problem->ode.state_count; i++) {
+        for (int k = 0; k < columns->count; k++) {
+            step->row[i][k] = columns->data[columns->count - 1 - k][i];
+        }
+    }
+    return location_search(&problem->location);
+}
+
+/* Takes the internal steps to t, which CVode in normal mode would take, one by one, searches each
+ * and asks the observer about each that changes the time. */
 static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
                              double x[], bool *is_cut_short) {
-    const struct problem *problem = cvode->base.problem;
+    struct problem *problem = cvode->base.problem;
     long begin = 0;
     long steps = 0;
     double internal = 0.0;
@@ -223,10 +248,23 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
             return CV_TOO_MUCH_WORK;
         }
         // the first one may have been taken by the advance before, which has not returned its end
+        const double before = internal;
         flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_ONE_STEP);
         sundials_get_state(&cvode->base, x);
         internal = *stopped_at;
-        if (flag >= 0 && internal < t && internal > watched) {
+        if (flag >= 0 && location_is_active(&problem->location) && internal > before) {
+            cvode->search_status = search(cvode, before, internal);
+            if (cvode->search_status != STATUS_OK) {
+                return CV_UNREC_RHSFUNC_ERR;
+            }
+            if (problem->location.time <= t) {
+                *is_cut_short = true;
+                *stopped_at = problem->location.time;
+                evaluate_history(cvode, *stopped_at, x);
+                break;
+            }
+        }
+        if (flag >= 0 && problem->observer != NULL && internal < t && internal > watched) {
             watched = internal;
             *is_cut_short = problem_ends_at(problem, internal, x);
         }
@@ -237,20 +275,21 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
 static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
                      double x[], bool *is_cut_short) {
     const struct problem *problem = cvode->base.problem;
+    const bool is_searched = location_is_active(&problem->location);
     int flag = CVodeSetMaxNumSteps(cvode->solver, sundials_steps(max_steps));
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
-        flag = CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
+        const double longest = is_searched && problem->goes_on ? problem->span : t;
+        flag = CVodeSetInitStep(cvode->solver, fmin(problem->first_step, longest));
     }
     if (flag == CV_SUCCESS) {
         // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
         flag = CVodeSetStopTime(cvode->solver, problem->span);
     }
     cvode->columns.count = 0;
-    if (flag == CV_SUCCESS && problem->observer != NULL) {
+    if (flag == CV_SUCCESS && (problem->observer != NULL || is_searched)) {
         flag = integrate_watched(cvode, t, max_steps, stopped_at, x, is_cut_short);
     }
     if (flag < 0 || *is_cut_short) {
-        sundials_get_state(&cvode->base, x);
         return flag;
     }
     small_vector_note_terms(cvode->base.x, &cvode->columns);
@@ -298,7 +337,8 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     const int flag = integrate(cvode, t, max_steps, stopped_at, x, &is_cut_short);
     measure_work(cvode, work);
     work->is_cut_short = is_cut_short;
-    return status_of_flag(cvode->base.problem, flag);
+    return cvode->search_status != STATUS_OK ? cvode->search_status
+                                             : status_of_flag(cvode->base.problem, flag);
 }
 
 /* The error of a step h of order 1 is about h^2 x'' / 2. */

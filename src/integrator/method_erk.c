@@ -289,6 +289,7 @@ const struct method integrator_erk = {
     .name = "erk",
     .tolerance_fraction = TOLERANCE_FRACTION,
     .longest_history = 0,
+    .longest_history_with_events = 0,
     .memory_size = sundials_memory_size,
     .create = create,
     .destroy = destroy,

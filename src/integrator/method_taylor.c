@@ -40,6 +40,7 @@ struct taylor {
     int order;
     int noted_order;    /* the largest whose size is noted */
     int expected_order; /* of the next step that lands; what it gives does not depend on it */
+    double last_length; /* s: of the last step, or the one that a restart gave; 0: none */
     double passed;      /* s since the restart: where the step ended that goes past requested times;
                            -INFINITY: there is none */
     double size[SERIES_LENGTH]; /* of the terms of each order from 1 on */
@@ -106,6 +107,7 @@ static enum status restart(void *memory, const double x[]) {
     struct taylor *taylor = memory;
     (void)x;
     taylor->passed = -INFINITY;
+    taylor->last_length = taylor->problem->first_step;
     return STATUS_OK;
 }
 
@@ -339,13 +341,23 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     return STATUS_NOT_FINITE;
 }
 
+/* Length that a step from now towards t is expanded for, s. With events, long steps must not depend
+ * on t: there it is the length of the step before. */
+static double length_to_expand(const struct taylor *taylor, double now, double t, bool is_long) {
+    const double longest = longest_step(taylor->problem, now);
+    if (is_long && location_is_active(&taylor->problem->location) && taylor->last_length > 0.0) {
+        return taylor->last_length < longest ? taylor->last_length : longest;
+    }
+    // parts of equal length leave no sliver at the end; nor does rounding
+    const double parts = (t - now) / longest * (1.0 - 1e-14);
+    return parts > 1.0 ? (t - now) / ceil(parts) : t - now;
+}
+
 /* One internal step from the state x at the time now towards the time t. Writes where it ends to
  * *end and the state there, or at t if that is earlier, to x. */
 static enum status take_step(struct taylor *taylor, double now, double t, bool is_long, double x[],
                              double *end, struct method_work *work) {
-    // parts of equal length leave no sliver at the end; nor does rounding
-    const double parts = (t - now) / longest_step(taylor->problem, now) * (1.0 - 1e-14);
-    const double length = parts > 1.0 ? (t - now) / ceil(parts) : t - now;
+    const double length = length_to_expand(taylor, now, t, is_long);
     double step;
     enum status status = expand(taylor, now, length, is_long, x, &step, work);
     if (status == STATUS_OK) {
@@ -365,6 +377,7 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     } else {
         memcpy(x, taylor->end_x, taylor->problem->ode.state_count * sizeof(double));
     }
+    taylor->last_length = *end - now;
     work->steps++;
     work->last_order = taylor->order;
     work->last_step = *end - now;
@@ -372,16 +385,45 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     return STATUS_OK;
 }
 
+/* Searches the step that has ended at the time end for an event. */
+static enum status search(struct taylor *taylor, double end) {
+    struct location *location = &taylor->problem->location;
+    struct step_polynomial *step = &location->step;
+    const double length = (end - taylor->begin) / taylor->unit;
+    step->begin = taylor->begin;
+    step->end = end;
+    step->is_from_end = false;
+    step->degree = taylor->order;
+    double power = 1.0;
+    for (int k = 0; k <= taylor->order; k++) {
+        for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+            step->row[i][k] = taylor->row[i][k] * power;
+        }
+        power *= length;
+    }
+    return location_search(location);
+}
+
+/* Where an advance begins, with the state there: with events, at the end of the last step. */
+static double begin_advance(struct taylor *taylor, const double begin_x[], double x[]) {
+    const struct problem *problem = taylor->problem;
+    const bool has_passed =
+        location_is_active(&problem->location) && taylor->passed > problem->reached;
+    memcpy(x, has_passed ? taylor->end_x : begin_x, problem->ode.state_count * sizeof(double));
+    const double begin = has_passed ? taylor->passed : problem->reached;
+    taylor->passed = -INFINITY;
+    taylor->longest_unit = INFINITY;
+    return begin;
+}
+
 static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work) {
     struct taylor *taylor = memory;
     const struct problem *problem = taylor->problem;
-    bool is_long = problem->goes_on && problem->reached == 0.0;
-    memcpy(x, begin_x, problem->ode.state_count * sizeof(double));
-    taylor->passed = -INFINITY;
-    taylor->longest_unit = INFINITY;
-    work->internal = problem->reached;
-    *stopped_at = problem->reached;
+    const bool is_searched = location_is_active(&problem->location);
+    bool is_long = problem->reached == 0.0 ? problem->goes_on : is_searched;
+    *stopped_at = begin_advance(taylor, begin_x, x);
+    work->internal = *stopped_at;
     while (*stopped_at < t) {
         if (work->steps == max_steps) {
             message_write(&problem->sink, STATUS_TOO_MANY_STEPS,
@@ -390,16 +432,26 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
             return STATUS_TOO_MANY_STEPS;
         }
         double end;
-        const enum status status = take_step(taylor, *stopped_at, t, is_long, x, &end, work);
+        enum status status = take_step(taylor, *stopped_at, t, is_long, x, &end, work);
+        if (status == STATUS_OK && is_searched) {
+            status = search(taylor, end);
+        }
         if (status != STATUS_OK) {
             return status;
+        }
+        if (problem->location.time <= t) {
+            taylor->passed = end;
+            *stopped_at = problem->location.time;
+            evaluate(taylor, (*stopped_at - taylor->begin) / taylor->unit, x, NULL);
+            work->is_cut_short = true;
+            break;
         }
         if (end > t) {
             taylor->passed = end;
             end = t;
         }
         *stopped_at = end;
-        is_long = false;
+        is_long = is_long && is_searched;
         if (end < t && problem->observer != NULL && problem_ends_at(problem, end, x)) {
             work->is_cut_short = true;
             break;
@@ -426,10 +478,15 @@ static double next_step(void *memory, const double x[]) {
 
 #define TOLERANCE_FRACTION 1e-1
 
+/* Events must not depend on the requested times, so that a long step begins where the last one
+ * ended. As in method_cvode.c. */
+#define LONGEST_HISTORY_WITH_EVENTS 1000
+
 const struct method integrator_taylor = {
     .name = "taylor",
     .tolerance_fraction = TOLERANCE_FRACTION,
     .longest_history = 1,
+    .longest_history_with_events = LONGEST_HISTORY_WITH_EVENTS,
     .needs_series = true,
     .memory_size = memory_size,
     .create = create,

@@ -2,6 +2,7 @@
 #ifndef ODE_H
 #define ODE_H
 
+#include "events.h"
 #include "series.h"
 #include "status.h"
 
@@ -20,12 +21,17 @@ typedef enum status ode_jacobian(double t, const double x[], double J[], void *c
 typedef enum status ode_series(double t, double unit, int first, int last,
                                double rows[][SERIES_LENGTH], void *context);
 
+/* Writes all indicators at the time t and the state x to z. As ode_rhs else. */
+typedef enum status ode_indicators(double t, const double x[], double z[], void *context);
+
 struct ode {
     size_t state_count; /* > 0 */
     ode_rhs *rhs;
     ode_jacobian *jacobian;  /* for INTEGRATOR_CVODE_BDF only */
     ode_series *series;      /* for INTEGRATOR_TAYLOR only; NULL: there is none */
     size_t series_row_count; /* >= state_count, where there is one */
+    size_t indicator_count;  /* 0: no events */
+    ode_indicators *indicators;
     void *context;
 };
 

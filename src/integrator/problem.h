@@ -4,6 +4,7 @@
 #define PROBLEM_H
 
 #include "integrator.h"
+#include "location.h"
 
 /* Times in s since the last restart. */
 struct problem {
@@ -16,6 +17,7 @@ struct problem {
     double reached;           /* where the last advance ended; 0 after a restart */
     double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
     int64_t evaluation_count; /* calls of the right-hand side; series begun */
+    struct location location;
     integrator_observer *observer; /* NULL: none */
     void *observer_context;
 };

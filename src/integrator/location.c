@@ -1,0 +1,275 @@
+#include "location.h"
+
+#include "roots.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+bool location_create(const struct ode *ode, struct location *location) {
+    const size_t states = ode->state_count;
+    const size_t count = ode->indicator_count;
+    *location = (struct location){.ode = ode, .time = INFINITY};
+    if (count == 0) {
+        return true;
+    }
+    location->step.row = calloc(states, sizeof *location->step.row);
+    location->first = calloc(count, sizeof *location->first);
+    location->samples = calloc(count, sizeof *location->samples);
+    location->x = calloc(states, sizeof *location->x);
+    location->z = calloc(count, sizeof *location->z);
+    location->is_armed = calloc(count, sizeof *location->is_armed);
+    location->fired = calloc(count, sizeof *location->fired);
+    if (location->step.row == NULL || location->first == NULL || location->samples == NULL ||
+        location->x == NULL || location->z == NULL || location->is_armed == NULL ||
+        location->fired == NULL) {
+        location_destroy(location);
+        return false;
+    }
+    return true;
+}
+
+void location_destroy(struct location *location) {
+    free(location->fired);
+    free(location->is_armed);
+    free(location->z);
+    free(location->x);
+    free(location->samples);
+    free(location->first);
+    free(location->step.row);
+    *location = (struct location){.time = INFINITY};
+}
+
+static enum status evaluate(struct location *location, double t, const double x[]) {
+    return location->ode->indicators(t, x, location->z, location->ode->context);
+}
+
+enum status location_restart(struct location *location, const struct indicator *indicators,
+                             const double x[]) {
+    location->indicators = indicators;
+    location->time = INFINITY;
+    if (indicators == NULL) {
+        return STATUS_OK;
+    }
+    const enum status status = evaluate(location, 0.0, x);
+    for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
+        location->is_armed[i] = location->z[i] > 0.0;
+    }
+    return status;
+}
+
+/* ---- Roots ---------------------------------------------------------------------------------- */
+
+/* The first s at which an indicator falls to 0; INFINITY: it does not. Before the step it has been
+ * above 0, or else it is about 0 since the restart and is to rise. */
+static double first_fall(const struct roots_polynomial *p, bool *is_armed) {
+    if (*is_armed) {
+        return roots_first(p);
+    }
+    struct root roots[ROOTS_LENGTH];
+    const int count = roots_find(p, roots);
+    for (int i = 0; i < count; i++) {
+        if (roots[i].kind == ROOT_FALLS) {
+            return roots[i].s;
+        }
+    }
+    double end = 0.0;
+    for (int k = p->degree; k >= 0; k--) {
+        end += p->c[k];
+    }
+    *is_armed = end > 0.0;
+    return end < 0.0 && count == 0 ? 0.0 : INFINITY;
+}
+
+/* ---- Indicators of states ------------------------------------------------------------------- */
+
+/* c(s) becomes c(s - 1). */
+static void shift(double c[], int degree) {
+    for (int i = 0; i < degree; i++) {
+        for (int k = degree - 1; k >= i; k--) {
+            c[k] -= c[k + 1];
+        }
+    }
+}
+
+static double first_of_state(const struct step_polynomial *step, const struct indicator *indicator,
+                             bool *is_armed) {
+    const double *row = step->row[indicator->state];
+    double c[ROOTS_LENGTH];
+    const struct roots_polynomial p = {.c = c, .degree = step->degree, .noise = -1.0};
+    c[0] = indicator->offset + indicator->factor * row[0];
+    if (!step->is_from_end) {
+        for (int k = 1; k <= step->degree; k++) {
+            c[k] = indicator->factor * row[k];
+        }
+        return first_fall(&p, is_armed);
+    }
+    // backwards in time a proof needs no shift
+    for (int k = 1; k <= step->degree; k++) {
+        c[k] = (k % 2 == 0 ? indicator->factor : -indicator->factor) * row[k];
+    }
+    if (roots_is_above(&p)) {
+        *is_armed = true;
+        return INFINITY;
+    }
+    for (int k = 1; k <= step->degree; k++) {
+        c[k] = indicator->factor * row[k];
+    }
+    shift(c, step->degree);
+    return first_fall(&p, is_armed);
+}
+
+/* ---- Indicators of the model ---------------------------------------------------------------- */
+
+/* Of the values' scale: how well a polynomial must represent an indicator. */
+static const double representation = 1e-12;
+
+/* Writes all indicators at s, of the whole step, to column k of samples. */
+static enum status sample(struct location *location, double s, int k) {
+    const struct step_polynomial *step = &location->step;
+    const double at = step->is_from_end ? s - 1.0 : s;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        double x = step->row[i][step->degree];
+        for (int j = step->degree - 1; j >= 0; j--) {
+            x = x * at + step->row[i][j];
+        }
+        location->x[i] = x;
+    }
+    const double t = step->begin + s * (step->end - step->begin);
+    const enum status status = evaluate(location, t, location->x);
+    for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
+        location->samples[i][k] = location->z[i];
+    }
+    return status;
+}
+
+/* A part of a step. */
+struct piece {
+    double begin; /* s */
+    double length;
+    int count; /* points sampled */
+};
+
+/* To 2 count - 1 points: those sampled before move apart. */
+static enum status refine(struct location *location, struct piece *piece) {
+    const int count = 2 * piece->count - 1;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        for (int k = piece->count - 1; k > 0; k--) {
+            location->samples[i][2 * k] = location->samples[i][k];
+        }
+    }
+    enum status status = STATUS_OK;
+    for (int k = 1; status == STATUS_OK && k < count; k += 2) {
+        status = sample(location, piece->begin + piece->length * chebyshev_point(count, k), k);
+    }
+    piece->count = count;
+    return status;
+}
+
+enum { FEWEST_POINTS = 5 };
+
+static enum status begin_piece(struct location *location, double begin, double length,
+                               struct piece *piece) {
+    *piece = (struct piece){begin, length, FEWEST_POINTS};
+    enum status status = STATUS_OK;
+    for (int k = 0; status == STATUS_OK && k < FEWEST_POINTS; k++) {
+        status = sample(location, begin + length * chebyshev_point(FEWEST_POINTS, k), k);
+    }
+    return status;
+}
+
+/* Whether the polynomial through the samples shows where the indicator falls. */
+static bool is_represented(const double samples[], int count, double c[], double *error) {
+    double scale = 0.0;
+    for (int k = 0; k < count; k++) {
+        scale = fmax(scale, fabs(samples[k]));
+    }
+    *error = chebyshev_interpolate(count, samples, c);
+    return *error <= representation * scale;
+}
+
+/* Searches one indicator in a piece; false: the piece needs more points. */
+static bool search_piece(struct location *location, const struct piece *piece, size_t i,
+                         bool is_last_try) {
+    double c[ROOTS_LENGTH] = {0};
+    double error;
+    const bool is_exact = is_represented(location->samples[i], piece->count, c, &error);
+    struct roots_polynomial p = {.c = c, .degree = piece->count - 1, .noise = -1.0};
+    if (!is_exact && !is_last_try) {
+        // far enough above 0
+        c[0] -= 16.0 * error;
+        if (roots_is_above(&p)) {
+            location->is_armed[i] = true;
+            return true;
+        }
+        return false;
+    }
+    const double s = first_fall(&p, &location->is_armed[i]);
+    location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
+    return true;
+}
+
+/* A step is divided in two until polynomials represent all indicators; the shortest piece is this
+ * part of it. */
+static const double shortest_piece = 0x1p-10;
+
+/* Searches the indicators from the given one on. */
+static enum status search_model_in(struct location *location, double begin, double length,
+                                   size_t from) {
+    struct piece piece;
+    enum status status = begin_piece(location, begin, length, &piece);
+    size_t i = from;
+    while (status == STATUS_OK && i < location->ode->indicator_count) {
+        const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
+        const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
+                               location->first[i] > begin;
+        if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
+            i++;
+        } else if (piece.count < CHEBYSHEV_LENGTH) {
+            status = refine(location, &piece);
+        } else {
+            status = search_model_in(location, begin, 0.5 * length, i);
+            if (status == STATUS_OK) {
+                status = search_model_in(location, begin + 0.5 * length, 0.5 * length, i);
+            }
+            break;
+        }
+    }
+    return status;
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+/* Roots of several indicators within this part of a step are one event. */
+static const double same_time = 4.0 * 0x1p-52;
+
+enum status location_search(struct location *location) {
+    const struct step_polynomial *step = &location->step;
+    const size_t count = location->ode->indicator_count;
+    bool needs_model = false;
+    for (size_t i = 0; i < count; i++) {
+        const struct indicator *indicator = &location->indicators[i];
+        location->first[i] = indicator->kind == INDICATOR_OF_STATE
+                                 ? first_of_state(step, indicator, &location->is_armed[i])
+                                 : INFINITY;
+        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+    }
+    const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;
+    if (status != STATUS_OK) {
+        return status;
+    }
+
+    double s = INFINITY;
+    for (size_t i = 0; i < count; i++) {
+        s = fmin(s, location->first[i]);
+    }
+    if (!(s <= 1.0)) {
+        return STATUS_OK;
+    }
+    for (size_t i = 0; i < count; i++) {
+        location->fired[i] = location->first[i] <= s + same_time;
+    }
+    location->time = s == 1.0 ? step->end : step->begin + s * (step->end - step->begin);
+    return STATUS_OK;
+}

@@ -1,0 +1,54 @@
+/* Where events are: on each finished internal step, the states are polynomials of time, and what
+ * indicators follow from them is searched for roots. So neither the requested times nor the sign at
+ * the end of a step decide whether an event is found. */
+#ifndef LOCATION_H
+#define LOCATION_H
+
+#include "chebyshev.h"
+#include "ode.h"
+
+#include "platform.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+/* States over an internal step: x_i is the sum of row[i][k] s^k. s: time in lengths of the step,
+ * from its begin on (0 to 1) or, where `is_from_end`, from its end on (-1 to 0). */
+struct step_polynomial {
+    double begin; /* s since the restart */
+    double end;
+    bool is_from_end;
+    int degree;
+    double (*row)[SERIES_LENGTH];
+};
+
+struct location {
+    const struct ode *ode;
+    const struct indicator *indicators;  /* since the restart; NULL: none is searched */
+    bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
+    bool *fired;                         /* by indicator: it is at 0 at `time` */
+    double time;                         /* of the event, s since the restart; INFINITY: none */
+    struct step_polynomial step;         /* the last one; methods write it */
+    double *x;                           /* at one point */
+    double *z;                           /* by indicator, at one point */
+    double *first;                       /* by indicator: s of its first root in the step */
+    double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
+};
+
+/* False where memory is short: then nothing has to be freed. */
+MUST_CHECK NONNULL bool location_create(const struct ode *ode, struct location *location);
+NONNULL void location_destroy(struct location *location);
+
+/* No event so far; indicators: those in force from now on, at the state x. */
+MUST_CHECK NONNULL_ARGUMENTS(1, 3) enum status
+    location_restart(struct location *location, const struct indicator *indicators,
+                     const double x[]);
+
+static inline bool location_is_active(const struct location *location) {
+    return location->indicators != NULL;
+}
+
+/* Searches location->step. If there is an event in it, writes its time and what has fired. */
+MUST_CHECK NONNULL enum status location_search(struct location *location);
+
+#endif
