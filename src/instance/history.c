@@ -17,12 +17,16 @@ static bool inputs_are_held(const struct instance_memory *memory, size_t count) 
     return true;
 }
 
-/* The parameters are those that the integrator runs with. */
-static bool parameters_are_held(const struct instance *instance) {
+static bool is_held(const struct instance *instance, struct span span) {
     const struct instance_memory *memory = &instance->memory;
-    const struct span parameters = instance->model->parameters;
-    return memcmp(memory->held + parameters.offset, memory->values + parameters.offset,
-                  parameters.size) == 0;
+    return memcmp(memory->held + span.offset, memory->values + span.offset, span.size) == 0;
+}
+
+/* The parameters, and the inputs that are no numbers, are those that the integrator runs with. */
+static bool parameters_are_held(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return is_held(instance, instance->model->parameters) &&
+           (events == NULL || is_held(instance, events->discrete_inputs));
 }
 
 /* Whether the motion to target is the one of the integrator's history. It depends only on the

@@ -29,6 +29,9 @@ struct instance_values {
     int solver_failed_steps; /* refused attempts since initialization */
     int solver_method;       /* an enum integrator_method */
     double max_step;         /* s: of internal steps; 0: no limit */
+    int event_count;         /* since initialization */
+    double last_event_time;  /* s; that of the start, before there has been one */
+    int max_events;          /* per communication step */
 };
 
 struct instance_experiment {

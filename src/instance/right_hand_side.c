@@ -42,6 +42,15 @@ enum status instance_jacobian(double t, const double x[], double J[], void *inst
                                      instance->u, J);
 }
 
+enum status instance_indicators(double t, const double x[], double z[], void *instance_pointer) {
+    const struct instance *instance = instance_pointer;
+    if (instance->inputs_move) {
+        evaluate_inputs(instance, t);
+    }
+    return instance->model->events->indicators(
+        instance->memory.held, instance->state.restart_time.s + t, x, instance->u, z);
+}
+
 /* Coefficients of the inputs at t, in units of time of unit. */
 static void expand_inputs(const struct instance *instance, double t, double unit) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {

@@ -25,6 +25,9 @@ static void transfer_own(struct codec *codec, struct instance_values *own) {
     codec_int(codec, "solver_failed_steps", &own->solver_failed_steps);
     codec_int(codec, "solver_method", &own->solver_method);
     codec_real(codec, &own->max_step);
+    codec_int(codec, "event_count", &own->event_count);
+    codec_real(codec, &own->last_event_time);
+    codec_int(codec, "max_events", &own->max_events);
 }
 
 static void transfer_statistics(struct codec *codec, struct integrator_statistics *statistics) {

@@ -16,6 +16,7 @@ enum severity {
     X(STATUS_NOT_FINITE, SEVERITY_DISCARD, "a value is not finite")                                \
     X(STATUS_OUT_OF_RANGE, SEVERITY_DISCARD, "a value is out of its range")                        \
     X(STATUS_TOO_MANY_STEPS, SEVERITY_DISCARD, "the integrator took all internal steps allowed")   \
+    X(STATUS_TOO_MANY_EVENTS, SEVERITY_DISCARD, "there were too many events")                      \
     X(STATUS_NO_CONVERGENCE, SEVERITY_DISCARD, "the integrator cannot reach its tolerance")        \
     X(STATUS_INVALID_ARGUMENT, SEVERITY_ERROR, "an argument is not valid")                         \
     X(STATUS_INVALID_PARAMETERS, SEVERITY_ERROR, "the parameters are inconsistent")                \

@@ -1,0 +1,30 @@
+/* Modes of the model and the events at which they change. */
+#ifndef INSTANCE_EVENTS_H
+#define INSTANCE_EVENTS_H
+
+#include "internals.h"
+
+/* There can be events with the parameters that the integrator runs with. */
+NONNULL bool instance_is_searched(const struct instance *instance);
+
+/* No state moves in the present modes. */
+NONNULL bool instance_is_at_rest(const struct instance *instance);
+
+/* Brings modes, states and sums to what follows the inputs and parameters set now and, where `fired`
+ * is not NULL, the event at the current time. */
+MUST_CHECK NONNULL_ARGUMENTS(1) enum status
+    instance_update_modes(struct instance *instance, const bool *fired);
+
+/* As instance_update_modes, but for the modes only: before the initialization ends, when states are
+ * still what was set. */
+MUST_CHECK NONNULL enum status instance_preview_modes(struct instance *instance);
+
+/* The indicators of the present modes, for the integrator; NULL: no events can be. */
+MUST_CHECK NONNULL const struct indicator *instance_describe_indicators(struct instance *instance);
+
+/* Counts an event with these indicators at the current time; fails at the first one above the
+ * limit of a communication step, whose count is in the step. */
+MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance, const bool fired[],
+                                                    int *count_in_step);
+
+#endif
