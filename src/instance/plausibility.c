@@ -54,7 +54,8 @@ static bool has_possible_settings(const struct instance *instance,
          instance->integrator == NULL || own->max_internal_steps >= 1},
         {"solver_method", own->solver_method,
          own->solver_method > INTEGRATOR_NO_METHOD && own->solver_method < INTEGRATOR_METHODS &&
-             integrator_is_possible((enum integrator_method)own->solver_method, &instance->ode)},
+             (!instance_has_integrator(instance) ||
+              integrator_is_possible((enum integrator_method)own->solver_method, &instance->ode))},
     };
     return are_possible(instance, values, COUNT(values)) &&
            (!state->experiment_defined ||

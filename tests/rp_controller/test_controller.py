@@ -327,6 +327,11 @@ def test_the_taylor_method_is_refused_where_the_fmu_integrates(loaded: LoadedFmu
         instance.fmi.setupExperiment()
         instance.fmi.enterInitializationMode()
         assert status_of(instance.fmi.exitInitializationMode) == OK
+        saved = instance.fmi.getFMUstate()
+        read = instance.fmi.deSerializeFMUstate(instance.fmi.serializeFMUstate(saved))
+        instance.fmi.setFMUstate(read)
+        instance.fmi.freeFMUstate(read)
+        instance.fmi.freeFMUstate(saved)
 
 
 def test_mode_changes_between_steps(loaded: LoadedFmu) -> None:
