@@ -1,5 +1,6 @@
 #include "history.h"
 
+#include "model_modes.h"
 #include "right_hand_side.h"
 
 #include <math.h>
@@ -50,7 +51,8 @@ static bool is_at_end(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     return target > state->passed_time &&
-           steps >= integrator_longest_history(instance->configured.method);
+           steps >= integrator_longest_history(instance->configured.method,
+                                               instance_is_searched(instance));
 }
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
@@ -69,9 +71,12 @@ void instance_update_next_step(struct instance *instance) {
     }
 }
 
-static struct integrator_start start_of(const struct instance_state *state) {
-    return (struct integrator_start){
-        .span = state->span, .first_step = state->restart_step, .goes_on = state->restart_goes_on};
+static struct integrator_start start_of(struct instance *instance) {
+    const struct instance_state *state = &instance->state;
+    return (struct integrator_start){.span = state->span,
+                                     .first_step = state->restart_step,
+                                     .goes_on = state->restart_goes_on,
+                                     .indicators = instance_describe_indicators(instance)};
 }
 
 /* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
@@ -83,25 +88,25 @@ static void hold(struct instance *instance, struct span span) {
     }
 }
 
-static enum status restart(struct instance *instance, struct clock_time end, bool goes_on) {
+static void hold_bytes(struct instance *instance, struct span span) {
+    memcpy(instance->memory.held + span.offset, instance->memory.values + span.offset, span.size);
+}
+
+void instance_hold(struct instance *instance, struct clock_time end,
+                   const struct polynomial inputs[]) {
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
     const struct model *model = instance->model;
-    const size_t input_count = count_of(model->inputs);
-    // the last step gives the length of the first one, unless the parameters have changed
-    if (parameters_are_held(instance)) {
-        instance_update_next_step(instance);
-    } else {
-        state->next_step = 0.0;
-        memcpy(memory->held + model->parameters.offset, memory->values + model->parameters.offset,
-               model->parameters.size);
+    if (!parameters_are_held(instance)) {
+        hold_bytes(instance, model->parameters);
     }
-
-    // hold what is set now
-    state->has_history = false; // until the first advance has succeeded
+    if (model->events != NULL) {
+        hold_bytes(instance, model->events->discrete_inputs);
+        hold_bytes(instance, model->events->modes);
+    }
     hold(instance, model->inputs);
     hold(instance, model->states);
-    memcpy(memory->running, memory->pending, input_count * sizeof *memory->pending);
+    memcpy(memory->running, inputs, count_of(model->inputs) * sizeof *inputs);
     instance_prepare_inputs(instance);
 
     // polynomials end with this step, held inputs at the stop time
@@ -113,17 +118,33 @@ static enum status restart(struct instance *instance, struct clock_time end, boo
         const struct clock_time stop = {.s = state->experiment.stop_time};
         state->span = fmax(clock_difference(stop, state->time), target);
     }
-
-    // note what a replay needs
     state->restart_time = state->time;
     state->first_time = target;
+    state->latest_time = 0.0;
+    instance->history_is_lost = false;
+    state->has_history = false; // until the first advance has succeeded
+}
+
+static enum status restart(struct instance *instance, struct clock_time end,
+                           enum continuation continuation) {
+    struct instance_memory *memory = &instance->memory;
+    struct instance_state *state = &instance->state;
+    // the last step gives the length of the first one, unless the parameters have changed
+    if (!parameters_are_held(instance)) {
+        state->next_step = 0.0;
+    } else if (continuation != CONTINUE_AFTER_EVENT) {
+        instance_update_next_step(instance);
+    }
+    const bool is_event = continuation == CONTINUE_AFTER_EVENT;
+    instance_hold(instance, end, is_event ? memory->current : memory->pending);
+
+    // note what a replay needs
     state->steps_before_restart = state->statistics.steps;
     state->restart_step = state->next_step;
-    state->restart_goes_on = goes_on;
-    instance->history_is_lost = false;
-    const struct integrator_start start = start_of(state);
-    return integrator_restart(instance->integrator, doubles_of(memory->held, model->states),
-                              &start);
+    state->restart_goes_on = continuation != CONTINUE_AFTER_CHANGE;
+    const struct integrator_start start = start_of(instance);
+    return integrator_restart(instance->integrator,
+                              doubles_of(memory->held, instance->model->states), &start);
 }
 
 /* In the number of internal steps that the state gives. A forged state fails here. */
@@ -134,7 +155,7 @@ enum status instance_replay_history(struct instance *instance) {
     double *x = doubles_of(instance->first_derivatives, states);
     double reached;
     instance_prepare_inputs(instance);
-    const struct integrator_start start = start_of(state);
+    const struct integrator_start start = start_of(instance);
     enum status status =
         integrator_restart(instance->integrator, doubles_of(instance->memory.held, states), &start);
     if (status == STATUS_OK) {
@@ -161,9 +182,9 @@ enum status instance_prepare_history(struct instance *instance, struct clock_tim
     case CONTINUE_AFTER_REPLAY:
         return instance_replay_history(instance);
     case CONTINUE_AFTER_RESTART:
-        return restart(instance, end, true);
     case CONTINUE_AFTER_CHANGE:
-        return restart(instance, end, false);
+    case CONTINUE_AFTER_EVENT:
+        return restart(instance, end, continuation);
     }
     return STATUS_OK;
 }

@@ -6,18 +6,24 @@
 #include "internals.h"
 
 /* How the integrator gets to a time: it goes on from its history, gets that back first, after a
- * restore, restarts on the same motion, because the history has become too long, or restarts
- * because an input or a parameter has changed. */
+ * restore, restarts on the same motion, because the history has become too long, restarts because
+ * an input or a parameter has changed, or restarts after an event, wherever it ends next. */
 enum continuation {
     CONTINUE_NOW,
     CONTINUE_AFTER_REPLAY,
     CONTINUE_AFTER_RESTART,
     CONTINUE_AFTER_CHANGE,
+    CONTINUE_AFTER_EVENT,
 };
 
 /* target: s since the restart. */
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
                                                            double target);
+
+/* What is set now holds from the present time on, the inputs being these polynomials of time, up to
+ * the time end at least: the history is over. */
+NONNULL void instance_hold(struct instance *instance, struct clock_time end,
+                           const struct polynomial inputs[]);
 
 /* Prepares the integrator for an advance to the time end by this continuation. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,

@@ -1,6 +1,7 @@
 #include "instance.h"
 
 #include "fields.h"
+#include "model_modes.h"
 #include "right_hand_side.h"
 #include "settings.h"
 #include "snapshot.h"
@@ -60,6 +61,21 @@ static void place_values(struct instance *instance) {
     }
 }
 
+static bool setup_events(struct instance *instance) {
+    const struct model *model = instance->model;
+    const size_t state_count = count_of(model->states);
+    instance->absolute_tolerances =
+        calloc(state_count + count_of(model->inputs) + 1, sizeof(double));
+    instance->indicators = calloc(model->events->indicator_count, sizeof *instance->indicators);
+    if (instance->absolute_tolerances == NULL || instance->indicators == NULL) {
+        return false;
+    }
+    instance->du = instance->absolute_tolerances + state_count;
+    instance->ode.indicator_count = model->events->indicator_count;
+    instance->ode.indicators = instance_indicators;
+    return true;
+}
+
 static enum status setup(struct instance *instance) {
     const struct model *model = instance->model;
     const size_t values_size = aligned(model->values_size);
@@ -86,14 +102,17 @@ static enum status setup(struct instance *instance) {
     memory->current = memory->pending + input_count;
     memory->running = memory->current + input_count;
     place_values(instance);
+    if (model->events != NULL && !setup_events(instance)) {
+        return STATUS_OUT_OF_MEMORY;
+    }
 
     if (model->states.size == 0) {
         return STATUS_OK;
     }
-    instance->ode = (struct ode){.state_count = count_of(model->states),
-                                 .rhs = instance_rhs,
-                                 .jacobian = instance_jacobian,
-                                 .context = instance};
+    instance->ode.state_count = count_of(model->states);
+    instance->ode.rhs = instance_rhs;
+    instance->ode.jacobian = instance_jacobian;
+    instance->ode.context = instance;
     if (model->series != NULL) {
         instance->ode.series = instance_series;
         instance->ode.series_row_count = model->series->row_count;
@@ -132,6 +151,8 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
+    free(instance->indicators);
+    free(instance->absolute_tolerances);
     free(instance->places);
     free(instance->u);
     free(instance->first_derivatives);
@@ -194,7 +215,11 @@ enum status instance_exit_initialization(struct instance *instance) {
         status = setup_integrator(instance);
     }
     if (status == STATUS_OK) {
+        status = instance_update_modes(instance, NULL);
+    }
+    if (status == STATUS_OK) {
         instance->state.phase = PHASE_STEPPING;
+        instance->state.own.last_event_time = instance->state.time.s;
     }
     return status;
 }

@@ -77,11 +77,12 @@ struct instance {
     struct integrator *integrator;         /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the
                                               tolerances of the states */
-    double *absolute_tolerances; /* one per state, as the integrator has them; NULL: the model has no events */
+    double *absolute_tolerances;  /* one per state, as the integrator has them; NULL: the model has
+                                     no events */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
-    bool inputs_move; /* since the last restart; otherwise u holds their values */
-    double *u;        /* one value per input, as the right-hand side sees them */
+    bool inputs_move;             /* since the last restart; otherwise u holds their values */
+    double *u;                    /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */

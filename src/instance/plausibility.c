@@ -84,7 +84,8 @@ static bool has_possible_history(const struct instance *instance,
                                  const struct instance_state *state) {
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     const int64_t most_steps =
-        integrator_longest_history((enum integrator_method)state->own.solver_method) +
+        integrator_longest_history((enum integrator_method)state->own.solver_method,
+                                   instance->model->events != NULL) +
         (int64_t)state->own.max_internal_steps;
     const bool exists = state->has_history;
     const struct named_value values[] = {

@@ -12,5 +12,6 @@ NONNULL void instance_prepare_inputs(struct instance *instance);
 ode_rhs instance_rhs;
 ode_jacobian instance_jacobian;
 ode_series instance_series;
+ode_indicators instance_indicators;
 
 #endif

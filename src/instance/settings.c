@@ -45,6 +45,20 @@ enum status instance_check_parameters(struct instance *instance) {
     return status;
 }
 
+/* Absolute tolerance of each state, in its unit. */
+static void write_absolute_tolerances(const struct instance *instance, double absolute[]) {
+    const struct span states = instance->model->states;
+    const double tolerance = instance->state.own.effective_relative_tolerance;
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        const size_t from_states = variable->offset - states.offset;
+        if (variable->owner == VARIABLE_OF_MODEL && from_states < states.size) {
+            absolute[from_states / sizeof(double)] =
+                absolute_fraction * variable->nominal * tolerance;
+        }
+    }
+}
+
 /* The parameter wins over the experiment, which wins over the default. */
 void instance_update_tolerance(struct instance *instance) {
     struct instance_state *state = &instance->state;
@@ -59,6 +73,9 @@ void instance_update_tolerance(struct instance *instance) {
                       tolerance,
                   INSTANCE_FINEST_TOLERANCE),
              INSTANCE_COARSEST_TOLERANCE);
+    if (instance->absolute_tolerances != NULL) {
+        write_absolute_tolerances(instance, instance->absolute_tolerances);
+    }
 }
 
 void instance_report_tolerance(const struct instance *instance) {
@@ -106,16 +123,8 @@ bool instance_is_configured_otherwise(const struct instance *instance) {
 
 enum status instance_configure_integrator(struct instance *instance) {
     const struct span states = instance->model->states;
-    const double tolerance = instance->state.own.effective_relative_tolerance;
     double *absolute = doubles_of(instance->first_derivatives, states);
-    for (size_t i = 0; i < instance->description->variable_count; i++) {
-        const struct variable *variable = &instance->description->variables[i];
-        const size_t from_states = variable->offset - states.offset;
-        if (variable->owner == VARIABLE_OF_MODEL && from_states < states.size) {
-            absolute[from_states / sizeof(double)] =
-                absolute_fraction * variable->nominal * tolerance;
-        }
-    }
+    write_absolute_tolerances(instance, absolute);
     struct integrator_settings settings = settings_of(instance);
     settings.absolute_tolerances = absolute;
     const enum status status = integrator_configure(instance->integrator, &settings);

@@ -77,6 +77,7 @@ static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
     instance->history_is_lost = true;
+    instance_update_tolerance(instance);
     if (!instance_has_integrator(instance)) {
         return STATUS_OK;
     }

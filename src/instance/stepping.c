@@ -2,6 +2,7 @@
 
 #include "fields.h"
 #include "history.h"
+#include "model_modes.h"
 #include "right_hand_side.h"
 #include "settings.h"
 #include "snapshot_contents.h"
@@ -68,6 +69,7 @@ struct step {
     bool is_over;                   /* the step is to end where it is */
     struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
     enum status answer;             /* of options->accept */
+    int events;                     /* so far */
 };
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
@@ -195,6 +197,7 @@ static enum status advance(struct step *step) {
                                     clock_difference(step->end, state->restart_time), steps,
                                     &state->latest_time, x);
         if (status != STATUS_OK || step->is_over ||
+            integrator_event(instance->integrator) != NULL ||
             !(state->latest_time < clock_difference(step->end, state->restart_time))) {
             break;
         }
@@ -228,31 +231,91 @@ static bool interpolate(const struct step *step, double target) {
     return true;
 }
 
-static enum status integrate(struct step *step) {
+/* To step->end, or to an event; *fired: what has fired there; NULL: the end is reached. */
+static enum status move(struct step *step, enum continuation continuation, const bool **fired) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    const double target = clock_difference(step->end, state->restart_time);
-    const enum continuation continuation = instance_continuation(instance, target);
-    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
-        return STATUS_OK;
-    }
-    keep(step);
     enum status status = instance_prepare_history(instance, step->end, continuation);
     if (status != STATUS_OK) {
         return status;
     }
     status = advance(step);
+    *fired = status == STATUS_OK ? integrator_event(instance->integrator) : NULL;
 
     // a step that ended early cannot be replayed: its end was not known when it began
-    state->has_history = status == STATUS_OK && !step->is_early &&
-                         integrator_longest_history(instance->configured.method) > 0;
+    state->has_history =
+        status == STATUS_OK && !step->is_early && *fired == NULL &&
+        integrator_longest_history(instance->configured.method, instance_is_searched(instance)) > 0;
     state->passed_time = integrator_passed_time(instance->integrator);
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
     }
+    update_statistics(instance);
+    return status;
+}
+
+/* The same where no state moves: time passes until an input sets them free. */
+static enum status rest(struct step *step, const bool **fired) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    instance_hold(instance, step->end,
+                  step->events > 0 ? instance->memory.current : instance->memory.pending);
+    state->next_step = 0.0;
+    *fired = NULL;
+    state->latest_time = state->first_time;
+    if (!instance->inputs_move) {
+        return STATUS_OK;
+    }
+    const struct integrator_start start = {.span = state->span,
+                                           .indicators = instance_describe_indicators(instance)};
+    const enum status status = integrator_rest(
+        instance->integrator, doubles_of(instance->memory.held, instance->model->states), &start,
+        state->first_time, &state->latest_time);
+    *fired = status == STATUS_OK ? integrator_event(instance->integrator) : NULL;
+    return status;
+}
+
+/* The instance goes to the time of an event, and its modes change. */
+static enum status pass_event(struct step *step, const bool fired[]) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+    place_inputs(instance, clock_difference(state->time, step->begin));
+    const enum status status = instance_count_event(instance, fired, &step->events);
+    if (state->next_step == 0.0) {
+        state->next_step = state->statistics.last_step;
+    }
+    return status == STATUS_OK ? instance_update_modes(instance, fired) : status;
+}
+
+static enum status integrate(struct step *step) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const double target = clock_difference(step->end, state->restart_time);
+    enum continuation continuation = instance_continuation(instance, target);
+    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
+        return STATUS_OK;
+    }
+    keep(step);
+    enum status status = STATUS_OK;
+    if (continuation == CONTINUE_AFTER_CHANGE) {
+        status = instance_update_modes(instance, NULL);
+    }
+    while (status == STATUS_OK) {
+        const bool *fired = NULL;
+        status =
+            instance_is_at_rest(instance) ? rest(step, &fired) : move(step, continuation, &fired);
+        if (status != STATUS_OK || fired == NULL) {
+            break;
+        }
+        status = pass_event(step, fired);
+        if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
+            break;
+        }
+        continuation = CONTINUE_AFTER_EVENT;
+    }
     arrive(step,
            status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
-    update_statistics(instance);
     return status;
 }
 

@@ -245,6 +245,19 @@ enum status integrator_advance(struct integrator *integrator, double t, int64_t 
     return status;
 }
 
+enum status integrator_rest(struct integrator *integrator, const double x[],
+                            const struct integrator_start *start, double t, double *reached) {
+    struct problem *problem = &integrator->problem;
+    enum status status = location_restart(&problem->location, start->indicators, x);
+    if (status == STATUS_OK && start->indicators != NULL) {
+        status = location_search_at_rest(&problem->location, x, t);
+    }
+    integrator->internal = -INFINITY;
+    problem->reached = status == STATUS_OK ? fmin(t, problem->location.time) : 0.0;
+    *reached = problem->reached;
+    return status;
+}
+
 const bool *integrator_event(const struct integrator *integrator) {
     const struct location *location = &integrator->problem.location;
     return location->time == integrator->problem.reached ? location->fired : NULL;

@@ -134,6 +134,13 @@ MUST_CHECK NONNULL bool integrator_interpolate(struct integrator *integrator, do
 MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
                                                   int64_t max_steps, double *reached, double x[]);
 
+/* Instead of a restart and an advance, where no state moves: searches the time to t for an event,
+ * with the states x. Writes t or the time of the event to *reached, as integrator_advance; counts
+ * nothing. A restart must follow. */
+MUST_CHECK NONNULL enum status integrator_rest(struct integrator *integrator, const double x[],
+                                               const struct integrator_start *start, double t,
+                                               double *reached);
+
 /* Where the last advance ended at an event: which indicators are at 0, one flag each; otherwise
  * NULL. The next call must be a restart. */
 NONNULL const bool *integrator_event(const struct integrator *integrator);

@@ -222,8 +222,8 @@ static enum status search_model_in(struct location *location, double begin, doub
     size_t i = from;
     while (status == STATUS_OK && i < location->ode->indicator_count) {
         const bool is_last_try = piece.count == CHEBYSHEV_LENGTH && length <= shortest_piece;
-        const bool is_wanted = location->indicators[i].kind == INDICATOR_OF_MODEL &&
-                               location->first[i] > begin;
+        const bool is_wanted =
+            location->indicators[i].kind == INDICATOR_OF_MODEL && location->first[i] > begin;
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
             i++;
         } else if (piece.count < CHEBYSHEV_LENGTH) {
@@ -272,4 +272,38 @@ enum status location_search(struct location *location) {
     }
     location->time = s == 1.0 ? step->end : step->begin + s * (step->end - step->begin);
     return STATUS_OK;
+}
+
+enum status location_search_at_rest(struct location *location, const double x[], double t) {
+    struct step_polynomial *step = &location->step;
+    step->begin = 0.0;
+    step->end = t;
+    step->is_from_end = false;
+    step->degree = 0;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        step->row[i][0] = x[i];
+    }
+    return location_search(location);
+}
+
+bool location_correction(struct location *location, double t, const double x[], const double dx[],
+                         double *correction) {
+    // over this part of the step the derivative of an indicator hardly changes
+    const double ahead = 0x1p-20 * (location->step.end - location->step.begin);
+    size_t i = 0;
+    while (!location->fired[i]) {
+        i++;
+    }
+    if (evaluate(location, t, x) != STATUS_OK) {
+        return false;
+    }
+    const double z = location->z[i];
+    for (size_t j = 0; j < location->ode->state_count; j++) {
+        location->x[j] = x[j] + ahead * dx[j];
+    }
+    if (evaluate(location, t + ahead, location->x) != STATUS_OK) {
+        return false;
+    }
+    *correction = -z * ahead / (location->z[i] - z);
+    return isfinite(*correction);
 }

@@ -51,4 +51,13 @@ static inline bool location_is_active(const struct location *location) {
 /* Searches location->step. If there is an event in it, writes its time and what has fired. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
 
+/* The same for the time from 0 to t, over which the states stay at x. */
+MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
+                                                       double t);
+
+/* Newton's correction (s) of the event's time, from the state x and its derivative dx at the time
+ * t: -z / z' of the first indicator that has fired. False where it has none. */
+MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
+                                            const double dx[], double *correction);
+
 #endif

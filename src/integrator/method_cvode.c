@@ -371,8 +371,9 @@ static double next_step(void *memory, const double x[]) {
 
 #define COMMON                                                                                     \
     .tolerance_fraction = TOLERANCE_FRACTION, .longest_history = LONGEST_HISTORY,                  \
-    .memory_size = sundials_memory_size, .destroy = destroy, .configure = configure,               \
-    .restart = restart, .advance = advance, .interpolate = interpolate, .next_step = next_step
+    .longest_history_with_events = LONGEST_HISTORY, .memory_size = sundials_memory_size,           \
+    .destroy = destroy, .configure = configure, .restart = restart, .advance = advance,            \
+    .interpolate = interpolate, .next_step = next_step
 
 const struct method integrator_cvode_adams = {COMMON, .name = "cvode_adams",
                                               .create = create_adams};

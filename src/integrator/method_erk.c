@@ -1,5 +1,6 @@
 /* Explicit Runge-Kutta steps of ARKODE. Each advance starts ERKStep again: only the length of the
  * next step connects one advance with the next. */
+#include "reserve.h"
 #include "sundials.h"
 
 #include <arkode/arkode_erkstep.h>
@@ -13,6 +14,9 @@
 static const ARKODE_ERKTableID table = ARKODE_DORMAND_PRINCE_7_4_5;
 static const int order = 5;
 
+/* Of the time of an event. */
+enum { MOST_CORRECTIONS = 20 };
+
 /* s: ARKODE multiplies lengths of steps with each other, and with one that it keeps over a restart.
  * Where that underflows, what it does would depend on the step before. */
 static const double shortest_advance = 1e-100;
@@ -25,8 +29,15 @@ struct erk {
     /* of the running advance */
     double end;        /* s since the restart */
     double watched;    /* s since the restart: the last time that the observer was asked about */
-    bool is_cut_short; /* by the observer, at that time */
+    bool is_cut_short; /* by an event in the step before that time, or by the observer there */
     double *cut_x;     /* the state there */
+
+    /* where events are looked for: the begin of the running internal step */
+    double step_begin; /* s since the restart */
+    double *step_x;    /* the state there */
+    double *step_dx;   /* and the right-hand side */
+    double *dx;        /* that of the end */
+    enum status search_status;
 };
 
 static enum status status_of_flag(const struct problem *problem, int flag) {
@@ -59,30 +70,79 @@ static enum status status_of_flag(const struct problem *problem, int flag) {
 
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Called by ERKStep after each step that it accepts; ends the advance where the observer says so.
- * Times that come again, after a failure, are not reported twice. */
+/* Searches the step that has ended at t with the state x: the cubic polynomial through the states
+ * and the right-hand sides at its ends. Goes on to the next one. */
+static enum status search(struct erk *erk, double t, const double x[]) {
+    struct problem *problem = erk->base.problem;
+    struct step_polynomial *step = &problem->location.step;
+    const size_t n = problem->ode.state_count;
+    enum status status = problem_rhs(problem, t, x, erk->dx);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    const double h = t - erk->step_begin;
+    step->begin = erk->step_begin;
+    step->end = t;
+    step->is_from_end = false;
+    step->degree = 3;
+    for (size_t i = 0; i < n; i++) {
+        const double change = x[i] - erk->step_x[i];
+        const double first = h * erk->step_dx[i];
+        const double last = h * erk->dx[i];
+        step->row[i][0] = erk->step_x[i];
+        step->row[i][1] = first;
+        step->row[i][2] = 3.0 * change - 2.0 * first - last;
+        step->row[i][3] = first + last - 2.0 * change;
+    }
+    status = location_search(&problem->location);
+    if (problem->location.time == INFINITY) {
+        erk->step_begin = t;
+        memcpy(erk->step_x, x, n * sizeof(double));
+        memcpy(erk->step_dx, erk->dx, n * sizeof(double));
+    }
+    return status;
+}
+
+/* Called by ERKStep after each step that it accepts; ends the advance at an event or where the
+ * observer says so. Times that come again, after a failure, are not reported twice. */
 static int observe(sunrealtype t, N_Vector x, void *user_data) {
     struct erk *erk = user_data;
     const struct problem *problem = erk->base.problem;
-    if (t <= erk->watched || t >= erk->end) {
+    if (t <= erk->watched) {
         return 0;
     }
     erk->watched = t;
-    erk->is_cut_short = problem_ends_at(problem, t, small_vector_data(x));
+    if (location_is_active(&problem->location)) {
+        erk->search_status = search(erk, t, small_vector_data(x));
+        erk->is_cut_short = erk->search_status != STATUS_OK || problem->location.time <= erk->end;
+    }
+    if (!erk->is_cut_short && problem->observer != NULL && t < erk->end) {
+        erk->is_cut_short = problem_ends_at(problem, t, small_vector_data(x));
+    }
     if (erk->is_cut_short) {
         memcpy(erk->cut_x, small_vector_data(x), problem->ode.state_count * sizeof(double));
     }
     return erk->is_cut_short ? 1 : 0;
 }
 
-/* Before an advance to the time end, which writes the state to x. */
-static int begin_watching(struct erk *erk, double end, double x[]) {
-    const struct problem *problem = erk->base.problem;
+/* Before an advance from the state begin_x to the time end, which writes the state to x. */
+static int begin_watching(struct erk *erk, double end, const double begin_x[], double x[]) {
+    struct problem *problem = erk->base.problem;
+    const bool is_searched = location_is_active(&problem->location);
     erk->is_cut_short = false;
     erk->cut_x = x;
     erk->end = end;
     erk->watched = problem->reached;
-    return ERKStepSetPostprocessStepFn(erk->solver, problem->observer != NULL ? observe : NULL);
+    erk->search_status = STATUS_OK;
+    if (is_searched) {
+        erk->step_begin = problem->reached;
+        memcpy(erk->step_x, begin_x, problem->ode.state_count * sizeof(double));
+        if (problem_rhs(problem, problem->reached, begin_x, erk->step_dx) != STATUS_OK) {
+            return ARK_RHSFUNC_FAIL;
+        }
+    }
+    const bool is_watched = is_searched || problem->observer != NULL;
+    return ERKStepSetPostprocessStepFn(erk->solver, is_watched ? observe : NULL);
 }
 
 /* An advance that the observer ends is none that fails. */
@@ -98,6 +158,7 @@ static void report_text(int error_code, const char *module, const char *function
 
 static void destroy(void *memory) {
     struct erk *erk = memory;
+    reserve_free(erk->step_x);
     if (erk->solver != NULL) {
         ERKStepFree(&erk->solver);
     }
@@ -124,11 +185,16 @@ static enum status create(struct problem *problem, void **memory) {
     if (erk == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
-    const enum status status = create_solver(erk) ? sundials_warm_up(erk) : STATUS_OUT_OF_MEMORY;
+    const size_t n = problem->ode.state_count;
+    erk->step_x = reserve_calloc(3 * n, sizeof *erk->step_x);
+    const bool is_created = erk->step_x != NULL && create_solver(erk);
+    const enum status status = is_created ? sundials_warm_up(erk) : STATUS_OUT_OF_MEMORY;
     if (status != STATUS_OK) {
         destroy(erk);
         return status;
     }
+    erk->step_dx = erk->step_x + n;
+    erk->dx = erk->step_dx + n;
     *memory = erk;
     return STATUS_OK;
 }
@@ -220,6 +286,50 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
+/* From the begin of the step in which the event is to the time t. Writes the state to x and the
+ * right-hand side to erk->dx. */
+static int step_to(struct erk *erk, double t, double x[]) {
+    struct problem *problem = erk->base.problem;
+    double reached;
+    sundials_set_state(&erk->base, erk->step_x);
+    if (t > erk->step_begin) {
+        int flag = start(erk, erk->step_begin, t, t - erk->step_begin);
+        if (flag == ARK_SUCCESS) {
+            flag = ERKStepEvolve(erk->solver, t, erk->base.x, &reached, ARK_NORMAL);
+        }
+        if (flag < 0) {
+            return flag;
+        }
+    }
+    sundials_get_state(&erk->base, x);
+    return problem_rhs(problem, t, x, erk->dx) == STATUS_OK ? ARK_SUCCESS : ARK_RHSFUNC_FAIL;
+}
+
+/* The polynomial of the search is less accurate than the step: Newton's method leads from its root
+ * to that of the steps which end there. */
+static int step_onto_event(struct erk *erk, double *stopped_at, double x[]) {
+    struct location *location = &erk->base.problem->location;
+    const double begin = erk->step_begin;
+    const double end = erk->watched;
+    double t = location->time;
+    int flag = ERKStepSetPostprocessStepFn(erk->solver, NULL);
+    for (int i = 0; flag >= 0 && i < MOST_CORRECTIONS; i++) {
+        flag = step_to(erk, t, x);
+        double correction = 0.0;
+        if (flag < 0 || !location_correction(location, t, x, erk->dx, &correction)) {
+            break;
+        }
+        const double next = fmin(fmax(t + correction, begin), end);
+        if (fabs(next - t) <= 2.0 * DBL_EPSILON * end) {
+            break;
+        }
+        t = next;
+    }
+    location->time = t;
+    *stopped_at = t;
+    return flag;
+}
+
 static int integrate(struct erk *erk, double t, int64_t max_steps, const double begin_x[],
                      double *stopped_at, double x[], struct method_work *work) {
     // parts of equal length leave no sliver at the end
@@ -229,7 +339,7 @@ static int integrate(struct erk *erk, double t, int64_t max_steps, const double 
     sundials_set_state(&erk->base, begin_x);
     int flag = start(erk, begin, t, first_step);
     if (flag == ARK_SUCCESS) {
-        flag = begin_watching(erk, t, x);
+        flag = begin_watching(erk, t, begin_x, x);
     }
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxNumSteps(erk->solver, sundials_steps(max_steps));
@@ -248,7 +358,8 @@ static int integrate(struct erk *erk, double t, int64_t max_steps, const double 
         work->internal = erk->watched;
         work->is_cut_short = true;
         *stopped_at = erk->watched;
-        return ARK_SUCCESS;
+        return erk->base.problem->location.time <= t ? step_onto_event(erk, stopped_at, x)
+                                                     : ARK_SUCCESS;
     }
     if (!is_given_up) {
         sundials_get_state(&erk->base, x);
@@ -272,7 +383,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         !isfinite(erk->next_step)) {
         erk->next_step = 0.0;
     }
-    return status_of_flag(problem, flag);
+    return erk->search_status != STATUS_OK ? erk->search_status : status_of_flag(problem, flag);
 }
 
 static double next_step(void *memory, const double x[]) {

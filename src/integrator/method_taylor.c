@@ -306,7 +306,8 @@ static double longest_step(const struct problem *problem, double t) {
 
 static double longest_step_in_units(const struct problem *problem, double t, double unit) {
     const double longest = longest_step(problem, t) / unit;
-    return longest < most_units ? longest : most_units;
+    const double most = location_is_active(&problem->location) ? growing : most_units;
+    return longest < most ? longest : most;
 }
 
 /* Begins the series of a step at the state x, the orders of which depend on is_long; writes the
@@ -469,11 +470,13 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
-/* The length of a step follows from the series. */
+/* The length of a step follows from the series. With events, it is expanded for what was left of the
+ * last one. */
 static double next_step(void *memory, const double x[]) {
-    (void)memory;
+    const struct taylor *taylor = memory;
+    const struct problem *problem = taylor->problem;
     (void)x;
-    return 0.0;
+    return location_is_active(&problem->location) ? problem->reached - taylor->begin : 0.0;
 }
 
 #define TOLERANCE_FRACTION 1e-1

@@ -121,7 +121,7 @@ static int most_roots(const struct rising *p) {
         if (above[k] < 0.0 || below[k] > 0.0) {
             const int next = above[k] < 0.0 ? -1 : 1;
             changes += next != sign;
-            if (changes > 1 || unknown > (next != sign)) {
+            if (unknown > (next != sign)) {
                 return 2;
             }
             unknown = 0;
@@ -258,27 +258,29 @@ static int find(const struct rising *p, int sign, int most, struct root roots[RO
                                      sign > 0 ? ROOT_RISES : ROOT_FALLS};
 
     struct node left = {0.0, p->c[0], 1, false};
-    int now = 1; // the last sign that is not 0
+    int now = 1;          // the last sign that is not 0
+    bool is_open = false; // the last root may turn out to be one that crosses
     int found = 0;
-    bool is_open = false; // what the last root is depends on the next sign
     for (int i = 0; i <= count && (found < most || is_open); i++) {
         double slope;
         const struct node right = node_at(p, i < count ? points[i] : 1.0, true, &slope);
-        const bool is_across = right.sign == -now;
-        if (is_across) {
+        if (right.sign == -now) {
             found += !is_open;
             const double s = left.sign == 0 ? left.s : crossing(p, left, right, true);
             roots[found - 1] = (struct root){s, across[now < 0]};
-        } else if (right.is_rounded && !is_open) {
+            is_open = false;
+            now = right.sign;
+        } else if (!right.is_rounded) {
+            is_open = false;
+        } else if (!left.is_rounded) {
             roots[found] = (struct root){right.s, ROOT_TOUCHES};
             found++;
+            is_open = true;
         }
-        if (right.sign == 0 && i == count) {
-            roots[found - 1] = (struct root){right.s, across[now < 0]};
-        }
-        is_open = right.is_rounded && !is_across;
-        now = is_across ? right.sign : now;
         left = right;
+    }
+    if (is_open && left.sign == 0) {
+        roots[found - 1] = (struct root){1.0, across[now < 0]};
     }
     return found;
 }
@@ -301,7 +303,7 @@ double roots_search_first(const struct roots_polynomial *p) {
     return sign > 0 && find(&rising, 1, 1, roots) > 0 ? roots[0].s : INFINITY;
 }
 
-/* |p(s)| is within its rounding and that of s > 0. */
+/* |p(s)| is within its rounding and that of s. */
 static bool is_zero_at(const struct roots_polynomial *p, double s) {
     struct rising rising;
     if (prepare(p, &rising) == 0) {
@@ -321,7 +323,7 @@ double roots_earliest(size_t count, const struct roots_polynomial p[], bool is_a
             earliest = s;
         }
     }
-    if (earliest > 0.0 && earliest < INFINITY) {
+    if (earliest < INFINITY) {
         for (size_t i = 0; i < count; i++) {
             is_at_root[i] = is_at_root[i] || is_zero_at(&p[i], earliest);
         }

@@ -1,21 +1,21 @@
-/* Where an indicator reaches 0 within an internal step: roots of its polynomial
- * p(s) = sum of c[k] s^k on (0, 1], of which s = 0 is the begin of the step and s = 1 its end.
+/* Where an indicator reaches 0 within an internal step: the roots of its polynomial
+ * p(s) = sum of c[k] s^k on (0, 1]. The step starts at s = 0 and ends at s = 1.
  *
- * The coefficients count as exact. Between a polynomial's extrema, which are the roots of its
- * derivative, there is one root or none; the signs of p at these points are those of exact
- * arithmetic, by Horner's scheme with compensated rounding. What is guaranteed, where
- * r(s) = (2 degree + 4) 2^-53 sum of |c[k]| s^k, which bounds the rounding of Horner's scheme:
+ * Coefficients count as exact. Between neighbouring extrema, which are the roots of the derivative,
+ * p has one root or none. The signs there are those of exact arithmetic, as far as |p| exceeds
+ * 2^-94 size(s); size(s) = sum of |c[k]| s^k. With r(s) = (2 degree + 4) 2^-53 size(s), which
+ * bounds the rounding of Horner's scheme, this is guaranteed:
  *
- * - Every root at which p changes its sign is found, to the last bit: s is the first double at
- *   which p has its new sign, or is 0. Two of them are found apart where |p| exceeds 2 r between
- *   them, and mostly so where it does not.
- * - A touch, an extremum that does not change the sign, is found where |p| <= r, and not where
- *   |p| > 2 r. So is an end of the step at which |p| <= r: the root may be beyond it by rounding.
- *   Touches with nothing but rounding between them are one, and a touch beside a change of sign is
- *   none.
+ * - Every change of sign is found, and to the last bit: s is the first double at which p has its
+ *   new sign or is 0 (less than 2^-94 size(s)). Two of them may be missed, or be one touch, only
+ *   where |p| <= 2 r between them.
+ * - A touch is an extremum without change of sign. It is found where |p| <= r, and never where
+ *   |p| > 2 r. The end of the step counts as one where |p(1)| <= r: by rounding, the root may be
+ *   beyond it. Touches with nothing but |p| <= 2 r between them are one; beside a change of sign
+ *   there is none.
  *
- * Coefficients are to be finite; with others, or with zeros only, no root is found. Nothing is
- * allocated, and the same polynomial has the same roots on every platform. */
+ * Coefficients are to be finite: with others no root is found, nor with zeros only. Nothing is
+ * allocated. The same polynomial has the same roots on every platform. */
 #ifndef ROOTS_H
 #define ROOTS_H
 
@@ -31,10 +31,9 @@ enum { ROOTS_LENGTH = 32 };
 struct roots_polynomial {
     const double *c; /* degree + 1 coefficients, in the unit of p */
     int degree;      /* 0 to ROOTS_LENGTH - 1 */
-    /* >= 0: p begins at a root that has been dealt with if |c[0]| <= noise. Then this and all
-     * further leading coefficients within the noise count as 0, and the roots are those of what is
-     * left, divided by its power of s; the one at s = 0 is none of them, another may be as close to
-     * it as it likes. < 0: p does not begin at such a root. In the unit of p. */
+    /* In the unit of p. >= 0: the first coefficients, as long as they are within it, count as 0: p
+     * starts at a root that has been dealt with. The next one is found however close it is. < 0: p
+     * does not start at such a root. */
     double noise;
 };
 
@@ -56,8 +55,8 @@ MUST_CHECK NONNULL int roots_find(const struct roots_polynomial *p,
 /* roots_first without the quick proof. */
 MUST_CHECK NONNULL double roots_search_first(const struct roots_polynomial *p);
 
-/* Proves that p exceeds its rounding on (0, 1] from p(s) >= c0 + c1 s + d s^2, d = c2 + sum of the
- * negative coefficients behind it; false: it may, or may not. */
+/* True: p > r on (0, 1], because p(s) >= c0 + c1 s + d s^2 > 0, where d is c2 plus the negative
+ * coefficients behind it. False: that is not known. */
 NONNULL static inline bool roots_is_above(const struct roots_polynomial *p) {
     // more than the rounding here and that of Horner's scheme, as parts of each coefficient
     const double slack = 0x1p-45;
@@ -85,14 +84,14 @@ NONNULL static inline bool roots_is_above(const struct roots_polynomial *p) {
     return is_above_at_ends && (c1 >= 0.0 || c1 + 2.0 * d <= 0.0 || 4.0 * c0 * d > c1 * c1);
 }
 
-/* The first s in (0, 1] at which p, above 0 before, is 0 or below, or touches 0; 0 if p is below 0
- * from the begin on; INFINITY if it stays above. */
+/* The first s in (0, 1] at which p, above 0 before, is 0 or below, or touches 0. 0: p is below 0
+ * right after the start, or 0 there with noise < 0. INFINITY: p stays above. */
 MUST_CHECK NONNULL static inline double roots_first(const struct roots_polynomial *p) {
     return roots_is_above(p) ? INFINITY : roots_search_first(p);
 }
 
-/* The smallest roots_first of count polynomials. Writes which of them are at 0 there: this is
- * their own first root, or |p| is within the rounding of its value or of s. */
+/* The smallest roots_first of count polynomials. Writes which of them are 0 there: it is their own
+ * roots_first, or |p| is within the rounding of its value and of s. */
 MUST_CHECK NONNULL double roots_earliest(size_t count, const struct roots_polynomial p[],
                                          bool is_at_root[]);
 

@@ -240,7 +240,7 @@ EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) 
     TEST_ASSERT_TRUE(x[0] == -7.0);
     TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, x));
     const double next = 1.0 + 1e-6;
-    if (!(integrator_longest_history((enum integrator_method)method) > 0)) {
+    if (!(integrator_longest_history((enum integrator_method)method, false) > 0)) {
         TEST_ASSERT_FALSE(integrator_interpolate(integrator, next, x));
         return;
     }

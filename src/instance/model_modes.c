@@ -1,4 +1,4 @@
-#include "events.h"
+#include "model_modes.h"
 
 #include "fields.h"
 

@@ -1,6 +1,6 @@
 /* Modes of the model and the events at which they change. */
-#ifndef INSTANCE_EVENTS_H
-#define INSTANCE_EVENTS_H
+#ifndef INSTANCE_MODEL_MODES_H
+#define INSTANCE_MODEL_MODES_H
 
 #include "internals.h"
 
@@ -10,8 +10,8 @@ NONNULL bool instance_is_searched(const struct instance *instance);
 /* No state moves in the present modes. */
 NONNULL bool instance_is_at_rest(const struct instance *instance);
 
-/* Brings modes, states and sums to what follows the inputs and parameters set now and, where `fired`
- * is not NULL, the event at the current time. */
+/* Brings modes, states and sums to what follows the inputs and parameters set now and, where
+ * `fired` is not NULL, the event at the current time. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *fired);
 

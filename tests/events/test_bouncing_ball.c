@@ -1,0 +1,145 @@
+/* A ball that bounces: impacts at v1 / g + 2 v1 (e + ... + e^(k-1)) / g, rest at
+ * v1 / g (1 + e) / (1 - e) from a height with v1 = sqrt(2 g h). */
+#include "toy_run.h"
+
+#include <string.h>
+
+static const double g = 9.81;
+
+void setUp(void) {}
+
+void tearDown(void) {
+    instance_destroy(toy);
+    toy = NULL;
+}
+
+/* Time of impact k, from 1 on. */
+static double impact_time(double height, double e, int k) {
+    const double first = sqrt(2.0 * height / g);
+    double time = first;
+    for (int i = 1; i < k; i++) {
+        time += 2.0 * first * pow(e, i);
+    }
+    return time;
+}
+
+static void test_times_of_impacts(void) {
+    static const double steps[] = {1e-3, 1e-2, 0.1};
+    for (int method = 1; method <= 4; method++) {
+        for (int s = 0; s < 3; s++) {
+            int seen = 0;
+            prepare(&ball_description, method, 1e-10);
+            initialize();
+            for (int i = 0; i < (int)round(1.5 / steps[s]); i++) {
+                run(i * steps[s], steps[s], 1);
+                const int count = get_int(TOY_EVENTS);
+                if (count > seen) {
+                    const double expected = impact_time(1.0, 0.8, count);
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, get(TOY_LAST_EVENT));
+                    seen = count;
+                }
+            }
+            TEST_ASSERT_EQUAL_INT(2, seen);
+        }
+    }
+}
+
+static void test_it_comes_to_rest_on_the_floor(void) {
+    static const double steps[] = {1e-3, 1.0, 10.0};
+    for (int method = 1; method <= 4; method++) {
+        for (int s = 0; s < 3; s++) {
+            prepare(&ball_description, method, 1e-10);
+            set(TOY_POSITION, 0.5);
+            initialize();
+            run(0.0, steps[s], (int)round(10.0 / steps[s]));
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_POSITION));
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_ACCELERATION));
+            const double e = 0.8;
+            const double rest = sqrt(2.0 * 0.5 / g) * (1.0 + e) / (1.0 - e);
+            const double fraction = method == 1 || method == 2 ? 2e-3 : method == 3 ? 1e-2 : 1e-1;
+            const double left_out = 2.0 * sqrt(2.0 * 1e-12 * fraction / g) / (1.0 - e);
+            // the last bounces are as low as the error of the position: so are their lengths
+            TEST_ASSERT_DOUBLE_WITHIN(2.0 * left_out, rest - left_out, get(TOY_LAST_EVENT));
+            static const int methods[] = {1, 2, 4};
+            for (int m = 0; m < 3; m++) {
+                double first = NAN;
+                for (int s = 0; s < 4; s++) {
+                    prepare(&ball_description, methods[m], 1e-8);
+                    initialize();
+                    run(0.0, 0.03125, 1);
+                    run(0.03125, steps[s], (int)round(2.25 / steps[s]));
+                    TEST_ASSERT_EQUAL_INT(4, get_int(TOY_EVENTS));
+                    if (s == 0) {
+                        first = get(TOY_LAST_EVENT);
+                    }
+                    TEST_ASSERT_EQUAL_DOUBLE(first, get(TOY_LAST_EVENT));
+                }
+            }
+        }
+
+        /* Thrown down and lifted, it passes the floor by this depth between two communication
+         * points. */
+        static void test_a_short_dip_is_found(void) {
+            static const double steps[] = {1e-3, 1e-2, 1.0, 4.0};
+            for (int method = 1; method <= 4; method++) {
+                for (int s = 0; s < 4; s++) {
+                    const double depth = 1e-7;
+                    const double pull = 1.0; // upwards
+                    const double v = -sqrt(2.0 * pull * (1.0 + depth));
+                    prepare(&ball_description, method, 1e-8);
+                    set(TOY_INPUT, g + pull);
+                    set(TOY_SPEED, v);
+                    initialize();
+                    run(0.0, steps[s], (int)round(4.0 / steps[s]));
+                    TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
+                    const double first = -v - sqrt(2.0 * pull * depth);
+                    // 2e-7 s for each 1e-10 m
+                    TEST_ASSERT_DOUBLE_WITHIN(2e-7, first, get(TOY_LAST_EVENT));
+                    set(TOY_PARAMETER2, 1.0);
+                    initialize();
+                    run(0.0, 10.0, 100);
+                    TEST_ASSERT_INT_WITHIN(1, 1107, get_int(TOY_EVENTS));
+                    const double energy =
+                        g * get(TOY_POSITION) + 0.5 * get(TOY_SPEED) * get(TOY_SPEED);
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-6, g, energy);
+                }
+            }
+
+            static void test_a_limit_of_events_ends_the_step(void) {
+                for (int method = 1; method <= 4; method++) {
+                    prepare(&ball_description, method, 1e-8);
+                    set_int(TOY_MAX_EVENTS, 3);
+                    initialize();
+                    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(toy, 0.0, 5.0));
+                    TEST_ASSERT_EQUAL_INT(3, get_int(TOY_EVENTS));
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-7, impact_time(1.0, 0.8, 4), instance_time(toy));
+                    TEST_ASSERT_NOT_NULL(strstr(last_text, "ended"));
+                }
+            }
+
+            static void test_the_lift_takes_it_from_the_floor(void) {
+                for (int method = 1; method <= 4; method++) {
+                    prepare(&ball_description, method, 1e-10);
+                    set(TOY_POSITION, 0.0);
+                    initialize();
+                    run(0.0, 1.0, 2);
+                    TEST_ASSERT_EQUAL_INT(0, get_int(TOY_STEPS));
+                    set(TOY_INPUT, g + 1.0);
+                    run(2.0, 1.0, 1);
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.5, get(TOY_POSITION));
+                    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
+                }
+            }
+
+            int main(void) {
+                UNITY_BEGIN();
+                RUN_TEST(test_times_of_impacts);
+                RUN_TEST(test_it_comes_to_rest_on_the_floor);
+                RUN_TEST(test_later_points_do_not_change_the_times);
+                RUN_TEST(test_a_short_dip_is_found);
+                RUN_TEST(test_restitution_1_keeps_the_energy);
+                RUN_TEST(test_a_limit_of_events_ends_the_step);
+                RUN_TEST(test_the_lift_takes_it_from_the_floor);
+                return UNITY_END();
+            }

@@ -1,0 +1,348 @@
+#include "toy.h"
+
+#include <string.h>
+
+/* ---- Ball ----------------------------------------------------------------------------------- */
+
+static enum status ball_rhs(const void *values, double t, const double x[], const double u[],
+                            double dx[]) {
+    const struct ball_values *ball = values;
+    (void)t;
+    dx[0] = ball->is_resting ? 0.0 : x[1];
+    dx[1] = ball->is_resting ? 0.0 : u[0] - ball->g;
+    return STATUS_OK;
+}
+
+/* Both models are two integrals: x' = v, v' = a. */
+static enum status jacobian(const void *values, double t, const double x[], const double u[],
+                            double J[]) {
+    (void)values;
+    (void)t;
+    (void)x;
+    (void)u;
+    memset(J, 0, 4 * sizeof *J);
+    J[2] = 1.0;
+    return STATUS_OK;
+}
+
+static void extend_motion(const struct series_origin *origin, int k, double a,
+                          double rows[][SERIES_LENGTH]) {
+    if (k > 0) {
+        rows[0][k] = origin->unit / k * rows[1][k - 1];
+        rows[1][k] = origin->unit / k * a;
+    }
+}
+
+static double input_order(const struct series_origin *origin, int k) {
+    return k < SERIES_INPUT_LENGTH ? origin->inputs[0][k] : 0.0;
+}
+
+static enum status ball_extend(const struct series_origin *origin, int first, int last,
+                               double rows[][SERIES_LENGTH]) {
+    const struct ball_values *ball = origin->values;
+    for (int k = first; k <= last; k++) {
+        const double pull = k == 1 ? ball->g : 0.0;
+        extend_motion(origin, k, ball->is_resting ? 0.0 : input_order(origin, k - 1) - pull, rows);
+    }
+    return STATUS_OK;
+}
+
+static const struct series ball_series = {.row_count = 2, .extend = ball_extend};
+
+static enum status ball_outputs(void *values, double t) {
+    struct ball_values *ball = values;
+    (void)t;
+    ball->a = ball->is_resting ? 0.0 : ball->lift - ball->g;
+    return STATUS_OK;
+}
+
+static enum status no_check(const void *values, char *text, size_t size) {
+    (void)values;
+    (void)text;
+    (void)size;
+    return STATUS_OK;
+}
+
+static bool ball_has_floor(const void *values) {
+    return ((const struct ball_values *)values)->has_floor != 0.0;
+}
+
+static bool ball_is_resting(const void *values) {
+    return ((const struct ball_values *)values)->is_resting;
+}
+
+enum { BALL_HEIGHT, BALL_LOAD };
+
+static void ball_describe(const void *values, struct indicator indicators[]) {
+    const bool is_resting = ball_is_resting(values);
+    indicators[BALL_HEIGHT] = (struct indicator){
+        .kind = is_resting ? INDICATOR_UNUSED : INDICATOR_OF_STATE, .state = 0, .factor = 1.0};
+    indicators[BALL_LOAD] =
+        (struct indicator){.kind = is_resting ? INDICATOR_OF_MODEL : INDICATOR_UNUSED};
+}
+
+static enum status ball_indicators(const void *values, double t, const double x[], const double u[],
+                                   double z[]) {
+    const struct ball_values *ball = values;
+    (void)t;
+    z[BALL_HEIGHT] = ball->is_resting ? 1.0 : x[0];
+    z[BALL_LOAD] = ball->is_resting ? ball->g - u[0] : 1.0;
+    return STATUS_OK;
+}
+
+static enum status ball_update(void *values, const struct event *event) {
+    struct ball_values *ball = values;
+    if (!ball_has_floor(values)) {
+        ball->is_resting = 0;
+        return STATUS_OK;
+    }
+    const bool hits = event->fired != NULL ? event->fired[BALL_HEIGHT] : ball->h <= 0.0;
+    const double pull = ball->g - ball->lift;
+    if (hits && !ball->is_resting) {
+        ball->h = 0.0;
+        if (ball->v <= 0.0) {
+            ball->impulse -= (1.0 + ball->restitution) * ball->v;
+            ball->v *= -ball->restitution;
+            if (ball->v * ball->v <= 2.0 * pull * event->tolerance[0]) {
+                ball->v = 0.0;
+                ball->is_resting = 1;
+            }
+        }
+    }
+    if (ball->is_resting && pull <= 0.0) {
+        ball->is_resting = pull == 0.0 && event->du[0] <= 0.0;
+    }
+    return STATUS_OK;
+}
+
+static const char *const ball_names[] = {"the height", "the load"};
+
+static const struct model_events ball_events = {
+    .indicator_count = 2,
+    .indicator_names = ball_names,
+    .modes = {offsetof(struct ball_values, is_resting), sizeof(int)},
+    .sums = {offsetof(struct ball_values, impulse), sizeof(double)},
+    .are_possible = ball_has_floor,
+    .is_at_rest = ball_is_resting,
+    .describe = ball_describe,
+    .indicators = ball_indicators,
+    .update = ball_update,
+};
+
+static const struct model ball_model = {
+    .values_size = sizeof(struct ball_values),
+    .parameters = {offsetof(struct ball_values, g), sizeof(double[3])},
+    .inputs = {offsetof(struct ball_values, lift), sizeof(double)},
+    .states = {offsetof(struct ball_values, h), sizeof(double[2])},
+    .derivatives = {offsetof(struct ball_values, v), sizeof(double[2])},
+    .right_hand_side = ball_rhs,
+    .jacobian = jacobian,
+    .series = &ball_series,
+    .outputs = ball_outputs,
+    .check_parameters = no_check,
+    .events = &ball_events,
+};
+
+/* ---- Block ---------------------------------------------------------------------------------- */
+
+static double block_acceleration(const struct block_values *block, double f) {
+    return block->direction == 0 ? 0.0 : (f - block->direction * block->coulomb) / block->m;
+}
+
+static enum status block_rhs(const void *values, double t, const double x[], const double u[],
+                             double dx[]) {
+    const struct block_values *block = values;
+    (void)t;
+    dx[0] = block->direction == 0 ? 0.0 : x[1];
+    dx[1] = block_acceleration(block, u[0]);
+    return STATUS_OK;
+}
+
+static enum status block_extend(const struct series_origin *origin, int first, int last,
+                                double rows[][SERIES_LENGTH]) {
+    const struct block_values *block = origin->values;
+    for (int k = first; k <= last; k++) {
+        const double friction = k == 1 ? block->direction * block->coulomb : 0.0;
+        const double force = block->direction == 0 ? 0.0 : input_order(origin, k - 1) - friction;
+        extend_motion(origin, k, force / block->m, rows);
+    }
+    return STATUS_OK;
+}
+
+static const struct series block_series = {.row_count = 2, .extend = block_extend};
+
+static enum status block_outputs(void *values, double t) {
+    struct block_values *block = values;
+    (void)t;
+    block->a = block_acceleration(block, block->f);
+    return STATUS_OK;
+}
+
+static bool block_always(const void *values) {
+    (void)values;
+    return true;
+}
+
+static bool block_sticks(const void *values) {
+    return ((const struct block_values *)values)->direction == 0;
+}
+
+enum { BLOCK_SPEED, BLOCK_FORWARD, BLOCK_BACKWARD };
+
+static void block_describe(const void *values, struct indicator indicators[]) {
+    const struct block_values *block = values;
+    const bool sticks = block_sticks(values);
+    const struct indicator force = {.kind = sticks ? INDICATOR_OF_MODEL : INDICATOR_UNUSED};
+    indicators[BLOCK_SPEED] = (struct indicator){
+        .kind = sticks ? INDICATOR_UNUSED : INDICATOR_OF_STATE,
+        .state = 1,
+        .factor = block->direction,
+    };
+    indicators[BLOCK_FORWARD] = force;
+    indicators[BLOCK_BACKWARD] = force;
+}
+
+static enum status block_indicators(const void *values, double t, const double x[],
+                                    const double u[], double z[]) {
+    const struct block_values *block = values;
+    (void)t;
+    z[BLOCK_SPEED] = block->direction == 0 ? 1.0 : block->direction * x[1];
+    z[BLOCK_FORWARD] = block->direction == 0 ? block->breakaway - u[0] : 1.0;
+    z[BLOCK_BACKWARD] = block->direction == 0 ? block->breakaway + u[0] : 1.0;
+    return STATUS_OK;
+}
+
+static enum status block_update(void *values, const struct event *event) {
+    struct block_values *block = values;
+    if (event->fired != NULL && event->fired[BLOCK_SPEED]) {
+        block->v = 0.0;
+    }
+    if (block->v != 0.0) {
+        block->direction = block->v > 0.0 ? 1 : -1;
+        return STATUS_OK;
+    }
+    const bool rises = event->du[0] > 0.0;
+    const bool falls = event->du[0] < 0.0;
+    const bool forward = event->fired != NULL && event->fired[BLOCK_FORWARD] && !falls;
+    const bool backward = event->fired != NULL && event->fired[BLOCK_BACKWARD] && !rises;
+    block->direction = forward || block->f > block->breakaway     ? 1
+                       : backward || block->f < -block->breakaway ? -1
+                                                                  : 0;
+    return STATUS_OK;
+}
+
+static const char *const block_names[] = {"the speed", "the force forward", "the force backward"};
+
+static const struct model_events block_events = {
+    .indicator_count = 3,
+    .indicator_names = block_names,
+    .modes = {offsetof(struct block_values, direction), sizeof(int)},
+    .are_possible = block_always,
+    .is_at_rest = block_sticks,
+    .describe = block_describe,
+    .indicators = block_indicators,
+    .update = block_update,
+};
+
+static const struct model block_model = {
+    .values_size = sizeof(struct block_values),
+    .parameters = {offsetof(struct block_values, m), sizeof(double[3])},
+    .inputs = {offsetof(struct block_values, f), sizeof(double)},
+    .states = {offsetof(struct block_values, x), sizeof(double[2])},
+    .derivatives = {offsetof(struct block_values, v), sizeof(double[2])},
+    .right_hand_side = block_rhs,
+    .jacobian = jacobian,
+    .series = &block_series,
+    .outputs = block_outputs,
+    .check_parameters = no_check,
+    .events = &block_events,
+};
+
+/* ---- Variables ------------------------------------------------------------------------------ */
+
+#define OF_INSTANCE(type, field)   type, VARIABLE_OF_INSTANCE, offsetof(struct instance_values, field)
+#define OF_MODEL(structure, field) VARIABLE_FLOAT64, VARIABLE_OF_MODEL, offsetof(structure, field)
+#define TIME                       CAUSALITY_INDEPENDENT, VARIABILITY_CONTINUOUS, INITIAL_NONE
+#define TUNABLE                    CAUSALITY_PARAMETER, VARIABILITY_TUNABLE, INITIAL_EXACT
+#define FIXED                      CAUSALITY_PARAMETER, VARIABILITY_FIXED, INITIAL_EXACT
+#define INPUT                      CAUSALITY_INPUT, VARIABILITY_CONTINUOUS, INITIAL_NONE
+#define STATE                      CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_EXACT
+#define OUTPUT                     CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_CALCULATED
+#define COUNTER                    CAUSALITY_LOCAL, VARIABILITY_DISCRETE, INITIAL_CALCULATED
+#define ANY                        -INFINITY, INFINITY, 1.0
+#define OWN                                                                                         \
+    {TOY_METHOD,                                                                                    \
+     "solver_method",                                                                               \
+     OF_INSTANCE(VARIABLE_ENUMERATION, solver_method),                                              \
+     FIXED,                                                                                         \
+     1.0,                                                                                           \
+     1.0,                                                                                           \
+     4.0,                                                                                           \
+     1.0},                                                                                          \
+        {TOY_TOLERANCE,                                                                             \
+         "relative_tolerance",                                                                      \
+         OF_INSTANCE(VARIABLE_FLOAT64, relative_tolerance),                                         \
+         FIXED,                                                                                     \
+         0.0,                                                                                       \
+         0.0,                                                                                       \
+         INFINITY,                                                                                  \
+         1.0},                                                                                      \
+        {TOY_EVENTS, "event_count", OF_INSTANCE(VARIABLE_INT32, event_count), COUNTER, 0.0, ANY},   \
+        {TOY_LAST_EVENT,                                                                            \
+         "last_event_time",                                                                         \
+         OF_INSTANCE(VARIABLE_FLOAT64, last_event_time),                                            \
+         COUNTER,                                                                                   \
+         0.0,                                                                                       \
+         ANY},                                                                                      \
+        {TOY_MAX_EVENTS, "max_events", OF_INSTANCE(VARIABLE_INT32, max_events), FIXED, 1000.0, 1.0, \
+         INFINITY,       1.0},                                                                      \
+        {TOY_STEPS, "solver_steps", OF_INSTANCE(VARIABLE_INT32, solver_steps), COUNTER, 0.0, ANY},  \
+        {TOY_RESTARTS,                                                                              \
+         "solver_restarts",                                                                         \
+         OF_INSTANCE(VARIABLE_INT32, solver_restarts),                                              \
+         COUNTER,                                                                                   \
+         0.0,                                                                                       \
+         ANY},                                                                                      \
+    {                                                                                               \
+        TOY_MAX_STEPS, "max_internal_steps", OF_INSTANCE(VARIABLE_INT32, max_internal_steps),       \
+            FIXED, 100000.0, 1.0, INFINITY, 1.0                                                     \
+    }
+
+static const struct variable ball_variables[] = {
+    {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
+    {TOY_PARAMETER1, "g", OF_MODEL(struct ball_values, g), TUNABLE, 9.81, ANY},
+    {TOY_PARAMETER2, "restitution", OF_MODEL(struct ball_values, restitution), TUNABLE, 0.8, 0.0,
+     1.0, 1.0},
+    {TOY_PARAMETER3, "has_floor", OF_MODEL(struct ball_values, has_floor), TUNABLE, 1.0, ANY},
+    {TOY_INPUT, "lift", OF_MODEL(struct ball_values, lift), INPUT, 0.0, ANY},
+    {TOY_POSITION, "h", OF_MODEL(struct ball_values, h), STATE, 1.0, ANY},
+    {TOY_SPEED, "v", OF_MODEL(struct ball_values, v), STATE, 0.0, ANY},
+    {TOY_ACCELERATION, "a", OF_MODEL(struct ball_values, a), OUTPUT, 0.0, ANY},
+    OWN,
+};
+
+static const struct variable block_variables[] = {
+    {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
+    {TOY_PARAMETER1, "m", OF_MODEL(struct block_values, m), TUNABLE, 1.0, ANY},
+    {TOY_PARAMETER2, "coulomb", OF_MODEL(struct block_values, coulomb), TUNABLE, 1.0, ANY},
+    {TOY_PARAMETER3, "breakaway", OF_MODEL(struct block_values, breakaway), TUNABLE, 1.0, ANY},
+    {TOY_INPUT, "f", OF_MODEL(struct block_values, f), INPUT, 0.0, ANY},
+    {TOY_POSITION, "x", OF_MODEL(struct block_values, x), STATE, 0.0, ANY},
+    {TOY_SPEED, "v", OF_MODEL(struct block_values, v), STATE, 0.0, ANY},
+    {TOY_ACCELERATION, "a", OF_MODEL(struct block_values, a), OUTPUT, 0.0, ANY},
+    OWN,
+};
+
+static const short row_of_reference[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+
+#define DESCRIPTION(text, model_symbol, table)                                                     \
+    {                                                                                              \
+        .name = (text), .guid = "{" text "}", .default_tolerance = 1e-8, .model = &(model_symbol), \
+        .variables = (table), .variable_count = sizeof(table) / sizeof *(table),                   \
+        .row_of_reference = row_of_reference,                                                      \
+        .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],                   \
+    }
+
+const struct model_description ball_description = DESCRIPTION("Ball", ball_model, ball_variables);
+const struct model_description block_description =
+    DESCRIPTION("Block", block_model, block_variables);
