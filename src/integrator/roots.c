@@ -1,0 +1,332 @@
+#include "roots.h"
+
+#include "horner.h"
+
+#include <float.h>
+#include <stdint.h>
+#include <string.h>
+
+/* A polynomial that is above 0 right behind s = 0: its first coefficient that is not 0 is above it.
+ */
+struct rising {
+    double c[ROOTS_LENGTH];
+    int degree;
+};
+
+/* A point between two of which a polynomial is monotone. */
+struct node {
+    double s;
+    double value;
+    int sign;        /* of the value: -1, 0, 1 */
+    bool is_rounded; /* |value| is within the rounding of Horner's scheme */
+};
+
+/* ---- Polynomials ---------------------------------------------------------------------------- */
+
+/* Writes p without its roots at s = 0, times a power of 2, so that products neither overflow nor
+ * underflow, and times its sign behind s = 0, which is returned; 0: it is 0 or not finite. */
+static int prepare(const struct roots_polynomial *p, struct rising *rising) {
+    double largest = 0.0;
+    for (int k = 0; k <= p->degree; k++) {
+        const double size = fabs(p->c[k]);
+        if (!(size <= DBL_MAX)) {
+            return 0;
+        }
+        largest = size > largest ? size : largest;
+    }
+    int first = 0;
+    while (first <= p->degree && (p->c[first] == 0.0 || fabs(p->c[first]) <= p->noise)) {
+        first++;
+    }
+    if (first > p->degree) {
+        return 0;
+    }
+
+    double scale = 1.0;
+    while (largest * scale > 0x1p500) {
+        scale *= 0x1p-500;
+    }
+    while (largest * scale < 0x1p-500) {
+        scale *= 0x1p500;
+    }
+    const int sign = p->c[first] < 0.0 ? -1 : 1;
+    for (int k = first; k <= p->degree; k++) {
+        rising->c[k - first] = sign * scale * p->c[k];
+    }
+    rising->degree = p->degree - first;
+    while (rising->degree > 0 && rising->c[rising->degree] == 0.0) {
+        rising->degree--;
+    }
+    return sign;
+}
+
+/* Writes the derivative of an order below the degree, over the factorial of the order and with the
+ * sign that makes it rise. Its coefficients are rounded once. */
+static void differentiate(const struct rising *p, int order, struct rising *derivative) {
+    double binomial = 1.0; // order + k over k
+    int sign = 0;
+    for (int k = 0; k <= p->degree - order; k++) {
+        const double coefficient = binomial * p->c[k + order];
+        if (sign == 0 && coefficient != 0.0) {
+            sign = coefficient < 0.0 ? -1 : 1;
+        }
+        derivative->c[k] = sign * coefficient;
+        binomial = binomial * (order + k + 1) / (k + 1);
+    }
+    derivative->degree = p->degree - order;
+}
+
+/* ---- How many roots ------------------------------------------------------------------------- */
+
+/* Coefficients of s^k become those of s^k (1 - s)^(degree - k), which are x^degree p(1 / x) with
+ * x + 1 for x. */
+static void move_to_ends(double c[ROOTS_LENGTH], int degree) {
+    for (int i = 0; i < degree; i++) {
+        double sum = c[0];
+        for (int k = 1; k <= degree - i; k++) {
+            sum += c[k];
+            c[k] = sum;
+        }
+    }
+}
+
+/* A little above p, or with a slack < 0 below it: by more than all rounding here and in Horner's
+ * scheme. Written as coefficients of s^k (1 - s)^(degree - k). */
+static void shift_to_ends(const struct rising *p, double slack, double shifted[ROOTS_LENGTH]) {
+    for (int k = 0; k <= p->degree; k++) {
+        shifted[k] = p->c[k] + slack * fabs(p->c[k]);
+    }
+    move_to_ends(shifted, p->degree);
+}
+
+/* Descartes' rule: 0 or 1 where p has as many roots on (0, 1] and is else beyond its rounding, to
+ * which its value at 1 may be an exception; 2: it can be more. */
+static int most_roots(const struct rising *p) {
+    double above[ROOTS_LENGTH];
+    double below[ROOTS_LENGTH];
+    shift_to_ends(p, -0x1p-45, below);
+    int positive = 0;
+    while (positive <= p->degree && below[positive] > 0.0) {
+        positive++;
+    }
+    if (positive > p->degree) {
+        return 0;
+    }
+    shift_to_ends(p, 0x1p-45, above);
+
+    int changes = 0;
+    int unknown = 0; // signs since the last one that is known
+    int sign = 1;
+    for (int k = positive; k <= p->degree; k++) {
+        if (above[k] < 0.0 || below[k] > 0.0) {
+            const int next = above[k] < 0.0 ? -1 : 1;
+            changes += next != sign;
+            if (changes > 1 || unknown > (next != sign)) {
+                return 2;
+            }
+            unknown = 0;
+            sign = next;
+        } else if (above[k] != 0.0 || below[k] != 0.0) {
+            unknown++;
+        }
+    }
+    return unknown > 1 - changes ? 2 : changes + unknown;
+}
+
+/* ---- Roots of monotone pieces --------------------------------------------------------------- */
+
+/* The order of doubles >= 0 is that of their bits. */
+static uint64_t bits_of(double s) {
+    uint64_t bits;
+    memcpy(&bits, &s, sizeof bits);
+    return bits;
+}
+
+static double with_bits(uint64_t bits) {
+    double s;
+    memcpy(&s, &bits, sizeof s);
+    return s;
+}
+
+/* is_exact: the sign is that of exact arithmetic; else 0 within the rounding. */
+static struct node node_at(const struct rising *p, double s, bool is_exact, double *slope) {
+    const struct horner_value at = horner(p->c, p->degree, s);
+    *slope = at.slope;
+    struct node node = {s, at.value, 0, fabs(at.value) <= at.rounding};
+    if (node.is_rounded) {
+        node.value = is_exact ? horner_compensated(p->c, p->degree, s) : 0.0;
+    }
+    node.sign = (node.value > 0.0) - (node.value < 0.0);
+    return node;
+}
+
+/* Between two doubles that are no neighbours. */
+static double middle(double low, double high) {
+    const double s = low < 0.0625 * high ? 0.0625 * high : 0.5 * (low + high);
+    return s > low && s < high ? s : with_bits((bits_of(low) + bits_of(high)) / 2);
+}
+
+/* Where p, monotone between two nodes of opposite sign, has no longer the sign of the lower one. By
+ * Newton's method while its steps become shorter, else by bisection. Steps of few units in the last
+ * place are lengthened to pass the root, so that it is soon between neighbours. */
+static double crossing(const struct rising *p, struct node low, struct node high, bool is_exact) {
+    double s = low.s + (high.s - low.s) * (low.value / (low.value - high.value));
+    double step = high.s - low.s;
+    uint64_t least = 1; // units in the last place
+    while (bits_of(high.s) - bits_of(low.s) > 1) {
+        if (!(s > low.s && s < high.s)) {
+            s = middle(low.s, high.s);
+            step = high.s - low.s;
+        }
+        double slope;
+        const struct node node = node_at(p, s, is_exact, &slope);
+        if (node.sign == 0) {
+            return s;
+        }
+        const bool is_low = node.sign == low.sign;
+        if (is_low) {
+            low = node;
+        } else {
+            high = node;
+        }
+        const double next = s - node.value / slope;
+        const double way = fabs(next - s);
+        if (way <= (double)least * (with_bits(bits_of(s) + 1) - s)) {
+            s = with_bits(is_low ? bits_of(s) + least : bits_of(s) - least);
+            least = least < UINT64_C(1) << 40 ? 2 * least : least;
+        } else {
+            s = way <= 0.25 * step ? next : -1.0;
+        }
+        step = way;
+    }
+    return high.s;
+}
+
+/* ---- All pieces ----------------------------------------------------------------------------- */
+
+/* Replaces the count points at which the derivative changes its sign by those at which p does, or
+ * is within its rounding, all of them inside (0, 1); returns how many. */
+static int replace_points(const struct rising *p, double points[ROOTS_LENGTH], int count) {
+    struct node left = {0.0, p->c[0], 1, false};
+    int found = 0;
+    for (int i = 0; i <= count; i++) {
+        double slope;
+        const struct node right = node_at(p, i < count ? points[i] : 1.0, false, &slope);
+        double s = 1.0;
+        if (right.sign == 0) {
+            s = right.s;
+        } else if (left.sign == -right.sign) {
+            s = crossing(p, left, right, false);
+        }
+        if (s < 1.0) {
+            points[found] = s;
+            found++;
+        }
+        left = right;
+    }
+    return found;
+}
+
+/* Writes points between which p is monotone, in their order inside (0, 1); returns how many. */
+static int find_extrema(const struct rising *p, double points[ROOTS_LENGTH]) {
+    // up to the first derivative with one root at most
+    struct rising derivative;
+    int order = 0;
+    do {
+        order++;
+        differentiate(p, order, &derivative);
+    } while (most_roots(&derivative) > 1);
+    // and down again
+    int count = replace_points(&derivative, points, 0);
+    for (order--; order > 0; order--) {
+        differentiate(p, order, &derivative);
+        count = replace_points(&derivative, points, count);
+    }
+    return count;
+}
+
+/* Writes the first most roots (1 or ROOTS_LENGTH) of p, which is rising or, with the sign -1, the
+ * opposite of it. */
+static int find(const struct rising *p, int sign, int most, struct root roots[ROOTS_LENGTH]) {
+    double points[ROOTS_LENGTH];
+    const int expected = most_roots(p);
+    if (expected == 0) {
+        return 0;
+    }
+    const int count = expected == 1 ? 0 : find_extrema(p, points);
+    const enum root_kind across[] = {sign > 0 ? ROOT_FALLS : ROOT_RISES,
+                                     sign > 0 ? ROOT_RISES : ROOT_FALLS};
+
+    struct node left = {0.0, p->c[0], 1, false};
+    int now = 1;          // the last sign that is not 0
+    bool is_open = false; // the last root may turn out to be one that crosses
+    int found = 0;
+    for (int i = 0; i <= count && (found < most || is_open); i++) {
+        double slope;
+        const struct node right = node_at(p, i < count ? points[i] : 1.0, true, &slope);
+        if (right.sign == -now) {
+            found += !is_open;
+            const double s = left.sign == 0 ? left.s : crossing(p, left, right, true);
+            roots[found - 1] = (struct root){s, across[now < 0]};
+            is_open = false;
+            now = right.sign;
+        } else if (!right.is_rounded) {
+            is_open = false;
+        } else if (!left.is_rounded) {
+            roots[found] = (struct root){right.s, ROOT_TOUCHES};
+            found++;
+            is_open = true;
+        }
+        left = right;
+    }
+    if (is_open && left.sign == 0) {
+        roots[found - 1] = (struct root){1.0, across[now < 0]};
+    }
+    return found;
+}
+
+/* ---- Interface ------------------------------------------------------------------------------ */
+
+int roots_find(const struct roots_polynomial *p, struct root roots[ROOTS_LENGTH]) {
+    struct rising rising;
+    const int sign = prepare(p, &rising);
+    return sign == 0 ? 0 : find(&rising, sign, ROOTS_LENGTH, roots);
+}
+
+double roots_search_first(const struct roots_polynomial *p) {
+    struct rising rising;
+    struct root roots[ROOTS_LENGTH];
+    const int sign = prepare(p, &rising);
+    if (sign < 0 || (p->noise < 0.0 && p->c[0] == 0.0)) {
+        return 0.0;
+    }
+    return sign > 0 && find(&rising, 1, 1, roots) > 0 ? roots[0].s : INFINITY;
+}
+
+/* |p(s)| is within its rounding and that of s > 0. */
+static bool is_zero_at(const struct roots_polynomial *p, double s) {
+    struct rising rising;
+    if (prepare(p, &rising) == 0) {
+        return false;
+    }
+    const struct horner_value at = horner(rising.c, rising.degree, s);
+    return fabs(at.value) <= at.rounding + 0x1p-52 * s * fabs(at.slope);
+}
+
+double roots_earliest(size_t count, const struct roots_polynomial p[], bool is_at_root[]) {
+    double earliest = INFINITY;
+    for (size_t i = 0; i < count; i++) {
+        const double s = roots_first(&p[i]);
+        is_at_root[i] = s <= earliest && s < INFINITY;
+        if (s < earliest) {
+            memset(is_at_root, 0, i * sizeof is_at_root[0]);
+            earliest = s;
+        }
+    }
+    if (earliest > 0.0 && earliest < INFINITY) {
+        for (size_t i = 0; i < count; i++) {
+            is_at_root[i] = is_at_root[i] || is_zero_at(&p[i], earliest);
+        }
+    }
+    return earliest;
+}
