@@ -167,7 +167,8 @@ static void test_multiple_roots_between_others(void) {
 /* (s - 1/2)^2 + gap, of which the coefficients are exact. */
 static void test_near_double_roots(void) {
     const double rounding = 8 * 0x1p-53 * 1.0; // at s = 1/2
-    for (double gap = 0x1p-2; gap > 0x1p-54; gap /= 2.0) {
+    for (int halvings = 2; halvings < 54; halvings++) {
+        const double gap = ldexp(1.0, -halvings);
         const double above[] = {0.25 + gap, -1.0, 1.0};
         const double below[] = {0.25 - gap, -1.0, 1.0};
         const int touches = gap <= rounding ? 1 : 0;
