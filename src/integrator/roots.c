@@ -121,7 +121,7 @@ static int most_roots(const struct rising *p) {
         if (above[k] < 0.0 || below[k] > 0.0) {
             const int next = above[k] < 0.0 ? -1 : 1;
             changes += next != sign;
-            if (changes > 1 || unknown > (next != sign)) {
+            if (unknown > (next != sign)) {
                 return 2;
             }
             unknown = 0;
@@ -303,7 +303,7 @@ double roots_search_first(const struct roots_polynomial *p) {
     return sign > 0 && find(&rising, 1, 1, roots) > 0 ? roots[0].s : INFINITY;
 }
 
-/* |p(s)| is within its rounding and that of s > 0. */
+/* |p(s)| is within its rounding and that of s. */
 static bool is_zero_at(const struct roots_polynomial *p, double s) {
     struct rising rising;
     if (prepare(p, &rising) == 0) {
@@ -323,7 +323,7 @@ double roots_earliest(size_t count, const struct roots_polynomial p[], bool is_a
             earliest = s;
         }
     }
-    if (earliest > 0.0 && earliest < INFINITY) {
+    if (earliest < INFINITY) {
         for (size_t i = 0; i < count; i++) {
             is_at_root[i] = is_at_root[i] || is_zero_at(&p[i], earliest);
         }

@@ -2,7 +2,6 @@
 #include "roots.h"
 
 #include <float.h>
-#include <stdint.h>
 #include <string.h>
 #include <unity.h>
 
@@ -104,20 +103,26 @@ static void test_chebyshev_polynomials(void) {
     }
 }
 
-/* 1e-300 to 1e300 of the same polynomial, and coefficients of which some are denormal. */
+/* Values near the roots need twice the digits. */
 static void test_units_do_not_matter(void) {
-    const double c[] = {0.3, -1.0, 0.9, -0.8, 0.5, 0.11};
-    TEST_ASSERT_EQUAL_INT(2, find(c, 5));
-    const double s = roots[0].s;
-    const double second = roots[1].s;
+    struct root expected[ROOTS_LENGTH];
+    double c[ROOTS_LENGTH] = {1.0};
+    int degree = 0;
+    for (int i = 1; i <= 7; i++) {
+        degree = multiply(c, degree, i / 7.3);
+    }
+    TEST_ASSERT_EQUAL_INT(7, find(c, degree));
+    memcpy(expected, roots, sizeof roots);
     for (int exponent = -1000; exponent <= 1000; exponent += 100) {
-        double scaled[6];
-        for (int k = 0; k < 6; k++) {
-            scaled[k] = ldexp(c[k], exponent);
+        double scaled[ROOTS_LENGTH];
+        for (int k = 0; k <= degree; k++) {
+            scaled[k] = ldexp(-c[k], exponent);
         }
-        TEST_ASSERT_EQUAL_INT(2, find(scaled, 5));
-        TEST_ASSERT_TRUE(roots[0].s == s && roots[1].s == second);
-        TEST_ASSERT_TRUE(first(scaled, 5, 0.0) == s);
+        TEST_ASSERT_TRUE(first(scaled, degree, 0.0) == expected[0].s);
+        TEST_ASSERT_EQUAL_INT(7, find(scaled, degree));
+        for (int i = 0; i < 7; i++) {
+            assert_root(expected[i].s, i % 2 == 0 ? ROOT_FALLS : ROOT_RISES, &roots[i]);
+        }
     }
     const double tiny[] = {3e-320, -4e-320};
     TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.75, first(tiny, 1, 0.0));
@@ -161,6 +166,34 @@ static void test_multiple_roots_between_others(void) {
         assert_root(0.25, times % 2 == 1 ? ROOT_FALLS : ROOT_RISES, &roots[0]);
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, roots[1].s);
         TEST_ASSERT_EQUAL_INT(times == 2 ? ROOT_TOUCHES : ROOT_RISES, roots[1].kind);
+    }
+}
+
+static void test_a_triple_root_changes_the_sign(void) {
+    for (int i = 1; i < 16; i++) {
+        double c[ROOTS_LENGTH] = {1.0};
+        int degree = 0;
+        for (int k = 0; k < 3; k++) {
+            degree = multiply(c, degree, i / 16.0);
+        }
+        TEST_ASSERT_EQUAL_INT(1, find(c, degree));
+        assert_root(i / 16.0, ROOT_RISES, &roots[0]);
+    }
+}
+
+/* Two double roots, with next to nothing between them. */
+static void test_extrema_within_rounding_of_each_other_are_one_touch(void) {
+    for (int i = 10; i < 90; i++) {
+        const double root = i / 100.0;
+        double c[ROOTS_LENGTH] = {1.0};
+        int degree = 0;
+        for (int k = 0; k < 4; k++) {
+            degree = multiply(c, degree, root * (k % 2 == 0 ? 1.0 - 2e-4 : 1.0 + 2e-4));
+        }
+        c[0] += 4 * 0x1p-53 * 16.0 * c[0];
+        TEST_ASSERT_EQUAL_INT(1, find(c, degree));
+        TEST_ASSERT_EQUAL_INT(ROOT_TOUCHES, roots[0].kind);
+        TEST_ASSERT_DOUBLE_WITHIN(5e-4 * root, root, roots[0].s);
     }
 }
 
@@ -248,6 +281,12 @@ static void test_the_start_is_at_0_or_below(void) {
     TEST_ASSERT_TRUE(first(at, 2, 0.0) == INFINITY);
     TEST_ASSERT_TRUE(first(at, 2, -1.0) == 0.0);
     TEST_ASSERT_EQUAL_INT(0, find(at, 2));
+    const double falls_at[] = {0.0, -1.0, 3.0};
+    const struct roots_polynomial p = {falls_at, 2, -1.0};
+    TEST_ASSERT_EQUAL_INT(1, roots_find(&p, roots));
+    TEST_ASSERT_EQUAL_INT(ROOT_RISES, roots[0].kind);
+    const double constant[] = {-2.0};
+    TEST_ASSERT_TRUE(first(constant, 0, 0.0) == 0.0);
     const double below[] = {-1e-9, 1.0, 0.0};
     TEST_ASSERT_TRUE(first(below, 2, 0.0) == 0.0);
     TEST_ASSERT_TRUE(first(below, 2, 1e-9) == INFINITY);
@@ -276,106 +315,4 @@ static void test_polynomials_without_roots(void) {
             TEST_ASSERT_TRUE(first(c, 3, 0.0) == INFINITY);
         }
     }
-}
-
-/* The proof holds for what is well above 0, and for nothing that reaches it. */
-static void test_quick_proof(void) {
-    uint64_t state = 1;
-    int proven = 0;
-    for (int i = 0; i < 200000; i++) {
-        double c[ROOTS_LENGTH];
-        const int degree = i % ROOTS_LENGTH;
-        double size = 1.0;
-        for (int k = 0; k <= degree; k++) {
-            state = state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
-            c[k] = size * ((double)(state >> 11) * 0x1p-52 - 1.0);
-            size *= i % 3 == 0 ? 1.0 : 0.5;
-        }
-        c[0] = i % 5 == 0 ? 0.0 : fabs(c[0]);
-        const struct roots_polynomial p = {c, degree, 0.0};
-        if (roots_is_above(&p)) {
-            TEST_ASSERT_TRUE(roots_search_first(&p) == INFINITY);
-            proven++;
-        } else if (degree >= 2 && c[0] > 0.0) {
-            double least = c[0];
-            for (int k = 1; k <= degree; k++) {
-                least -= fabs(c[k]);
-            }
-            TEST_ASSERT_TRUE(least < 1e-12);
-        }
-    }
-    TEST_ASSERT_TRUE(proven > 60000);
-}
-
-/* c0 + c1 s + d s^2 is 0 at one end, or at its lowest point; a little above, that is proven. */
-static void test_limits_of_the_quick_proof(void) {
-    const double at_limit[][5] = {
-        {1.0, -0.5, -0.25, 0.5, -0.25}, {1.0, 0.5, 0.5, -1.0, -1.0},
-        {0.25, -1.0, 1.0, 7.0, 0.0},    {0.0, 1.0, -0.5, -0.5, 0.25},
-        {1.0, -2.0, 1.0, 0.0, 3.0},     {0.25, -1.0, 2.0, -1.0, 1.0},
-        {1.0, -1.5, 0.5, 0.0, 0.0},     {0.0, 0.25, -1.0, 1.25, -0.25},
-    };
-    for (size_t i = 0; i < sizeof at_limit / sizeof at_limit[0]; i++) {
-        double c[5];
-        memcpy(c, at_limit[i], sizeof c);
-        const struct roots_polynomial p = {c, 4, 0.0};
-        double *const lowest = c[0] == 0.0 ? &c[1] : &c[0];
-        TEST_ASSERT_FALSE(roots_is_above(&p));
-        *lowest += 1e-15;
-        TEST_ASSERT_FALSE(roots_is_above(&p));
-        *lowest += 1e-12;
-        TEST_ASSERT_TRUE(roots_is_above(&p));
-        const struct roots_polynomial in_noise = {c, 4, 2.0};
-        TEST_ASSERT_FALSE(roots_is_above(&in_noise));
-    }
-}
-
-/* ---- Several -------------------------------------------------------------------------------- */
-
-static void test_earliest_of_several(void) {
-    const double late[] = {0.75, -1.0, 0.0};
-    const double early[] = {0.5, -1.0, 0.0};
-    const double never[] = {1.0, 0.5, 0.25};
-    const double same[] = {1.0, -1.0, -2.0};
-    const double touching[] = {0.25, -1.0, 1.0};
-    const struct roots_polynomial p[] = {
-        {late, 2, 0.0}, {early, 2, 0.0}, {never, 2, 0.0}, {same, 2, 0.0}, {touching, 2, 0.0},
-    };
-    bool is_at_root[5];
-    TEST_ASSERT_TRUE(roots_earliest(5, p, is_at_root) == 0.5);
-    const bool expected[] = {false, true, false, true, true};
-    TEST_ASSERT_EQUAL_MEMORY(expected, is_at_root, sizeof expected);
-    TEST_ASSERT_TRUE(roots_earliest(1, p, is_at_root) == 0.75);
-    TEST_ASSERT_TRUE(is_at_root[0]);
-    TEST_ASSERT_TRUE(roots_earliest(1, p + 2, is_at_root) == INFINITY);
-    TEST_ASSERT_FALSE(is_at_root[0]);
-    TEST_ASSERT_TRUE(roots_earliest(0, p, is_at_root) == INFINITY);
-}
-
-/* Their own roots differ in the last bits, or the other one has been dealt with. */
-static void test_several_are_within_rounding_of_0(void) {
-    const double third[] = {1.0, -3.0};
-    const double seventh_of_sevens[] = {0.7, -2.1};
-    const double beside[] = {1.0, -3.0 + 1e-14};
-    const double bouncing[] = {0.0, 1.0, -0.5};
-    const struct roots_polynomial p[] = {
-        {beside, 1, 0.0}, {third, 1, 0.0}, {seventh_of_sevens, 1, 0.0}, {bouncing, 2, 0.0}};
-    bool is_at_root[4];
-    TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON, 1.0 / 3.0, roots_earliest(4, p, is_at_root));
-    const bool expected[] = {false, true, true, false};
-    TEST_ASSERT_EQUAL_MEMORY(expected, is_at_root, sizeof expected);
-}
-
-static void test_earliest_is_the_start(void) {
-    const double below[] = {-1.0, 3.0, 0.0};
-    const double above[] = {1e-30, 3.0, 0.0};
-    const double at[] = {0.0, 3.0, 0.0};
-    const double falling[] = {0.0, -1.0, 0.0};
-    const double later[] = {0.5, -1.0, 0.0};
-    const struct roots_polynomial p[] = {
-        {later, 2, 0.0}, {below, 2, 0.0}, {above, 2, 0.0}, {at, 2, 0.0}, {falling, 2, 0.0}};
-    bool is_at_root[5];
-    TEST_ASSERT_TRUE(roots_earliest(5, p, is_at_root) == 0.0);
-    const bool expected[] = {false, true, false, false, true};
-    TEST_ASSERT_EQUAL_MEMORY(expected, is_at_root, sizeof expected);
 }
