@@ -1,0 +1,318 @@
+/* Roots of polynomials whose factors or values are known. Random ones: test_random_roots.py. */
+#include "roots.h"
+
+#include <float.h>
+#include <string.h>
+#include <unity.h>
+
+static struct root roots[ROOTS_LENGTH];
+
+static int find(const double c[], int degree) {
+    const struct roots_polynomial p = {c, degree, 0.0};
+    return roots_find(&p, roots);
+}
+
+static double first(const double c[], int degree, double noise) {
+    const struct roots_polynomial p = {c, degree, noise};
+    return roots_first(&p);
+}
+
+static void assert_root(double s, enum root_kind kind, const struct root *root) {
+    TEST_ASSERT_TRUE(root->s == s);
+    TEST_ASSERT_EQUAL_INT(kind, root->kind);
+}
+
+/* c becomes c (s - root); returns the degree. */
+static int multiply(double c[], int degree, double root) {
+    c[degree + 1] = 0.0;
+    for (int k = degree + 1; k > 0; k--) {
+        c[k] = c[k - 1] - root * c[k];
+    }
+    c[0] *= -root;
+    return degree + 1;
+}
+
+static double before(double s) {
+    return nextafter(s, 0.0);
+}
+
+/* ---- Changes of sign ------------------------------------------------------------------------ */
+
+static void test_linear_polynomials(void) {
+    for (int i = 1; i <= 1000; i++) {
+        const double c[] = {i, -1000.0};
+        const double rising[] = {-i, 1000.0};
+        const double s = i / 1000.0;
+        TEST_ASSERT_EQUAL_INT(1, find(c, 1));
+        TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON * s, s, roots[0].s);
+        // the first double at which p is 0 or below
+        TEST_ASSERT_TRUE(i - 1000.0L * roots[0].s <= 0.0L);
+        TEST_ASSERT_TRUE(i - 1000.0L * before(roots[0].s) > 0.0L);
+        TEST_ASSERT_EQUAL_INT(ROOT_FALLS, roots[0].kind);
+        TEST_ASSERT_TRUE(first(c, 1, 0.0) == roots[0].s);
+        const double falls = roots[0].s;
+        TEST_ASSERT_EQUAL_INT(1, find(rising, 1));
+        assert_root(falls, ROOT_RISES, &roots[0]);
+    }
+}
+
+/* All degrees with roots at 1/8 to 7/8, or some of them: the coefficients are exact. */
+static void test_products_of_exact_factors(void) {
+    for (unsigned set = 1; set < 1u << 7; set++) {
+        double c[ROOTS_LENGTH] = {1.0};
+        double expected[8];
+        int degree = 0;
+        for (int i = 1; i <= 7; i++) {
+            if ((set >> (i - 1) & 1u) != 0u) {
+                expected[degree] = i / 8.0;
+                degree = multiply(c, degree, i / 8.0);
+            }
+        }
+        TEST_ASSERT_EQUAL_INT(degree, find(c, degree));
+        for (int i = 0; i < degree; i++) {
+            const bool falls = (degree - i) % 2 == 0;
+            assert_root(expected[i], falls ? ROOT_FALLS : ROOT_RISES, &roots[i]);
+        }
+        // with no root in (0, 1] and no coefficient 0 before the others, but many behind them
+        c[degree + 1] = 0.0;
+        c[degree + 2] = 0.0;
+        TEST_ASSERT_EQUAL_INT(degree, find(c, degree + 2));
+    }
+}
+
+/* T_n(1 - 2 s) is 0 at sin^2((2 k - 1) pi / (4 n)). Values of degree 20 lose 15 digits. */
+static void test_chebyshev_polynomials(void) {
+    const long double pi = 3.14159265358979323846264338327950288L;
+    double before_last[ROOTS_LENGTH] = {1.0};
+    double c[ROOTS_LENGTH] = {1.0, -2.0};
+    for (int n = 2; n <= 20; n++) {
+        double next[ROOTS_LENGTH] = {0.0};
+        for (int k = 0; k <= n; k++) {
+            next[k] = 2.0 * c[k] - (k > 0 ? 4.0 * c[k - 1] : 0.0) - before_last[k];
+        }
+        memcpy(before_last, c, sizeof c);
+        memcpy(c, next, sizeof c);
+        TEST_ASSERT_EQUAL_INT(n, find(c, n));
+        for (int k = 1; k <= n; k++) {
+            const long double root = sinl((2 * k - 1) * pi / (4 * n));
+            const double s = (double)(root * root);
+            TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON * s, s, roots[k - 1].s);
+            TEST_ASSERT_EQUAL_INT(k % 2 == 1 ? ROOT_FALLS : ROOT_RISES, roots[k - 1].kind);
+        }
+        TEST_ASSERT_TRUE(first(c, n, 0.0) == roots[0].s);
+    }
+}
+
+/* Values near the roots need twice the digits. */
+static void test_units_do_not_matter(void) {
+    struct root expected[ROOTS_LENGTH];
+    double c[ROOTS_LENGTH] = {1.0};
+    int degree = 0;
+    for (int i = 1; i <= 7; i++) {
+        degree = multiply(c, degree, i / 7.3);
+    }
+    TEST_ASSERT_EQUAL_INT(7, find(c, degree));
+    memcpy(expected, roots, sizeof roots);
+    for (int exponent = -1000; exponent <= 1000; exponent += 100) {
+        double scaled[ROOTS_LENGTH];
+        for (int k = 0; k <= degree; k++) {
+            scaled[k] = ldexp(-c[k], exponent);
+        }
+        TEST_ASSERT_TRUE(first(scaled, degree, 0.0) == expected[0].s);
+        TEST_ASSERT_EQUAL_INT(7, find(scaled, degree));
+        for (int i = 0; i < 7; i++) {
+            assert_root(expected[i].s, i % 2 == 0 ? ROOT_FALLS : ROOT_RISES, &roots[i]);
+        }
+    }
+    const double tiny[] = {3e-320, -4e-320};
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.75, first(tiny, 1, 0.0));
+}
+
+static void test_roots_near_the_start(void) {
+    for (int i = 1; i < 300; i++) {
+        const double s = pow(10.0, -i);
+        const double linear[] = {s, -1.0, 0.25, 0.5};
+        const double power[] = {s, 0.0, 0.0, 0.0, 0.0, -1.0};
+        TEST_ASSERT_DOUBLE_WITHIN(fmax(s, DBL_EPSILON) * s, s, first(linear, 3, -1.0));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-13 * pow(s, 0.2), pow(s, 0.2), first(power, 5, -1.0));
+    }
+}
+
+/* ---- Roots that are no changes of sign, or nearly none -------------------------------------- */
+
+static void test_a_double_root_is_a_touch(void) {
+    for (int i = 1; i < 64; i++) {
+        const double s = i / 64.0;
+        const double above[] = {s * s, -2.0 * s, 1.0};
+        const double below[] = {-s * s, 2.0 * s, -1.0};
+        TEST_ASSERT_EQUAL_INT(1, find(above, 2));
+        assert_root(s, ROOT_TOUCHES, &roots[0]);
+        TEST_ASSERT_TRUE(first(above, 2, 0.0) == s);
+        TEST_ASSERT_EQUAL_INT(1, find(below, 2));
+        assert_root(s, ROOT_TOUCHES, &roots[0]);
+    }
+}
+
+/* (s - 1/2)^2 (s - 1/4) (s + 2), and with the factors twice and three times. */
+static void test_multiple_roots_between_others(void) {
+    for (int times = 1; times <= 3; times++) {
+        double c[ROOTS_LENGTH] = {1.0};
+        int degree = multiply(c, 0, -2.0);
+        for (int i = 0; i < times; i++) {
+            degree = multiply(c, degree, 0.5);
+        }
+        degree = multiply(c, degree, 0.25);
+        TEST_ASSERT_EQUAL_INT(2, find(c, degree));
+        assert_root(0.25, times % 2 == 1 ? ROOT_FALLS : ROOT_RISES, &roots[0]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, roots[1].s);
+        TEST_ASSERT_EQUAL_INT(times == 2 ? ROOT_TOUCHES : ROOT_RISES, roots[1].kind);
+    }
+}
+
+static void test_a_triple_root_changes_the_sign(void) {
+    for (int i = 1; i < 16; i++) {
+        double c[ROOTS_LENGTH] = {1.0};
+        int degree = 0;
+        for (int k = 0; k < 3; k++) {
+            degree = multiply(c, degree, i / 16.0);
+        }
+        TEST_ASSERT_EQUAL_INT(1, find(c, degree));
+        assert_root(i / 16.0, ROOT_RISES, &roots[0]);
+    }
+}
+
+/* Two double roots, with next to nothing between them. */
+static void test_extrema_within_rounding_of_each_other_are_one_touch(void) {
+    for (int i = 10; i < 90; i++) {
+        const double root = i / 100.0;
+        double c[ROOTS_LENGTH] = {1.0};
+        int degree = 0;
+        for (int k = 0; k < 4; k++) {
+            degree = multiply(c, degree, root * (k % 2 == 0 ? 1.0 - 2e-4 : 1.0 + 2e-4));
+        }
+        c[0] += 4 * 0x1p-53 * 16.0 * c[0];
+        TEST_ASSERT_EQUAL_INT(1, find(c, degree));
+        TEST_ASSERT_EQUAL_INT(ROOT_TOUCHES, roots[0].kind);
+        TEST_ASSERT_DOUBLE_WITHIN(5e-4 * root, root, roots[0].s);
+    }
+}
+
+/* (s - 1/2)^2 + gap, of which the coefficients are exact. */
+static void test_near_double_roots(void) {
+    const double rounding = 8 * 0x1p-53 * 1.0; // at s = 1/2
+    for (int halvings = 2; halvings < 54; halvings++) {
+        const double gap = ldexp(1.0, -halvings);
+        const double above[] = {0.25 + gap, -1.0, 1.0};
+        const double below[] = {0.25 - gap, -1.0, 1.0};
+        const int touches = gap <= rounding ? 1 : 0;
+        TEST_ASSERT_EQUAL_INT(touches, find(above, 2));
+        TEST_ASSERT_TRUE((first(above, 2, 0.0) < INFINITY) == (touches == 1));
+        if (touches == 1) {
+            assert_root(0.5, ROOT_TOUCHES, &roots[0]);
+        }
+        if (gap < 0.25) {
+            TEST_ASSERT_EQUAL_INT(2, find(below, 2));
+            TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON, 0.5 - sqrt(gap), roots[0].s);
+            TEST_ASSERT_DOUBLE_WITHIN(DBL_EPSILON, 0.5 + sqrt(gap), roots[1].s);
+            TEST_ASSERT_EQUAL_INT(ROOT_FALLS, roots[0].kind);
+            TEST_ASSERT_EQUAL_INT(ROOT_RISES, roots[1].kind);
+            TEST_ASSERT_TRUE(first(below, 2, 0.0) == roots[0].s);
+        }
+    }
+}
+
+/* A parabola that passes a stop by 1e-7 of a step's way, or by as much in front of it. */
+static void test_grazing(void) {
+    const double passes[] = {0.3 * 0.3 - 1e-7, -0.6, 1.0, 1e-9, -1e-11};
+    const double misses[] = {0.3 * 0.3 + 1e-7, -0.6, 1.0, 1e-9, -1e-11};
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.3 - sqrt(1e-7), first(passes, 4, 0.0));
+    TEST_ASSERT_TRUE(first(misses, 4, 0.0) == INFINITY);
+}
+
+/* ---- Ends ----------------------------------------------------------------------------------- */
+
+static void test_roots_at_the_end_and_beyond(void) {
+    const double at_end[] = {1.0, -0.5, -0.5};
+    TEST_ASSERT_EQUAL_INT(1, find(at_end, 2));
+    assert_root(1.0, ROOT_FALLS, &roots[0]);
+    const double rising[] = {-1.0, 0.5, 0.5};
+    TEST_ASSERT_EQUAL_INT(1, find(rising, 2));
+    assert_root(1.0, ROOT_RISES, &roots[0]);
+    const double beyond_by_rounding[] = {1.0, -0.5, -0.5 + 0x1p-53};
+    TEST_ASSERT_EQUAL_INT(1, find(beyond_by_rounding, 2));
+    assert_root(1.0, ROOT_TOUCHES, &roots[0]);
+    const double beyond[] = {1.0, -0.5, -0.5 + 0x1p-46};
+    TEST_ASSERT_EQUAL_INT(0, find(beyond, 2));
+    const double before_end[] = {1.0, -0.5, -0.5 - 0x1p-46};
+    TEST_ASSERT_EQUAL_INT(1, find(before_end, 2));
+    TEST_ASSERT_TRUE(roots[0].s < 1.0);
+    // the last of three
+    const double three[] = {-0.25, 1.375, -2.125, 1.0};
+    TEST_ASSERT_EQUAL_INT(3, find(three, 3));
+    TEST_ASSERT_EQUAL_INT(ROOT_FALLS, roots[1].kind);
+    assert_root(1.0, ROOT_RISES, &roots[2]);
+}
+
+static void test_a_root_at_the_start_is_left_out(void) {
+    // a ball that leaves the ground and comes back
+    for (int i = 1; i < 40; i++) {
+        const double s = ldexp(1.0, -i);
+        const double c[] = {0.0, s, -1.0};
+        TEST_ASSERT_TRUE(first(c, 2, 0.0) == s);
+        TEST_ASSERT_EQUAL_INT(1, find(c, 2));
+        assert_root(s, ROOT_FALLS, &roots[0]);
+        const double above[] = {1e-17, s, -1.0};
+        const double below[] = {-1e-17, s, -1.0};
+        TEST_ASSERT_TRUE(first(above, 2, 1e-17) == s);
+        TEST_ASSERT_TRUE(first(below, 2, 1e-17) == s);
+    }
+    // the speed at the start is within the noise, too
+    const double slow[] = {1e-17, -1e-17, 1.0, -2.0};
+    TEST_ASSERT_TRUE(first(slow, 3, 1e-17) == 0.5);
+    const double leaving[] = {1e-17, -1e-17, 1.0, -0.5};
+    TEST_ASSERT_TRUE(first(leaving, 3, 1e-17) == INFINITY);
+    // coefficients behind the first that counts are no noise
+    const double later[] = {0.0, 1e-5, -1e-12, 0.0, -1e-5};
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, first(later, 4, 1e-8));
+}
+
+static void test_the_start_is_at_0_or_below(void) {
+    const double at[] = {0.0, 1.0, -0.5};
+    TEST_ASSERT_TRUE(first(at, 2, 0.0) == INFINITY);
+    TEST_ASSERT_TRUE(first(at, 2, -1.0) == 0.0);
+    TEST_ASSERT_EQUAL_INT(0, find(at, 2));
+    const double falls_at[] = {0.0, -1.0, 3.0};
+    const struct roots_polynomial p = {falls_at, 2, -1.0};
+    TEST_ASSERT_EQUAL_INT(1, roots_find(&p, roots));
+    TEST_ASSERT_EQUAL_INT(ROOT_RISES, roots[0].kind);
+    const double constant[] = {-2.0};
+    TEST_ASSERT_TRUE(first(constant, 0, 0.0) == 0.0);
+    const double below[] = {-1e-9, 1.0, 0.0};
+    TEST_ASSERT_TRUE(first(below, 2, 0.0) == 0.0);
+    TEST_ASSERT_TRUE(first(below, 2, 1e-9) == INFINITY);
+    const double falling[] = {0.0, -1e-9, 1.0};
+    TEST_ASSERT_TRUE(first(falling, 2, 0.0) == 0.0);
+    TEST_ASSERT_EQUAL_INT(1, find(falling, 2));
+    assert_root(1e-9, ROOT_RISES, &roots[0]);
+}
+
+/* ---- None ----------------------------------------------------------------------------------- */
+
+static void test_polynomials_without_roots(void) {
+    const double zeros[ROOTS_LENGTH] = {0.0};
+    const double constant[] = {-2.0};
+    const double noise[] = {1e-9, -1e-9, 1e-9};
+    TEST_ASSERT_EQUAL_INT(0, find(zeros, ROOTS_LENGTH - 1));
+    TEST_ASSERT_TRUE(first(zeros, 0, 0.0) == INFINITY);
+    TEST_ASSERT_EQUAL_INT(0, find(constant, 0));
+    TEST_ASSERT_TRUE(first(noise, 2, 1e-9) == INFINITY);
+    const double wrong[] = {NAN, INFINITY, -INFINITY};
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i < 3; i++) {
+            double c[] = {1.0, -3.0, 2.0, -1.0};
+            c[k] = wrong[i];
+            TEST_ASSERT_EQUAL_INT(0, find(c, 3));
+            TEST_ASSERT_TRUE(first(c, 3, 0.0) == INFINITY);
+        }
+    }
+}
