@@ -27,7 +27,10 @@ MAY_INCLUDE = {
     r"models/\w+": ("models", "src/model"),
 }
 # the equations of another model
-MAY_INCLUDE_MODEL = {"models/rp_controller": "models/rp_manipulator"}
+MAY_INCLUDE_MODEL = {
+    "models/rp_controller": "models/rp_manipulator",
+    "models/rp_plant": "models/rp_manipulator",
+}
 
 # libraries that hide headers; those of other folders are all public
 PUBLIC_HEADERS = {
