@@ -176,19 +176,16 @@ static bool makes_last_impact_plastic(const struct rp_plant_values *values,
     return found;
 }
 
-/* True if velocities jump. */
-static bool collide(struct rp_plant_values *values, const struct event *event, const int side[2]) {
-    if (side[0] * values->dq[0] >= 0.0 && side[1] * values->dq[1] >= 0.0) {
-        return false;
-    }
-    const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_contacts contacts = {
-        .side = {side[0], side[1]},
-        .restitution = {p->restitution[0], p->restitution[1]},
-    };
+static bool moves_into_stop(const struct rp_plant_values *values, const int side[2]) {
+    return side[0] * values->dq[0] < 0.0 || side[1] * values->dq[1] < 0.0;
+}
+
+static void strike_stops(struct rp_plant_values *values, const struct event *event,
+                         struct rp_plant_contacts contacts) {
     struct rp_plant_inertia inertia;
     struct rp_plant_impact impact;
-    rp_plant_inertia(p, values->modes.payload == RP_PLANT_ATTACHED, values->q[1], &inertia);
+    const bool attached = values->modes.payload == RP_PLANT_ATTACHED;
+    rp_plant_inertia(&values->parameters, attached, values->q[1], &inertia);
     do {
         rp_plant_impact(&inertia, &contacts, values->dq, &impact);
     } while (makes_last_impact_plastic(values, event, impact.dq, &contacts));
@@ -198,7 +195,25 @@ static bool collide(struct rp_plant_values *values, const struct event *event, c
         values->sums.stop_impulse[i] += impact.impulse[i];
     }
     values->sums.impact_loss += impact.loss;
-    return true;
+}
+
+/* True if velocities jump. With both joints on stops, an impact of one can drive the other, which
+ * was leaving, back into its stop: that is the next impact, at the same time. There may be many
+ * before both leave; from some number on they are plastic, and one or two more end them. */
+static bool collide(struct rp_plant_values *values, const struct event *event, const int side[2]) {
+    enum { MOST_ELASTIC = 8, MOST = 16 };
+    const struct rp_plant_parameters *p = &values->parameters;
+    int count = 0;
+    while (count < MOST && moves_into_stop(values, side)) {
+        const bool elastic = count < MOST_ELASTIC;
+        const struct rp_plant_contacts contacts = {
+            .side = {side[0], side[1]},
+            .restitution = {elastic ? p->restitution[0] : 0.0, elastic ? p->restitution[1] : 0.0},
+        };
+        strike_stops(values, event, contacts);
+        count++;
+    }
+    return count > 0;
 }
 
 /* ---- Payload -------------------------------------------------------------------------------- */
