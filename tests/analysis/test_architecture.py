@@ -237,7 +237,7 @@ def test_what_may_be_included(project: Path, name: str, header: str) -> None:
         ("fmu/fmi2/fmi2.c", "fmi3_calls.h"),
         ("fmu/fmi2/fmi2.c", "fmi3Functions.h"),
         ("models/rp_plant/rp_plant.c", "instance.h"),
-        ("models/rp_plant/rp_plant.c", "rp_manipulator.h"),
+        ("models/rp_trajectory/rp_trajectory.c", "rp_manipulator.h"),
         ("models/rp_plant/rp_plant.c", "nowhere.h"),
     ],
 )
