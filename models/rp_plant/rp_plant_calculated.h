@@ -113,10 +113,12 @@ EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
     const bool attached = modes->payload == RP_PLANT_ATTACHED;
     const struct plant plant = plant_in_state(p, attached, q, dq);
 
+    real applied[2];
     real efforts[2];
     real ddq[2];
     real reaction[2];
-    plant_efforts(&plant, p, modes->joint, tau, wrench, efforts);
+    plant_wrench_forces(&plant, wrench, applied);
+    plant_efforts(&plant, p, modes->joint, tau, applied, efforts);
     plant_motion(&plant, modes->joint, efforts, ddq, reaction);
     WRITE(to, ddq[0], ddq[0]);
     WRITE(to, ddq[1], ddq[1]);

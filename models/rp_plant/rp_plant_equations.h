@@ -132,9 +132,7 @@ EQUATION real plant_friction(const struct rp_plant_parameters *const p[SOURCES],
 /* tau + Q - damping q' - friction of sliding joints */
 EQUATION void plant_efforts(const struct plant *plant,
                             const struct rp_plant_parameters *const p[SOURCES], const int mode[2],
-                            const real tau[2], const real wrench[3], real efforts[2]) {
-    real Q[2];
-    plant_wrench_forces(plant, wrench, Q);
+                            const real tau[2], const real Q[2], real efforts[2]) {
     for (int i = 0; i < 2; i++) {
         const real dq = plant->arm.dq[i];
         const real damped = minus(plus(tau[i], Q[i]), times(READ(p, damping[i]), dq));

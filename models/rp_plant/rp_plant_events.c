@@ -16,8 +16,10 @@ struct fired {
     int hit[2];     /* +1: the lower stop is reached, -1: the upper one, else 0 */
 };
 
-bool rp_plant_can_be_held(const struct rp_plant_parameters *p, int joint) {
-    return rp_plant_breakaway(p, joint) > 0.0 || p->stops[joint] == RP_PLANT_STOPS_RIGID;
+/* Whether anything can hold a joint: dry friction or stops. Each right-hand side asks. */
+static bool can_be_held(const struct rp_plant_parameters *p, int joint) {
+    return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
+           p->stops[joint] == RP_PLANT_STOPS_RIGID;
 }
 
 static bool slides(int mode) {
@@ -71,14 +73,14 @@ struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *val
     struct rp_plant_modes modes = values->modes;
     if (modes.payload == RP_PLANT_UNDECIDED) {
         modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
-        if (rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1)) {
+        if (can_be_held(p, 0) || can_be_held(p, 1)) {
             struct decision decision;
             decide(p, q, dq, inputs, &modes, &decision);
             return modes;
         }
     }
     for (int i = 0; i < 2; i++) {
-        if (!rp_plant_can_be_held(p, i)) {
+        if (!can_be_held(p, i)) {
             modes.joint[i] = RP_PLANT_FREE;
         }
     }
@@ -295,7 +297,7 @@ static enum status update(void *values_pointer, const struct event *event) {
 static bool are_possible(const void *values_pointer) {
     const struct rp_plant_parameters *p =
         &((const struct rp_plant_values *)values_pointer)->parameters;
-    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) || p->payload_mass > 0.0 ||
+    return can_be_held(p, 0) || can_be_held(p, 1) || p->payload_mass > 0.0 ||
            p->payload_inertia > 0.0;
 }
 

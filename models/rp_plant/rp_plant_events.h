@@ -7,9 +7,6 @@
 
 extern const struct model_events rp_plant_events;
 
-/* Whether a joint can be held: it has dry friction or stops. */
-bool rp_plant_can_be_held(const struct rp_plant_parameters *p, int joint);
-
 /* Whether all modes are of their enumerations: those of a saved state may be anything. */
 bool rp_plant_modes_exist(const struct rp_plant_modes *modes);
 

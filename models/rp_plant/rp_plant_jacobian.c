@@ -13,10 +13,12 @@ void rp_plant_jacobians(const struct rp_plant_parameters *p, const struct rp_pla
 
     const bool attached = modes->payload == RP_PLANT_ATTACHED;
     const struct plant plant = plant_in_state(&p, attached, q_moving, dq_moving);
+    real applied[2];
     real efforts[2];
     real ddq[2];
     real reaction[2];
-    plant_efforts(&plant, &p, modes->joint, tau, wrench, efforts);
+    plant_wrench_forces(&plant, wrench, applied);
+    plant_efforts(&plant, &p, modes->joint, tau, applied, efforts);
     plant_motion(&plant, modes->joint, efforts, ddq, reaction);
     for (int i = 0; i < 2; i++) {
         for (int j = 0; j < 2; j++) {

@@ -21,10 +21,12 @@ void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
 
     const bool attached = modes->payload == RP_PLANT_ATTACHED;
     const struct plant plant = plant_in_state(sources, attached, q_moving, dq_moving);
+    real applied[2];
     real efforts[2];
     real ddq[2];
     real reaction[2];
-    plant_efforts(&plant, sources, modes->joint, tau, wrench, efforts);
+    plant_wrench_forces(&plant, wrench, applied);
+    plant_efforts(&plant, sources, modes->joint, tau, applied, efforts);
     plant_motion(&plant, modes->joint, efforts, ddq, reaction);
     rates[0] = reaction[0].first;
     rates[1] = reaction[1].first;
