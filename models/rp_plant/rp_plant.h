@@ -1,0 +1,129 @@
+/* Equations of the plant: the RP manipulator (rp_manipulator.h) with what a real one has: armature
+ * and damping of its drives, dry friction, rigid stops, a wrench at its end effector, a payload.
+ *
+ *   D q'' + C q' + g = tau + Q - damping q' - friction + stop                     (N.m, N)
+ *
+ * Frames, joints and symbols are those of rp_manipulator.h; arrays have one element per joint: rad,
+ * rad/s, N.m of joint 1 and m, m/s, N of joint 2. Each feature is off while its parameters are 0
+ * or none; with all off the results are those of the manipulator bit for bit, up to the sign of
+ * zero.
+ *
+ * The equations themselves are in rp_plant_equations.h, once for values and derivatives; the
+ * functions here are their values. All functions are pure and allocate nothing. */
+#ifndef RP_PLANT_H
+#define RP_PLANT_H
+
+#include "rp_manipulator.h"
+
+enum rp_plant_stops {
+    RP_PLANT_STOPS_NONE = 1,
+    RP_PLANT_STOPS_RIGID = 2,
+};
+
+/* What happens to the velocities when the payload is grasped. */
+enum rp_plant_grasp {
+    RP_PLANT_KEEP_VELOCITY = 1, /* the payload already moves with the end effector */
+    RP_PLANT_AT_REST = 2,       /* the payload rests: a plastic impact */
+};
+
+enum rp_plant_joint_mode {
+    RP_PLANT_BACKWARD = -1, /* slides, friction drives it forward */
+    RP_PLANT_STUCK = 0,     /* held by friction or at a closed stop */
+    RP_PLANT_FORWARD = 1,   /* slides, friction drives it backward */
+    RP_PLANT_FREE = 2,      /* moves without friction */
+};
+
+enum rp_plant_payload_mode {
+    RP_PLANT_UNDECIDED = 0, /* initialization goes on: no mode has been decided */
+    RP_PLANT_ATTACHED = 1,
+    RP_PLANT_RELEASED = 2,
+};
+
+struct rp_plant_parameters {
+    struct rp_parameters arm;
+    double armature[2];           /* kg.m2, kg, >= 0: inertia of the drive, seen at the joint */
+    double damping[2];            /* N.m.s/rad, N.s/m, >= 0 */
+    double coulomb_friction[2];   /* N.m, N, >= 0: of a fast joint */
+    double breakaway_friction[2]; /* N.m, N: of a joint at rest; 0: as coulomb_friction, else not
+                                     below it */
+    double stribeck_velocity[2];  /* rad/s, m/s, >= 0: how fast friction falls with the velocity;
+                                     above 0 where breakaway_friction is above coulomb_friction */
+    double lower[2];              /* rad, m: where the stops are */
+    double upper[2];              /* rad, m, > lower */
+    double restitution[2];        /* 0 .. 1: velocity after an impact by that before it */
+    double payload_mass;          /* kg, >= 0 */
+    double payload_inertia;       /* kg.m2, >= 0: about its center of mass, along z0 */
+    double payload_x;             /* m: its center of mass in frame 2, along x2 */
+    double payload_z;             /* m: the same, along z2 (the slide) */
+    int stops[2];                 /* enum rp_plant_stops */
+    int grasp;                    /* enum rp_plant_grasp */
+};
+
+struct rp_plant_inputs {
+    double tau[2];    /* N.m, N: efforts of the drives */
+    double wrench[3]; /* N, N, N.m: force along x0 and y0 and moment about z0 that act on link 2 at
+                         the end effector, the origin of frame 2 */
+};
+
+struct rp_plant_modes {
+    int joint[2]; /* enum rp_plant_joint_mode */
+    int payload;  /* enum rp_plant_payload_mode */
+};
+
+struct rp_plant_inertia {
+    double D[2][2];     /* kg.m2, kg.m, kg: mass matrix with armature and payload */
+    double determinant; /* D11 D22 - D12^2, without cancellation; > 0 */
+};
+
+/* A motion in given modes, which need not be those that follow from the rest. */
+struct rp_plant_motion {
+    double ddq[2];      /* rad/s2, m/s2; 0 for a stuck joint */
+    double reaction[2]; /* N.m, N: of a stuck joint friction - stop, else 0 */
+};
+
+/* Friction of a joint at rest at most (N.m, N). */
+double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint);
+
+/* Friction of a joint that slides at the velocity dq, by Stribeck's law. Its value at dq = 0 is the
+ * breakaway friction: there is no jump when a joint breaks away. */
+double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double dq);
+
+/* +1: the joint rests on its lower stop and can only move forward; -1: on its upper one; 0. */
+int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q);
+
+void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double q2,
+                      struct rp_plant_inertia *inertia);
+
+/* Kinetic energy with armature and payload, J. */
+double rp_plant_kinetic_energy(const struct rp_plant_parameters *p, bool attached,
+                               const double q[2], const double dq[2]);
+
+/* b: all generalized forces but those that hold joints at rest. A joint that slides has its
+ * friction in it, a stuck one has none:  b = tau + Q - damping q' - friction - C q' - g */
+void rp_plant_forces(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
+                     const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
+                     double forces[2]);
+
+void rp_plant_motion(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
+                     const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
+                     struct rp_plant_motion *motion);
+
+/* Derivatives of the accelerations in these modes (rp_plant_jacobian.c): row i, column j is
+ * d ddq[i] / d (argument)[j]. */
+struct rp_plant_jacobians {
+    double q[2][2];
+    double dq[2][2];
+};
+
+void rp_plant_jacobians(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
+                        const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
+                        struct rp_plant_jacobians *jacobians);
+
+/* Time derivatives of the reactions along the motion in these modes, the inputs changing at the
+ * rates du (rp_plant_rates.c). */
+void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
+                             const struct rp_plant_modes *modes, const double q[2],
+                             const double dq[2], const struct rp_plant_inputs *inputs,
+                             const struct rp_plant_inputs *du, double rates[2]);
+
+#endif

@@ -1,0 +1,153 @@
+#include "rp_plant_check.h"
+
+#include "rp_plant_model.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static enum status check_arm(const struct rp_plant_parameters *p, char *text, size_t size) {
+    const struct rp_parameters *arm = &p->arm;
+    if (rp_parameters_check(arm)) {
+        return STATUS_OK;
+    }
+    (void)snprintf(text, size,
+                   "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
+                   "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
+                   rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
+    return STATUS_INVALID_PARAMETERS;
+}
+
+/* One of the numbers that have to be finite and not negative; joint 0: no joint's. */
+struct not_negative {
+    const char *name;
+    int joint;
+    double value;
+};
+
+static enum status check_not_negative(const struct rp_plant_parameters *p, char *text,
+                                      size_t size) {
+    const struct not_negative all[] = {
+        {"armature", 1, p->armature[0]},
+        {"armature", 2, p->armature[1]},
+        {"damping", 1, p->damping[0]},
+        {"damping", 2, p->damping[1]},
+        {"coulomb_friction", 1, p->coulomb_friction[0]},
+        {"coulomb_friction", 2, p->coulomb_friction[1]},
+        {"breakaway_friction", 1, p->breakaway_friction[0]},
+        {"breakaway_friction", 2, p->breakaway_friction[1]},
+        {"stribeck_velocity", 1, p->stribeck_velocity[0]},
+        {"stribeck_velocity", 2, p->stribeck_velocity[1]},
+        {"payload_mass", 0, p->payload_mass},
+        {"payload_inertia", 0, p->payload_inertia},
+    };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        if (isfinite(all[i].value) && all[i].value >= 0.0) {
+            continue;
+        }
+        char joint[2] = {all[i].joint == 0 ? '\0' : (char)('0' + all[i].joint), '\0'};
+        (void)snprintf(text, size, "%s%s = %g is refused: it must be finite and not below 0",
+                       all[i].name, joint, all[i].value);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    return STATUS_OK;
+}
+
+static enum status check_payload(const struct rp_plant_parameters *p, char *text, size_t size) {
+    if (!isfinite(p->payload_x) || !isfinite(p->payload_z)) {
+        (void)snprintf(text, size,
+                       "payload_x = %g and payload_z = %g are refused: they must be finite",
+                       p->payload_x, p->payload_z);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    if (p->grasp != RP_PLANT_KEEP_VELOCITY && p->grasp != RP_PLANT_AT_REST) {
+        (void)snprintf(text, size, "grasp = %d is refused: it must be %d or %d", p->grasp,
+                       RP_PLANT_KEEP_VELOCITY, RP_PLANT_AT_REST);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    return STATUS_OK;
+}
+
+static enum status check_friction(const struct rp_plant_parameters *p, int i, char *text,
+                                  size_t size) {
+    const double coulomb = p->coulomb_friction[i];
+    const double breakaway = p->breakaway_friction[i];
+    const int joint = i + 1;
+    if (breakaway > 0.0 && breakaway < coulomb) {
+        (void)snprintf(text, size,
+                       "breakaway_friction%d = %g is refused: it must not be below "
+                       "coulomb_friction%d = %g (0: the same)",
+                       joint, breakaway, joint, coulomb);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    if (breakaway > coulomb && p->stribeck_velocity[i] == 0.0) {
+        (void)snprintf(text, size,
+                       "stribeck_velocity%d = 0 is refused: it must be above 0 where "
+                       "breakaway_friction%d = %g is above coulomb_friction%d = %g",
+                       joint, joint, breakaway, joint, coulomb);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    return STATUS_OK;
+}
+
+static enum status check_stops(const struct rp_plant_parameters *p, int i, char *text,
+                               size_t size) {
+    const int joint = i + 1;
+    if (p->stops[i] != RP_PLANT_STOPS_NONE && p->stops[i] != RP_PLANT_STOPS_RIGID) {
+        (void)snprintf(text, size, "stops%d = %d is refused: it must be %d or %d", joint,
+                       p->stops[i], RP_PLANT_STOPS_NONE, RP_PLANT_STOPS_RIGID);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    if (!(p->restitution[i] >= 0.0 && p->restitution[i] <= 1.0)) {
+        (void)snprintf(text, size, "restitution%d = %g is refused: it must be within 0 and 1",
+                       joint, p->restitution[i]);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    if (p->stops[i] == RP_PLANT_STOPS_RIGID &&
+        !(isfinite(p->lower[i]) && isfinite(p->upper[i]) && p->lower[i] < p->upper[i])) {
+        (void)snprintf(text, size,
+                       "lower%d = %g and upper%d = %g are refused: with rigid stops they must be "
+                       "finite and lower%d below upper%d",
+                       joint, p->lower[i], joint, p->upper[i], joint, joint);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    return STATUS_OK;
+}
+
+/* A limit that is moved past a joint while it runs takes the joint along; a start outside is a
+ * mistake. */
+static enum status check_start(const struct rp_plant_values *values, int i, char *text,
+                               size_t size) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const double q = values->q[i];
+    const int joint = i + 1;
+    if (values->modes.payload != RP_PLANT_UNDECIDED || p->stops[i] != RP_PLANT_STOPS_RIGID ||
+        (q >= p->lower[i] && q <= p->upper[i])) {
+        return STATUS_OK;
+    }
+    (void)snprintf(text, size,
+                   "q%d = %g is refused: a start must be within lower%d = %g and upper%d = %g",
+                   joint, q, joint, p->lower[i], joint, p->upper[i]);
+    return STATUS_INVALID_PARAMETERS;
+}
+
+enum status rp_plant_check_parameters(const void *values_pointer, char *text, size_t size) {
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_parameters *p = &values->parameters;
+    enum status status = check_arm(p, text, size);
+    if (status == STATUS_OK) {
+        status = check_not_negative(p, text, size);
+    }
+    if (status == STATUS_OK) {
+        status = check_payload(p, text, size);
+    }
+    for (int i = 0; i < 2 && status == STATUS_OK; i++) {
+        status = check_friction(p, i, text, size);
+        if (status == STATUS_OK) {
+            status = check_stops(p, i, text, size);
+        }
+        if (status == STATUS_OK) {
+            status = check_start(values, i, text, size);
+        }
+    }
+    return status;
+}

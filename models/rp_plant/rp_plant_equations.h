@@ -1,0 +1,250 @@
+/* The equations of the plant in any arithmetic (equation.h): rp_plant.h is these with doubles, and
+ * says what they mean. In given modes they are smooth: a joint that slides forward keeps the sign
+ * of its friction also where its velocity passes 0. */
+#ifndef RP_PLANT_EQUATIONS_H
+#define RP_PLANT_EQUATIONS_H
+
+#include "rp_equations.h"
+#include "rp_plant.h"
+
+/* The plant in a state, with what many equations share. */
+struct plant {
+    struct arm hand; /* without payload and armature: where the end effector is */
+    struct arm arm;  /* link 2 with the payload, if attached; J with the armature of joint 1 */
+    real armature2;  /* kg */
+    real offset_x;   /* m: center of mass of link 2 with payload, from that without */
+    real offset_z;   /* m */
+};
+
+/* ---- Bodies --------------------------------------------------------------------------------- */
+
+/* Link 2 and the payload are one rigid body. With M = m2 + mp its center of mass is at
+ * mp (cx, cz) / M in frame 2, and its inertia about that follows from the parallel axes:
+ *
+ *   m2 -> M,  a -> a + mp cx / M,  l1 -> l1 + mp cz / M,
+ *   I2z -> I2z + Ip + (m2 mp / M) (cx^2 + cz^2)
+ *
+ * in dynamics and energies. */
+EQUATION void plant_attach(struct plant *plant,
+                           const struct rp_plant_parameters *const p[SOURCES]) {
+    struct arm *arm = &plant->arm;
+    const real cx = READ(p, payload_x);
+    const real cz = READ(p, payload_z);
+    const real mass = plus(arm->m2, READ(p, payload_mass));
+    const real share = over(READ(p, payload_mass), mass);
+    const real distance2 = plus(times(cx, cx), times(cz, cz));
+    plant->offset_x = times(share, cx);
+    plant->offset_z = times(share, cz);
+
+    const real parallel = times(times(arm->m2, share), distance2);
+    arm->I2z = plus(plus(arm->I2z, READ(p, payload_inertia)), parallel);
+    arm->m2 = mass;
+    arm->a = plus(arm->a, plant->offset_x);
+    arm->l1 = plus(arm->l1, plant->offset_z);
+    arm->L = plus(arm->l1, arm->q[1]);
+    const real link1 = times(times(arm->m1, arm->lc1), arm->lc1);
+    const real fixed = plus(plus(link1, arm->I1z), arm->I2z);
+    arm->J = plus(fixed, times(times(arm->m2, arm->L), arm->L));
+}
+
+/* The armature of joint 1 turns as I1z does, so that J takes it up; that of joint 2 is the only one
+ * that the manipulator's equations have no place for. */
+EQUATION struct plant plant_in_state(const struct rp_plant_parameters *const p[SOURCES],
+                                     bool attached, const real q[2], const real dq[2]) {
+    const struct rp_parameters *const arm[SOURCES] = PARTS(p, arm);
+    struct plant plant;
+    plant.hand = arm_in_state(arm, q, dq);
+    plant.arm = plant.hand;
+    plant.armature2 = READ(p, armature[1]);
+    plant.offset_x = constant(0.0);
+    plant.offset_z = constant(0.0);
+    if (attached) {
+        plant_attach(&plant, p);
+    }
+    plant.arm.J = plus(plant.arm.J, READ(p, armature[0]));
+    return plant;
+}
+
+EQUATION void plant_mass_matrix(const struct plant *plant, real D[2][2]) {
+    arm_mass_matrix(&plant->arm, D);
+    D[1][1] = plus(D[1][1], plant->armature2);
+}
+
+EQUATION real plant_kinetic_energy(const struct plant *plant) {
+    const real dq2 = plant->arm.dq[1];
+    const real drive2 = times(times(plant->armature2, dq2), dq2);
+    return plus(arm_kinetic_energy(&plant->arm), scaled(0.5, drive2));
+}
+
+/* ---- Forces --------------------------------------------------------------------------------- */
+
+/* Q = J^T w with the rows of (1) and (3):  Q1 = x fy - y fx + mz,  Q2 = c1 fx + s1 fy */
+EQUATION void plant_wrench_forces(const struct plant *plant, const real wrench[3], real forces[2]) {
+    const struct arm *hand = &plant->hand;
+    real position[2];
+    arm_end_effector_position(hand, position);
+    const real moment = minus(times(position[0], wrench[1]), times(position[1], wrench[0]));
+    forces[0] = plus(moment, wrench[2]);
+    forces[1] = plus(times(hand->c1, wrench[0]), times(hand->s1, wrench[1]));
+}
+
+/* exp(x): the polynomial of degree 2 about the value of x has its value and its first two
+ * derivatives, more than which no arithmetic keeps. */
+EQUATION real plant_exponential(real x) {
+    const double least = -750.0; // exp is 0 below
+    if (value_of(x) < least) {
+        return constant(0.0);
+    }
+    const real d = minus(x, constant(value_of(x)));
+    const real polynomial = plus(plus(constant(1.0), d), scaled(0.5, times(d, d)));
+    return scaled(exp(value_of(x)), polynomial);
+}
+
+EQUATION real plant_breakaway(const struct rp_plant_parameters *const p[SOURCES], int i) {
+    const real breakaway = READ(p, breakaway_friction[i]);
+    return value_of(breakaway) > 0.0 ? breakaway : READ(p, coulomb_friction[i]);
+}
+
+/* F(v) = Fc + (Fb - Fc) e with e = exp(-(v / vs)^2), summed up so that F(0) is Fb to the bit. Even
+ * in v: smooth where v passes 0. */
+EQUATION real plant_sliding_friction(const struct rp_plant_parameters *const p[SOURCES], int i,
+                                     real dq) {
+    const real coulomb = READ(p, coulomb_friction[i]);
+    const real breakaway = READ(p, breakaway_friction[i]);
+    const real velocity = READ(p, stribeck_velocity[i]);
+    if (!(value_of(breakaway) > 0.0 && value_of(velocity) > 0.0)) {
+        return coulomb;
+    }
+    const real ratio = over(dq, velocity);
+    const real e = plant_exponential(negative(times(ratio, ratio)));
+    return plus(times(breakaway, e), times(coulomb, minus(constant(1.0), e)));
+}
+
+/* Friction of a joint that slides, against its direction; 0 for one that does not. */
+EQUATION real plant_friction(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
+                             real dq) {
+    if (mode != RP_PLANT_FORWARD && mode != RP_PLANT_BACKWARD) {
+        return constant(0.0);
+    }
+    return scaled(mode, plant_sliding_friction(p, i, dq));
+}
+
+/* tau + Q - damping q' - friction of sliding joints */
+EQUATION void plant_efforts(const struct plant *plant,
+                            const struct rp_plant_parameters *const p[SOURCES], const int mode[2],
+                            const real tau[2], const real Q[2], real efforts[2]) {
+    for (int i = 0; i < 2; i++) {
+        const real dq = plant->arm.dq[i];
+        const real damped = minus(plus(tau[i], Q[i]), times(READ(p, damping[i]), dq));
+        efforts[i] = minus(damped, plant_friction(p, mode[i], i, dq));
+    }
+}
+
+/* efforts - C q' - g */
+EQUATION void plant_forces(const struct plant *plant, const real efforts[2], real forces[2]) {
+    real coriolis[2];
+    real gravity[2];
+    arm_coriolis_forces(&plant->arm, coriolis);
+    arm_gravity_forces(&plant->arm, gravity);
+    for (int i = 0; i < 2; i++) {
+        forces[i] = minus(minus(efforts[i], coriolis[i]), gravity[i]);
+    }
+}
+
+/* ---- Motion --------------------------------------------------------------------------------- */
+
+/* arm_forward_dynamics with the armature b2 of joint 2. Row 2 of (13) gives, with
+ * mu = m2 / (m2 + b2),
+ *
+ *   q2'' = mu (f2 / m2 + L q1'^2 - g s1 + a q1''),
+ *
+ * and row 1 plus a mu times row 2 eliminates q2'':
+ *
+ *   (J + a^2 mu b2) q1'' = tau1 + a mu f2 + m2 L q1' (a mu q1' - 2 q2')
+ *                          - g c1 (m1 lc1 + m2 L) + (1 - mu) m2 g a s1
+ *
+ * At b2 = 0 each operation gives what it gives in arm_forward_dynamics. */
+EQUATION void plant_forward_dynamics(const struct plant *plant, const real efforts[2],
+                                     real ddq[2]) {
+    const struct arm *arm = &plant->arm;
+    const real dq1 = arm->dq[0];
+    const real dq2 = arm->dq[1];
+    const real m2L = times(arm->m2, arm->L);
+    const real moved2 = plus(arm->m2, plant->armature2);
+    const real mu = over(arm->m2, moved2);
+    const real a_mu = times(arm->a, mu);
+
+    const real driven = plus(efforts[0], times(a_mu, efforts[1]));
+    const real velocities = times(times(m2L, dq1), minus(times(a_mu, dq1), scaled(2.0, dq2)));
+    const real weight = times(times(arm->g, arm->c1), plus(times(arm->m1, arm->lc1), m2L));
+    const real weight2 = times(times(arm->m2, arm->g), times(arm->a, arm->s1));
+    const real held = times(over(plant->armature2, moved2), weight2);
+    const real torque = plus(minus(plus(driven, velocities), weight), held);
+    ddq[0] = over(torque, plus(arm->J, times(times(arm->a, a_mu), plant->armature2)));
+
+    const real push = over(efforts[1], arm->m2);
+    const real centrifugal = times(times(arm->L, dq1), dq1);
+    const real fall = times(arm->g, arm->s1);
+    const real free = plus(minus(plus(push, centrifugal), fall), times(arm->a, ddq[0]));
+    ddq[1] = times(mu, free);
+}
+
+/* Accelerations, and what it takes to hold the stuck joints: with q_i'' = 0 row i of
+ * D q'' = forces is left out, and reaction_i = forces_i - D_ij q_j''. */
+EQUATION void plant_motion(const struct plant *plant, const int mode[2], const real efforts[2],
+                           real ddq[2], real reaction[2]) {
+    const bool stuck[2] = {mode[0] == RP_PLANT_STUCK, mode[1] == RP_PLANT_STUCK};
+    ddq[0] = ddq[1] = constant(0.0);
+    reaction[0] = reaction[1] = constant(0.0);
+    if (!stuck[0] && !stuck[1]) {
+        plant_forward_dynamics(plant, efforts, ddq);
+        return;
+    }
+    real D[2][2];
+    real forces[2];
+    plant_mass_matrix(plant, D);
+    plant_forces(plant, efforts, forces);
+    for (int i = 0; i < 2; i++) {
+        if (!stuck[i]) {
+            ddq[i] = over(forces[i], D[i][i]);
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        if (stuck[i]) {
+            reaction[i] = minus(forces[i], times(D[i][1 - i], ddq[1 - i]));
+        }
+    }
+}
+
+/* ---- Event indicators ----------------------------------------------------------------------- */
+
+enum { PLANT_INDICATORS = 4 }; /* of a joint */
+
+/* Those of a stuck joint on its lower and upper side; a closed stop leaves the one that opens. */
+EQUATION void plant_stuck_indicators(const struct rp_plant_parameters *const p[SOURCES], int i,
+                                     real q, real reaction, real z[2]) {
+    const int closed = rp_plant_closed_stop(p[0], i, value_of(q));
+    const real breakaway = plant_breakaway(p, i);
+    z[0] = closed < 0 ? constant(1.0) : minus(breakaway, reaction);
+    z[1] = closed > 0 ? constant(1.0) : plus(breakaway, reaction);
+}
+
+/* Above 0 while the mode is valid: joint i breaks away forward, or comes to rest if it slides;
+ * breaks away backward; reaches its lower stop; its upper stop. 1: unused. */
+EQUATION void plant_indicators(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
+                               real q, real dq, real reaction, real z[PLANT_INDICATORS]) {
+    z[0] = z[1] = z[2] = z[3] = constant(1.0);
+    if (mode == RP_PLANT_STUCK) {
+        plant_stuck_indicators(p, i, q, reaction, z);
+        return;
+    }
+    if (mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) {
+        z[0] = scaled(mode, dq);
+    }
+    if (p[0]->stops[i] == RP_PLANT_STOPS_RIGID) {
+        z[2] = minus(q, READ(p, lower[i]));
+        z[3] = minus(READ(p, upper[i]), q);
+    }
+}
+
+#endif

@@ -1,0 +1,383 @@
+#include "rp_plant_events.h"
+
+#include "arithmetic_double.h"
+#include "rp_plant_equations.h"
+#include "rp_plant_impact.h"
+#include "rp_plant_rest.h"
+
+#include <string.h>
+
+enum { SLIP_FORWARD, SLIP_BACKWARD, LOWER, UPPER }; /* the indicators of a joint */
+
+/* What has fired, by the modes that held until now. */
+struct fired {
+    bool halted[2]; /* a sliding joint has come to rest */
+    int leaves[2];  /* the direction in which a stuck joint breaks away, else 0 */
+    int hit[2];     /* +1: the lower stop is reached, -1: the upper one, else 0 */
+};
+
+/* Whether anything can hold a joint: dry friction or stops. Each right-hand side asks. */
+static bool can_be_held(const struct rp_plant_parameters *p, int joint) {
+    return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
+           p->stops[joint] == RP_PLANT_STOPS_RIGID;
+}
+
+static bool slides(int mode) {
+    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+}
+
+/* ---- Modes from velocities and forces ------------------------------------------------------- */
+
+/* Of a joint that moves, or begins to, in a direction. */
+static int moving_mode(const struct rp_plant_parameters *p, int joint, int direction) {
+    if (rp_plant_breakaway(p, joint) > 0.0) {
+        return direction > 0 ? RP_PLANT_FORWARD : RP_PLANT_BACKWARD;
+    }
+    return RP_PLANT_FREE;
+}
+
+/* A decision about the joints at rest, and what it was made from. */
+struct decision {
+    struct rp_plant_rest rest;
+    struct rp_plant_outcome outcome;
+};
+
+/* Writes the joints' modes; that of the payload is given. */
+static void decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                   const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
+                   struct decision *decision) {
+    struct rp_plant_rest *rest = &decision->rest;
+    for (int i = 0; i < 2; i++) {
+        rest->breakaway[i] = rp_plant_breakaway(p, i);
+        rest->closed[i] = rp_plant_closed_stop(p, i, q[i]);
+        rest->at_rest[i] = dq[i] == 0.0 && (rest->breakaway[i] > 0.0 || rest->closed[i] != 0);
+        modes->joint[i] =
+            rest->at_rest[i] ? RP_PLANT_STUCK : moving_mode(p, i, dq[i] > 0.0 ? 1 : -1);
+    }
+    const bool attached = modes->payload == RP_PLANT_ATTACHED;
+    rp_plant_inertia(p, attached, q[1], &rest->inertia);
+    rp_plant_forces(p, modes, q, dq, inputs, rest->forces);
+    rp_plant_rest_decide(rest, &decision->outcome);
+    for (int i = 0; i < 2; i++) {
+        const int direction = decision->outcome.pattern[i];
+        if (direction != 0) {
+            modes->joint[i] = moving_mode(p, i, direction);
+        }
+    }
+}
+
+struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
+                                               const double q[2], const double dq[2],
+                                               const struct rp_plant_inputs *inputs) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    struct rp_plant_modes modes = values->modes;
+    if (modes.payload == RP_PLANT_UNDECIDED) {
+        modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+        if (can_be_held(p, 0) || can_be_held(p, 1)) {
+            struct decision decision;
+            decide(p, q, dq, inputs, &modes, &decision);
+            return modes;
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        if (!can_be_held(p, i)) {
+            modes.joint[i] = RP_PLANT_FREE;
+        }
+    }
+    return modes;
+}
+
+/* ---- Breaking away -------------------------------------------------------------------------- */
+
+/* The side on which a joint that stays is at its limit: that which has fired, or where the reaction
+ * is the breakaway friction. */
+static int side_at_limit(const struct decision *decision, int joint, int leaves) {
+    const struct rp_plant_rest *rest = &decision->rest;
+    if (!rest->at_rest[joint] || decision->outcome.pattern[joint] != 0) {
+        return 0;
+    }
+    if (leaves != 0) {
+        return leaves;
+    }
+    const double reaction = decision->outcome.reaction[joint];
+    if (reaction >= rest->breakaway[joint] && rest->closed[joint] >= 0) {
+        return 1;
+    }
+    return -reaction >= rest->breakaway[joint] && rest->closed[joint] <= 0 ? -1 : 0;
+}
+
+/* At the limit with no acceleration, stuck and sliding fit both: the next derivative decides. It
+ * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
+ * go to that side, and without friction, since that does not change at breakaway. A joint whose
+ * indicator has fired leaves unless the rate points back; otherwise it would fire again. */
+static void break_away(struct rp_plant_values *values, const struct event *event,
+                       const struct decision *decision, const int leaves[2]) {
+    const int side[2] = {side_at_limit(decision, 0, leaves[0]),
+                         side_at_limit(decision, 1, leaves[1])};
+    if (side[0] == 0 && side[1] == 0) {
+        return;
+    }
+    const struct rp_plant_parameters *p = &values->parameters;
+    struct rp_plant_inputs du;
+    memcpy(&du, event->du, sizeof du);
+    struct rp_plant_rest next = {.inertia = decision->rest.inertia};
+    rp_plant_reaction_rates(p, &values->modes, values->q, values->dq, &values->inputs, &du,
+                            next.forces);
+    struct rp_plant_outcome outcome = {.reaction = {next.forces[0], next.forces[1]}};
+    if (side[0] != 0 && side[1] != 0) {
+        for (int i = 0; i < 2; i++) {
+            next.at_rest[i] = true;
+            next.closed[i] = side[i];
+        }
+        rp_plant_rest_decide(&next, &outcome);
+    }
+    for (int i = 0; i < 2; i++) {
+        const double push = side[i] * outcome.reaction[i];
+        if (side[i] != 0 &&
+            (outcome.pattern[i] != 0 || push > 0.0 || (leaves[i] != 0 && push == 0.0))) {
+            values->modes.joint[i] = moving_mode(p, i, side[i]);
+        }
+    }
+}
+
+/* ---- Stops ---------------------------------------------------------------------------------- */
+
+/* Puts joints that have reached a stop, or are past it, on it. */
+static void arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    for (int i = 0; i < 2; i++) {
+        side[i] = rp_plant_closed_stop(p, i, values->q[i]);
+        if (side[i] == 0 && p->stops[i] == RP_PLANT_STOPS_RIGID) {
+            side[i] = fired->hit[i];
+        }
+        if (side[i] != 0) {
+            values->q[i] = side[i] > 0 ? p->lower[i] : p->upper[i];
+        }
+    }
+}
+
+/* Bouncing comes to rest where the next bounce goes no higher than the absolute tolerance of q: at
+ * v^2 / (2 |q''|), where q'' points into the stop. Such an impact is a plastic one. */
+static bool makes_last_impact_plastic(const struct rp_plant_values *values,
+                                      const struct event *event, const double dq_after[2],
+                                      struct rp_plant_contacts *contacts) {
+    struct rp_plant_modes modes = values->modes;
+    struct decision decision;
+    decide(&values->parameters, values->q, dq_after, &values->inputs, &modes, &decision);
+    bool found = false;
+    for (int i = 0; i < 2; i++) {
+        const int side = contacts->side[i];
+        const double away = side * dq_after[i];
+        const double into = -side * decision.outcome.ddq[i];
+        const bool bounces = side * values->dq[i] < 0.0 && contacts->restitution[i] > 0.0;
+        if (bounces && into > 0.0 && away * away <= 2.0 * into * event->tolerance[i]) {
+            contacts->restitution[i] = 0.0;
+            found = true;
+        }
+    }
+    return found;
+}
+
+static bool moves_into_stop(const struct rp_plant_values *values, const int side[2]) {
+    return side[0] * values->dq[0] < 0.0 || side[1] * values->dq[1] < 0.0;
+}
+
+static void strike_stops(struct rp_plant_values *values, const struct event *event,
+                         struct rp_plant_contacts contacts) {
+    struct rp_plant_inertia inertia;
+    struct rp_plant_impact impact;
+    const bool attached = values->modes.payload == RP_PLANT_ATTACHED;
+    rp_plant_inertia(&values->parameters, attached, values->q[1], &inertia);
+    do {
+        rp_plant_impact(&inertia, &contacts, values->dq, &impact);
+    } while (makes_last_impact_plastic(values, event, impact.dq, &contacts));
+
+    for (int i = 0; i < 2; i++) {
+        values->dq[i] = impact.dq[i];
+        values->sums.stop_impulse[i] += impact.impulse[i];
+    }
+    values->sums.impact_loss += impact.loss;
+}
+
+/* True if velocities jump. With both joints on stops, an impact of one can drive the other, which
+ * was leaving, back into its stop: that is the next impact, at the same time. There may be many
+ * before both leave; from some number on they are plastic, and one or two more end them. */
+static bool collide(struct rp_plant_values *values, const struct event *event, const int side[2]) {
+    enum { MOST_ELASTIC = 8, MOST = 16 };
+    const struct rp_plant_parameters *p = &values->parameters;
+    int count = 0;
+    while (count < MOST && moves_into_stop(values, side)) {
+        const bool elastic = count < MOST_ELASTIC;
+        const struct rp_plant_contacts contacts = {
+            .side = {side[0], side[1]},
+            .restitution = {elastic ? p->restitution[0] : 0.0, elastic ? p->restitution[1] : 0.0},
+        };
+        strike_stops(values, event, contacts);
+        count++;
+    }
+    return count > 0;
+}
+
+/* ---- Payload -------------------------------------------------------------------------------- */
+
+/* True if the inertia changes. Before the first event nothing is grasped: what is attached then
+ * belongs to link 2. */
+static bool take_payload(struct rp_plant_values *values) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const int mode = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+    const int before = values->modes.payload;
+    values->modes.payload = mode;
+    if (before == mode || before == RP_PLANT_UNDECIDED) {
+        return false;
+    }
+    if (mode == RP_PLANT_ATTACHED && p->grasp == RP_PLANT_AT_REST) {
+        double dq[2];
+        values->sums.grasp_loss += rp_plant_grasp_at_rest(p, values->q, values->dq, dq);
+        memcpy(values->dq, dq, sizeof dq);
+    }
+    return true;
+}
+
+/* ---- struct model_events -------------------------------------------------------------------- */
+
+static struct fired read_fired(const struct rp_plant_values *values, const bool *at_zero) {
+    struct fired fired = {.halted = {false}};
+    if (at_zero == NULL || values->modes.payload == RP_PLANT_UNDECIDED) {
+        return fired;
+    }
+    for (int i = 0; i < 2; i++) {
+        const bool *of_joint = at_zero + PLANT_INDICATORS * i;
+        const int mode = values->modes.joint[i];
+        fired.halted[i] = slides(mode) && of_joint[SLIP_FORWARD];
+        if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
+            fired.leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
+        }
+        if (mode != RP_PLANT_STUCK && of_joint[LOWER] != of_joint[UPPER]) {
+            fired.hit[i] = of_joint[LOWER] ? 1 : -1;
+        }
+    }
+    return fired;
+}
+
+bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
+    const int *joint = modes->joint;
+    return joint[0] >= RP_PLANT_BACKWARD && joint[0] <= RP_PLANT_FREE &&
+           joint[1] >= RP_PLANT_BACKWARD && joint[1] <= RP_PLANT_FREE &&
+           modes->payload >= RP_PLANT_UNDECIDED && modes->payload <= RP_PLANT_RELEASED;
+}
+
+static enum status update(void *values_pointer, const struct event *event) {
+    static const int none[2] = {0, 0};
+    struct rp_plant_values *values = values_pointer;
+    const struct fired fired = read_fired(values, event->fired);
+
+    bool jumps = false;
+    for (int i = 0; i < 2; i++) {
+        if (fired.halted[i]) {
+            values->dq[i] = 0.0;
+            jumps = true;
+        }
+    }
+    if (take_payload(values)) {
+        jumps = true;
+    }
+    int side[2];
+    arrive(values, &fired, side);
+    if (collide(values, event, side)) {
+        jumps = true;
+    }
+
+    // what has fired counts where the forces of the stuck joints have not changed since
+    struct decision decision;
+    decide(&values->parameters, values->q, values->dq, &values->inputs, &values->modes, &decision);
+    break_away(values, event, &decision, jumps ? none : fired.leaves);
+    return STATUS_OK;
+}
+
+static bool are_possible(const void *values_pointer) {
+    const struct rp_plant_parameters *p =
+        &((const struct rp_plant_values *)values_pointer)->parameters;
+    return can_be_held(p, 0) || can_be_held(p, 1) || p->payload_mass > 0.0 ||
+           p->payload_inertia > 0.0;
+}
+
+static bool is_at_rest(const void *values_pointer) {
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_modes modes =
+        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    return modes.joint[0] == RP_PLANT_STUCK && modes.joint[1] == RP_PLANT_STUCK;
+}
+
+/* As plant_indicators. */
+static void describe_joint(const struct rp_plant_values *values, int mode, int joint,
+                           struct indicator indicators[PLANT_INDICATORS]) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const size_t q = (size_t)joint;
+    for (int k = 0; k < PLANT_INDICATORS; k++) {
+        indicators[k] = (struct indicator){.kind = INDICATOR_UNUSED};
+    }
+    if (mode == RP_PLANT_STUCK) {
+        const int closed = rp_plant_closed_stop(p, joint, values->q[joint]);
+        if (closed >= 0) {
+            indicators[SLIP_FORWARD].kind = INDICATOR_OF_MODEL;
+        }
+        if (closed <= 0) {
+            indicators[SLIP_BACKWARD].kind = INDICATOR_OF_MODEL;
+        }
+        return;
+    }
+    if (slides(mode)) {
+        indicators[SLIP_FORWARD] =
+            (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
+    }
+    if (p->stops[joint] == RP_PLANT_STOPS_RIGID) {
+        indicators[LOWER] = (struct indicator){INDICATOR_OF_STATE, q, 1.0, -p->lower[joint]};
+        indicators[UPPER] = (struct indicator){INDICATOR_OF_STATE, q, -1.0, p->upper[joint]};
+    }
+}
+
+static void describe(const void *values_pointer, struct indicator indicators[]) {
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_modes modes =
+        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    for (int i = 0; i < 2; i++) {
+        describe_joint(values, modes.joint[i], i, indicators + PLANT_INDICATORS * i);
+    }
+}
+
+static enum status indicators(const void *values_pointer, double t, const double x[],
+                              const double u[], double z[]) {
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_parameters *p = &values->parameters;
+    struct rp_plant_inputs inputs;
+    (void)t;
+    memcpy(&inputs, u, sizeof inputs);
+    const struct rp_plant_modes modes = rp_plant_modes_in_effect(values, x, x + 2, &inputs);
+    struct rp_plant_motion motion = {.reaction = {0.0}};
+    if (modes.joint[0] == RP_PLANT_STUCK || modes.joint[1] == RP_PLANT_STUCK) {
+        rp_plant_motion(p, &modes, x, x + 2, &inputs, &motion);
+    }
+    for (int i = 0; i < 2; i++) {
+        plant_indicators(&p, modes.joint[i], i, x[i], x[2 + i], motion.reaction[i],
+                         z + PLANT_INDICATORS * i);
+    }
+    return STATUS_OK;
+}
+
+static const char *const indicator_names[RP_PLANT_INDICATORS] = {
+    "slip1_forward", "slip1_backward", "stop1_lower", "stop1_upper",
+    "slip2_forward", "slip2_backward", "stop2_lower", "stop2_upper",
+};
+
+const struct model_events rp_plant_events = {
+    .indicator_count = RP_PLANT_INDICATORS,
+    .indicator_names = indicator_names,
+    .modes = {offsetof(struct rp_plant_values, modes), sizeof(struct rp_plant_modes)},
+    .sums = {offsetof(struct rp_plant_values, sums), sizeof(struct rp_plant_sums)},
+    .discrete_inputs = {offsetof(struct rp_plant_values, payload_attached), sizeof(int)},
+    .are_possible = are_possible,
+    .is_at_rest = is_at_rest,
+    .describe = describe,
+    .indicators = indicators,
+    .update = update,
+};

@@ -1,0 +1,113 @@
+/* plant_rows model|rest: reads rows of doubles from standard input, in the order of the structures
+ * below, and writes a row of doubles for each to standard output. */
+#include "rp_plant_model.h"
+#include "rp_plant_rest.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* Parameters up to payload_z, inputs, states, and as doubles: payload_attached, modes. */
+struct model_row {
+    double parameters[28];
+    double inputs[5];
+    double q[2];
+    double dq[2];
+    double attached;
+    double joint[2];
+};
+
+struct model_results {
+    double ddq[2];
+    double ee_acceleration[2];
+    double energies[2]; /* kinetic, potential */
+    double D[3];        /* D11, D12, D22 */
+    double coriolis[2];
+    double gravity[2];
+    double loads[6]; /* f1_x, f1_z, tau1_y, f2_x, f2_z, tau2_y */
+    double friction[2];
+};
+
+_Static_assert(offsetof(struct rp_plant_parameters, stops) == sizeof(double[28]),
+               "28 parameters are doubles and come first");
+
+static void evaluate_model(const struct model_row *row, struct model_results *results) {
+    struct rp_plant_values v = {.inputs.tau = {row->inputs[0], row->inputs[1]}};
+    memcpy(&v.parameters, row->parameters, sizeof row->parameters);
+    memcpy(&v.inputs, row->inputs, sizeof row->inputs);
+    memcpy(v.q, row->q, sizeof v.q);
+    memcpy(v.dq, row->dq, sizeof v.dq);
+    v.modes.payload = row->attached != 0.0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+    v.modes.joint[0] = (int)row->joint[0];
+    v.modes.joint[1] = (int)row->joint[1];
+    (void)rp_plant_model.outputs(&v, 0.0);
+
+    const struct rp_joint_loads *loads = &v.loads;
+    *results = (struct model_results){
+        .ddq = {v.ddq[0], v.ddq[1]},
+        .ee_acceleration = {v.ee_acceleration[0], v.ee_acceleration[1]},
+        .energies = {v.kinetic_energy, v.potential_energy},
+        .D = {v.D[0][0], v.D[0][1], v.D[1][1]},
+        .coriolis = {v.coriolis[0], v.coriolis[1]},
+        .gravity = {v.gravity[0], v.gravity[1]},
+        .loads = {loads->f1[0], loads->f1[2], loads->tau1[1], loads->f2[0], loads->f2[2],
+                  loads->tau2[1]},
+        .friction = {v.friction[0], v.friction[1]},
+    };
+}
+
+struct rest_row {
+    double D[3]; /* D11, D12, D22 */
+    double forces[2];
+    double breakaway[2];
+    double at_rest[2];
+    double closed[2];
+};
+
+struct rest_results {
+    double pattern[2];
+    double ddq[2];
+    double reaction[2];
+};
+
+static void evaluate_rest(const struct rest_row *row, struct rest_results *results) {
+    const double *D = row->D;
+    const struct rp_plant_rest rest = {
+        .inertia = {.D = {{D[0], D[1]}, {D[1], D[2]}}, .determinant = D[0] * D[2] - D[1] * D[1]},
+        .forces = {row->forces[0], row->forces[1]},
+        .breakaway = {row->breakaway[0], row->breakaway[1]},
+        .at_rest = {row->at_rest[0] != 0.0, row->at_rest[1] != 0.0},
+        .closed = {(int)row->closed[0], (int)row->closed[1]},
+    };
+    struct rp_plant_outcome outcome;
+    rp_plant_rest_decide(&rest, &outcome);
+    *results = (struct rest_results){
+        .pattern = {outcome.pattern[0], outcome.pattern[1]},
+        .ddq = {outcome.ddq[0], outcome.ddq[1]},
+        .reaction = {outcome.reaction[0], outcome.reaction[1]},
+    };
+}
+
+int main(int argc, char **argv) {
+    const bool model = argc == 2 && strcmp(argv[1], "model") == 0;
+    if (!model && (argc != 2 || strcmp(argv[1], "rest") != 0)) {
+        (void)fprintf(stderr, "usage: plant_rows model|rest\n");
+        return 2;
+    }
+    struct model_row model_row;
+    struct model_results model_results;
+    struct rest_row rest_row;
+    struct rest_results rest_results;
+    size_t written = 1;
+    if (model) {
+        while (written == 1 && fread(&model_row, sizeof model_row, 1, stdin) == 1) {
+            evaluate_model(&model_row, &model_results);
+            written = fwrite(&model_results, sizeof model_results, 1, stdout);
+        }
+    } else {
+        while (written == 1 && fread(&rest_row, sizeof rest_row, 1, stdin) == 1) {
+            evaluate_rest(&rest_row, &rest_results);
+            written = fwrite(&rest_results, sizeof rest_results, 1, stdout);
+        }
+    }
+    return written == 1 && fflush(stdout) == 0 ? 0 : 1;
+}

@@ -1,0 +1,69 @@
+"""The plant's C functions from Python, by the program plant_rows: many rows in one call."""
+
+import subprocess
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ARM = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
+JOINT = (
+    "armature", "damping", "coulomb_friction", "breakaway_friction", "stribeck_velocity", "lower",
+    "upper", "restitution",
+)  # fmt: skip
+PAYLOAD = ("payload_mass", "payload_inertia", "payload_x", "payload_z")
+INPUTS = ("tau1", "f2", "ee_fx", "ee_fy", "ee_mz")
+STATES = ("q1", "q2", "dq1", "dq2")
+PARAMETERS = (*ARM, *(f"{name}{joint}" for name in JOINT for joint in (1, 2)), *PAYLOAD)
+KNOWNS = (*PARAMETERS, *INPUTS, *STATES, "attached", "mode1", "mode2")
+RESULTS = (
+    "ddq1", "ddq2", "ee_ax", "ee_ay", "kinetic_energy", "potential_energy", "D11", "D12", "D22",
+    "coriolis1", "coriolis2", "gravity1", "gravity2", "f1_x", "f1_z", "tau1_y", "f2_x", "f2_z",
+    "tau2_y", "friction1", "friction2",
+)  # fmt: skip
+FREE, STUCK = 2.0, 0.0
+DEFAULT = {
+    "m1": 2.0, "m2": 1.0, "I1z": 0.1, "I2z": 0.05, "l1": 0.5, "lc1": 0.25, "a": 0.1, "g": 9.81,
+    "mode1": FREE, "mode2": FREE,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Decisions about n pairs of joints at rest."""
+
+    pattern: np.ndarray  # (n, 2): -1, 0, 1
+    accelerations: np.ndarray  # (n, 2) rad/s2, m/s2
+    reactions: np.ndarray  # (n, 2) N.m, N
+
+
+def _run(program: Path, what: str, rows: np.ndarray, width: int) -> np.ndarray:
+    """Results of the rows, (n, width)."""
+    data = np.ascontiguousarray(rows, dtype=np.float64).tobytes()
+    done = subprocess.run([program, what], input=data, capture_output=True, check=True)
+    return np.frombuffer(done.stdout).reshape(len(rows), width)
+
+
+def evaluate(program: Path, cases: list[Mapping[str, float]]) -> list[dict[str, float]]:
+    """Calculated values of the plant, in SI units; knowns that a case does not have are those of
+    DEFAULT, or else 0."""
+    values = [DEFAULT | dict(case) for case in cases]
+    assert all(case.keys() <= set(KNOWNS) for case in values)
+    rows = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values])
+    found = _run(program, "model", rows, len(RESULTS))
+    return [dict(zip(RESULTS, row, strict=True)) for row in found.tolist()]
+
+
+def decide(
+    program: Path,
+    inertia: np.ndarray,
+    forces: np.ndarray,
+    breakaway: np.ndarray,
+    at_rest: np.ndarray,
+    closed: np.ndarray,
+) -> Rest:
+    """What the joints at rest do: arguments (n, 3) D11, D12, D22 and (n, 2) each."""
+    rows = np.hstack([inertia, forces, breakaway, at_rest, closed])
+    found = _run(program, "rest", rows, 6)
+    return Rest(found[:, :2], found[:, 2:4], found[:, 4:])

@@ -1,0 +1,149 @@
+/* What is refused when initialization ends, with the values in one line. */
+#include "plant_test_support.h"
+#include "unity.h"
+
+#include <math.h>
+#include <stdio.h>
+
+static struct rp_plant_values v;
+
+void setUp(void) {
+    plant_test_start(&v);
+    v.parameters.stops[1] = RP_PLANT_STOPS_RIGID;
+    v.parameters.lower[1] = -1.0;
+    v.parameters.upper[1] = 2.0;
+}
+
+static void assert_accepted(void) {
+    char text[256] = "";
+    TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, rp_plant_model.check_parameters(&v, text, sizeof text),
+                                  text);
+}
+
+static void assert_refused(const char *expected) {
+    char text[256] = "";
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
+                          rp_plant_model.check_parameters(&v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING(expected, text);
+}
+
+static void test_start_values_are_accepted(void) {
+    assert_accepted();
+    plant_test_start(&v);
+    assert_accepted();
+}
+
+static void test_parameters_of_the_arm(void) {
+    v.parameters.arm.m1 = v.parameters.arm.I1z = v.parameters.arm.I2z = 0.0;
+    assert_refused("the inertia m1 lc1^2 + I1z + I2z = 0 is refused: it must be above 0 "
+                   "(m1 = 0, lc1 = 0.25, I1z = 0, I2z = 0)");
+}
+
+static void test_negative_values(void) {
+    struct {
+        double *value;
+        const char *name;
+    } all[] = {
+        {&v.parameters.armature[0], "armature1"},
+        {&v.parameters.armature[1], "armature2"},
+        {&v.parameters.damping[0], "damping1"},
+        {&v.parameters.damping[1], "damping2"},
+        {&v.parameters.coulomb_friction[0], "coulomb_friction1"},
+        {&v.parameters.coulomb_friction[1], "coulomb_friction2"},
+        {&v.parameters.breakaway_friction[0], "breakaway_friction1"},
+        {&v.parameters.breakaway_friction[1], "breakaway_friction2"},
+        {&v.parameters.stribeck_velocity[0], "stribeck_velocity1"},
+        {&v.parameters.stribeck_velocity[1], "stribeck_velocity2"},
+        {&v.parameters.payload_mass, "payload_mass"},
+        {&v.parameters.payload_inertia, "payload_inertia"},
+    };
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        const double refused[] = {-0.5, NAN, INFINITY};
+        for (size_t k = 0; k < 3; k++) {
+            char expected[128];
+            *all[i].value = refused[k];
+            (void)snprintf(expected, sizeof expected,
+                           "%s = %g is refused: it must be finite and not below 0", all[i].name,
+                           refused[k]);
+            assert_refused(expected);
+        }
+        *all[i].value = 0.0;
+        assert_accepted();
+    }
+}
+
+static void test_breakaway_below_coulomb(void) {
+    v.parameters.coulomb_friction[0] = 2.0;
+    assert_accepted();
+    v.parameters.breakaway_friction[0] = 2.0;
+    assert_accepted();
+    v.parameters.breakaway_friction[0] = 1.5;
+    v.parameters.stribeck_velocity[0] = 1.0;
+    assert_refused("breakaway_friction1 = 1.5 is refused: it must not be below "
+                   "coulomb_friction1 = 2 (0: the same)");
+}
+
+static void test_breakaway_above_coulomb_needs_a_stribeck_velocity(void) {
+    v.parameters.breakaway_friction[1] = 2.5;
+    v.parameters.coulomb_friction[1] = 2.0;
+    assert_refused("stribeck_velocity2 = 0 is refused: it must be above 0 where "
+                   "breakaway_friction2 = 2.5 is above coulomb_friction2 = 2");
+    v.parameters.stribeck_velocity[1] = 0.1;
+    assert_accepted();
+}
+
+static void test_limits(void) {
+    v.parameters.lower[1] = 2.0;
+    assert_refused("lower2 = 2 and upper2 = 2 are refused: with rigid stops they must be finite "
+                   "and lower2 below upper2");
+    v.parameters.stops[1] = RP_PLANT_STOPS_NONE;
+    assert_accepted();
+    v.parameters.stops[1] = RP_PLANT_STOPS_RIGID;
+    v.parameters.lower[1] = -INFINITY;
+    assert_refused("lower2 = -inf and upper2 = 2 are refused: with rigid stops they must be finite "
+                   "and lower2 below upper2");
+}
+
+static void test_restitution(void) {
+    v.parameters.restitution[0] = 1.0;
+    assert_accepted();
+    v.parameters.restitution[0] = 1.25;
+    assert_refused("restitution1 = 1.25 is refused: it must be within 0 and 1");
+    v.parameters.restitution[0] = -0.25;
+    assert_refused("restitution1 = -0.25 is refused: it must be within 0 and 1");
+    v.parameters.restitution[0] = NAN;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
+                          rp_plant_model.check_parameters(&v, (char[256]){""}, 256));
+}
+
+static void test_items_of_the_enumerations(void) {
+    v.parameters.stops[0] = 3;
+    assert_refused("stops1 = 3 is refused: it must be 1 or 2");
+    v.parameters.stops[0] = RP_PLANT_STOPS_NONE;
+    v.parameters.grasp = 0;
+    assert_refused("grasp = 0 is refused: it must be 1 or 2");
+}
+
+static void test_offset_of_the_payload(void) {
+    v.parameters.payload_x = NAN;
+    v.parameters.payload_z = 0.5;
+    assert_refused("payload_x = nan and payload_z = 0.5 are refused: they must be finite");
+}
+
+static void test_start_outside_the_stops(void) {
+    v.q[1] = 2.5;
+    assert_refused("q2 = 2.5 is refused: a start must be within lower2 = -1 and upper2 = 2");
+    v.q[1] = -1.5;
+    assert_refused("q2 = -1.5 is refused: a start must be within lower2 = -1 and upper2 = 2");
+    v.q[1] = 2.0;
+    assert_accepted();
+    v.q[1] = -1.0;
+    assert_accepted();
+}
+
+/* While it runs a limit may pass the joint: test_plant_events.c. */
+static void test_limit_past_a_joint_that_runs(void) {
+    plant_test_update(&v, -1);
+    v.q[1] = 2.5;
+    assert_accepted();
+}

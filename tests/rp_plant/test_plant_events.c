@@ -1,0 +1,299 @@
+/* What an update makes of modes, states and sums. Impacts, grasps and decisions at rest have files
+ * of their own for their laws. */
+#include "plant_test_support.h"
+#include "unity.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+enum {
+    FORWARD1,
+    BACKWARD1,
+    LOWER1,
+    UPPER1,
+    FORWARD2,
+    BACKWARD2,
+    LOWER2,
+    UPPER2,
+};
+
+static const struct model_events *events;
+static struct rp_test_random random_source;
+static struct rp_plant_values v;
+
+/* Without gravity and offset, friction 3 in both joints; the first event has been. */
+void setUp(void) {
+    events = rp_plant_model.events;
+    random_source.state = 61;
+    plant_test_start(&v);
+    v.parameters.arm.g = v.parameters.arm.a = 0.0;
+    v.parameters.coulomb_friction[0] = v.parameters.coulomb_friction[1] = 3.0;
+    plant_test_update(&v, -1);
+}
+
+static void assert_modes(int joint1, int joint2) {
+    TEST_ASSERT_EQUAL_INT(joint1, v.modes.joint[0]);
+    TEST_ASSERT_EQUAL_INT(joint2, v.modes.joint[1]);
+}
+
+static void indicators_now(double z[RP_PLANT_INDICATORS]) {
+    double u[PLANT_INPUTS];
+    const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
+    memcpy(u, &v.inputs, sizeof u);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, events->indicators(&v, 3.0, x, u, z));
+}
+
+static void fire(int indicator, const double *du) {
+    bool fired[RP_PLANT_INDICATORS] = {false};
+    fired[indicator] = true;
+    plant_test_update_with(&v, fired, du);
+}
+
+/* ---- Any state ------------------------------------------------------------------------------ */
+
+static void next_sample(void) {
+    plant_test_random_plant(&random_source, &v);
+    v.modes.payload = RP_PLANT_UNDECIDED;
+    for (int i = 0; i < 2; i++) {
+        const uint64_t bits = rp_test_random_bits(&random_source);
+        v.parameters.restitution[i] = rp_test_uniform(&random_source, 0.0, 1.0);
+        if (bits % 2 == 0) {
+            v.dq[i] = 0.0;
+        }
+        v.parameters.lower[i] = bits % 3 == 0 ? v.q[i] : v.q[i] - 0.5;
+        v.parameters.upper[i] = bits % 3 == 1 ? v.q[i] : v.q[i] + 0.5;
+        v.parameters.stops[i] = bits % 5 == 0 ? RP_PLANT_STOPS_NONE : RP_PLANT_STOPS_RIGID;
+    }
+}
+
+static void test_after_an_update_all_modes_are_valid(void) {
+    for (int n = 0; n < 20 * RP_TEST_SAMPLES; n++) {
+        double z[RP_PLANT_INDICATORS];
+        next_sample();
+        plant_test_update(&v, -1);
+        plant_test_outputs(&v);
+        indicators_now(z);
+        for (int k = 0; k < RP_PLANT_INDICATORS; k++) {
+            TEST_ASSERT_TRUE(z[k] >= 0.0);
+            ASSERT_SAME(v.indicators[k], z[k]);
+        }
+        for (int i = 0; i < 2; i++) {
+            const int mode = v.modes.joint[i];
+            const int closed = rp_plant_closed_stop(&v.parameters, i, v.q[i]);
+            if (mode == RP_PLANT_STUCK) {
+                TEST_ASSERT_TRUE(v.dq[i] == 0.0 && v.ddq[i] == 0.0);
+            } else if (v.dq[i] == 0.0) {
+                TEST_ASSERT_TRUE(mode == RP_PLANT_FREE || mode * v.ddq[i] > 0.0);
+                TEST_ASSERT_TRUE(closed * v.ddq[i] >= 0.0);
+            } else {
+                TEST_ASSERT_TRUE(mode == RP_PLANT_FREE || mode * v.dq[i] > 0.0);
+                TEST_ASSERT_TRUE(closed * v.dq[i] >= 0.0);
+            }
+        }
+    }
+}
+
+static void test_a_second_update_changes_nothing(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_sample();
+        plant_test_update(&v, -1);
+        const struct rp_plant_values once = v;
+        plant_test_update(&v, -1);
+        TEST_ASSERT_EQUAL_MEMORY(&once, &v, sizeof v);
+    }
+}
+
+static void test_description_gives_the_indicators(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        double z[RP_PLANT_INDICATORS];
+        struct indicator described[RP_PLANT_INDICATORS];
+        next_sample();
+        plant_test_update(&v, -1);
+        indicators_now(z);
+        events->describe(&v, described);
+        for (int k = 0; k < RP_PLANT_INDICATORS; k++) {
+            const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
+            const struct indicator *indicator = &described[k];
+            if (indicator->kind == INDICATOR_OF_STATE) {
+                ASSERT_SAME(indicator->offset + indicator->factor * x[indicator->state], z[k]);
+            } else if (indicator->kind == INDICATOR_UNUSED) {
+                ASSERT_SAME(1.0, z[k]);
+            } else {
+                TEST_ASSERT_EQUAL_INT(RP_PLANT_STUCK, v.modes.joint[k / 4]);
+                TEST_ASSERT_TRUE(k % 4 < 2);
+            }
+        }
+    }
+}
+
+/* While initialization goes on, values can be read that the first update does not change. */
+static void test_before_the_first_event_modes_follow_from_the_state(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_sample();
+        plant_test_outputs(&v);
+        struct rp_plant_values first = v;
+        plant_test_update(&v, -1);
+        plant_test_outputs(&v);
+        if (memcmp(first.dq, v.dq, sizeof v.dq) == 0 && first.q[0] == v.q[0]) {
+            for (int i = 0; i < 2; i++) {
+                ASSERT_SAME(v.ddq[i], first.ddq[i]);
+                ASSERT_SAME(v.friction[i], first.friction[i]);
+            }
+            ASSERT_SAME(v.kinetic_energy, first.kinetic_energy);
+        }
+    }
+}
+
+/* ---- Friction ------------------------------------------------------------------------------- */
+
+static void test_a_joint_that_halts_sticks_or_turns_back(void) {
+    v.dq[1] = 2.0;
+    plant_test_update(&v, -1);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_FORWARD);
+    v.dq[1] = 1e-17;
+    v.inputs.tau[1] = -2.0;
+    plant_test_update(&v, FORWARD2);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+    TEST_ASSERT_TRUE(v.dq[1] == 0.0);
+
+    v.modes.joint[1] = RP_PLANT_FORWARD;
+    v.dq[1] = -1e-17; // past 0 by rounding
+    v.inputs.tau[1] = -4.0;
+    plant_test_update(&v, FORWARD2);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_BACKWARD);
+    TEST_ASSERT_TRUE(v.dq[1] == 0.0);
+}
+
+static void test_at_breakaway_the_rate_decides(void) {
+    const double tau2 = v.parameters.coulomb_friction[1];
+    for (int side = -1; side <= 1; side += 2) {
+        const double on[PLANT_INPUTS] = {0.0, 0.5 * side};
+        const double back[PLANT_INPUTS] = {0.0, -0.5 * side};
+        const struct rp_plant_values held = v;
+        const int indicator = side > 0 ? FORWARD2 : BACKWARD2;
+        v.inputs.tau[1] = side * nextafter(tau2, 0.0); // the root, to rounding
+        fire(indicator, on);
+        assert_modes(RP_PLANT_STUCK, side);
+        v = held;
+        fire(indicator, back);
+        assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+        fire(indicator, NULL);
+        assert_modes(RP_PLANT_STUCK, side);
+
+        // an input that jumps to the limit: nothing has fired
+        v = held;
+        v.inputs.tau[1] = side * tau2;
+        plant_test_update(&v, -1);
+        assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+        plant_test_update_with(&v, NULL, back);
+        assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+        plant_test_update_with(&v, NULL, on);
+        assert_modes(RP_PLANT_STUCK, side);
+        v = held;
+    }
+}
+
+/* The force of a held joint that follows from the motion of the other one: m2 L dq1^2 */
+static void test_centrifugal_force_throws_the_slide_out(void) {
+    const double m2L = v.parameters.arm.m2 * v.parameters.arm.l1;
+    const double limit = sqrt(v.parameters.coulomb_friction[1] / m2L);
+    for (int side = -1; side <= 1; side += 2) {
+        v.dq[0] = limit;
+        v.modes.joint[0] = RP_PLANT_FORWARD;
+        v.modes.joint[1] = RP_PLANT_STUCK;
+        v.inputs.tau[0] = 3.0 + side; // faster, or slower against its friction
+        plant_test_update(&v, FORWARD2);
+        assert_modes(RP_PLANT_FORWARD, side > 0 ? RP_PLANT_FORWARD : RP_PLANT_STUCK);
+    }
+}
+
+/* Both joints at their limits: each would leave by itself, but the faster one pulls the other
+ * back. With a = 1/2, m2 = 1: D12 = -1/2, and joint 2 leaving backward takes joint 1 along. */
+static void test_two_joints_at_their_limits(void) {
+    v.parameters.arm.a = 0.5;
+    v.inputs.tau[0] = 3.0;
+    v.inputs.tau[1] = -3.0;
+    const double D11 = rp_test_inertia(&v.parameters.arm, 0.0) + 0.25;
+    const struct {
+        double rates[2];
+        int modes[2];
+    } cases[] = {
+        {{1.0, 0.0}, {RP_PLANT_FORWARD, RP_PLANT_STUCK}},
+        {{1.0, 0.5}, {RP_PLANT_FORWARD, RP_PLANT_STUCK}},
+        {{0.0, -1.0}, {RP_PLANT_STUCK, RP_PLANT_BACKWARD}},
+        // D12 (-1) = 1/2 is what joint 2 brings to row 1: below it joint 1 stays
+        {{0.25, -1.0}, {RP_PLANT_STUCK, RP_PLANT_BACKWARD}},
+        {{0.75, -1.0}, {RP_PLANT_FORWARD, RP_PLANT_BACKWARD}},
+        {{1.0, -0.25 / D11}, {RP_PLANT_FORWARD, RP_PLANT_STUCK}},
+        {{1.0, -1.0 / D11}, {RP_PLANT_FORWARD, RP_PLANT_BACKWARD}},
+        {{-1.0, 1.0}, {RP_PLANT_STUCK, RP_PLANT_STUCK}},
+    };
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        const double du[PLANT_INPUTS] = {cases[n].rates[0], cases[n].rates[1]};
+        plant_test_update_with(&v, NULL, du);
+        assert_modes(cases[n].modes[0], cases[n].modes[1]);
+    }
+}
+
+/* A slide that moves loads the held joint 1 through the offset. */
+static void test_what_fires_counts_only_where_forces_have_not_jumped(void) {
+    v.parameters.arm.a = 0.5;
+    v.modes.joint[1] = RP_PLANT_FORWARD;
+    v.inputs.tau[0] = 3.0 - 1e-3;
+    bool fired[RP_PLANT_INDICATORS] = {false};
+    fired[FORWARD1] = fired[FORWARD2] = true; // the slide halts, joint 1 is then held
+    const double du[PLANT_INPUTS] = {1.0};
+    plant_test_update_with(&v, fired, du);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+}
+
+static void test_at_rest(void) {
+    TEST_ASSERT_TRUE(events->is_at_rest(&v));
+    v.dq[0] = 1.0;
+    plant_test_update(&v, -1);
+    assert_modes(RP_PLANT_FORWARD, RP_PLANT_STUCK);
+    TEST_ASSERT_FALSE(events->is_at_rest(&v));
+}
+
+/* ---- struct model_events -------------------------------------------------------------------- */
+
+static void test_when_events_are_possible(void) {
+    struct rp_plant_parameters *p = &v.parameters;
+    const struct rp_plant_values start = {.parameters.arm = p->arm};
+    v = start;
+    TEST_ASSERT_FALSE(events->are_possible(&v));
+    double *const each[] = {&p->coulomb_friction[0], &p->breakaway_friction[1], &p->payload_mass,
+                            &p->payload_inertia};
+    for (size_t i = 0; i < sizeof each / sizeof each[0]; i++) {
+        *each[i] = 1.0;
+        TEST_ASSERT_TRUE(events->are_possible(&v));
+        v = start;
+    }
+    p->stops[1] = RP_PLANT_STOPS_RIGID;
+    TEST_ASSERT_TRUE(events->are_possible(&v));
+}
+
+static void test_places_in_the_value_structure(void) {
+    TEST_ASSERT_EQUAL_size_t(RP_PLANT_INDICATORS, events->indicator_count);
+    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, modes), events->modes.offset);
+    TEST_ASSERT_EQUAL_size_t(3 * sizeof(int), events->modes.size);
+    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, sums), events->sums.offset);
+    TEST_ASSERT_EQUAL_size_t(4 * sizeof(double), events->sums.size);
+    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, payload_attached),
+                             events->discrete_inputs.offset);
+    TEST_ASSERT_EQUAL_size_t(sizeof(int), events->discrete_inputs.size);
+    TEST_ASSERT_EQUAL_STRING("slip2_backward", events->indicator_names[BACKWARD2]);
+}
+
+static void test_modes_that_exist(void) {
+    for (int mode = -2; mode <= 3; mode++) {
+        const bool is_joint_mode = mode >= -1 && mode <= 2;
+        TEST_ASSERT_EQUAL_INT(is_joint_mode,
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{mode, 0}, 1}));
+        TEST_ASSERT_EQUAL_INT(is_joint_mode,
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, mode}, 1}));
+        TEST_ASSERT_EQUAL_INT(mode >= 0 && mode <= 2,
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, mode}));
+    }
+}

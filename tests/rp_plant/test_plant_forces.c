@@ -1,0 +1,260 @@
+/* The smooth part: friction law, mass matrix, balance of power, joint loads, derivatives. */
+#include "plant_test_support.h"
+#include "unity.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define EPS DBL_EPSILON
+
+static struct rp_test_random random_source;
+static struct rp_plant_values v;
+
+void setUp(void) {
+    random_source.state = 53;
+}
+
+static void next_sample(void) {
+    plant_test_random_plant(&random_source, &v);
+    for (int i = 0; i < 2; i++) {
+        if (v.modes.joint[i] == RP_PLANT_STUCK) {
+            v.dq[i] = 0.0;
+        }
+    }
+}
+
+/* ---- Friction ------------------------------------------------------------------------------- */
+
+static void test_friction_falls_from_breakaway_to_coulomb(void) {
+    struct rp_plant_parameters *p = &v.parameters;
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        plant_test_start(&v);
+        p->coulomb_friction[1] = rp_test_uniform(&random_source, 0.0, 1.0) / 3.0;
+        p->breakaway_friction[1] = p->coulomb_friction[1] + rp_test_uniform(&random_source, 0.1, 1);
+        p->stribeck_velocity[1] = rp_test_uniform(&random_source, 0.1, 2.0);
+        const double fc = p->coulomb_friction[1];
+        const double fb = p->breakaway_friction[1];
+        const double vs = p->stribeck_velocity[1];
+        TEST_ASSERT_TRUE(rp_plant_breakaway(p, 1) == fb);
+        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, 0.0) == fb);
+        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, 1e6) == fc);
+        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, 1e300) == fc);
+        const double dq = rp_test_uniform(&random_source, -4.0, 4.0);
+        const double expected = fc + (fb - fc) * exp(-(dq / vs) * (dq / vs));
+        ASSERT_CLOSE(expected, rp_plant_sliding_friction(p, 1, dq), 8 * EPS * fb);
+        TEST_ASSERT_TRUE(rp_plant_sliding_friction(p, 1, dq) ==
+                         rp_plant_sliding_friction(p, 1, -dq));
+    }
+}
+
+static void test_without_breakaway_friction_is_coulombs(void) {
+    plant_test_start(&v);
+    v.parameters.coulomb_friction[0] = 0.3;
+    v.parameters.stribeck_velocity[0] = 1.0;
+    TEST_ASSERT_TRUE(rp_plant_breakaway(&v.parameters, 0) == 0.3);
+    TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
+    v.parameters.breakaway_friction[0] = 0.3;
+    v.parameters.stribeck_velocity[0] = 0.0;
+    TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
+}
+
+/* With the mode frozen the friction keeps its sign where the velocity passes 0. */
+static void test_sliding_friction_is_smooth_past_zero(void) {
+    struct rp_plant_motion motion[2];
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_sample();
+        v.modes.joint[0] = RP_PLANT_FORWARD;
+        v.modes.joint[1] = RP_PLANT_BACKWARD;
+        for (int k = 0; k < 2; k++) {
+            const double dq[2] = {k == 0 ? 1e-13 : -1e-13, k == 0 ? -1e-13 : 1e-13};
+            rp_plant_motion(&v.parameters, &v.modes, v.q, dq, &v.inputs, &motion[k]);
+        }
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(motion[0].ddq[i], motion[1].ddq[i], 1e-9 * (1 + fabs(motion[0].ddq[i])));
+        }
+    }
+}
+
+/* ---- Motion --------------------------------------------------------------------------------- */
+
+/* D q'' = forces in the rows of moving joints; in those of stuck ones the reaction is missing. */
+static void test_motion_obeys_the_equations(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_plant_inertia inertia;
+        struct rp_plant_motion motion;
+        double forces[2];
+        next_sample();
+        const bool attached = v.modes.payload == RP_PLANT_ATTACHED;
+        rp_plant_inertia(&v.parameters, attached, v.q[1], &inertia);
+        rp_plant_forces(&v.parameters, &v.modes, v.q, v.dq, &v.inputs, forces);
+        rp_plant_motion(&v.parameters, &v.modes, v.q, v.dq, &v.inputs, &motion);
+        double(*D)[2] = inertia.D;
+        const double determinant = D[0][0] * D[1][1] - D[0][1] * D[1][0];
+        ASSERT_CLOSE(determinant, inertia.determinant, 8 * EPS * D[0][0] * D[1][1]);
+        TEST_ASSERT_TRUE(inertia.determinant > 0.0);
+        const double condition = D[0][0] * D[1][1] / inertia.determinant;
+        for (int i = 0; i < 2; i++) {
+            const double inertial[2] = {D[i][0] * motion.ddq[0], D[i][1] * motion.ddq[1]};
+            const double scale = fabs(inertial[0]) + fabs(inertial[1]) + fabs(forces[i]) + 1000.0;
+            ASSERT_CLOSE(forces[i], inertial[0] + inertial[1] + motion.reaction[i],
+                         64 * EPS * condition * scale);
+            if (v.modes.joint[i] == RP_PLANT_STUCK) {
+                TEST_ASSERT_TRUE(motion.ddq[i] == 0.0);
+            } else {
+                TEST_ASSERT_TRUE(motion.reaction[i] == 0.0);
+            }
+        }
+    }
+}
+
+/* The curve on which the state moves, by which propagate gives derivatives by time. */
+static void along_the_motion(struct rp_plant_values *first) {
+    memset(first, 0, sizeof *first);
+    memcpy(first->q, v.dq, sizeof v.dq);
+    memcpy(first->dq, v.ddq, sizeof v.ddq);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, first, NULL));
+}
+
+/* (K + P)' = power of the drives and the wrench - what friction takes; stuck joints and closed
+ * stops have no power. */
+static void test_power_is_balanced(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_plant_values first;
+        next_sample();
+        plant_test_outputs(&v);
+        along_the_motion(&first);
+        const double *w = v.inputs.wrench;
+        const double wrench_power =
+            w[0] * v.ee_velocity[0] + w[1] * v.ee_velocity[1] + w[2] * v.dq[0];
+        const double scale = fabs(first.kinetic_energy) + fabs(first.potential_energy) +
+                             fabs(v.actuator_power) + fabs(wrench_power) + 1000.0;
+        const double expected = v.actuator_power + wrench_power - v.friction_power;
+        ASSERT_CLOSE(expected, first.total_energy, 1e-12 * scale);
+        TEST_ASSERT_TRUE(v.modes.joint[0] != RP_PLANT_STUCK || v.modes.joint[1] != RP_PLANT_STUCK ||
+                         expected == 0.0);
+    }
+}
+
+/* The recursion of the joint loads shares no equation with the motion: what passes through the
+ * joints is what drives, friction, stops and armature exert on them. */
+static void test_joint_loads_are_what_the_joints_exert(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_sample();
+        plant_test_outputs(&v);
+        const double loads[2] = {v.loads.tau1[1], v.loads.f2[2]};
+        for (int i = 0; i < 2; i++) {
+            const struct rp_plant_parameters *p = &v.parameters;
+            const double exerted = v.inputs.tau[i] - p->damping[i] * v.dq[i] - v.friction[i] +
+                                   v.stop_force[i] - p->armature[i] * v.ddq[i];
+            const double scale = 100.0 * (1.0 + fabs(v.ddq[0]) + fabs(v.ddq[1])) +
+                                 100.0 * (v.dq[0] * v.dq[0] + v.dq[1] * v.dq[1]);
+            ASSERT_CLOSE(exerted, loads[i], 1e-13 * scale);
+        }
+    }
+}
+
+static void test_end_effector_moves_as_its_derivatives_say(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_plant_values first;
+        next_sample();
+        plant_test_outputs(&v);
+        along_the_motion(&first);
+        const double scale = 10.0 * (1.0 + fabs(v.ddq[0]) + fabs(v.ddq[1])) + 1000.0;
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(first.ee_position[i], v.ee_velocity[i], EPS * scale);
+            ASSERT_CLOSE(first.ee_velocity[i], v.ee_acceleration[i], 4 * EPS * scale);
+        }
+        ASSERT_SAME(v.q[0], v.ee_angle);
+        ASSERT_SAME(v.dq[0], v.ee_rate);
+        ASSERT_SAME(v.ee_rate, first.ee_angle);
+        ASSERT_SAME(v.ddq[0], first.ee_rate);
+    }
+}
+
+/* ---- Derivatives ---------------------------------------------------------------------------- */
+
+struct rate {
+    int row;
+    int state;
+};
+
+static double rate_at(const void *context, double value) {
+    const struct rate *rate = context;
+    double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
+    double u[PLANT_INPUTS];
+    double dx[PLANT_STATES];
+    memcpy(u, &v.inputs, sizeof u);
+    x[rate->state] = value;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.right_hand_side(&v, 3.0, x, u, dx));
+    return dx[rate->row];
+}
+
+/* No more than a sign or a factor is at stake: the arithmetics that differentiate are tested in
+ * tests/rp_manipulator. */
+static void test_jacobian_is_that_of_the_right_hand_side(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        double J[PLANT_STATES][PLANT_STATES];
+        next_sample();
+        v.parameters.arm.I1z += 1.0;
+        double u[PLANT_INPUTS];
+        const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
+        memcpy(u, &v.inputs, sizeof u);
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
+        for (int j = 0; j < PLANT_STATES; j++) {
+            for (int i = 0; i < PLANT_STATES; i++) {
+                const struct rate rate = {i, j};
+                const double expected = rp_test_derivative(rate_at, &rate, x[j], 1.0 / 256);
+                const double scale = 1.0 + fabs(rate_at(&rate, x[j])) + fabs(expected);
+                ASSERT_CLOSE(expected, J[j][i], 1e-8 * scale);
+            }
+        }
+    }
+}
+
+static void test_jacobian_is_what_propagation_gives(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        double J[PLANT_STATES][PLANT_STATES];
+        next_sample();
+        double u[PLANT_INPUTS];
+        const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
+        memcpy(u, &v.inputs, sizeof u);
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
+        for (int j = 0; j < PLANT_STATES; j++) {
+            struct rp_plant_values first = {.q = {0.0}};
+            (j < 2 ? first.q : first.dq)[j % 2] = 1.0;
+            TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
+            for (int i = 0; i < 2; i++) {
+                ASSERT_SAME(first.dq[i], J[j][i]);
+                ASSERT_SAME(first.ddq[i], J[j][2 + i]);
+            }
+        }
+    }
+}
+
+static void test_rates_of_the_reactions(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_plant_values first;
+        struct rp_plant_inputs du;
+        double rates[2];
+        next_sample();
+        plant_test_outputs(&v);
+        memset(&first, 0, sizeof first);
+        memcpy(first.q, v.dq, sizeof v.dq);
+        memcpy(first.dq, v.ddq, sizeof v.ddq);
+        for (int i = 0; i < 2; i++) {
+            du.tau[i] = rp_test_uniform(&random_source, -5.0, 5.0);
+        }
+        for (int i = 0; i < 3; i++) {
+            du.wrench[i] = rp_test_uniform(&random_source, -5.0, 5.0);
+        }
+        first.inputs = du;
+        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
+        const struct rp_plant_modes modes = rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs);
+        rp_plant_reaction_rates(&v.parameters, &modes, v.q, v.dq, &v.inputs, &du, rates);
+        for (int i = 0; i < 2; i++) {
+            const bool stuck = modes.joint[i] == RP_PLANT_STUCK;
+            ASSERT_SAME(stuck ? first.friction[i] : 0.0, rates[i]);
+        }
+    }
+}

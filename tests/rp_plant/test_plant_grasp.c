@@ -1,0 +1,149 @@
+/* Grasp of a payload at rest: momenta, closed form, energy. */
+#include "plant_test_support.h"
+#include "rp_plant_impact.h"
+#include "unity.h"
+
+#include <float.h>
+#include <math.h>
+
+#define EPS DBL_EPSILON
+
+static struct rp_test_random random_source;
+static struct rp_plant_values v;
+static double after[2];
+
+void setUp(void) {
+    random_source.state = 47;
+}
+
+static void next_sample(void) {
+    plant_test_random_plant(&random_source, &v);
+}
+
+static void test_momenta_of_the_joints_are_kept(void) {
+    for (int n = 0; n < 10 * RP_TEST_SAMPLES; n++) {
+        next_sample();
+        struct rp_plant_inertia without;
+        struct rp_plant_inertia with;
+        const double loss = rp_plant_grasp_at_rest(&v.parameters, v.q, v.dq, after);
+        rp_plant_inertia(&v.parameters, false, v.q[1], &without);
+        rp_plant_inertia(&v.parameters, true, v.q[1], &with);
+        const double condition = with.D[0][0] * with.D[1][1] / with.determinant;
+        for (int i = 0; i < 2; i++) {
+            double kept = 0.0;
+            double scale = 0.0;
+            for (int j = 0; j < 2; j++) {
+                kept += with.D[i][j] * after[j] - without.D[i][j] * v.dq[j];
+                scale += fabs(with.D[i][j]) * (fabs(after[j]) + fabs(v.dq[j]));
+            }
+            ASSERT_CLOSE(0.0, kept, 32 * EPS * condition * scale);
+        }
+        const double before_energy = rp_plant_kinetic_energy(&v.parameters, false, v.q, v.dq);
+        const double after_energy = rp_plant_kinetic_energy(&v.parameters, true, v.q, after);
+        TEST_ASSERT_TRUE(loss >= 0.0);
+        const double scale = with.D[0][0] * v.dq[0] * v.dq[0] + with.D[1][1] * v.dq[1] * v.dq[1];
+        ASSERT_CLOSE(before_energy - after_energy, loss, 64 * EPS * condition * scale);
+    }
+}
+
+/* a = 0 and the payload at the origin of frame 2:
+ * q2'+ = q2' m2 / (m2 + mp),  q1'+ = q1' J / (J + mp L^2 + Ip) */
+static void test_closed_form_without_offset(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_sample();
+        struct rp_plant_parameters *p = &v.parameters;
+        p->arm.a = p->payload_x = p->payload_z = 0.0;
+        p->armature[0] = p->armature[1] = 0.0;
+        (void)rp_plant_grasp_at_rest(p, v.q, v.dq, after);
+        const double J = rp_test_inertia(&p->arm, v.q[1]);
+        const double L = p->arm.l1 + v.q[1];
+        const double grown = J + p->payload_mass * L * L + p->payload_inertia;
+        const double mass = p->arm.m2 + p->payload_mass;
+        ASSERT_CLOSE(v.dq[0] * J / grown, after[0], 16 * EPS * fabs(v.dq[0]));
+        ASSERT_CLOSE(v.dq[1] * p->arm.m2 / mass, after[1], 16 * EPS * fabs(v.dq[1]));
+    }
+}
+
+static void test_nothing_is_lost_at_rest_or_without_payload(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_sample();
+        const double rest[2] = {0.0, 0.0};
+        ASSERT_SAME(0.0, rp_plant_grasp_at_rest(&v.parameters, v.q, rest, after));
+        ASSERT_SAME(0.0, after[0]);
+        ASSERT_SAME(0.0, after[1]);
+        v.parameters.payload_mass = v.parameters.payload_inertia = 0.0;
+        ASSERT_SAME(0.0, rp_plant_grasp_at_rest(&v.parameters, v.q, v.dq, after));
+        ASSERT_SAME(v.dq[0], after[0]);
+        ASSERT_SAME(v.dq[1], after[1]);
+    }
+}
+
+/* update: the velocities jump and the loss is summed up, once. */
+static void test_update_grasps_once(void) {
+    next_sample();
+    v.parameters.grasp = RP_PLANT_AT_REST;
+    v.parameters.payload_mass = 1.0;
+    v.payload_attached = 0;
+    v.modes.payload = RP_PLANT_RELEASED;
+    const struct rp_plant_values before = v;
+    const double loss = rp_plant_grasp_at_rest(&v.parameters, v.q, v.dq, after);
+    TEST_ASSERT_TRUE(loss > 0.0);
+    v.payload_attached = 1;
+    for (int n = 0; n < 2; n++) {
+        plant_test_update(&v, -1);
+        TEST_ASSERT_EQUAL_INT(RP_PLANT_ATTACHED, v.modes.payload);
+        for (int i = 0; i < 2; i++) {
+            ASSERT_SAME(after[i], v.dq[i]);
+            ASSERT_SAME(before.q[i], v.q[i]);
+        }
+        ASSERT_SAME(loss, v.sums.grasp_loss);
+    }
+    v.payload_attached = 0;
+    plant_test_update(&v, -1);
+    TEST_ASSERT_EQUAL_INT(RP_PLANT_RELEASED, v.modes.payload);
+    ASSERT_SAME(after[0], v.dq[0]);
+    ASSERT_SAME(after[1], v.dq[1]);
+    ASSERT_SAME(loss, v.sums.grasp_loss);
+}
+
+static void test_keep_velocity_keeps_it(void) {
+    next_sample();
+    v.parameters.grasp = RP_PLANT_KEEP_VELOCITY;
+    v.modes.payload = RP_PLANT_RELEASED;
+    v.payload_attached = 1;
+    const struct rp_plant_values before = v;
+    plant_test_update(&v, -1);
+    TEST_ASSERT_EQUAL_INT(RP_PLANT_ATTACHED, v.modes.payload);
+    ASSERT_SAME(before.dq[0], v.dq[0]);
+    ASSERT_SAME(before.dq[1], v.dq[1]);
+    ASSERT_SAME(0.0, v.sums.grasp_loss);
+}
+
+/* Before the first event the payload belongs to link 2. */
+static void test_payload_attached_before_the_start_makes_no_jump(void) {
+    next_sample();
+    v.parameters.grasp = RP_PLANT_AT_REST;
+    v.modes.payload = RP_PLANT_UNDECIDED;
+    v.payload_attached = 1;
+    const struct rp_plant_values before = v;
+    plant_test_update(&v, -1);
+    TEST_ASSERT_EQUAL_INT(RP_PLANT_ATTACHED, v.modes.payload);
+    ASSERT_SAME(before.dq[0], v.dq[0]);
+    ASSERT_SAME(before.dq[1], v.dq[1]);
+    ASSERT_SAME(0.0, v.sums.grasp_loss);
+}
+
+/* As parameters of the arm that change while it moves: velocities stay. */
+static void test_payload_parameters_that_change_while_attached_keep_velocities(void) {
+    next_sample();
+    v.parameters.grasp = RP_PLANT_AT_REST;
+    v.payload_attached = 1;
+    v.modes.payload = RP_PLANT_ATTACHED;
+    v.parameters.payload_mass += 2.0;
+    v.parameters.payload_x += 0.25;
+    const struct rp_plant_values before = v;
+    plant_test_update(&v, -1);
+    ASSERT_SAME(before.dq[0], v.dq[0]);
+    ASSERT_SAME(before.dq[1], v.dq[1]);
+    ASSERT_SAME(0.0, v.sums.grasp_loss);
+}

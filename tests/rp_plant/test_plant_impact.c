@@ -1,0 +1,169 @@
+/* Impacts at one stop and at two: the law, momentum, energy. */
+#include "plant_test_support.h"
+#include "rp_plant_impact.h"
+#include "unity.h"
+
+#include <float.h>
+#include <math.h>
+
+#define EPS DBL_EPSILON
+
+enum { CASES = 100000 };
+
+static struct rp_test_random random_source;
+static struct rp_plant_inertia inertia;
+static struct rp_plant_contacts contacts;
+static struct rp_plant_impact impact;
+static double before[2];
+
+void setUp(void) {
+    random_source.state = 43;
+}
+
+static double restitution(void) {
+    switch (rp_test_random_bits(&random_source) % 4) {
+    case 0:
+        return 0.0;
+    case 1:
+        return 1.0;
+    default:
+        return rp_test_uniform(&random_source, 0.0, 1.0);
+    }
+}
+
+/* Both joints into a stop of theirs, or resting on it. */
+static void next_sample(void) {
+    plant_test_random_inertia(&random_source, &inertia);
+    for (int i = 0; i < 2; i++) {
+        const bool rests = rp_test_random_bits(&random_source) % 8 == 0;
+        before[i] = rests ? 0.0 : rp_test_uniform(&random_source, -5.0, 5.0);
+        contacts.side[i] = before[i] > 0.0 ? -1 : 1;
+        contacts.restitution[i] = restitution();
+    }
+}
+
+static double kinetic_energy(const double dq[2]) {
+    double(*D)[2] = inertia.D;
+    return 0.5 * (D[0][0] * dq[0] * dq[0] + D[1][1] * dq[1] * dq[1]) + D[0][1] * dq[0] * dq[1];
+}
+
+/* A bound of all terms, with which errors of the energy are compared. */
+static double energy_scale(const double dq[2]) {
+    double(*D)[2] = inertia.D;
+    return D[0][0] * dq[0] * dq[0] + D[1][1] * dq[1] * dq[1];
+}
+
+static void test_impulses_change_the_momenta(void) {
+    for (int n = 0; n < CASES; n++) {
+        next_sample();
+        rp_plant_impact(&inertia, &contacts, before, &impact);
+        for (int i = 0; i < 2; i++) {
+            double change = 0.0;
+            double scale = 0.0;
+            for (int j = 0; j < 2; j++) {
+                const double term = inertia.D[i][j] * (impact.dq[j] - before[j]);
+                change += term;
+                scale += fabs(inertia.D[i][j]) * (fabs(impact.dq[j]) + fabs(before[j]));
+            }
+            ASSERT_CLOSE(change, impact.impulse[i], 16 * EPS * scale);
+        }
+    }
+}
+
+/* At each stop: P >= 0, q'+ + e q'- >= 0, and one of them is 0. */
+static void test_law_of_impact_holds_at_two_stops(void) {
+    int both = 0;
+    int single = 0;
+    for (int n = 0; n < CASES; n++) {
+        next_sample();
+        rp_plant_impact(&inertia, &contacts, before, &impact);
+        int struck = 0;
+        for (int i = 0; i < 2; i++) {
+            const double push = contacts.side[i] * impact.impulse[i];
+            const double away =
+                contacts.side[i] * (impact.dq[i] + contacts.restitution[i] * before[i]);
+            TEST_ASSERT_TRUE(push >= 0.0 && away >= -16 * EPS * (fabs(impact.dq[i]) + 10.0));
+            if (push > 0.0) {
+                ASSERT_SAME(-contacts.restitution[i] * before[i], impact.dq[i]);
+                struck++;
+            }
+        }
+        both += struck == 2;
+        single += struck == 1;
+    }
+    TEST_ASSERT_GREATER_THAN_INT(CASES / 10, both);
+    TEST_ASSERT_GREATER_THAN_INT(CASES / 10, single);
+}
+
+static void test_loss_is_that_of_kinetic_energy_and_never_negative(void) {
+    for (int n = 0; n < CASES; n++) {
+        next_sample();
+        rp_plant_impact(&inertia, &contacts, before, &impact);
+        TEST_ASSERT_TRUE(impact.loss >= 0.0);
+        const double scale = energy_scale(before) + energy_scale(impact.dq);
+        ASSERT_CLOSE(kinetic_energy(before) - kinetic_energy(impact.dq), impact.loss,
+                     32 * EPS * scale);
+        if (contacts.restitution[0] == 1.0 && contacts.restitution[1] == 1.0) {
+            TEST_ASSERT_TRUE(impact.loss == 0.0);
+        }
+    }
+}
+
+/* One stop i, the other joint j free: q_i' -> -e q_i', the momentum of j stays, and with
+ * m = D_ii - D_ij^2 / D_jj = 1 / (D^-1)_ii the loss is (1 - e^2) m q_i'^2 / 2. */
+static void test_one_stop(void) {
+    for (int n = 0; n < CASES; n++) {
+        next_sample();
+        const int i = (int)(rp_test_random_bits(&random_source) % 2);
+        const int j = 1 - i;
+        contacts.side[j] = rp_test_random_bits(&random_source) % 2 == 0 ? 0 : -contacts.side[j];
+        if (before[j] == 0.0) {
+            contacts.side[j] = 0; // it would rest on its stop
+        }
+        rp_plant_impact(&inertia, &contacts, before, &impact);
+        double(*D)[2] = inertia.D;
+        const double e = contacts.restitution[i];
+        ASSERT_SAME(-e * before[i], impact.dq[i]);
+        const double momentum = D[j][i] * before[i] + D[j][j] * before[j];
+        const double scale = fabs(D[j][i]) * fabs(before[i]) + D[j][j] * fabs(impact.dq[j]) +
+                             fabs(momentum) + D[j][j] * fabs(before[j]);
+        ASSERT_CLOSE(momentum, D[j][i] * impact.dq[i] + D[j][j] * impact.dq[j], 8 * EPS * scale);
+        const double loss =
+            0.5 * (1.0 - e * e) * inertia.determinant / D[j][j] * before[i] * before[i];
+        ASSERT_CLOSE(loss, impact.loss, 16 * EPS * fabs(impact.impulse[i] * before[i]));
+        TEST_ASSERT_TRUE(impact.impulse[j] == 0.0);
+    }
+}
+
+static void test_a_joint_that_moves_away_has_no_impact(void) {
+    next_sample();
+    before[0] = contacts.side[0] * 2.0;
+    before[1] = contacts.side[1] * 3.0;
+    rp_plant_impact(&inertia, &contacts, before, &impact);
+    for (int i = 0; i < 2; i++) {
+        ASSERT_SAME(before[i], impact.dq[i]);
+        ASSERT_SAME(0.0, impact.impulse[i]);
+    }
+    ASSERT_SAME(0.0, impact.loss);
+}
+
+/* A joint that rests on its stop holds the blow of the other, or is thrown off by it. */
+static void test_a_joint_at_rest_on_its_stop(void) {
+    inertia = (struct rp_plant_inertia){{{2.0, -1.0}, {-1.0, 1.0}}, 1.0};
+    before[0] = 0.0;
+    before[1] = -1.0;
+    contacts = (struct rp_plant_contacts){{1, 1}, {0.5, 0.5}};
+    rp_plant_impact(&inertia, &contacts, before, &impact);
+    ASSERT_SAME(0.75, impact.dq[0]); // D11 dq1 + D12 dq2 = 1 before and after
+    ASSERT_SAME(0.5, impact.dq[1]);
+    ASSERT_SAME(0.0, impact.impulse[0]);
+    ASSERT_SAME(0.75, impact.impulse[1]);
+
+    contacts.side[0] = -1;
+    rp_plant_impact(&inertia, &contacts, before, &impact);
+    ASSERT_SAME(0.0, impact.dq[0]);
+    ASSERT_SAME(0.5, impact.dq[1]);
+    ASSERT_SAME(-1.5, impact.impulse[0]);
+    ASSERT_SAME(1.5, impact.impulse[1]);
+    ASSERT_SAME(0.375, impact.loss);
+}

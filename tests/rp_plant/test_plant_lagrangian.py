@@ -1,0 +1,131 @@
+"""The smooth part of the plant against its Lagrangian, at random rationals."""
+
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+
+from tests.rp_plant.plant_rows import FREE, STUCK, evaluate
+from tests.rp_plant.plant_symbolic import SmoothPlant
+
+CASES = 400
+Case = dict[str, float]
+
+
+def random_case(random: np.random.Generator) -> Case:
+    """Everything on, or off in one draw of four; numbers are multiples of 2^-12."""
+
+    def uniform(low: float, high: float) -> float:
+        return round(random.uniform(low, high) * 4096) / 4096
+
+    def maybe(high: float) -> float:
+        return 0.0 if random.integers(4) == 0 else uniform(0, high)
+
+    return {
+        "m1": maybe(5), "m2": uniform(0.1, 5), "I1z": uniform(0.05, 1), "I2z": maybe(1),
+        "l1": maybe(2), "lc1": maybe(1), "a": uniform(-1, 1), "g": uniform(-10, 10),
+        "armature1": maybe(2), "armature2": maybe(2), "damping1": maybe(5), "damping2": maybe(5),
+        "payload_mass": maybe(4), "payload_inertia": maybe(1),
+        "payload_x": uniform(-1, 1), "payload_z": uniform(-1, 1),
+        "attached": float(random.integers(4) != 0),
+        "tau1": uniform(-50, 50), "f2": uniform(-50, 50),
+        "ee_fx": uniform(-50, 50), "ee_fy": uniform(-50, 50), "ee_mz": uniform(-50, 50),
+        "q1": uniform(-4, 4), "q2": uniform(-2, 2), "dq1": uniform(-5, 5), "dq2": uniform(-5, 5),
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def exact() -> SmoothPlant:
+    return SmoothPlant()
+
+
+@pytest.fixture(scope="module")
+def cases() -> list[Case]:
+    random = np.random.default_rng(15)
+    return [random_case(random) for _ in range(CASES)]
+
+
+def assert_close(actual: float, expected: mpmath.mpf, scale: mpmath.mpf, what: object) -> None:
+    assert abs(mpmath.mpf(actual) - expected) <= mpmath.mpf("1e-13") * scale, what
+
+
+def size(matrix: mpmath.matrix) -> mpmath.mpf:
+    """The largest absolute value of the entries."""
+    return max(abs(entry) for entry in matrix)
+
+
+def assert_accelerations(exact: SmoothPlant, case: Case, found: Case) -> Case:
+    """Both rows of D ddq = forces, or of one where the other joint is stuck."""
+    D, applied = exact.evaluate("mass_matrix", case), exact.evaluate("applied", case)
+    coriolis, gravity = exact.evaluate("coriolis", case), exact.evaluate("gravity", case)
+    forces = applied - coriolis - gravity
+    scale = 10 + size(applied) + size(coriolis) + size(gravity)
+    moves = [i for i in range(2) if case.get(f"mode{i + 1}", FREE) == FREE]
+    rows = mpmath.matrix([[D[i, j] for j in moves] for i in moves])
+    inverse = rows**-1
+    expected = inverse * mpmath.matrix([forces[i] for i in moves])
+    ddq = mpmath.matrix(2, 1)
+    for k, i in enumerate(moves):
+        ddq[i] = expected[k]
+    for i in range(2):
+        assert_close(found[f"ddq{i + 1}"], ddq[i], size(inverse) * scale, (case, i))
+    reaction = forces - D * ddq
+    for i in range(2):
+        bound = scale * (1 + size(D) * size(inverse))
+        if i not in moves:
+            assert_close(found[f"friction{i + 1}"], reaction[i], bound, (case, i))
+    return case | {"ddq1": found["ddq1"], "ddq2": found["ddq2"]}
+
+
+def test_motion_is_that_of_the_lagrangian(
+    program: Path, exact: SmoothPlant, cases: list[Case]
+) -> None:
+    for case, found in zip(cases, evaluate(program, cases), strict=True):
+        assert_accelerations(exact, case, found)
+
+
+@pytest.mark.parametrize("stuck", [1, 2])
+def test_motion_beside_a_stuck_joint(
+    program: Path, exact: SmoothPlant, cases: list[Case], stuck: int
+) -> None:
+    """A stuck joint is a constraint: one equation is left, and what holds is its multiplier."""
+    held = {f"mode{stuck}": STUCK, f"coulomb_friction{stuck}": 1e3, f"dq{stuck}": 0.0}
+    changed = [case | held for case in cases]
+    for case, found in zip(changed, evaluate(program, changed), strict=True):
+        assert_accelerations(exact, case, found)
+
+
+def test_terms_and_energies(program: Path, exact: SmoothPlant, cases: list[Case]) -> None:
+    for case, found in zip(cases, evaluate(program, cases), strict=True):
+        D = exact.evaluate("mass_matrix", case)
+        for name, entry in (("D11", D[0, 0]), ("D12", D[0, 1]), ("D22", D[1, 1])):
+            assert_close(found[name], entry, size(D), (name, case))
+        for name in ("coriolis", "gravity"):
+            forces = exact.evaluate(name, case)
+            for i in range(2):
+                assert_close(found[f"{name}{i + 1}"], forces[i], 100 + size(forces), (name, case))
+        for name in ("kinetic_energy", "potential_energy"):
+            energy = exact.evaluate(name, case)
+            assert_close(found[name], energy, 100 + abs(energy), (name, case))
+
+
+def test_joint_loads_are_newtons(program: Path, exact: SmoothPlant, cases: list[Case]) -> None:
+    names = ("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")
+    for case, found in zip(cases, evaluate(program, cases), strict=True):
+        # the accelerations are those found: their rounding is tested above
+        loads = exact.evaluate("loads", case | {"ddq1": found["ddq1"], "ddq2": found["ddq2"]})
+        scale = 100 * (10 + abs(found["ddq1"]) + abs(found["ddq2"]))
+        for i, name in enumerate(names):
+            assert_close(found[name], loads[i], scale, (name, case))
+
+
+def test_acceleration_of_the_end_effector(
+    program: Path, exact: SmoothPlant, cases: list[Case]
+) -> None:
+    for case, found in zip(cases, evaluate(program, cases), strict=True):
+        moved = case | {"ddq1": found["ddq1"], "ddq2": found["ddq2"]}
+        acceleration = exact.evaluate("acceleration", moved)
+        scale = 10 * (10 + abs(found["ddq1"]) + abs(found["ddq2"]))
+        assert_close(found["ee_ax"], acceleration[0], scale, case)
+        assert_close(found["ee_ay"], acceleration[1], scale, case)
