@@ -4,16 +4,11 @@
 #ifndef MODEL_H
 #define MODEL_H
 
+#include "events.h"
 #include "series.h"
 #include "status.h"
 
 #include <stddef.h>
-
-/* A part of the value structure. */
-struct span {
-    size_t offset; /* bytes from the start of the structure */
-    size_t size;   /* bytes */
-};
 
 struct model {
     size_t values_size;      /* bytes of the value structure */
@@ -50,6 +45,8 @@ struct model {
     /* STATUS_OK if the parameters are consistent; otherwise STATUS_INVALID_PARAMETERS and one line
      * in text (size bytes) that says what is wrong and what is expected. */
     enum status (*check_parameters)(const void *values, char *text, size_t size);
+
+    const struct model_events *events; /* NULL: none */
 };
 
 #endif

@@ -1,0 +1,66 @@
+/* Modes of a model, and the events at which they change. A model without them has none of this.
+ *
+ * Between two events the modes stay as they are and the right-hand side is smooth. An indicator is
+ * above 0 while the modes are valid; an event is where one reaches 0. */
+#ifndef EVENTS_H
+#define EVENTS_H
+
+#include "status.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Parts of the value structure. */
+struct span {
+    size_t offset; /* bytes from the start of the structure */
+    size_t size;   /* bytes */
+};
+
+/* How an indicator follows from states and inputs while the modes stay as they are. */
+enum indicator_kind {
+    INDICATOR_UNUSED,   /* above 0 whatever states and inputs are */
+    INDICATOR_OF_STATE, /* offset + factor x[state] */
+    INDICATOR_OF_MODEL, /* what struct model_events' indicators writes: smooth in t, x and u */
+};
+
+struct indicator {
+    enum indicator_kind kind;
+    size_t state;  /* INDICATOR_OF_STATE */
+    double factor; /* INDICATOR_OF_STATE */
+    double offset; /* INDICATOR_OF_STATE */
+};
+
+struct event {
+    double t;          /* s */
+    const bool *fired; /* one per indicator: it is at 0 now; NULL: none, the event is a change of inputs or parameters, or the end of initialization */
+    const double *du;  /* derivative of each input by the time after the event */
+    const double *tolerance; /* absolute tolerance of each state in effect, in its unit */
+};
+
+struct model_events {
+    size_t indicator_count;
+    const char *const *indicator_names;
+    struct span modes;           /* int[]: the right-hand side reads them, only update writes them */
+    struct span sums;            /* double[]: sums over events, such as a loss; only update writes them */
+    struct span discrete_inputs; /* int[]: Boolean inputs */
+
+    /* Whether events can happen with these parameters. If not, the modes are those of the start. */
+    bool (*are_possible)(const void *values);
+
+    /* In these modes no state moves, whatever the inputs are. */
+    bool (*is_at_rest)(const void *values);
+
+    /* Writes the kind of each indicator in these modes. */
+    void (*describe)(const void *values, struct indicator indicators[]);
+
+    /* Writes all indicators; 1 for unused ones. Pure as right_hand_side: parameters and modes are
+     * read from values, states and inputs from x and u. */
+    enum status (*indicators)(const void *values, double t, const double x[], const double u[],
+                              double z[]);
+
+    /* Writes the modes, states and sums that follow the event; idempotent but for `fired`. All of it is read
+     * from values: parameters, inputs, discrete inputs, states, modes. */
+    enum status (*update)(void *values, const struct event *event);
+};
+
+#endif
