@@ -218,9 +218,11 @@ class Discrete(Variable):
     @model_validator(mode="after")
     def check_discrete(self) -> Self:
         """Refuse what only a floating-point number can be."""
+        article = "a" if self.type == "boolean" else "an"
         if self.variability == "continuous" or self.derivative_of is not None:
-            article = "a" if self.type == "boolean" else "an"
             raise ValueError(f"{article} {self.type} is not continuous")
+        if self.causality != "parameter" and self.initial == "exact":
+            raise ValueError(f"{article} {self.type} is no state: initial must be calculated")
         return self
 
 

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from cosim import scenario, simulation
+from cosim.coupling.master import Master
 from cosim.errors import UserError
 from cosim.fmu_file import INSTANCES, Fmu
+from cosim.system.structure import Connection
 from tests.support.cosim_project import BUILD, fmi3_fmu
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy
 
@@ -131,3 +133,20 @@ def test_only_boolean_inputs(write, wheel: Fmu) -> None:
     text = f"{timed(0, 2, 1)}[initial]\nangle = 1.0\n[inputs.is_counting]\nconstant = false\n"
     result = simulation.simulate(wheel, scenario.load(write(text), wheel.model))
     assert set(result.values[:, result.names.index("angle")]) == {1.0}
+
+
+def turns(wheel: Fmu, counting: object) -> int | None:
+    """Turns that one of two wheels counts, which give each other their speed in a master."""
+    other = [Connection("a", "angle", "b", "speed"), Connection("b", "angle", "a", "speed")]
+    with Master({"a": wheel, "b": wheel}, other) as master:
+        start = {"angle": 20.0, "is_counting": counting}
+        master.initialize(0.0, None, {"a": start, "b": {"angle": 1.0}})
+        instance = master.components["a"].instance
+        return instance.integer("turns")
+
+
+def test_a_master_leaves_boolean_inputs_at_their_start(wheel: Fmu) -> None:
+    assert turns(wheel, True) == 3
+    assert turns(wheel, False) == 0
+    with pytest.raises(UserError, match=r"^a\.is_counting: expected true or false, got 1$"):
+        turns(wheel, 1)

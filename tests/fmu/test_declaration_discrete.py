@@ -47,6 +47,11 @@ MISTAKES = {
         COUNTING.replace("discrete", "continuous"),
         ["is_counting", "a boolean is not continuous"],
     ),
+    "exact": (
+        TURNING,
+        f'{TURNING}\ninitial = "exact"\nstart = true',
+        ["is_turning", "a boolean is no state: initial must be calculated"],
+    ),
     "unknown_indicator": (
         INDICATORS,
         'event_indicators = ["to_stop", "pusch"]',
