@@ -90,9 +90,9 @@ static inline size_t count_of(struct span span) {
     return span.size / sizeof(double);
 }
 
-/* Places in the value structure for what events keep; empty for models without events. */
-static inline struct model_events events_of(const struct model *model) {
-    return model->events != NULL ? *model->events : (struct model_events){0};
+/* The doubles at a span of a value structure. */
+static inline double *doubles_of(char *values, struct span span) {
+    return (double *)(void *)(values + span.offset);
 }
 
 /* The ints at a span of a value structure. */
@@ -100,9 +100,9 @@ static inline int *ints_of(char *values, struct span span) {
     return (int *)(void *)(values + span.offset);
 }
 
-/* The doubles at a span of a value structure. */
-static inline double *doubles_of(char *values, struct span span) {
-    return (double *)(void *)(values + span.offset);
+/* Places in the value structure for what events keep; empty for models without events. */
+static inline struct model_events events_of(const struct model *model) {
+    return model->events != NULL ? *model->events : (struct model_events){0};
 }
 
 #endif
