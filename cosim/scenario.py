@@ -15,8 +15,17 @@ import numpy as np
 from cosim import project
 from cosim.errors import UserError, did_you_mean
 from cosim.input_files import read_toml, show
-from cosim.model import INITIAL, INPUTS, PARAMETERS, Model, Value, WrongValueError, finite_number
-from cosim.signals import Constant, Signal, Sines, Table
+from cosim.model import (
+    INITIAL,
+    INPUTS,
+    PARAMETERS,
+    Model,
+    Value,
+    Variable,
+    WrongValueError,
+    finite_number,
+)
+from cosim.signals import Constant, Signal, Sines, Switches, Table
 
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
@@ -28,7 +37,7 @@ class Scenario:
     """A run of one model: parameters, initial state, communication points and inputs (SI units).
 
     Only what the file gives is in `parameters`, `initial` and `inputs`; everything else has its
-    start value. Arrays are read-only.
+    start value. Arrays are read-only; those of Boolean inputs hold Booleans.
     """
 
     name: str
@@ -57,7 +66,7 @@ class Scenario:
         """Values of an input, (n + 1,): its start value throughout if the file gives none."""
         if name in self.inputs:
             return self.inputs[name]
-        return np.full(len(self.times), float(self.defaults[name]))
+        return np.full(len(self.times), self.defaults[name])
 
     @property
     def reference_folder(self) -> Path:
@@ -251,11 +260,36 @@ class _Reader:
         result = {}
         for name, given in self.table(content.get(INPUTS, {}), f"[{INPUTS}]").items():
             try:
-                model.find(name, INPUTS)
+                variable = model.find(name, INPUTS)
             except WrongValueError as error:
                 self.fail(f"[{INPUTS}]: {error}")
-            result[name] = self.signal(given, f"[{INPUTS}.{name}]")
+            where = f"[{INPUTS}.{name}]"
+            if variable.type == "Boolean":
+                result[name] = self.switches(given, where, variable)
+            elif variable.type == "Real":
+                result[name] = self.signal(given, where)
+            else:
+                self.fail(f"{where}: is of type {variable.type}, expected Real or Boolean")
         return result
+
+    def switches(self, content: Any, where: str, variable: Variable) -> Switches:
+        """A Boolean input: constant, or a table of times and values."""
+        table = self.table(content, where)
+        self.keys(table, where, optional=("constant", "table"))
+        if len(table) != 1:
+            self.fail(f"{where}: expected exactly one of constant, table, got {len(table)}")
+        if "constant" in table:
+            return Switches(
+                ((0.0, self.boolean(table["constant"], f"{where} constant", variable)),)
+            )
+        rows = self.rows(table, where)
+        return Switches(tuple((t, self.boolean(v, key, variable)) for t, v, key in rows))
+
+    def boolean(self, given: Any, key: str, variable: Variable) -> bool:
+        try:
+            return bool(variable.checked(given))
+        except WrongValueError as error:
+            self.fail(f"{key}: {error}")
 
     def signal(self, content: Any, where: str) -> Signal:
         table = self.table(content, where)
@@ -284,17 +318,23 @@ class _Reader:
         return Sines(offset, tuple(terms))
 
     def points(self, table: dict[str, Any], where: str) -> Table:
-        key = f"{where} table"
-        points: list[tuple[float, float]] = []
-        for i, row in enumerate(self.array(table["table"], key, "[time, value] pairs")):
+        rows = self.rows(table, where)
+        return Table(tuple((time, self.number(value, key)) for time, value, key in rows))
+
+    def rows(self, table: dict[str, Any], where: str) -> list[tuple[float, Any, str]]:
+        """Times in s, values as they stand in the file, and their keys."""
+        rows: list[tuple[float, Any, str]] = []
+        for i, row in enumerate(
+            self.array(table["table"], f"{where} table", "[time, value] pairs")
+        ):
+            key = f"{where} table[{i}]"
             if not isinstance(row, list) or len(row) != 2:
-                self.fail(f"{key}[{i}]: expected [time, value], got {show(row)}")
-            time, value = (self.number(number, f"{key}[{i}]") for number in row)
-            if i and time <= points[-1][0]:
-                last = points[-1][0]
-                self.fail(f"{key}[{i}]: expected a time after {last!r} s, got {show(row)}")
-            points.append((time, value))
-        return Table(tuple(points))
+                self.fail(f"{key}: expected [time, value], got {show(row)}")
+            time = self.number(row[0], key)
+            if i and time <= rows[-1][0]:
+                self.fail(f"{key}: expected a time after {rows[-1][0]!r} s, got {show(row)}")
+            rows.append((time, row[1], key))
+        return rows
 
     def sampled(
         self, signals: dict[str, Signal], elapsed: np.ndarray, model: Model

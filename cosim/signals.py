@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+EARLY = 1e-9  # s; a communication point that rounding puts this little before a switch is at it
+
 
 @dataclass(frozen=True)
 class Constant:
@@ -59,4 +61,17 @@ class Table:
         return np.interp(elapsed, times, values)
 
 
-Signal = Constant | Sines | Table
+@dataclass(frozen=True)
+class Switches:
+    """True or false from each time on, and before the first one as there."""
+
+    points: tuple[tuple[float, bool], ...]  # s since the start, value; in order of time
+
+    def values(self, elapsed: np.ndarray) -> np.ndarray:
+        """Values at `elapsed` seconds after the start, (n,), Boolean."""
+        times, values = zip(*self.points, strict=True)
+        rows = np.searchsorted(times, elapsed + EARLY, side="right") - 1
+        return np.array(values)[np.maximum(rows, 0)]
+
+
+Signal = Constant | Sines | Table | Switches

@@ -80,7 +80,7 @@ def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None
         instance.set(name, value)
     instance.enter_initialization()
     for name, values in scenario.inputs.items():
-        instance.set(name, float(values[0]))
+        instance.set(name, values[0].item())
     instance.exit_initialization()
 
 
@@ -88,9 +88,12 @@ def _step_through(
     instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
 ) -> tuple[np.ndarray, float]:
     """All steps: recorded outputs (rows, outputs), and the seconds that the loop took."""
-    inputs = instance.reals(list(scenario.inputs))
+    switches = {name: values for name, values in scenario.inputs.items() if values.dtype == bool}
+    inputs = instance.reals([name for name in scenario.inputs if name not in switches])
     outputs = instance.reals(instance.fmu.model.real_outputs)
-    held = np.column_stack([*scenario.inputs.values()]) if inputs.names else None
+    columns = [scenario.inputs[name] for name in inputs.names]
+    held = np.column_stack(columns) if columns else None
+    switching = _switching(switches)
 
     times, lengths = scenario.times, np.diff(scenario.times)
     rows = scenario.reference_rows
@@ -105,6 +108,8 @@ def _step_through(
             if held is not None:
                 inputs.view[:] = held[i]
                 inputs.set()
+            for name in switching.get(i, ()):
+                instance.set(name, bool(switches[name][i]))
             instance.do_step(times[i], length)
             if rows[recorded + 1] == i + 1:
                 outputs.get()
@@ -121,3 +126,12 @@ def _step_through(
     if progress is not None:
         progress(len(lengths) - reported)
     return values, wall_time
+
+
+def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
+    """Boolean inputs whose value is another one at a communication point, by its index."""
+    found: dict[int, list[str]] = {}
+    for name, values in switches.items():
+        for i in np.flatnonzero(values[1:] != values[:-1]) + 1:
+            found.setdefault(int(i), []).append(name)
+    return found

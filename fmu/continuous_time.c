@@ -1,6 +1,8 @@
 #include "continuous_time.h"
 
 #include "continuous_states.h"
+#include "model_description.h"
+#include "values.h"
 
 enum component_status continuous_set_time(struct component *component, unsigned call, double time) {
     if (!component_enter(component, call)) {
@@ -45,13 +47,16 @@ enum component_status continuous_get_nominals(struct component *component, unsig
 
 enum component_status continuous_get_indicators(struct component *component, unsigned call,
                                                 double indicators[], size_t count) {
-    (void)indicators;
-    if (!component_enter(component, call)) {
+    const size_t expected = model_description.indicator_count;
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, indicators, indicators)) {
         return COMPONENT_ERROR;
     }
-    if (count > 0) {
-        return component_fail(component, "%zu event indicators are accessed: there are none",
-                              count);
+    if (count != expected) {
+        return component_fail(component, "%zu event indicators are accessed: there are %zu", count,
+                              expected);
     }
-    return COMPONENT_OK;
+    return component_result(
+        component,
+        instance_get_real(component->instance, model_description.indicators, count, indicators));
 }

@@ -16,7 +16,7 @@ enum component_status continuous_get_derivatives(struct component *component, un
 enum component_status continuous_get_nominals(struct component *component, unsigned call,
                                               double nominals[], size_t count);
 
-/* Models have no events so far: there are none. */
+/* The variables that are the event indicators. */
 enum component_status continuous_get_indicators(struct component *component, unsigned call,
                                                 double indicators[], size_t count);
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
-from declaration.schema import Experiment, Unit
+from declaration.schema import Boolean, Experiment, Unit, Variable
 from provenance import Provenance
 
 LOG_CATEGORIES = {
@@ -47,6 +47,14 @@ def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
 def type_name(variable: str) -> str:
     """Name of the type of an enumeration, for example SolverMethodType for solver_method."""
     return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
+
+
+def value_attributes(variable: Variable) -> dict[str, str]:
+    """Attributes start, min and max, of those that the variable has."""
+    if isinstance(variable, Boolean):
+        return {} if variable.start is None else {"start": str(variable.start).lower()}
+    values = {key: getattr(variable, key) for key in ("start", "min", "max")}
+    return {key: repr(value) for key, value in values.items() if value is not None}
 
 
 def add_log_categories(root: ET.Element, prefix: str) -> None:

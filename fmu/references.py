@@ -18,7 +18,7 @@ from typing import Any
 
 from atomic_write import atomic_write
 from declaration.load import Declaration, DeclarationError, load
-from declaration.schema import Enumeration, Float64, Variable
+from declaration.schema import Boolean, Enumeration, Float64, Variable
 from description_parts import document
 
 MANIFEST = "fmi-ls-manifest.xml"
@@ -115,13 +115,15 @@ def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, st
                 f"{place} = {value!r:.40} is not one of {', '.join(variable.items)}"
             )
         return "Enumeration", {"value": value}
-    wanted = (int, float) if isinstance(variable, Float64) else (int,)
-    if type(value) not in wanted:
+    wanted = {"float64": (int, float), "int32": (int,), "boolean": (bool,)}
+    if type(value) not in wanted[variable.type]:
         raise CarriedScenarioError(
             f"{place} = {value!r:.40} is not a value of type {variable.type}"
         )
     if isinstance(variable, Float64):
         return "Real", {"value": repr(float(value)), "unit": variable.unit}
+    if isinstance(variable, Boolean):
+        return "Boolean", {"value": str(value).lower()}
     return "Integer", {"value": str(value)}
 
 

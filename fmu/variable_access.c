@@ -91,6 +91,48 @@ enum component_status access_set_enumeration(struct component *component, unsign
         component, instance_set_enumeration(component->instance, references, count, values));
 }
 
+enum component_status access_get_boolean(struct component *component, unsigned call,
+                                         const unsigned references[], size_t count, int values[]) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, references, values)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component,
+                            instance_get_boolean(component->instance, references, count, values));
+}
+
+enum component_status access_get_bool(struct component *component, unsigned call,
+                                      const unsigned references[], size_t count, bool values[]) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, references, values)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component,
+                            instance_get_bool(component->instance, references, count, values));
+}
+
+enum component_status access_set_boolean(struct component *component, unsigned call,
+                                         const unsigned references[], size_t count,
+                                         const int values[]) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, references, values)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component,
+                            instance_set_boolean(component->instance, references, count, values));
+}
+
+enum component_status access_set_bool(struct component *component, unsigned call,
+                                      const unsigned references[], size_t count,
+                                      const bool values[]) {
+    if (!component_enter(component, call) ||
+        !component_has_arrays(component, call, count, references, values)) {
+        return COMPONENT_ERROR;
+    }
+    return component_result(component,
+                            instance_set_bool(component->instance, references, count, values));
+}
+
 enum component_status access_none(struct component *component, unsigned call, const char *type,
                                   const unsigned references[], size_t count, const void *values) {
     if (!component_enter(component, call) ||

@@ -5,6 +5,7 @@
 
 #include "component.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -36,6 +37,18 @@ enum component_status access_get_enumeration(struct component *component, unsign
 enum component_status access_set_enumeration(struct component *component, unsigned call,
                                              const unsigned references[], size_t count,
                                              const int64_t values[]);
+
+/* Booleans, as ints and as bools. */
+enum component_status access_get_boolean(struct component *component, unsigned call,
+                                         const unsigned references[], size_t count, int values[]);
+enum component_status access_set_boolean(struct component *component, unsigned call,
+                                         const unsigned references[], size_t count,
+                                         const int values[]);
+enum component_status access_get_bool(struct component *component, unsigned call,
+                                      const unsigned references[], size_t count, bool values[]);
+enum component_status access_set_bool(struct component *component, unsigned call,
+                                      const unsigned references[], size_t count,
+                                      const bool values[]);
 
 /* Of a type that no variable has: succeeds for no values only. */
 enum component_status access_none(struct component *component, unsigned call, const char *type,

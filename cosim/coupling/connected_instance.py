@@ -9,7 +9,7 @@ import numpy as np
 from cosim.errors import UserError
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
-from cosim.model import INITIAL, PARAMETERS, Value, Variable, WrongValueError
+from cosim.model import INITIAL, INPUTS, PARAMETERS, Value, Variable, WrongValueError
 
 
 @dataclass(frozen=True)
@@ -91,19 +91,21 @@ def start_value(fmu: Fmu, component: str, name: str, value: Value) -> Value:
     Raises
     ------
     UserError
-        If it is not a parameter or the start value of a state.
+        If it is not a parameter, the start value of a state or a Boolean input.
     """
     variable = fmu.model.variables.get(name)
     if variable is None or not _can_start(variable):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
-    if variable.type != "Enumeration" or not isinstance(value, str):
+    is_item = variable.type == "Enumeration" and isinstance(value, str)
+    if not is_item and variable.type != "Boolean":
         return value
     try:
-        return variable.item(value)
+        return variable.checked(value)
     except WrongValueError as error:
         raise UserError(f"{component}.{name}: {error}") from None
 
 
 def _can_start(variable: Variable) -> bool:
     local_state = variable.causality == "local" and variable.initial == "exact"
-    return variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state
+    switch = variable.is_a(INPUTS) and variable.type == "Boolean"
+    return variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state or switch

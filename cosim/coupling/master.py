@@ -1,10 +1,11 @@
 """A master that steps connected FMUs.
 
-Every component is an instance of an FMU; connections lead from Real outputs to Real inputs. In
-Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
-what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
-each takes the newest outputs: those of the end of the step from components before it, those of its
-beginning from itself and the components behind it.
+Every component is an instance of an FMU; connections lead from Real outputs to Real inputs. Other
+inputs keep their values from before initialization. In Jacobi order all components make a step,
+then all outputs are read; each step takes its inputs from what was read at its beginning. In
+Gauss-Seidel order the components step one after the other, and each takes the newest outputs: those
+of the end of the step from components before it, those of its beginning from itself and the
+components behind it.
 
 Inputs are held over a step, or are straight lines through the value of their source at the time at
 which it was read, with its slope there: in Jacobi order they extrapolate from the beginning of the
@@ -103,7 +104,7 @@ class Master:
     Raises
     ------
     UserError
-        If names are unknown, an input is connected not once, or an FMU cannot do what is asked.
+        If names are unknown, a Real input is connected not once, or an FMU cannot do what is asked.
     """
 
     def __init__(
@@ -348,5 +349,6 @@ def _check(fmus: Mapping[str, Fmu], connections: Sequence[Connection], sloped: b
             )
     for component, fmu in fmus.items():
         for variable in fmu.model.variables.values():
-            if variable.causality == "input" and (component, variable.name) not in seen:
+            connects = variable.causality == "input" and variable.type == "Real"
+            if connects and (component, variable.name) not in seen:
                 raise UserError(f"{component}.{variable.name}: the input is not connected")

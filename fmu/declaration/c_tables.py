@@ -5,8 +5,7 @@ from __future__ import annotations
 from declaration.load import Declaration
 from declaration.schema import Enumeration, Variable
 
-C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int"}
-TABLE_TYPES = {"float64": "FLOAT64", "int32": "INT32", "enumeration": "ENUMERATION"}
+C_TYPES = {"float64": "double", "int32": "int", "enumeration": "int", "boolean": "int"}
 
 
 def value_references(declaration: Declaration) -> str:
@@ -69,6 +68,7 @@ def variable_table(declaration: Declaration) -> str:
         *("    " + ", ".join(entries[i : i + 20]) + "," for i in range(0, len(entries), 20)),
         "};",
         "",
+        *indicator_list(declaration),
         "const struct model_description model_description = {",
         f'    .name = "{model.name}",',
         f'    .guid = "{declaration.guid}",',
@@ -78,11 +78,25 @@ def variable_table(declaration: Declaration) -> str:
         "    .variable_count = sizeof variables / sizeof variables[0],",
         "    .row_of_reference = row_of_reference,",
         "    .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],",
+        *(INDICATORS if model.event_indicators else []),
         "};",
         "",
         f'const char model_token_fmi3[] = "{declaration.token("fmi3")}";',
     ]
     return "\n".join(lines) + "\n"
+
+
+INDICATORS = [
+    "    .indicators = indicators,",
+    "    .indicator_count = sizeof indicators / sizeof indicators[0],",
+]
+
+
+def indicator_list(declaration: Declaration) -> list[str]:
+    """The value references of the event indicators; nothing where there are none."""
+    names = declaration.model.event_indicators
+    references = ", ".join(str(declaration.variables[name].reference) for name in names)
+    return [f"static const unsigned indicators[] = {{{references}}};", ""] if names else []
 
 
 def type_checks(name: str, variable: Variable, structure: str) -> list[str]:
@@ -104,7 +118,7 @@ def table_row(name: str, variable: Variable, structure: str) -> str:
     """A row of the table: struct variable of src/instance/variables.h."""
     nominal = getattr(variable, "nominal", None)
     return (
-        f'    {{{variable.reference}, "{name}", VARIABLE_{TABLE_TYPES[variable.type]}, '
+        f'    {{{variable.reference}, "{name}", VARIABLE_{variable.type.upper()}, '
         f"VARIABLE_OF_{variable.owner.upper()}, offsetof({structure}, {variable.field}),\n"
         f"     CAUSALITY_{variable.causality.upper()}, "
         f"VARIABILITY_{variable.variability.upper()}, "

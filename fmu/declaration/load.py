@@ -53,6 +53,8 @@ class Declaration:
             "units": {name: unit.model_dump() for name, unit in self.units.items()},
             "variables": {name: v.interface for name, v in self.variables.items()},
         }
+        if self.model.event_indicators:
+            interface["event_indicators"] = self.model.event_indicators
         text = json.dumps(interface, sort_keys=True) + "".join(versions)
         digest = hashlib.sha256(text.encode()).hexdigest()
         parts = (digest[0:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])
@@ -85,6 +87,8 @@ def load(path: Path) -> Declaration:
     check_references(variables, places)
     check_names(variables, units, places)
     check_dependencies(variables, places)
+    check_states(variables, places)
+    check_indicators(file.model.event_indicators, variables, f"{path}: [model]")
     check_terminals(file.terminals, variables, f"{path}: terminal ")
     by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
     return Declaration(path, file.model, file.experiment, units, dict(by_reference), file.terminals)
@@ -219,6 +223,30 @@ def check_dependencies(variables: dict[str, Variable], places: dict[str, str]) -
         for other in variable.parameters:
             if variables[other].causality != "parameter":
                 raise DeclarationError(f"{places[name]}: '{other}' is not a parameter")
+
+
+def check_states(variables: dict[str, Variable], places: dict[str, str]) -> None:
+    """Check that only states can be changed by events."""
+    states = {v.derivative_of for v in variables.values()}
+    for name, variable in variables.items():
+        if variable.reinit and name not in states:
+            raise DeclarationError(f"{places[name]}: reinit is for states only")
+
+
+def check_indicators(names: list[str], variables: dict[str, Variable], place: str) -> None:
+    """Check that the event indicators are calculated locals that can cross 0."""
+    for i, name in enumerate(names):
+        where = f"{place}: event_indicators[{i}]"
+        variable = variables.get(name)
+        if variable is None:
+            raise DeclarationError(f"{where}: '{name}' is not declared")
+        if name in names[:i]:
+            raise DeclarationError(f"{where}: '{name}' is there twice")
+        kind = (variable.causality, variable.variability, variable.initial)
+        if kind != ("local", "continuous", "calculated"):
+            raise DeclarationError(f"{where}: '{name}' is not local, continuous and calculated")
+        if variable.dependencies is None:
+            raise DeclarationError(f"{where}: dependencies of '{name}' is missing")
 
 
 def check_terminals(

@@ -2,25 +2,30 @@
 
 include       further files, relative to this one, whose [variables] and [units] count too
 [model]       name (also the identifier), description, header, values (C type of the value
-              structure), symbol (the C object of type struct model)
+              structure), symbol (the C object of type struct model), event_indicators (names of
+              local continuous variables, in the order of the model's indicators; default: none)
 [experiment]  start, stop, tolerance, step: the default experiment
 [units]       "name" = { exponents of the SI base units, display.NAME = factor }
 [variables.NAME]
     reference     value reference, unique, 0 to 9999
     owner         "model" (default) or "instance": the structure that holds the value
     field         C designator of the value in that structure
-    type          "float64" (default), "int32" or "enumeration"
+    type          "float64" (default), "int32", "enumeration" or "boolean"
     causality, variability, initial, description
                   as in section 2.2.7 of the FMI 2.0 specification
-    start         where initial is exact, and of inputs; of an enumeration the name of an item
+    start         where initial is exact, and of inputs; of an enumeration the name of an item, of
+                  a boolean true or false
     unit, nominal of a float64
     min, max      of a float64 or int32
     items         of an enumeration: [variables.NAME.items.ITEM] with description and constant,
                   the C constant of that value; the values are 1, 2, ... in the order of the
                   file
     derivative_of name of the variable that this one is the time derivative of
-    dependencies  of outputs and derivatives: the inputs, states and time they depend on
-    parameters    of calculated outputs and derivatives: the parameters they depend on
+    reinit        true: events may change this state
+    dependencies  of outputs, derivatives and event indicators: the inputs, states and time they
+                  depend on
+    parameters    of calculated outputs, derivatives and event indicators: the parameters they
+                  depend on
 [terminals.NAME]
     rule          "plug": terminals fit whose members have the same names; "bus": members of the
                   same name are connected; "none": no rule
@@ -102,6 +107,7 @@ class Model(Table):
     header: str
     values: str
     symbol: Identifier
+    event_indicators: list[str] = []
 
 
 class Experiment(Table):
@@ -159,6 +165,7 @@ class Variable(Table):
     initial: Literal["exact", "calculated"] | None = Field(default_factory=usual_initial)
     description: str
     derivative_of: str | None = None
+    reinit: bool = False
     dependencies: list[str] | None = None
     parameters: list[str] = []
 
@@ -170,7 +177,8 @@ class Variable(Table):
     @property
     def interface(self) -> dict[str, Any]:
         """What users depend on: neither the texts nor where C keeps the value."""
-        return self.model_dump(exclude={"owner", "field", "description"}, exclude_none=True)
+        hidden = {"owner", "field", "description"} | (set() if self.reinit else {"reinit"})
+        return self.model_dump(exclude=hidden, exclude_none=True)
 
     @model_validator(mode="after")
     def check_together(self) -> Self:
@@ -210,8 +218,11 @@ class Discrete(Variable):
     @model_validator(mode="after")
     def check_discrete(self) -> Self:
         """Refuse what only a floating-point number can be."""
+        article = "a" if self.type == "boolean" else "an"
         if self.variability == "continuous" or self.derivative_of is not None:
-            raise ValueError(f"an {self.type} is not continuous")
+            raise ValueError(f"{article} {self.type} is not continuous")
+        if self.causality != "parameter" and self.initial == "exact":
+            raise ValueError(f"{article} {self.type} is no state: initial must be calculated")
         return self
 
 
@@ -269,7 +280,24 @@ class Enumeration(Discrete):
         return super().interface | {"items": [*self.items]}
 
 
-TYPES = {"float64": Float64, "int32": Int32, "enumeration": Enumeration}
+class Boolean(Discrete):
+    """True or false, which C keeps as 1 or 0."""
+
+    type: Literal["boolean"]
+    start: bool | None = None
+
+    @property
+    def min(self) -> int:
+        """Value of false."""
+        return 0
+
+    @property
+    def max(self) -> int:
+        """Value of true."""
+        return 1
+
+
+TYPES = {"float64": Float64, "int32": Int32, "enumeration": Enumeration, "boolean": Boolean}
 
 
 def type_of(variable: Any) -> Any:
@@ -280,7 +308,8 @@ def type_of(variable: Any) -> Any:
 AnyVariable = Annotated[
     Annotated[Float64, Tag("float64")]
     | Annotated[Int32, Tag("int32")]
-    | Annotated[Enumeration, Tag("enumeration")],
+    | Annotated[Enumeration, Tag("enumeration")]
+    | Annotated[Boolean, Tag("boolean")],
     Discriminator(type_of),
 ]
 

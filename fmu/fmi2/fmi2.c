@@ -175,7 +175,7 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           fmi2Boolean value[]) {
-    return fmi2_status(access_none(c, CALL_fmi2GetBoolean, "Boolean", vr, nvr, value));
+    return fmi2_status(access_get_boolean(c, CALL_fmi2GetBoolean, vr, nvr, value));
 }
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
@@ -185,7 +185,7 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                           const fmi2Boolean value[]) {
-    return fmi2_status(access_none(c, CALL_fmi2SetBoolean, "Boolean", vr, nvr, value));
+    return fmi2_status(access_set_boolean(c, CALL_fmi2SetBoolean, vr, nvr, value));
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,

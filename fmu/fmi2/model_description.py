@@ -14,10 +14,16 @@ from description_parts import (
     document,
     texts_of,
     type_name,
+    value_attributes,
 )
 from provenance import Provenance
 
-TYPES = {"float64": "Real", "int32": "Integer", "enumeration": "Enumeration"}
+TYPES = {
+    "float64": "Real",
+    "int32": "Integer",
+    "enumeration": "Enumeration",
+    "boolean": "Boolean",
+}
 
 
 def model_description(
@@ -34,7 +40,7 @@ def model_description(
         guid=declaration.guid,
         **texts_of(declaration, provenance),
         variableNamingConvention="flat",
-        numberOfEventIndicators="0",
+        numberOfEventIndicators=str(len(model.event_indicators)),
     )
     add_interfaces(root, model.name, sources)
     add_units(root, declaration.units)
@@ -68,6 +74,7 @@ def with_aliases(declaration: Declaration) -> dict[str, Variable]:
             "causality": "local",
             "initial": "calculated",
             "start": None,
+            "reinit": False,
             "description": f"Time derivative of {variable.derivative_of}: alias of {name}",
         }
         variables[alias] = variable.model_copy(update=changes)
@@ -137,10 +144,12 @@ def add_variable(
             element.set("displayUnit", display)
     if variable.derivative_of is not None:
         element.set("derivative", index[variable.derivative_of])
-    for key in ("start", "min", "max", "nominal"):
-        value = getattr(variable, key, None)
-        if value is not None:
-            element.set(key, repr(value))
+    if variable.reinit:
+        element.set("reinit", "true")
+    for key, text in value_attributes(variable).items():
+        element.set(key, text)
+    if isinstance(variable, Float64) and variable.nominal is not None:
+        element.set("nominal", repr(variable.nominal))
 
 
 def add_structure(root: ET.Element, variables: dict[str, Variable], index: dict[str, str]) -> None:

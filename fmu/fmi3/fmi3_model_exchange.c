@@ -2,6 +2,7 @@
 #include "continuous_states.h"
 #include "continuous_time.h"
 #include "fmi3_component.h"
+#include "model_description.h"
 #include "modes.h"
 
 /* ---- Modes ---------------------------------------------------------------------------------- */
@@ -71,7 +72,7 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventI
         !component_has_arrays(component, call, 1, nEventIndicators, nEventIndicators)) {
         return fmi3Error;
     }
-    *nEventIndicators = 0;
+    *nEventIndicators = model_description.indicator_count;
     return fmi3OK;
 }
 

@@ -75,6 +75,8 @@ ACCESS(Get, get, Int32, int32, fmi3Int32, false)
 ACCESS(Set, set, Int32, int32, const fmi3Int32, true)
 ACCESS(Get, get, Int64, enumeration, fmi3Int64, false)
 ACCESS(Set, set, Int64, enumeration, const fmi3Int64, true)
+ACCESS(Get, get, Boolean, bool, fmi3Boolean, false)
+ACCESS(Set, set, Boolean, bool, const fmi3Boolean, true)
 
 /* ---- Types that no variable has ---------------------------------------------------------------
  */
@@ -104,8 +106,6 @@ ACCESS_NONE(Get, UInt32, fmi3UInt32, false)
 ACCESS_NONE(Set, UInt32, const fmi3UInt32, true)
 ACCESS_NONE(Get, UInt64, fmi3UInt64, false)
 ACCESS_NONE(Set, UInt64, const fmi3UInt64, true)
-ACCESS_NONE(Get, Boolean, fmi3Boolean, false)
-ACCESS_NONE(Set, Boolean, const fmi3Boolean, true)
 ACCESS_NONE(Get, String, fmi3String, false)
 ACCESS_NONE(Set, String, const fmi3String, true)
 

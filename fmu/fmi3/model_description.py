@@ -13,10 +13,16 @@ from description_parts import (
     document,
     texts_of,
     type_name,
+    value_attributes,
 )
 from provenance import Provenance
 
-TYPES = {"float64": "Float64", "int32": "Int32", "enumeration": "Enumeration"}
+TYPES = {
+    "float64": "Float64",
+    "int32": "Int32",
+    "enumeration": "Enumeration",
+    "boolean": "Boolean",
+}
 
 
 def model_description(declaration: Declaration, provenance: Provenance) -> str:
@@ -38,7 +44,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
     elements = ET.SubElement(root, "ModelVariables")
     for name, variable in variables.items():
         add_variable(elements, name, variable, declaration)
-    add_structure(root, variables)
+    add_structure(root, declaration)
     return document(root)
 
 
@@ -129,14 +135,15 @@ def add_variable(
     if variable.derivative_of is not None:
         state = declaration.variables[variable.derivative_of]
         element.set("derivative", str(state.reference))
-    for key in ("start", "min", "max"):
-        value = getattr(variable, key, None)
-        if value is not None:
-            element.set(key, repr(value))
+    if variable.reinit:
+        element.set("reinit", "true")
+    for key, text in value_attributes(variable).items():
+        element.set(key, text)
 
 
-def add_structure(root: ET.Element, variables: dict[str, Variable]) -> None:
+def add_structure(root: ET.Element, declaration: Declaration) -> None:
     """Write ModelStructure with exact dependencies (section 2.4.8): parameters are knowns, too."""
+    variables = declaration.variables
     structure = ET.SubElement(root, "ModelStructure")
     states = {v.derivative_of for v in variables.values() if v.derivative_of is not None}
     derivatives = {v.derivative_of: n for n, v in variables.items() if v.derivative_of is not None}
@@ -147,6 +154,7 @@ def add_structure(root: ET.Element, variables: dict[str, Variable]) -> None:
             "InitialUnknown",
             [n for n, v in variables.items() if v.is_unknown and v.initial == "calculated"],
         ),
+        ("EventIndicator", declaration.model.event_indicators),
     ):
         for name in names:
             unknown = variables[name]

@@ -5,7 +5,7 @@
 #include <string.h>
 
 static const char magic[8] = {'C', 'O', 'S', 'I', 'M', 'S', 'T', 'A'};
-enum { FORMAT_VERSION = 1, HASH_SIZE = 8 };
+enum { FORMAT_VERSION = 2, HASH_SIZE = 8 };
 
 struct codec codec_counting(void) {
     return (struct codec){.mode = CODEC_COUNTING};
@@ -94,7 +94,7 @@ const char *codec_check(struct codec *codec, const char *guid, size_t length) {
         return "it is not a saved state of such a model";
     }
     if (version != FORMAT_VERSION) {
-        return "it has another version of the format, 1 is expected";
+        return "it has another version of the format, 2 is expected";
     }
     if (guid_length != strlen(guid) || codec->size - codec->at < guid_length ||
         memcmp(codec->from + codec->at, guid, guid_length) != 0) {

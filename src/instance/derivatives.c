@@ -5,15 +5,27 @@
 #include <math.h>
 #include <string.h>
 
-/* The variable, or NULL with a message that says what it is needed for. */
+/* The variable, or NULL with a message that says what it is needed for. Discrete variables jump:
+ * they have no derivatives. */
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
-    const struct variable *variable = instance_find(instance, reference, VARIABLE_FLOAT64);
-    if (variable != NULL && !serves(instance, variable)) {
+    const struct variable *variable = variable_find(instance->description, reference);
+    if (variable == NULL) {
+        return instance_refuse_reference(instance, reference, VARIABLE_FLOAT64);
+    }
+    if (variable->type != VARIABLE_FLOAT64) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "%s (value reference %u) is refused: %s is expected", variable->name,
-                      reference, expected);
+                      "%s (value reference %u) is refused: it is of type %s, %s of type float64 is "
+                      "expected",
+                      variable->name, reference, variable_type_name(variable->type), expected);
+        return NULL;
+    }
+    const bool is_discrete = variable->variability == VARIABILITY_DISCRETE;
+    if (is_discrete || !serves(instance, variable)) {
+        message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                      "%s (value reference %u) is refused: %s%s is expected", variable->name,
+                      reference, is_discrete ? "it is discrete, " : "", expected);
         return NULL;
     }
     return variable;
@@ -125,8 +137,7 @@ static double double_in(const char *structure, const struct variable *variable) 
 enum status instance_get_output_derivatives(struct instance *instance, const unsigned references[],
                                             size_t count, const int orders[], double values[]) {
     for (size_t i = 0; i < count; i++) {
-        const struct variable *variable =
-            find_as(instance, references[i], is_output, "an output of type float64");
+        const struct variable *variable = find_as(instance, references[i], is_output, "an output");
         if (variable == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }

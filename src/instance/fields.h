@@ -26,17 +26,17 @@ static inline void *instance_field(struct instance *instance, const struct varia
     return structure + variable->offset;
 }
 
-/* Index of an input variable among the inputs. */
+/* Index of an input of type float64 among the inputs. */
 static inline size_t instance_input_index(const struct instance *instance,
                                           const struct variable *variable) {
     return (variable->offset - instance->model->inputs.offset) / sizeof(double);
 }
 
-/* Writes the value; an input is held at it from now on. */
+/* Writes the value; an input of type float64 is held at it from now on. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
     void *field = instance_field(instance, variable);
-    if (variable->causality == CAUSALITY_INPUT) {
+    if (variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64) {
         const size_t i = instance_input_index(instance, variable);
         instance->memory.pending[i].d[0] = value;
         instance->memory.current[i] = instance->memory.pending[i];

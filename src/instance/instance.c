@@ -22,20 +22,44 @@ static bool lies_in(struct span span, const struct variable *variable) {
     return variable->offset >= span.offset && variable->offset - span.offset < span.size;
 }
 
+/* Only events write its value: a mode or a sum. */
+static bool is_kept_by_events(const struct model *model, const struct variable *variable) {
+    const struct model_events events = events_of(model);
+    return variable->owner == VARIABLE_OF_MODEL &&
+           (lies_in(events.modes, variable) || lies_in(events.sums, variable));
+}
+
+/* What events keep is calculated and discrete: ints as modes, doubles as sums. */
+static bool is_bound_well(const struct model *model, const struct variable *variable) {
+    const struct model_events events = events_of(model);
+    const bool is_real = variable->type == VARIABLE_FLOAT64;
+    const bool is_parameter = variable->causality == CAUSALITY_PARAMETER;
+    const bool is_input = variable->causality == CAUSALITY_INPUT;
+    const bool is_state = !is_parameter && variable->initial == INITIAL_EXACT;
+    const bool can_be_kept =
+        variable->initial == INITIAL_CALCULATED && variable->variability == VARIABILITY_DISCRETE;
+    return is_parameter == lies_in(model->parameters, variable) &&
+           (is_input && is_real) == lies_in(model->inputs, variable) &&
+           (is_input && !is_real) == lies_in(events.discrete_inputs, variable) &&
+           is_state == lies_in(model->states, variable) &&
+           (!lies_in(events.modes, variable) || (can_be_kept && !is_real)) &&
+           (!lies_in(events.sums, variable) || (can_be_kept && is_real));
+}
+
 /* Each variable is bound to a field of its own kind: a wrong binding compiles, but the value would
  * have no effect. */
 static enum status check_bindings(const struct model_description *description,
                                   const struct message_sink *sink) {
+    const size_t indicator_count = events_of(description->model).indicator_count;
+    if (description->indicator_count != indicator_count) {
+        message_write(sink, STATUS_INTERNAL,
+                      "%zu event indicators of %s are declared: its model has %zu",
+                      description->indicator_count, description->name, indicator_count);
+        return STATUS_INTERNAL;
+    }
     for (size_t i = 0; i < description->variable_count; i++) {
         const struct variable *variable = &description->variables[i];
-        const struct model *model = description->model;
-        const bool is_parameter = variable->causality == CAUSALITY_PARAMETER;
-        const bool is_input = variable->causality == CAUSALITY_INPUT;
-        const bool is_state = !is_parameter && variable->initial == INITIAL_EXACT;
-        if (variable->owner == VARIABLE_OF_MODEL &&
-            (is_parameter != lies_in(model->parameters, variable) ||
-             is_input != lies_in(model->inputs, variable) ||
-             is_state != lies_in(model->states, variable))) {
+        if (variable->owner == VARIABLE_OF_MODEL && !is_bound_well(description->model, variable)) {
             message_write(sink, STATUS_INTERNAL,
                           "%s is bound to a field that is not of its kind among the values of %s",
                           variable->name, description->name);
@@ -50,11 +74,13 @@ static void place_values(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         struct instance_place *place = &instance->places[variable->reference];
-        if (variable->type == VARIABLE_FLOAT64) {
-            place->value = instance_field(instance, variable);
-            place->is_calculated =
-                variable->initial == INITIAL_CALCULATED && variable->owner == VARIABLE_OF_MODEL;
+        place->is_calculated = variable->initial == INITIAL_CALCULATED &&
+                               variable->owner == VARIABLE_OF_MODEL &&
+                               !is_kept_by_events(instance->model, variable);
+        if (variable->type != VARIABLE_FLOAT64) {
+            continue;
         }
+        place->value = instance_field(instance, variable);
         if (variable->causality == CAUSALITY_INPUT) {
             place->value = instance->memory.pending[instance_input_index(instance, variable)].d;
         }

@@ -53,10 +53,10 @@ struct instance_memory {
     struct polynomial *running; /* inputs since the last restart */
 };
 
-/* Where the value of a Real lies. */
+/* Where the value of a Real lies, and when the value of any variable is up to date. */
 struct instance_place {
-    const double *value;
-    bool is_calculated; /* by the model */
+    const double *value; /* NULL: of no Real */
+    bool is_calculated;  /* by the outputs of the model */
 };
 
 struct instance {
@@ -66,7 +66,7 @@ struct instance {
     struct instance_state state;
     struct instance_memory memory;
 
-    struct instance_place *places; /* by value reference; value NULL: of no Real */
+    struct instance_place *places; /* by value reference */
 
     bool is_integrated_outside;
     bool states_are_settable;  /* after initialization, too */
@@ -103,6 +103,16 @@ static inline bool instance_has_integrator(const struct instance *instance) {
 /* The doubles at a span of a value structure. */
 static inline double *doubles_of(char *values, struct span span) {
     return (double *)(void *)(values + span.offset);
+}
+
+/* The ints at a span of a value structure. */
+static inline int *ints_of(char *values, struct span span) {
+    return (int *)(void *)(values + span.offset);
+}
+
+/* Places in the value structure for what events keep; empty for models without events. */
+static inline struct model_events events_of(const struct model *model) {
+    return model->events != NULL ? *model->events : (struct model_events){0};
 }
 
 #endif

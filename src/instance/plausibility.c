@@ -117,13 +117,15 @@ static bool are_finite_inputs(const struct instance *instance, const char *name,
     return true;
 }
 
-/* Parameters, inputs and states that could have been set. */
-static bool are_settable(const struct instance *instance, const char *values) {
+/* Parameters, inputs and states that could have been set, and modes and sums within their limits.
+ */
+static bool are_within_limits(const struct instance *instance, const char *values) {
     const struct message_sink quiet = {0};
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
         const void *field = values + variable->offset;
-        if (variable->owner != VARIABLE_OF_MODEL || variable->initial == INITIAL_CALCULATED) {
+        if (variable->owner != VARIABLE_OF_MODEL ||
+            instance->places[variable->reference].is_calculated) {
             continue;
         }
         const double number =
@@ -135,6 +137,24 @@ static bool are_settable(const struct instance *instance, const char *values) {
         }
     }
     return true;
+}
+
+/* Sums that are no variables. */
+static bool are_finite_sums(const struct instance *instance, const char *values) {
+    const struct span sums = events_of(instance->model).sums;
+    for (size_t i = 0; i < count_of(sums); i++) {
+        const double sum = ((const double *)(const void *)(values + sums.offset))[i];
+        const struct named_value value = {"a sum over events", sum, isfinite(sum)};
+        if (!are_possible(instance, &value, 1)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* A value structure that the instance can have. */
+static bool is_possible_structure(const struct instance *instance, const char *values) {
+    return are_within_limits(instance, values) && are_finite_sums(instance, values);
 }
 
 enum status instance_check_plausible(const struct instance *instance,
@@ -152,6 +172,7 @@ enum status instance_check_plausible(const struct instance *instance,
         has_possible_history(instance, state) &&
         are_finite_inputs(instance, "an input", (const void *)pending) &&
         are_finite_inputs(instance, "an input since the restart", (const void *)running) &&
-        are_settable(instance, values) && (!state->has_history || are_settable(instance, held));
+        is_possible_structure(instance, values) &&
+        (!state->has_history || is_possible_structure(instance, held));
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

@@ -56,6 +56,19 @@ static void transfer_values(struct codec *codec, const struct model_description 
     }
 }
 
+/* What events keep: modes and sums, declared as variables or not. */
+static void transfer_kept(struct codec *codec, const struct model *model, char *values) {
+    const struct model_events events = events_of(model);
+    int *modes = ints_of(values, events.modes);
+    double *sums = doubles_of(values, events.sums);
+    for (size_t i = 0; i < events.modes.size / sizeof *modes; i++) {
+        codec_int(codec, "a mode", &modes[i]);
+    }
+    for (size_t i = 0; i < count_of(events.sums); i++) {
+        codec_real(codec, &sums[i]);
+    }
+}
+
 static void transfer_polynomials(struct codec *codec, struct polynomial polynomials[],
                                  size_t count) {
     for (size_t i = 0; i < count; i++) {
@@ -63,6 +76,12 @@ static void transfer_polynomials(struct codec *codec, struct polynomial polynomi
             codec_real(codec, &polynomials[i].d[k]);
         }
     }
+}
+
+/* A value structure: all but what the outputs of the model calculate. */
+static void transfer_structure(struct codec *codec, const struct instance *instance, char *values) {
+    transfer_values(codec, instance->description, values);
+    transfer_kept(codec, instance->model, values);
 }
 
 /* All fields, in one order for reading, writing and counting. */
@@ -91,8 +110,8 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_real(codec, &state->restart_step);
     codec_real(codec, &state->next_step);
     codec_bool(codec, "restart_goes_on", &state->restart_goes_on);
-    transfer_values(codec, instance->description, block + (memory->values - memory->block));
-    transfer_values(codec, instance->description, block + (memory->held - memory->block));
+    transfer_structure(codec, instance, block + (memory->values - memory->block));
+    transfer_structure(codec, instance, block + (memory->held - memory->block));
     // pending, current and running lie side by side
     transfer_polynomials(
         codec, (struct polynomial *)(void *)(block + ((char *)memory->pending - memory->block)),

@@ -2,7 +2,7 @@
  * on another platform. All numbers are little-endian, reals as IEEE 754 double:
  *
  *     8 bytes      "COSIMSTA"
- *     u32          version of the format, 1
+ *     u32          version of the format, 2
  *     u32          length of the whole in bytes
  *     u32, bytes   length of the GUID, GUID
  *     8 bytes each fields, in the order of transfer_state() in serialization.c

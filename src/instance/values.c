@@ -6,16 +6,27 @@
 #include <math.h>
 
 /* What an array is made of, and which variables it is for. */
-enum array { ARRAY_OF_DOUBLES, ARRAY_OF_INTS, ARRAY_OF_INT32, ARRAY_OF_ENUMERATIONS };
+enum array {
+    ARRAY_OF_DOUBLES,
+    ARRAY_OF_INTS,
+    ARRAY_OF_INT32,
+    ARRAY_OF_ENUMERATIONS,
+    ARRAY_OF_BOOLEANS, /* ints */
+    ARRAY_OF_BOOLS,
+};
 
-/* Element i. Every int is exact as a double; an int64_t that is not is no item of an enumeration.
- */
+_Static_assert(sizeof(bool) == 1, "a bool is read as a byte");
+
+/* Element i. Every int is exact as a double; an int64_t that is not is no item of an enumeration. A
+ * bool is read as a byte: one that is neither 0 nor 1 is refused, not undefined. */
 ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
     switch (array) {
     case ARRAY_OF_DOUBLES:
         return ((const double *)values)[i];
     case ARRAY_OF_ENUMERATIONS:
         return (double)((const int64_t *)values)[i];
+    case ARRAY_OF_BOOLS:
+        return ((const unsigned char *)values)[i];
     default:
         return ((const int *)values)[i];
     }
@@ -31,6 +42,9 @@ ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum 
         const struct variable *variable = variable_find(instance->description, reference);
         return variable != NULL && variable->type == VARIABLE_ENUMERATION ? VARIABLE_ENUMERATION
                                                                           : VARIABLE_INT32;
+    }
+    if (array == ARRAY_OF_BOOLEANS || array == ARRAY_OF_BOOLS) {
+        return VARIABLE_BOOLEAN;
     }
     return array == ARRAY_OF_INT32 ? VARIABLE_INT32 : VARIABLE_ENUMERATION;
 }
@@ -106,6 +120,16 @@ enum status instance_set_enumeration(struct instance *instance, const unsigned r
     return set(instance, ARRAY_OF_ENUMERATIONS, references, count, values);
 }
 
+enum status instance_set_boolean(struct instance *instance, const unsigned references[],
+                                 size_t count, const int values[]) {
+    return set(instance, ARRAY_OF_BOOLEANS, references, count, values);
+}
+
+enum status instance_set_bool(struct instance *instance, const unsigned references[], size_t count,
+                              const bool values[]) {
+    return set(instance, ARRAY_OF_BOOLS, references, count, values);
+}
+
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
                               double values[]) {
     const struct model_description *description = instance->description;
@@ -132,27 +156,34 @@ enum status instance_get_real(struct instance *instance, const unsigned referenc
     return STATUS_OK;
 }
 
-static enum status find_integers(const struct instance *instance, enum array array,
-                                 const unsigned references[], size_t count) {
+/* Checks that all of them can be read, and brings them up to date. */
+static enum status prepare_ints(struct instance *instance, enum array array,
+                                const unsigned references[], size_t count) {
     for (size_t i = 0; i < count; i++) {
-        if (instance_find(instance, references[i], type_for(instance, array, references[i])) ==
-            NULL) {
+        const unsigned reference = references[i];
+        if (instance_find(instance, reference, type_for(instance, array, reference)) == NULL) {
             return STATUS_INVALID_ARGUMENT;
+        }
+        if (instance->places[reference].is_calculated) {
+            const enum status status = instance_update_outputs(instance);
+            if (status != STATUS_OK) {
+                return status;
+            }
         }
     }
     return STATUS_OK;
 }
 
-static int read_integer(struct instance *instance, unsigned reference) {
+static int read_int(struct instance *instance, unsigned reference) {
     const struct variable *variable = variable_of(instance->description, reference);
     return *(const int *)instance_field(instance, variable);
 }
 
 static enum status get_ints(struct instance *instance, enum array array,
                             const unsigned references[], size_t count, int values[]) {
-    const enum status status = find_integers(instance, array, references, count);
+    const enum status status = prepare_ints(instance, array, references, count);
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        values[i] = read_integer(instance, references[i]);
+        values[i] = read_int(instance, references[i]);
     }
     return status;
 }
@@ -169,9 +200,23 @@ enum status instance_get_int32(struct instance *instance, const unsigned referen
 
 enum status instance_get_enumeration(struct instance *instance, const unsigned references[],
                                      size_t count, int64_t values[]) {
-    const enum status status = find_integers(instance, ARRAY_OF_ENUMERATIONS, references, count);
+    const enum status status = prepare_ints(instance, ARRAY_OF_ENUMERATIONS, references, count);
     for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        values[i] = read_integer(instance, references[i]);
+        values[i] = read_int(instance, references[i]);
+    }
+    return status;
+}
+
+enum status instance_get_boolean(struct instance *instance, const unsigned references[],
+                                 size_t count, int values[]) {
+    return get_ints(instance, ARRAY_OF_BOOLEANS, references, count, values);
+}
+
+enum status instance_get_bool(struct instance *instance, const unsigned references[], size_t count,
+                              bool values[]) {
+    const enum status status = prepare_ints(instance, ARRAY_OF_BOOLS, references, count);
+    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
+        values[i] = read_int(instance, references[i]) != 0;
     }
     return status;
 }

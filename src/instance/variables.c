@@ -20,7 +20,9 @@ const char *variable_type_name(enum variable_type type) {
     case VARIABLE_INT32:
         return "int32";
     case VARIABLE_ENUMERATION:
+        return "enumeration";
+    case VARIABLE_BOOLEAN:
         break;
     }
-    return "enumeration";
+    return "boolean";
 }

@@ -10,8 +10,9 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* An enumeration is kept as an int: 1 for its first item. */
-enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32, VARIABLE_ENUMERATION };
+/* All but float64 are kept as an int: an enumeration as 1 for its first item, a Boolean as 0 or 1.
+ */
+enum variable_type { VARIABLE_FLOAT64, VARIABLE_INT32, VARIABLE_ENUMERATION, VARIABLE_BOOLEAN };
 
 /* The structure that holds the value: the model's own or struct instance_values. */
 enum variable_owner { VARIABLE_OF_MODEL, VARIABLE_OF_INSTANCE };
@@ -58,6 +59,8 @@ struct model_description {
     size_t variable_count;
     const short *row_of_reference; /* -1: no such reference */
     unsigned reference_count;      /* entries of row_of_reference */
+    const unsigned *indicators;    /* references, in the order of the model; NULL: none */
+    size_t indicator_count;
 };
 
 /* Phase in the life of an instance; it decides what may be set. */

@@ -113,7 +113,7 @@ static void test_the_form_is_the_documented_one(void) {
     const uint8_t *data = (const uint8_t *)bytes.data;
     const size_t length = data[12] + 256u * data[13] + 65536u * data[14];
     TEST_ASSERT_EQUAL_MEMORY("COSIMSTA", data, MAGIC_SIZE);
-    TEST_ASSERT_EQUAL_MEMORY("\1\0\0\0", data + VERSION_AT, 4);
+    TEST_ASSERT_EQUAL_MEMORY("\2\0\0\0", data + VERSION_AT, 4);
     TEST_ASSERT_EQUAL_UINT(bytes.size, length);
     TEST_ASSERT_EQUAL_UINT(sizeof guid - 1, data[16]);
     TEST_ASSERT_EQUAL_MEMORY(guid, data + GUID_AT, sizeof guid - 1);
@@ -132,7 +132,8 @@ static void check_foreign(fmi2Component c, fmi2FMUstate good, const struct fmu_b
         const char *word; /* of the message */
     } cases[] = {
         {0, 'X', ""},
-        {VERSION_AT, 2, "version"},
+        {VERSION_AT, 1, "version"},
+        {VERSION_AT, 3, "version"},
         {VERSION_AT + 3, 1, "version"},
         {12, 0, ""}, // length
         {15, 1, ""},

@@ -68,12 +68,12 @@ static void test_type_mismatches_are_named(void) {
         const char *words[2]; /* of the message */
     } cases[] = {
         {FMU_GetInteger, RP_MANIPULATOR_q1, {"int32", "10"}},
-        {FMU_GetBoolean, RP_MANIPULATOR_q1, {"Boolean", "10"}},
+        {FMU_GetBoolean, RP_MANIPULATOR_q1, {"boolean", "10"}},
         {FMU_GetString, RP_MANIPULATOR_q1, {"String", "10"}},
         {FMU_GetReal, RP_MANIPULATOR_solver_steps, {"float64", "80"}},
-        {FMU_GetBoolean, RP_MANIPULATOR_solver_steps, {"Boolean", "80"}},
+        {FMU_GetBoolean, RP_MANIPULATOR_solver_steps, {"boolean", "80"}},
         {FMU_SetInteger, RP_MANIPULATOR_tau1, {"int32", "20"}},
-        {FMU_SetBoolean, RP_MANIPULATOR_tau1, {"Boolean", "20"}},
+        {FMU_SetBoolean, RP_MANIPULATOR_tau1, {"boolean", "20"}},
         {FMU_SetString, RP_MANIPULATOR_tau1, {"String", "20"}},
         {FMU_SetReal, RP_MANIPULATOR_max_internal_steps, {"float64", "83"}},
     };

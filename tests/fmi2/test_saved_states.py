@@ -60,7 +60,8 @@ def damages(content: bytes, loaded: LoadedFmu, chance: random.Random) -> dict[st
     found["longer, with a checksum"] = hashed(content + b"\0")
     found["zeros"] = bytes(len(content))
     found["random"] = chance.randbytes(len(content))
-    found["newer"] = hashed(content[:8] + (2).to_bytes(4, "little") + content[12:])
+    found["older"] = hashed(content[:8] + (1).to_bytes(4, "little") + content[12:])
+    found["newer"] = hashed(content[:8] + (3).to_bytes(4, "little") + content[12:])
     found["much newer"] = hashed(content[:8] + b"\xff\xff\xff\xff" + content[12:])
     found["other magic"] = hashed(b"X" + content[1:])
     found["other GUID"] = with_guid(content, guid[:-2] + "0}" + guid[-1:], loaded)[: len(content)]
@@ -72,7 +73,7 @@ def damages(content: bytes, loaded: LoadedFmu, chance: random.Random) -> dict[st
 def test_the_format_is_the_one_that_is_damaged_here(loaded: LoadedFmu) -> None:
     with Instance(loaded) as instance:
         content = serialized(instance.initialize(**START))
-    assert content[:12] == b"COSIMSTA\1\0\0\0" and hashed(content) == content
+    assert content[:12] == b"COSIMSTA\2\0\0\0" and hashed(content) == content
     assert with_guid(content, loaded.description.guid, loaded) == content
 
 
@@ -116,6 +117,7 @@ def test_damaged_foreign_and_newer_states_are_refused(loaded: LoadedFmu) -> None
     [
         ("byte 100 changed", "checksum"),
         ("cut to 100 bytes", "length"),
+        ("older", "version"),
         ("newer", "version"),
         ("GUID changed", "GUID"),
         ("other magic", "not a saved state"),

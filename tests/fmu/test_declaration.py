@@ -47,8 +47,8 @@ MISTAKES = {
     "no_parameter": ('parameters = ["l1", "a"]', 'parameters = ["q1"]', ["ee_x", "'q1'"]),
     "wrong_type": (
         'unit = "kg"',
-        'unit = "kg"\ntype = "boolean"',
-        ["m1", "type = 'boolean'", "float64"],
+        'unit = "kg"\ntype = "bool"',
+        ["m1", "type = 'bool'", "float64", "boolean"],
     ),
     "model_missing": ("[model]", "[modell]", ["unknown key 'modell'"]),
     "model_lacks": ('header = "rp_model.h"\n', "", ["[model]: header is missing"]),

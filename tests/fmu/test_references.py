@@ -199,6 +199,7 @@ def test_a_copy_is_collected(controller: Path, tmp_path: Path) -> None:
         ("Kp1 = 90.0", "Kp9 = 90.0", "'Kp9' is not declared"),
         ("Kp1 = 90.0", 'Kp1 = "stiff"', "Kp1 = 'stiff' is not a value of type float64"),
         ("Kp1 = 90.0", "Kp1 = true", "Kp1 = True is not a value of type float64"),
+        ("Kp1 = 90.0", "solver_steps = true", "solver_steps = True is not a value of type int32"),
         ("Kp1 = 90.0", "solver_steps = 1.5", "solver_steps = 1.5 is not a value of type int32"),
         ('"pd_gravity"', '"pid"', "mode = 'pid' is not one of pd, pd_gravity, computed_torque"),
         ('"pd_gravity"', "[1]", "mode = [1] is not one of pd, pd_gravity, computed_torque"),

@@ -69,7 +69,7 @@ static void test_the_layout_is_little_endian(void) {
     unsigned char bytes[128];
     const size_t size = written(bytes);
     const unsigned char start[] = {
-        'C', 'O', 'S', 'I', 'M', 'S', 'T', 'A', 1, 0, 0, 0, (unsigned char)size,
+        'C', 'O', 'S', 'I', 'M', 'S', 'T', 'A', 2, 0, 0, 0, (unsigned char)size,
         0,   0,   0,   6,   0,   0,   0,   '{'};
     TEST_ASSERT_EQUAL_MEMORY(start, bytes, sizeof start);
     const unsigned char minus_a_tenth[] = {0x9a, 0x99, 0x99, 0x99, 0x99, 0x99, 0xb9, 0xbf};

@@ -33,14 +33,14 @@ def generated(
     return ET.parse(output / "modelDescription.xml").getroot()
 
 
-def copied(model: str, to: Path) -> Path:
+def copied(model: str, to: Path, below: str = "models") -> Path:
     """Copy what the generator reads for a model, to be changed; the path of its variables.toml."""
     (to / "src" / "instance").mkdir(parents=True)
     for shared in (ROOT / "src" / "instance").glob("*.toml"):
         shutil.copy(shared, to / "src" / "instance")
-    folder = to / "models" / model
+    folder = to / below / model
     folder.mkdir(parents=True)
-    return Path(shutil.copy(ROOT / "models" / model / "variables.toml", folder))
+    return Path(shutil.copy(ROOT / below / model / "variables.toml", folder))
 
 
 def change(path: Path, old: str, new: str) -> None:

@@ -1,0 +1,130 @@
+"""The wheel's FMUs in fmpy: their descriptions, and runs in which a Boolean input switches."""
+
+import os
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from zipfile import ZipFile
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+
+from tests.support.paths import ROOT
+
+FOLDER = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
+FMUS = {
+    "fmi2": FOLDER / "tests" / "wheel" / "Wheel.fmu",
+    "fmi3": FOLDER / "tests" / "wheel" / "fmi3" / "Wheel.fmu",
+}
+SPEED = 7.0  # rad/s
+
+both_versions = pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+
+
+def described(version: str) -> ET.Element:
+    with ZipFile(FMUS[version]) as archive:
+        return ET.fromstring(archive.read("modelDescription.xml"))
+
+
+@both_versions
+def test_fmpy_finds_no_problem(version: str) -> None:
+    assert validate_fmu(str(FMUS[version])) == []
+
+
+def test_variables_in_fmi2() -> None:
+    root = described("fmi2")
+    assert root.get("numberOfEventIndicators") == "2"
+    found = {v.get("name"): v for v in root.iterfind("ModelVariables/ScalarVariable")}
+    booleans = {
+        name: (v.get("causality"), v.get("variability"), v.get("initial"), v[0].attrib)
+        for name, v in found.items()
+        if v[0].tag == "Boolean"
+    }
+    assert booleans == {
+        "is_reversed": ("parameter", "tunable", "exact", {"start": "false"}),
+        "is_counting": ("input", "discrete", None, {"start": "true"}),
+        "is_turning": ("output", "discrete", "calculated", {}),
+        "is_caught": ("output", "discrete", "calculated", {}),
+    }
+    assert found["turns"][0].tag == "Integer"
+    assert found["lost_speed"].get("variability") == "discrete"
+    assert [name for name, v in found.items() if v[0].get("reinit") == "true"] == ["angle"]
+
+
+def test_variables_in_fmi3() -> None:
+    root = described("fmi3")
+    variables = {v.get("name"): v for v in root.find("ModelVariables")}
+    booleans = {
+        name: (v.get("causality"), v.get("variability"), v.get("initial"), v.get("start"))
+        for name, v in variables.items()
+        if v.tag == "Boolean"
+    }
+    assert booleans == {
+        "is_reversed": ("parameter", "tunable", "exact", "false"),
+        "is_counting": ("input", "discrete", None, "true"),
+        "is_turning": ("output", "discrete", "calculated", None),
+        "is_caught": ("output", "discrete", "calculated", None),
+    }
+    assert [name for name, v in variables.items() if v.get("reinit") == "true"] == ["angle"]
+    updated = [name for name, v in variables.items() if v.get("intermediateUpdate")]
+    assert updated == ["angle", "rate", "speed"]
+    indicators = [e.attrib for e in root.iterfind("ModelStructure/EventIndicator")]
+    assert indicators == [
+        {"valueReference": "50", "dependencies": "1 10"},  # to_stop: stop, angle
+        {"valueReference": "51", "dependencies": "1 20"},  # push: stop, speed
+    ]
+
+
+@both_versions
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_an_integer_counts_while_a_boolean_input_says_so(version: str, kind: str) -> None:
+    switches = [(0.0, True), (2.0, True), (2.0, False), (4.0, False), (4.0, True), (6.0, True)]
+    inputs = np.array(
+        [(time, SPEED, counting) for time, counting in switches],
+        dtype=[("time", float), ("speed", float), ("is_counting", bool)],
+    )
+    result = fmpy.simulate_fmu(
+        str(FMUS[version]),
+        fmi_type=kind,
+        solver="Euler",  # exact here; fmpy's CVode sets Booleans in continuous-time mode
+        step_size=0.5,
+        stop_time=6.0,
+        output_interval=0.5,
+        input=inputs,
+        output=["angle", "turns", "is_turning", "is_counting"],
+    )
+    np.testing.assert_allclose(result["angle"], SPEED * result["time"], rtol=0, atol=1e-5)
+    counting = result["is_counting"].astype(bool)
+    assert counting.any() and not counting.all()
+    expected = np.where(counting, np.floor(result["angle"] / (2 * np.pi)), 0)
+    np.testing.assert_array_equal(result["turns"], expected)
+    assert len(set(expected)) > 4
+    assert result["is_turning"][1:].all()
+
+
+@both_versions
+def test_indicators_in_an_integrator_that_looks_for_roots(version: str) -> None:
+    result = fmpy.simulate_fmu(
+        str(FMUS[version]),
+        fmi_type="ModelExchange",
+        stop_time=2.0,
+        output_interval=0.5,
+        start_values={"stop": 20.0, "is_counting": False},
+        input=np.array([(0.0, SPEED)], dtype=[("time", float), ("speed", float)]),
+        output=["angle", "to_stop", "push", "turns"],
+    )
+    np.testing.assert_allclose(result["angle"], SPEED * result["time"], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result["to_stop"], 20.0 - result["angle"], rtol=0, atol=1e-14)
+    assert set(result["push"]) == {1.0} and set(result["turns"]) == {0}
+
+
+@both_versions
+def test_a_boolean_parameter(version: str) -> None:
+    result = fmpy.simulate_fmu(
+        str(FMUS[version]),
+        stop_time=1.0,
+        start_values={"angle": 20.0, "is_reversed": True},
+        output=["turns"],
+    )
+    assert set(result["turns"]) == {-3}

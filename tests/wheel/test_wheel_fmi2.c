@@ -1,0 +1,167 @@
+/* Booleans, Integers that the model calculates and event indicators through FMI 2.0. */
+#include "fmu_library.h"
+#include "value_references.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unity.h>
+
+static struct fmu_functions fmu;
+static fmi2Component c;
+static char last_message[512];
+
+static void keep(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+                 fmi2String category, fmi2String message, ...) {
+    (void)environment;
+    (void)name;
+    (void)status;
+    (void)category;
+    snprintf(last_message, sizeof last_message, "%s", message);
+}
+
+static void instantiate(fmi2Type type) {
+    static const fmi2CallbackFunctions callbacks = {
+        .logger = keep, .allocateMemory = calloc, .freeMemory = free};
+    c = fmu.Instantiate("wheel", type, WHEEL_GUID, NULL, &callbacks, fmi2False, fmi2False);
+    TEST_ASSERT_NOT_NULL_MESSAGE(c, last_message);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
+}
+
+void setUp(void) {
+    last_message[0] = '\0';
+    if (fmu.Instantiate == NULL && fmu_library_open(WHEEL_LIBRARY, &fmu) == NULL) {
+        exit(2);
+    }
+}
+
+void tearDown(void) {
+    fmu.FreeInstance(c);
+    c = NULL;
+}
+
+static void assert_message(const char *text) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_message, text), last_message);
+}
+
+static fmi2Status set_boolean(fmi2ValueReference reference, fmi2Boolean value) {
+    return fmu.SetBoolean(c, &reference, 1, &value);
+}
+
+static void set_real(fmi2ValueReference reference, double value) {
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(c, &reference, 1, &value));
+}
+
+static fmi2Boolean get_boolean(fmi2ValueReference reference) {
+    fmi2Boolean value = -1;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.GetBoolean(c, &reference, 1, &value), last_message);
+    return value;
+}
+
+static fmi2Integer turns(void) {
+    const fmi2ValueReference reference = WHEEL_turns;
+    fmi2Integer value = -1;
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetInteger(c, &reference, 1, &value));
+    return value;
+}
+
+/* At 7 rad/s the wheel has made n whole turns of 2 pi after n seconds, for n < 8. */
+static void test_an_integer_counts_while_a_boolean_input_says_so(void) {
+    instantiate(fmi2CoSimulation);
+    set_real(WHEEL_speed, 7.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_turning));
+    for (int n = 1; n < 8; n++) {
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, n - 1, 1.0, fmi2True));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, set_boolean(WHEEL_is_counting, fmi2True));
+        TEST_ASSERT_EQUAL_INT(n, turns());
+        TEST_ASSERT_EQUAL_INT(fmi2OK, set_boolean(WHEEL_is_counting, fmi2False));
+        TEST_ASSERT_EQUAL_INT(fmi2False, get_boolean(WHEEL_is_counting));
+        TEST_ASSERT_EQUAL_INT(0, turns());
+    }
+}
+
+static void test_a_value_that_is_no_boolean_is_discarded(void) {
+    instantiate(fmi2CoSimulation);
+    TEST_ASSERT_EQUAL_INT(fmi2Discard, set_boolean(WHEEL_is_counting, 2));
+    assert_message("is_counting = 2 is refused: a value from 0 to 1 is expected");
+    TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_counting));
+}
+
+static void test_other_types_are_refused(void) {
+    static const struct {
+        fmi2ValueReference reference;
+        const char *text;
+    } cases[] = {
+        {WHEEL_speed, "speed (value reference 20) is accessed as boolean: it is of type float64"},
+        {WHEEL_turns, "accessed as boolean: it is of type int32"},
+        {99, "value reference 99 is unknown"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        fmi2Boolean value = 7;
+        instantiate(fmi2CoSimulation);
+        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.GetBoolean(c, &cases[i].reference, 1, &value));
+        TEST_ASSERT_EQUAL_INT(7, value);
+        assert_message(cases[i].text);
+        fmu.FreeInstance(c);
+        instantiate(fmi2CoSimulation);
+        TEST_ASSERT_EQUAL_INT(fmi2Error, set_boolean(cases[i].reference, fmi2True));
+        assert_message(cases[i].text);
+        fmu.FreeInstance(c);
+        c = NULL;
+    }
+    instantiate(fmi2CoSimulation);
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.GetBoolean(c, NULL, 1, NULL));
+}
+
+/* In Model Exchange, a discrete input can be set in event mode only. */
+static void test_model_exchange(void) {
+    const fmi2ValueReference counting = WHEEL_is_counting;
+    const fmi2Boolean off = fmi2False;
+    double z[2] = {-1.0, -1.0};
+    double x = 20.0;
+    instantiate(fmi2ModelExchange);
+    set_real(WHEEL_stop, 30.0);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterContinuousTimeMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetContinuousStates(c, &x, 1));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetEventIndicators(c, z, 2));
+    TEST_ASSERT_TRUE(z[0] == 10.0 && z[1] == 1.0);
+    TEST_ASSERT_EQUAL_INT(3, turns());
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, set_boolean(WHEEL_is_counting, fmi2False));
+    TEST_ASSERT_EQUAL_INT(0, turns());
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterContinuousTimeMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.SetBoolean(c, &counting, 1, &off));
+    assert_message("fmi2SetBoolean");
+}
+
+static void test_a_wrong_number_of_indicators_is_refused(void) {
+    double z[3] = {-1.0, -1.0, -1.0};
+    for (size_t count = 0; count <= 3; count++) {
+        instantiate(fmi2ModelExchange);
+        const fmi2Status status = fmu.GetEventIndicators(c, z, count);
+        TEST_ASSERT_EQUAL_INT(count == 2 ? fmi2OK : fmi2Error, status);
+        if (count != 2) {
+            assert_message("event indicators are accessed: there are 2");
+        }
+        fmu.FreeInstance(c);
+    }
+    c = NULL;
+    TEST_ASSERT_TRUE(z[2] == -1.0);
+}
+
+static void test_states_hold_booleans(void) {
+    fmi2FMUstate state = NULL;
+    instantiate(fmi2CoSimulation);
+    TEST_ASSERT_EQUAL_INT(fmi2OK, set_boolean(WHEEL_is_counting, fmi2False));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &state));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, set_boolean(WHEEL_is_counting, fmi2True));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetFMUstate(c, state));
+    TEST_ASSERT_EQUAL_INT(fmi2False, get_boolean(WHEEL_is_counting));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
+    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
+    TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_counting));
+}

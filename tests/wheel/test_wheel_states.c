@@ -1,0 +1,210 @@
+/* What events keep, in snapshots and serialized states, and which bindings and states are refused.
+ */
+#include "serialization.h"
+#include "wheel_instance.h"
+
+#include <stdlib.h>
+
+/* ---- What events keep ----------------------------------------------------------------------- */
+
+/* The wheel arrives at its stop at 3 rad/s. */
+static void catch_wheel(void) {
+    const bool fired[] = {true, false};
+    const struct event event = {.fired = fired};
+    set_real(WHEEL_stop, 1.0);
+    set_real(WHEEL_angle, 1.0);
+    set_real(WHEEL_speed, 3.0);
+    ASSERT_OK(wheel_model.events->update(values_of(instance), &event));
+}
+
+static void assert_caught(struct instance *caught, int catches) {
+    TEST_ASSERT_EQUAL_INT(catches > 0, get_boolean(caught, WHEEL_is_caught));
+    TEST_ASSERT_EQUAL_INT(catches, get_int32(caught, WHEEL_catches));
+    TEST_ASSERT_EQUAL_DOUBLE(3.0 * catches, get_real(caught, WHEEL_lost_speed));
+}
+
+static void test_snapshots_keep_modes_and_sums(void) {
+    struct instance_snapshot *before = NULL;
+    struct instance_snapshot *after = NULL;
+    ASSERT_OK(instance_save(instance, 0, &before));
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
+    catch_wheel();
+    ASSERT_OK(instance_save(instance, 0, &after));
+    ASSERT_OK(instance_restore(instance, before));
+    assert_caught(instance, 0);
+    TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_counting));
+    ASSERT_OK(instance_restore(instance, after));
+    assert_caught(instance, 1);
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_counting));
+}
+
+/* What a second instance makes of the serialized state of the first one. */
+static enum status transfer(struct instance **other) {
+    struct instance_snapshot *snapshot = NULL;
+    ASSERT_OK(instance_save(instance, 0, &snapshot));
+    const size_t size = instance_serialized_size(instance);
+    unsigned char *bytes = malloc(size);
+    TEST_ASSERT_NOT_NULL(bytes);
+    ASSERT_OK(instance_serialize(instance, snapshot, bytes, size));
+    *other = initializing();
+    struct instance_snapshot *read = NULL;
+    enum status status = instance_deserialize(*other, bytes, size, &read);
+    if (status == STATUS_OK) {
+        status = instance_restore(*other, read);
+    }
+    free(bytes);
+    return status;
+}
+
+static void test_serialized_states_keep_modes_and_sums(void) {
+    struct instance *other;
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
+    ASSERT_OK(set_boolean(WHEEL_is_reversed, 1));
+    catch_wheel();
+    ((struct wheel_values *)(void *)instance->memory.held)->catches = 5;
+    ASSERT_OK(transfer(&other));
+    assert_caught(other, 1);
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(other, WHEEL_is_counting));
+    TEST_ASSERT_EQUAL_INT(1, get_boolean(other, WHEEL_is_reversed));
+    TEST_ASSERT_EQUAL_INT(5, ((struct wheel_values *)(void *)other->memory.held)->catches);
+    instance_destroy(other);
+}
+
+static void assert_forged_is_refused(const char *text) {
+    struct instance *other;
+    last_text[0] = '\0';
+    TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_INVALID_ARGUMENT, transfer(&other), text);
+    assert_text(text);
+    instance_destroy(other);
+}
+
+static void test_forged_states_are_refused_with_the_value(void) {
+    const struct {
+        int *field;
+        int value;
+        const char *text;
+    } cases[] = {
+        {&values_of(instance)->is_counting, 2, "is_counting = 2 is impossible"},
+        {&values_of(instance)->is_reversed, -1, "is_reversed = -1 is impossible"},
+        {&values_of(instance)->is_caught, 3, "is_caught = 3 is impossible"},
+        {&values_of(instance)->catches, -1, "catches = -1 is impossible"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const int kept = *cases[i].field;
+        *cases[i].field = cases[i].value;
+        assert_forged_is_refused(cases[i].text);
+        *cases[i].field = kept;
+    }
+    values_of(instance)->lost_speed = INFINITY;
+    assert_forged_is_refused("lost_speed = inf is impossible");
+    values_of(instance)->lost_speed = 0.0;
+    values_of(instance)->turns = 1234; // calculated: not among the bytes
+    struct instance *other;
+    ASSERT_OK(transfer(&other));
+    instance_destroy(other);
+}
+
+/* ---- Bindings ------------------------------------------------------------------------------- */
+
+enum { MOST_VARIABLES = 64 };
+static struct variable rows[MOST_VARIABLES];
+
+/* A description whose rows can be changed. */
+static struct model_description changeable(void) {
+    struct model_description copy = model_description;
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(MOST_VARIABLES, model_description.variable_count);
+    memcpy(rows, model_description.variables, model_description.variable_count * sizeof rows[0]);
+    copy.variables = rows;
+    return copy;
+}
+
+static struct variable *row_of(unsigned reference) {
+    return &rows[model_description.row_of_reference[reference]];
+}
+
+/* All texts of one call. */
+static char texts[1000];
+
+static void collect(void *context, enum status status, const char *text) {
+    (void)context;
+    (void)status;
+    (void)strncat(texts, text, sizeof texts - strlen(texts) - 1);
+}
+
+static void assert_no_instance(const struct model_description *wrong, const char *text) {
+    const struct message_sink sink = {.write = collect};
+    struct instance *none = instance;
+    texts[0] = '\0';
+    TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_INTERNAL, instance_create(wrong, &sink, &none), text);
+    TEST_ASSERT_NULL(none);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(texts, text), texts);
+}
+
+static void test_the_number_of_indicators_is_checked(void) {
+    struct model_description wrong = changeable();
+    wrong.indicator_count = 1;
+    assert_no_instance(&wrong, "1 event indicators of Wheel are declared: its model has 2");
+    struct model without = wheel_model;
+    without.events = NULL;
+    wrong = changeable();
+    wrong.model = &without;
+    assert_no_instance(&wrong, "2 event indicators of Wheel are declared: its model has 0");
+}
+
+static void test_wrong_bindings_of_discrete_variables_are_refused(void) {
+    static const struct {
+        unsigned reference;
+        size_t offset;
+    } moved[] = {
+        {WHEEL_is_counting, offsetof(struct wheel_values, is_turning)},
+        {WHEEL_is_counting, offsetof(struct wheel_values, is_caught)},
+        {WHEEL_is_counting, offsetof(struct wheel_values, speed)},
+        {WHEEL_is_reversed, offsetof(struct wheel_values, is_turning)},
+        {WHEEL_is_reversed, offsetof(struct wheel_values, is_counting)},
+        {WHEEL_is_turning, offsetof(struct wheel_values, is_reversed)},
+        {WHEEL_speed, offsetof(struct wheel_values, rate)},
+        {WHEEL_rate, offsetof(struct wheel_values, speed)},
+        {WHEEL_speed, offsetof(struct wheel_values, is_counting)},
+        {WHEEL_is_turning, offsetof(struct wheel_values, is_counting)},
+        {WHEEL_lost_speed, offsetof(struct wheel_values, is_caught)},
+        {WHEEL_catches, offsetof(struct wheel_values, lost_speed)},
+    };
+    for (size_t i = 0; i < sizeof moved / sizeof moved[0]; i++) {
+        struct model_description wrong = changeable();
+        row_of(moved[i].reference)->offset = moved[i].offset;
+        assert_no_instance(&wrong, "is bound to a field that is not of its kind");
+    }
+    // only events write what they keep
+    struct model_description wrong = changeable();
+    row_of(WHEEL_is_caught)->initial = INITIAL_EXACT;
+    assert_no_instance(&wrong, "is_caught is bound to a field");
+    wrong = changeable();
+    row_of(WHEEL_lost_speed)->variability = VARIABILITY_CONTINUOUS;
+    assert_no_instance(&wrong, "lost_speed is bound to a field");
+}
+
+/* A sum that is no variable. */
+static void test_a_forged_sum_without_a_name_is_refused(void) {
+    struct model_description fewer = changeable();
+    short table[WHEEL_lost_speed + 1];
+    fewer.variable_count = (size_t)model_description.row_of_reference[WHEEL_lost_speed];
+    fewer.reference_count = WHEEL_lost_speed;
+    memcpy(table, model_description.row_of_reference, sizeof table);
+    fewer.row_of_reference = table;
+    struct instance *named = instance;
+    ASSERT_OK(instance_create(&fewer, &last_text_sink, &instance));
+    instance_destroy(named);
+    values_of(instance)->lost_speed = NAN;
+
+    struct instance_snapshot *snapshot = NULL;
+    struct instance_snapshot *read = NULL;
+    unsigned char bytes[2000];
+    const size_t size = instance_serialized_size(instance);
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(sizeof bytes, size);
+    instance->state.own.max_internal_steps = 1; // the variable, too, is left out
+    ASSERT_OK(instance_save(instance, 0, &snapshot));
+    ASSERT_OK(instance_serialize(instance, snapshot, bytes, sizeof bytes));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_deserialize(instance, bytes, size, &read));
+    assert_text("a sum over events = nan is impossible");
+}

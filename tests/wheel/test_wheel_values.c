@@ -1,0 +1,170 @@
+/* Discrete variables in the core: Booleans and Integers by reference, and no derivatives of them.
+ */
+#include "continuous_states.h"
+#include "derivatives.h"
+#include "stepping.h"
+#include "wheel_instance.h"
+
+#include <limits.h>
+
+static void test_booleans_are_set_and_read_in_both_forms(void) {
+    const unsigned both[] = {WHEEL_is_reversed, WHEEL_is_counting};
+    bool read[2] = {true, false};
+    ASSERT_OK(instance_get_bool(instance, both, 2, read));
+    TEST_ASSERT_TRUE(!read[0] && read[1]); // start values
+    const bool swapped[2] = {true, false};
+    ASSERT_OK(instance_set_bool(instance, both, 2, swapped));
+    TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_reversed));
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_counting));
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 1));
+    ASSERT_OK(instance_get_bool(instance, both, 2, read));
+    TEST_ASSERT_TRUE(read[0] && read[1]);
+    instance_reset(instance);
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_reversed));
+    TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_counting));
+}
+
+static void test_only_0_and_1_are_booleans(void) {
+    const int wrong[] = {2, -1, INT_MAX};
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, set_boolean(WHEEL_is_counting, wrong[i]));
+        assert_text("a value from 0 to 1 is expected");
+    }
+    const unsigned both[] = {WHEEL_is_reversed, WHEEL_is_counting};
+    const unsigned char bytes[2] = {1, 2};
+    TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE,
+                          instance_set_bool(instance, both, 2, (const bool *)(const void *)bytes));
+    assert_text("is_counting = 2 is refused");
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_reversed)); // all or nothing
+    TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_counting));
+}
+
+static void test_other_types_and_references_are_refused(void) {
+    static const struct {
+        unsigned reference;
+        const char *text;
+    } cases[] = {
+        {WHEEL_speed, "speed (value reference 20) is accessed as boolean: it is of type float64"},
+        {WHEEL_turns, "turns (value reference 30) is accessed as boolean: it is of type int32"},
+        {WHEEL_solver_method, "accessed as boolean: it is of type enumeration"},
+        {99, "value reference 99 is unknown"},
+        {100000, "value reference 100000 is unknown"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const bool on = true;
+        int read = 7;
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set_boolean(cases[i].reference, 1));
+        assert_text(cases[i].text);
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              instance_set_bool(instance, &cases[i].reference, 1, &on));
+        assert_text(cases[i].text);
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              instance_get_boolean(instance, &cases[i].reference, 1, &read));
+        assert_text(cases[i].text);
+        TEST_ASSERT_EQUAL_INT(7, read);
+    }
+    const unsigned counting = WHEEL_is_counting;
+    const double one = 1.0;
+    const int on = 1;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_set_real(instance, &counting, 1, &one));
+    assert_text("is_counting (value reference 21) is accessed as float64: it is of type boolean");
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_set_integer(instance, &counting, 1, &on));
+    assert_text("is accessed as int32: it is of type boolean");
+}
+
+static void test_calculated_integers_and_booleans_are_up_to_date(void) {
+    set_real(WHEEL_angle, 20.0); // 3.18 turns
+    TEST_ASSERT_EQUAL_INT(3, get_int32(instance, WHEEL_turns));
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_turning));
+    set_real(WHEEL_speed, -2.0);
+    TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_turning));
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
+    TEST_ASSERT_EQUAL_INT(0, get_int32(instance, WHEEL_turns));
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 1));
+    ASSERT_OK(set_boolean(WHEEL_is_reversed, 1));
+    TEST_ASSERT_EQUAL_INT(-3, get_int32(instance, WHEEL_turns));
+    ASSERT_OK(set_boolean(WHEEL_is_reversed, 0));
+    ASSERT_OK(instance_exit_initialization(instance));
+    ASSERT_OK(instance_do_step(instance, 0.0, 5.0)); // to 10 rad
+    TEST_ASSERT_EQUAL_INT(1, get_int32(instance, WHEEL_turns));
+}
+
+/* What cannot be calculated is not read; what events keep needs no calculation. */
+static void test_integers_that_cannot_be_calculated_are_not_read(void) {
+    const unsigned turns = WHEEL_turns;
+    const unsigned turning = WHEEL_is_turning;
+    int value = 7;
+    bool flag = true;
+    set_real(WHEEL_angle, 1e30);
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_get_int32(instance, &turns, 1, &value));
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_get_bool(instance, &turning, 1, &flag));
+    TEST_ASSERT_TRUE(value == 7 && flag);
+    TEST_ASSERT_EQUAL_INT(0, get_int32(instance, WHEEL_catches));
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_caught));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get_real(instance, WHEEL_lost_speed));
+}
+
+static void test_when_booleans_can_be_set(void) {
+    ASSERT_OK(instance_exit_initialization(instance));
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
+    ASSERT_OK(set_boolean(WHEEL_is_reversed, 1)); // tunable
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set_boolean(WHEEL_is_turning, 1));
+    assert_text("is_turning (value reference 31) cannot be set after initialization");
+
+    ASSERT_OK(instance_enter_continuous_time(instance));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set_boolean(WHEEL_is_counting, 1));
+    assert_text("is_counting (value reference 21) cannot be set while the time is continuous");
+    set_real(WHEEL_speed, 1.0);
+    TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_counting));
+    instance_enter_event_mode(instance);
+    ASSERT_OK(set_boolean(WHEEL_is_counting, 1));
+}
+
+static void test_discrete_variables_have_no_derivatives(void) {
+    const unsigned speed = WHEEL_speed;
+    const unsigned rate = WHEEL_rate;
+    const int order = 1;
+    const double one = 1.0;
+    double result = 7.0;
+    ASSERT_OK(instance_get_directional_derivative(instance, KNOWN_MOTION, &rate, 1, &speed, 1, &one,
+                                                  &result));
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, result);
+    const struct {
+        unsigned unknown, known;
+        const char *text;
+    } cases[] = {
+        {WHEEL_rate, WHEEL_is_counting,
+         "is_counting (value reference 21) is refused: it is of type boolean, an input, a state"},
+        {WHEEL_rate, WHEEL_is_reversed,
+         "is_reversed (value reference 2) is refused: it is of type"},
+        {WHEEL_is_caught, WHEEL_speed, "it is of type boolean, an output, a local or a derivative"},
+        {WHEEL_turns, WHEEL_speed, "it is of type int32, an output, a local or a derivative"},
+        {WHEEL_lost_speed, WHEEL_speed,
+         "lost_speed (value reference 42) is refused: it is discrete"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        TEST_ASSERT_EQUAL_INT(
+            STATUS_INVALID_ARGUMENT,
+            instance_get_directional_derivative(instance, KNOWN_ARGUMENTS, &cases[i].unknown, 1,
+                                                &cases[i].known, 1, &one, &result));
+        assert_text(cases[i].text);
+        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                              instance_get_adjoint_derivative(instance, KNOWN_ARGUMENTS,
+                                                              &cases[i].unknown, 1, &cases[i].known,
+                                                              1, &one, &result));
+        assert_text(cases[i].text);
+    }
+    const unsigned outputs[] = {WHEEL_is_turning, WHEEL_turns, WHEEL_lost_speed};
+    for (size_t i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL_INT(
+            STATUS_INVALID_ARGUMENT,
+            instance_get_output_derivatives(instance, &outputs[i], 1, &order, &result));
+        assert_text("is refused: it is ");
+    }
+    const unsigned counting = WHEEL_is_counting;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_set_input_derivatives(instance, &counting, 1, &order, &one));
+    assert_text("it is of type boolean, a continuous input of type float64 is expected");
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, result);
+}
