@@ -1,7 +1,5 @@
 #include "fields.h"
 
-#include "model_modes.h"
-
 const struct variable *instance_refuse_reference(const struct instance *instance,
                                                  unsigned reference, enum variable_type type) {
     const struct variable *variable = variable_find(instance->description, reference);
@@ -27,14 +25,8 @@ enum status instance_update_outputs(struct instance *instance) {
     if (instance->outputs_are_valid) {
         return STATUS_OK;
     }
-    enum status status = STATUS_OK;
-    if (instance->state.phase == PHASE_INSTANTIATED ||
-        instance->state.phase == PHASE_INITIALIZATION) {
-        status = instance_preview_modes(instance);
-    }
-    if (status == STATUS_OK) {
-        status = instance->model->outputs(instance->memory.values, instance->state.time.s);
-    }
+    const enum status status =
+        instance->model->outputs(instance->memory.values, instance->state.time.s);
     instance->outputs_are_valid = status == STATUS_OK;
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no outputs at t = %.17g: %s",

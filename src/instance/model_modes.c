@@ -3,7 +3,6 @@
 #include "fields.h"
 
 #include <limits.h>
-#include <string.h>
 
 bool instance_is_searched(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
@@ -23,7 +22,7 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
     return instance->indicators;
 }
 
-static enum status update(struct instance *instance, char *values, const bool *fired) {
+static enum status update(struct instance *instance, const bool *fired) {
     const struct model_events *events = instance->model->events;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         instance->du[i] = instance->memory.current[i].d[1];
@@ -34,7 +33,7 @@ static enum status update(struct instance *instance, char *values, const bool *f
         .du = instance->du,
         .tolerance = instance->absolute_tolerances,
     };
-    const enum status status = events->update(values, &event);
+    const enum status status = events->update(instance->memory.values, &event);
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,
                       status_text(status));
@@ -47,22 +46,7 @@ enum status instance_update_modes(struct instance *instance, const bool *fired) 
         return STATUS_OK;
     }
     instance->outputs_are_valid = false;
-    return update(instance, instance->memory.values, fired);
-}
-
-enum status instance_preview_modes(struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    if (events == NULL) {
-        return STATUS_OK;
-    }
-    char *copy = instance->second_derivatives;
-    memcpy(copy, instance->memory.values, instance->model->values_size);
-    const enum status status = update(instance, copy, NULL);
-    if (status == STATUS_OK) {
-        memcpy(instance->memory.values + events->modes.offset, copy + events->modes.offset,
-               events->modes.size);
-    }
-    return status;
+    return update(instance, fired);
 }
 
 enum status instance_count_event(struct instance *instance, const bool fired[],

@@ -15,10 +15,6 @@ NONNULL bool instance_is_at_rest(const struct instance *instance);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *fired);
 
-/* As instance_update_modes, but for the modes only: before the initialization ends, when states are
- * still what was set. */
-MUST_CHECK NONNULL enum status instance_preview_modes(struct instance *instance);
-
 /* The indicators of the present modes, for the integrator; NULL: no events can be. */
 MUST_CHECK NONNULL const struct indicator *instance_describe_indicators(struct instance *instance);
 

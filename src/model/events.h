@@ -42,7 +42,8 @@ struct event {
 struct model_events {
     size_t indicator_count;
     const char *const *indicator_names;
-    struct span modes; /* int[]: the right-hand side reads them, only update writes them */
+    struct span modes; /* int[]: the right-hand side reads them, only update writes them. Zeros
+                          until the initialization ends */
     struct span sums;  /* double[]: sums over events, such as losses; as modes */
     struct span discrete_inputs; /* int[]: Boolean inputs */
 
