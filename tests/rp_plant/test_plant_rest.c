@@ -134,8 +134,8 @@ static void test_judging_each_joint_by_itself_is_often_wrong(void) {
         bool alike = true;
         for (int i = 0; i < 2; i++) {
             const bool leaves = fabs(rest.forces[i]) > rest.breakaway[i];
-            const int alone = leaves ? (rest.forces[i] > 0.0 ? 1 : -1) : 0;
-            alike = alike && alone == outcome.pattern[i];
+            const int judged = leaves ? (rest.forces[i] > 0.0 ? 1 : -1) : 0;
+            alike = alike && judged == outcome.pattern[i];
         }
         wrong += !alike;
     }
