@@ -17,36 +17,34 @@ static enum status check_arm(const struct rp_plant_parameters *p, char *text, si
     return STATUS_INVALID_PARAMETERS;
 }
 
-/* One of the numbers that have to be finite and not negative; joint 0: no joint's. */
+/* One of the numbers that have to be finite and not negative. */
 struct not_negative {
     const char *name;
-    int joint;
     double value;
 };
 
 static enum status check_not_negative(const struct rp_plant_parameters *p, char *text,
                                       size_t size) {
     const struct not_negative all[] = {
-        {"armature", 1, p->armature[0]},
-        {"armature", 2, p->armature[1]},
-        {"damping", 1, p->damping[0]},
-        {"damping", 2, p->damping[1]},
-        {"coulomb_friction", 1, p->coulomb_friction[0]},
-        {"coulomb_friction", 2, p->coulomb_friction[1]},
-        {"breakaway_friction", 1, p->breakaway_friction[0]},
-        {"breakaway_friction", 2, p->breakaway_friction[1]},
-        {"stribeck_velocity", 1, p->stribeck_velocity[0]},
-        {"stribeck_velocity", 2, p->stribeck_velocity[1]},
-        {"payload_mass", 0, p->payload_mass},
-        {"payload_inertia", 0, p->payload_inertia},
+        {"armature1", p->armature[0]},
+        {"armature2", p->armature[1]},
+        {"damping1", p->damping[0]},
+        {"damping2", p->damping[1]},
+        {"coulomb_friction1", p->coulomb_friction[0]},
+        {"coulomb_friction2", p->coulomb_friction[1]},
+        {"breakaway_friction1", p->breakaway_friction[0]},
+        {"breakaway_friction2", p->breakaway_friction[1]},
+        {"stribeck_velocity1", p->stribeck_velocity[0]},
+        {"stribeck_velocity2", p->stribeck_velocity[1]},
+        {"payload_mass", p->payload_mass},
+        {"payload_inertia", p->payload_inertia},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         if (isfinite(all[i].value) && all[i].value >= 0.0) {
             continue;
         }
-        char joint[2] = {all[i].joint == 0 ? '\0' : (char)('0' + all[i].joint), '\0'};
-        (void)snprintf(text, size, "%s%s = %g is refused: it must be finite and not below 0",
-                       all[i].name, joint, all[i].value);
+        (void)snprintf(text, size, "%s = %g is refused: it must be finite and not below 0",
+                       all[i].name, all[i].value);
         return STATUS_INVALID_PARAMETERS;
     }
     return STATUS_OK;

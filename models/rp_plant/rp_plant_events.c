@@ -246,7 +246,7 @@ static struct fired read_fired(const struct rp_plant_values *values, const bool 
         return fired;
     }
     for (int i = 0; i < 2; i++) {
-        const bool *of_joint = at_zero + PLANT_INDICATORS * i;
+        const bool *of_joint = at_zero + PLANT_INDICATORS * (size_t)i;
         const int mode = values->modes.joint[i];
         fired.halted[i] = slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
@@ -341,7 +341,7 @@ static void describe(const void *values_pointer, struct indicator indicators[]) 
     const struct rp_plant_modes modes =
         rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
     for (int i = 0; i < 2; i++) {
-        describe_joint(values, modes.joint[i], i, indicators + PLANT_INDICATORS * i);
+        describe_joint(values, modes.joint[i], i, indicators + PLANT_INDICATORS * (size_t)i);
     }
 }
 
@@ -359,7 +359,7 @@ static enum status indicators(const void *values_pointer, double t, const double
     }
     for (int i = 0; i < 2; i++) {
         plant_indicators(&p, modes.joint[i], i, x[i], x[2 + i], motion.reaction[i],
-                         z + PLANT_INDICATORS * i);
+                         z + PLANT_INDICATORS * (size_t)i);
     }
     return STATUS_OK;
 }

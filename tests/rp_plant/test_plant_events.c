@@ -248,6 +248,24 @@ static void test_what_fires_counts_only_where_forces_have_not_jumped(void) {
     assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
 }
 
+/* The load that would have drawn the slide down is let go at the same time. */
+static void test_what_fires_does_not_count_where_the_payload_is_released(void) {
+    v.parameters.arm.g = 2.0;
+    v.parameters.payload_mass = 0.5; // with link 2 it weighs 3, which is the limit
+    v.q[0] = RP_TEST_PI / 2.0;
+    v.parameters.coulomb_friction[0] = 50.0;
+    v.payload_attached = 1;
+    plant_test_update(&v, -1);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+    const struct rp_plant_values attached = v;
+    plant_test_update(&v, BACKWARD2);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_BACKWARD);
+    v = attached;
+    v.payload_attached = 0;
+    plant_test_update(&v, BACKWARD2);
+    assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
+}
+
 static void test_at_rest(void) {
     TEST_ASSERT_TRUE(events->is_at_rest(&v));
     v.dq[0] = 1.0;

@@ -57,6 +57,7 @@ static void test_without_breakaway_friction_is_coulombs(void) {
     v.parameters.breakaway_friction[0] = 0.3;
     v.parameters.stribeck_velocity[0] = 0.0;
     TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.5) == 0.3);
+    TEST_ASSERT_TRUE(rp_plant_sliding_friction(&v.parameters, 0, 0.0) == 0.3);
 }
 
 /* With the mode frozen the friction keeps its sign where the velocity passes 0. */

@@ -1,4 +1,4 @@
-/* The model run by a method of its own for this test, Runge-Kutta steps of 1/2 ms with events found
+/* The model run by a simple method, Runge-Kutta steps of 1/2 ms with events found
  * by bisection: closed forms of friction and stops, and the balance of energy over random motions.
  * The core that runs models has its own tests; here any method serves. */
 #include "plant_test_support.h"

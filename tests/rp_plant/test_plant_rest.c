@@ -134,8 +134,8 @@ static void test_judging_each_joint_by_itself_is_often_wrong(void) {
         bool alike = true;
         for (int i = 0; i < 2; i++) {
             const bool leaves = fabs(rest.forces[i]) > rest.breakaway[i];
-            const int alone = leaves ? (rest.forces[i] > 0.0 ? 1 : -1) : 0;
-            alike = alike && alone == outcome.pattern[i];
+            const int judged = leaves ? (rest.forces[i] > 0.0 ? 1 : -1) : 0;
+            alike = alike && judged == outcome.pattern[i];
         }
         wrong += !alike;
     }
@@ -179,6 +179,38 @@ static void test_a_closed_stop_takes_what_friction_cannot(void) {
             } else {
                 TEST_ASSERT_TRUE(hold.friction == reaction && hold.stop == 0.0);
             }
+        }
+    }
+}
+
+/* Forces at which a pattern just fits, to rounding: what is decided then misses the conditions by
+ * no more than rounding. */
+static void test_decisions_at_the_limits(void) {
+    for (int n = 0; n < CASES; n++) {
+        struct rp_plant_rest rest;
+        struct rp_plant_outcome outcome;
+        double a[2];
+        double held[2];
+        next_case(&rest);
+        for (int i = 0; i < 2; i++) {
+            // stays at its limit, or leaves with an acceleration or none
+            const int direction = rest.closed[i] != 0 ? rest.closed[i] : 1 - 2 * below(2);
+            rest.at_rest[i] = true;
+            held[i] = direction * rest.breakaway[i];
+            a[i] = below(2) == 0 ? 0.0 : direction * decades(-14.0, 1.0);
+        }
+        const double(*D)[2] = (const double(*)[2])rest.inertia.D;
+        for (int i = 0; i < 2; i++) {
+            rest.forces[i] = D[i][0] * a[0] + D[i][1] * a[1] + held[i];
+        }
+        rp_plant_rest_decide(&rest, &outcome);
+        const double misfit = rp_plant_rest_misfit(&rest, outcome.pattern, &outcome);
+        TEST_ASSERT_TRUE(misfit <= 1e-14);
+        for (int i = 0; i < 2; i++) {
+            const double size =
+                fabs(rest.forces[0]) + fabs(rest.forces[1]) + rest.breakaway[0] + rest.breakaway[1];
+            const double inverse = (D[0][0] + D[1][1]) / rest.inertia.determinant;
+            ASSERT_CLOSE(a[i], outcome.ddq[i], 1e-14 * inverse * size);
         }
     }
 }
