@@ -21,7 +21,7 @@ double integrator_tolerance_fraction(enum integrator_method method) {
     return 1.0;
 }
 
-int64_t integrator_longest_history(enum integrator_method method) {
+int64_t integrator_longest_history(enum integrator_method method, bool has_events) {
     (void)method;
     return 1;
 }

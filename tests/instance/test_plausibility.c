@@ -158,7 +158,7 @@ static void test_a_history_does_not_contradict_itself(void) {
 
     // internal steps since the restart: at least one, and no more than restart and step allow
     const int64_t most =
-        integrator_longest_history(INTEGRATOR_CVODE_ADAMS) + (int64_t)state.own.max_internal_steps;
+        integrator_longest_history(INTEGRATOR_CVODE_ADAMS, false) + (int64_t)state.own.max_internal_steps;
     state.statistics.steps = state.steps_before_restart + most;
     TEST_ASSERT_TRUE(is_plausible());
     state.statistics.steps++;
