@@ -209,9 +209,10 @@ static double crossing(const struct rising *p, struct node low, struct node high
 static int replace_points(const struct rising *p, double points[ROOTS_LENGTH], int count) {
     struct node left = {0.0, p->c[0], 1, false};
     int found = 0;
+    points[count] = 1.0;
     for (int i = 0; i <= count; i++) {
         double slope;
-        const struct node right = node_at(p, i < count ? points[i] : 1.0, false, &slope);
+        const struct node right = node_at(p, points[i], false, &slope);
         double s = 1.0;
         if (right.sign == 0) {
             s = right.s;
@@ -261,9 +262,10 @@ static int find(const struct rising *p, int sign, int most, struct root roots[RO
     int now = 1;          // the last sign that is not 0
     bool is_open = false; // the last root may turn out to be one that crosses
     int found = 0;
+    points[count] = 1.0;
     for (int i = 0; i <= count && (found < most || is_open); i++) {
         double slope;
-        const struct node right = node_at(p, i < count ? points[i] : 1.0, true, &slope);
+        const struct node right = node_at(p, points[i], true, &slope);
         if (right.sign == -now) {
             found += !is_open;
             const double s = left.sign == 0 ? left.s : crossing(p, left, right, true);

@@ -18,7 +18,7 @@ static void test_quick_proof(void) {
     uint64_t state = 1;
     int proven = 0;
     for (int i = 0; i < 200000; i++) {
-        double c[ROOTS_LENGTH];
+        double c[ROOTS_LENGTH] = {0.0};
         const int degree = i % ROOTS_LENGTH;
         double size = 1.0;
         for (int k = 0; k <= degree; k++) {
