@@ -93,7 +93,7 @@ INDICATORS = [
 
 
 def indicator_list(declaration: Declaration) -> list[str]:
-    """The value references of the event indicators; nothing where there are none."""
+    """The value references of the event indicators; empty without any."""
     names = declaration.model.event_indicators
     references = ", ".join(str(declaration.variables[name].reference) for name in names)
     return [f"static const unsigned indicators[] = {{{references}}};", ""] if names else []
