@@ -356,7 +356,8 @@ static void make_run(struct fuzz_instance *instance, unsigned variant, struct ru
         require(FUZZ_CHECKED(instance, SetReal, starts, FUZZ_COUNT(starts), values), "fmi2SetReal");
     }
     require(FUZZ_CHECKED(instance, SetInteger, &method, 1, &method_value), "fmi2SetInteger");
-    require(fuzz_initialize(instance, variant < FUZZ_METHODS ? 0.0 : 1e-6, variant < FUZZ_METHODS ? 0.0 : 1000.0),
+    require(fuzz_initialize(instance, variant < FUZZ_METHODS ? 0.0 : 1e-6,
+                            variant < FUZZ_METHODS ? 0.0 : 1000.0),
             "the initialization");
     if (instance->kind == fmi2CoSimulation) {
         run_co_simulation(instance, run);
