@@ -23,6 +23,7 @@ double integrator_tolerance_fraction(enum integrator_method method) {
 
 int64_t integrator_longest_history(enum integrator_method method, bool has_events) {
     (void)method;
+    (void)has_events;
     return 1;
 }
 
@@ -100,4 +101,18 @@ void integrator_get_statistics(const struct integrator *integrator,
 void integrator_set_statistics(struct integrator *integrator,
                                const struct integrator_statistics *statistics) {
     integrator->statistics = *statistics;
+}
+
+const bool *integrator_event(const struct integrator *integrator) {
+    (void)integrator;
+    return NULL;
+}
+
+enum status integrator_rest(struct integrator *integrator, const double x[],
+                            const struct integrator_start *start, double t, double *reached) {
+    (void)integrator;
+    (void)x;
+    (void)start;
+    *reached = t;
+    return STATUS_OK;
 }
