@@ -1,0 +1,80 @@
+"""Runs of the built FMUs of the plant: started by name, stepped, with the events they report."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+from cosim.fmi_instance import Instance
+from cosim.fmu_file import Fmu
+
+METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3}
+STEPS = {"1 ms": 1e-3, "10 ms": 1e-2, "1 s": 1.0}
+NONE, RIGID = 1, 2  # stops
+KEEP_VELOCITY, AT_REST = 1, 2  # grasp
+FIRM = 1000.0  # N.m, N: dry friction that holds a joint whatever happens
+
+
+class Event(NamedTuple):
+    """The last event at a communication point; several within one step are seen as the last."""
+
+    count: int
+    time: float  # s
+
+
+@contextmanager
+def started(
+    fmu: Fmu,
+    method: str = "cvode_adams",
+    tolerance: float = 1e-10,
+    smooth_inputs: tuple[str, ...] = (),
+    **values: float | bool,
+) -> Iterator[Instance]:
+    """An instance at t = 0, with these parameters, start values and inputs."""
+    with fmu.instance("plant", smooth_inputs) as instance:
+        instance.set_up(0.0, None, tolerance)
+        instance.set("solver_method", METHODS[method])
+        for name, value in values.items():
+            instance.set(name, value)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        yield instance
+
+
+def read(instance: Instance, *names: str) -> list[float]:
+    """Values of Real variables."""
+    reals = instance.reals(names)
+    reals.get()
+    return reals.view.tolist()
+
+
+def modes(instance: Instance) -> tuple[int | None, int | None]:
+    return instance.integer("mode1"), instance.integer("mode2")
+
+
+def last_event(instance: Instance) -> Event:
+    return Event(instance.integer("event_count") or 0, *read(instance, "last_event_time"))
+
+
+def events(
+    instance: Instance, h: float, stop: float, slopes: dict[str, float] | None = None
+) -> list[Event]:
+    """Step by `h` (s) from 0 to `stop`: the last event of each step that had one.
+
+    `slopes`: inputs that are slope times t (per s), which `started` was given as smooth ones.
+    """
+    slopes = slopes or {}
+    polynomials = instance.input_polynomials(list(slopes), 1) if slopes else None
+    time = instance.reals(["last_event_time"])
+    found: list[Event] = []
+    count, t = 0, 0.0
+    for i in range(round(stop / h)):
+        t = i * h
+        if polynomials is not None:
+            polynomials.view[:] = [[r * t for r in slopes.values()], list(slopes.values())]
+            polynomials.set()
+        instance.do_step(t, h)
+        if instance.integer("event_count") != count:
+            count = instance.integer("event_count") or 0
+            time.get()
+            found.append(Event(count, time.view.item()))
+    return found

@@ -1,0 +1,168 @@
+"""RPPlant beside RPManipulator: the same interface, and with start values the same bits."""
+
+import xml.etree.ElementTree as ET
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+
+from cosim.errors import UserError
+from cosim.fmi_instance import Instance
+from cosim.fmu_file import Fmu
+from cosim.scenario import Scenario
+from cosim.simulation import initialize
+from tests.rp_plant.plant_runs import METHODS, NONE, RIGID, started
+from tests.support.cosim_project import load, names_of
+
+COUNTS = (
+    "solver_steps",
+    "solver_rhs_evaluations",
+    "solver_restarts",
+    "solver_failed_steps",
+    "solver_last_order",
+)
+INDICATORS = [
+    f"{kind}"
+    for i in (1, 2)
+    for kind in (f"slip{i}_forward", f"slip{i}_backward", f"stop{i}_lower", f"stop{i}_upper")
+]
+
+
+# ---- Interface -------------------------------------------------------------------------------
+
+
+def test_fmpy_finds_no_problem(plant: Fmu) -> None:
+    assert validate_fmu(str(plant.path)) == []
+
+
+def test_every_variable_of_the_arm_is_there(plant: Fmu, arm: Fmu) -> None:
+    """With its value reference, type, unit, start value and limits."""
+    for name, variable in arm.model.variables.items():
+        assert plant.model.variables[name] == variable
+    further = set(plant.model.variables) - set(arm.model.variables)
+    solver = {"event_count", "last_event_time", "max_events"}
+    references = {name: plant.model.variables[name].reference for name in further}
+    assert {references[name] for name in solver} == {93, 94, 95}
+    assert min(references[name] for name in further - solver) == 100
+
+
+def test_states_may_jump_and_indicators_are_counted(plant: Fmu) -> None:
+    with ZipFile(plant.path) as archive:
+        root = ET.fromstring(archive.read("modelDescription.xml"))
+    variables = {v.get("name"): v for v in root.find("ModelVariables")}
+    if plant.model.fmi_version == "2.0":
+        assert root.get("numberOfEventIndicators") == "8"
+        jump = [name for name, v in variables.items() if v[0].get("reinit") == "true"]
+    else:
+        found = root.iterfind("ModelStructure/EventIndicator")
+        names = {v.get("valueReference"): name for name, v in variables.items()}
+        assert [names[e.get("valueReference")] for e in found] == INDICATORS
+        jump = [name for name, v in variables.items() if v.get("reinit") == "true"]
+    assert jump == ["q1", "q2", "dq1", "dq2"]
+
+
+# ---- Start values ----------------------------------------------------------------------------
+
+
+def record(fmu: Fmu, scenario: Scenario, names: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Real variables (points, names) and counters (points, COUNTS) at each communication point."""
+    with fmu.instance("record") as instance:
+        initialize(instance, scenario, scenario.tolerance)
+        inputs = instance.reals(list(scenario.inputs))
+        held = np.column_stack([*scenario.inputs.values()]) if scenario.inputs else None
+        reals = instance.reals(names)
+        values, counts = [], []
+
+        def note(instance: Instance) -> None:
+            reals.get()
+            values.append(reals.view.copy())
+            counts.append([instance.integer(name) for name in COUNTS])
+
+        note(instance)
+        for i, length in enumerate(np.diff(scenario.times)):
+            if held is not None:
+                inputs.view[:] = held[i]
+                inputs.set()
+            instance.do_step(scenario.times[i], length)
+            note(instance)
+    return np.array(values), np.array(counts)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", names_of("rp_manipulator"))
+def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method: str) -> None:
+    """All Real variables bit for bit, but the sign of zero, and all counters, at each point."""
+    scenario = load(name)
+    scenario.parameters["solver_method"] = METHODS[method]
+    reals = [v.name for v in arm.model.variables.values() if v.type == "Real"]
+    expected, expected_counts = record(arm, scenario, reals)
+    found, counts = record(plant, scenario, reals)
+    assert np.isfinite(expected).all()
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(counts, expected_counts)
+    assert counts[-1, 0] > 0
+
+
+def test_taylor_is_refused(plant: Fmu) -> None:
+    with plant.instance("plant") as instance:
+        instance.set_up(0.0, None)
+        instance.set("solver_method", 4)
+        instance.enter_initialization()
+        with pytest.raises(UserError, match="taylor"):
+            instance.exit_initialization()
+
+
+# ---- Refused ---------------------------------------------------------------------------------
+
+OUT_OF_RANGE = {
+    "armature1": -0.1,
+    "armature2": -0.1,
+    "damping1": -0.1,
+    "damping2": -0.1,
+    "coulomb_friction1": -0.1,
+    "coulomb_friction2": -0.1,
+    "breakaway_friction1": -0.1,
+    "breakaway_friction2": -0.1,
+    "stribeck_velocity1": -0.1,
+    "stribeck_velocity2": -0.1,
+    "restitution1": 1.1,
+    "restitution2": -0.1,
+    "stops1": 3,
+    "stops2": 0,
+    "payload_mass": -0.1,
+    "payload_inertia": -0.1,
+    "grasp": 3,
+    "max_events": 0,
+    "lower1": float("nan"),
+    "upper2": float("inf"),
+}
+
+
+@pytest.mark.parametrize("name", OUT_OF_RANGE)
+def test_values_out_of_range_are_refused(plant: Fmu, name: str) -> None:
+    with plant.instance("plant") as instance, pytest.raises(UserError, match=name):
+        instance.set(name, OUT_OF_RANGE[name])
+
+
+TOGETHER = [
+    ({"coulomb_friction1": 2.0, "breakaway_friction1": 1.5}, ("breakaway_friction1 = 1.5", "= 2")),
+    ({"coulomb_friction2": 2.0, "breakaway_friction2": 2.5}, ("stribeck_velocity2 = 0", "2.5")),
+    ({"stops1": RIGID, "lower1": 0.5, "upper1": 0.5}, ("lower1 = 0.5", "upper1 = 0.5")),
+    ({"stops2": RIGID, "q2": 0.75}, ("q2 = 0.75", "upper2 = 0.5")),
+    ({"stops1": RIGID, "q1": -3.0}, ("q1 = -3", "lower1 = -2.5")),
+]
+
+
+@pytest.mark.parametrize(("values", "texts"), TOGETHER)
+def test_values_that_do_not_fit_each_other_are_refused(
+    plant: Fmu, values: dict[str, float], texts: tuple[str, ...]
+) -> None:
+    with pytest.raises(UserError) as refusal, started(plant, **values):
+        pass
+    assert all(text in str(refusal.value) for text in texts)
+
+
+def test_limits_play_no_role_without_stops(plant: Fmu) -> None:
+    with started(plant, stops2=NONE, lower2=1.0, upper2=-1.0, q2=5.0) as instance:
+        instance.do_step(0.0, 1e-3)
