@@ -1,0 +1,267 @@
+"""Events of the built FMU do not depend on communication points, and rollback leaves no trace of
+them: bit for bit."""
+
+import dataclasses
+import random
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from cosim.errors import UserError
+from cosim.fmi_instance import Instance
+from cosim.fmu_file import Fmu
+from tests.rp_plant.plant_runs import (
+    AT_REST,
+    FIRM,
+    METHODS,
+    RIGID,
+    events,
+    last_event,
+    modes,
+    read,
+    started,
+)
+from tests.support.instances import DISCARD, LoadedFmu, status_of
+from tests.support.instances import Instance as Fmi2Instance
+
+SEQUENCES = 100
+FRICTION = {
+    "coulomb_friction1": 1.5,
+    "breakaway_friction1": 2.0,
+    "stribeck_velocity1": 0.2,
+    "coulomb_friction2": 2.0,
+    "breakaway_friction2": 2.6,
+    "stribeck_velocity2": 0.1,
+}
+STOPS = {
+    "stops1": RIGID,
+    "lower1": -0.6,
+    "upper1": 0.9,
+    "restitution1": 0.5,
+    "stops2": RIGID,
+    "lower2": -0.1,
+    "upper2": 0.2,
+    "restitution2": 0.7,
+}
+PAYLOAD = {"payload_mass": 0.8, "payload_inertia": 0.01, "payload_x": 0.05, "payload_z": 0.1}
+BUSY = FRICTION | STOPS | PAYLOAD | {"grasp": AT_REST, "dq1": 1.2, "dq2": -0.4}
+
+each_method = pytest.mark.parametrize("method", METHODS)
+
+
+# ---- The same bits of every event time -------------------------------------------------------
+
+MOTIONS = {
+    "bounces": STOPS | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM, "restitution2": 0.8},
+    "slides": FRICTION | {"tau1": 14.0, "f2": 3.0, "dq1": -1.0, "dq2": 0.8},
+    "everything": FRICTION | STOPS | {"dq1": 1.2, "dq2": -0.4},
+}
+
+
+@pytest.mark.parametrize("method", ["cvode_adams", "cvode_bdf"])
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_later_communication_points_do_not_matter(plant: Fmu, method: str, motion: str) -> None:
+    """With constant inputs and the same first step: all event times, and the state at the end."""
+    stop, first = 3.0, 1e-3
+    with started(plant, method, **MOTIONS[motion]) as instance:
+        expected = dict(events(instance, first, stop))
+        end = last_event(instance)
+    assert end.count > 3
+    for seed in range(4):
+        chance = random.Random(seed)
+        longest = (2e-3, 0.02, 0.3, 2.0)[seed]
+        with started(plant, method, **MOTIONS[motion]) as instance:
+            t, h = 0.0, first
+            while t < stop:
+                instance.do_step(t, h)
+                t += h
+                event = last_event(instance)
+                if event.count > 0:
+                    assert event.time == expected.get(event.count, event.time)
+                h = min(chance.uniform(1e-6, longest), stop - t) if stop - t > 1e-6 else stop - t
+            assert last_event(instance) == end
+
+
+# ---- Rollback --------------------------------------------------------------------------------
+
+
+@dataclasses.dataclass(frozen=True)
+class Move:
+    """One communication step and what is set before it."""
+
+    length: float  # s
+    values: dict[str, float | bool]
+
+
+def sequence(length: int, chance: random.Random) -> list[Move]:
+    """Random steps; now and then the efforts change, and the payload is grasped or released."""
+    moves = []
+    for _ in range(length):
+        values: dict[str, float | bool] = {}
+        if chance.random() < 0.2:
+            values |= {"tau1": chance.gauss(8, 6), "f2": chance.gauss(2, 6)}
+        if chance.random() < 0.05:
+            values["payload_attached"] = chance.random() < 0.5
+        if chance.random() < 0.02:
+            values |= {"coulomb_friction1": chance.uniform(0, 2), "upper2": chance.uniform(0.1, 1)}
+        moves.append(Move(chance.choice((1e-3, 1e-2, 0.05, 0.2)), values))
+    return moves
+
+
+def times(moves: Sequence[Move]) -> list[float]:
+    found = [0.0]
+    for move in moves:
+        found.append(found[-1] + move.length)
+    return found
+
+
+class Run:
+    """An instance, with all that it shows after a step."""
+
+    def __init__(self, instance: Instance) -> None:
+        self.instance = instance
+        variables = instance.fmu.model.variables.values()
+        self._reals = instance.reals([v.name for v in variables if v.type == "Real"])
+        self._integers = [v.name for v in variables if v.type == "Integer"]
+
+    def do(self, t: float, move: Move) -> tuple[bytes, list[int | None]]:
+        """Make one step; all Real and Integer variables after it, bit for bit."""
+        for name, value in move.values.items():
+            self.instance.set(name, value)
+        self.instance.do_step(t, move.length, goes_back=True)
+        self._reals.get()
+        return self._reals.view.tobytes(), [self.instance.integer(name) for name in self._integers]
+
+
+@contextmanager
+def busy(plant: Fmu, method: str) -> Iterator[Run]:
+    with started(plant, method, tolerance=1e-8, **BUSY) as instance:
+        yield Run(instance)
+
+
+@pytest.mark.parametrize("number", range(SEQUENCES))
+def test_random_rollback(plant: Fmu, number: int) -> None:
+    """Saved states and jumps back at random, across events, with every method."""
+    chance = random.Random(number)
+    method = [*METHODS][number % len(METHODS)]
+    moves = sequence(chance.randint(10, 50), chance)
+    at = times(moves)
+    with busy(plant, method) as run:
+        expected = [run.do(t, move) for t, move in zip(at, moves, strict=False)]
+        assert last_event(run.instance).count > 0
+    with busy(plant, method) as run:
+        saved = []
+        position, left = 0, 4 * len(moves)
+        while position < len(moves):
+            left -= 1
+            action = chance.random() if left > 0 else 1.0
+            if action < 0.25:
+                state = run.instance.saved_state()
+                state.take()
+                saved.append((position, state))
+            elif action < 0.45 and saved:
+                position, state = chance.choice(saved)
+                state.restore()
+            else:
+                assert run.do(at[position], moves[position]) == expected[position]
+                position += 1
+        for _, state in saved:
+            state.free()
+
+
+def packed(instance: Instance) -> bytes:
+    """The state as bytes."""
+    fmi = instance.fmi
+    if instance.fmu.model.fmi_version == "2.0":
+        state = fmi.getFMUstate()
+        content = fmi.serializeFMUstate(state)
+        fmi.freeFMUstate(state)
+        return content
+    state = fmi.getFMUState()
+    content = fmi.serializeFMUState(state)
+    fmi.freeFMUState(state)
+    return content
+
+
+def unpack(instance: Instance, content: bytes) -> None:
+    fmi = instance.fmi
+    if instance.fmu.model.fmi_version == "2.0":
+        state = fmi.deSerializeFMUstate(content)
+        fmi.setFMUstate(state)
+        fmi.freeFMUstate(state)
+        return
+    state = fmi.deserializeFMUState(content)
+    fmi.setFMUState(state)
+    fmi.freeFMUState(state)
+
+
+@each_method
+def test_serialized_states_keep_the_modes(plant: Fmu, method: str) -> None:
+    """Another instance goes on the same from each mode: held, sliding, free, on a stop, loaded."""
+    chance = random.Random(method)
+    moves = sequence(150, chance)
+    at = times(moves)
+    seen = set()
+    with busy(plant, method) as run, busy(plant, "erk") as other:
+        for t, move in zip(at, moves, strict=False):
+            content = packed(run.instance)
+            expected = run.do(t, move)
+            if modes(run.instance) not in seen or chance.random() < 0.2:
+                unpack(other.instance, content)
+                assert other.do(t, move) == expected
+                assert packed(other.instance) == packed(run.instance)
+            seen.add(modes(run.instance))
+    assert {0, 1, -1} <= {mode for pair in seen for mode in pair}
+    assert (0, 0) in seen and len(seen) > 4
+
+
+# ---- Too many events -------------------------------------------------------------------------
+
+
+@each_method
+def test_one_event_too_many_discards_the_step(fmu: Path, tmp_path: Path, method: str) -> None:
+    """The message names indicator and time; FMI 2.0 says how far the step came."""
+    g, height, e = 9.81, 0.5, 0.5
+    t1 = (2 * height / g) ** 0.5
+    third = t1 * (1 + 2 * e + 2 * e**2)
+    loaded = LoadedFmu(fmu.with_name("RPPlant.fmu"), tmp_path)
+    with Fmi2Instance(loaded) as instance:
+        integers = {"solver_method": METHODS[method], "stops2": RIGID, "max_events": 2}
+        references = [loaded.references[name] for name in integers]
+        instance.fmi.setInteger(references, [*integers.values()])
+        start = {"a": 0.0, "q1": 1.5707963267948966, "q2": height, "coulomb_friction1": FIRM}
+        limits = {"lower2": 0.0, "upper2": 2.0, "restitution2": e}
+        instance.initialize(tolerance=1e-10, **start, **limits)
+        before = instance.fmi.getFMUstate()
+        assert status_of(instance.fmi.doStep, 0.0, 10.0) == DISCARD
+        text = instance.messages[0].text
+        assert "stop2_lower" in text and "max_events = 2" in text
+        named = float(text.split("t = ")[1].split(",")[0])
+        assert named == pytest.approx(third, rel=0, abs=1e-9)
+        assert instance.fmi.getRealStatus(2) == named  # fmi2LastSuccessfulTime
+        # a shorter step has fewer of them
+        instance.fmi.setFMUstate(before)
+        instance.step(0.0, named - 1e-6)
+        assert instance.count("event_count") == 2
+        instance.step(named - 1e-6, 2e-6)
+        assert instance.count("event_count") == 3
+
+
+def test_a_discarded_step_of_fmi3_is_explained(plant: Fmu) -> None:
+    stops = {"stops2": RIGID, "lower2": 0.0, "upper2": 2.0, "restitution2": 0.5, "max_events": 2}
+    with (
+        started(plant, q1=1.5, q2=0.5, coulomb_friction1=FIRM, **stops) as instance,
+        pytest.raises(UserError, match=r"discard.*stop2_lower at t = 0\.7"),
+    ):
+        try:
+            instance.do_step(0.0, 10.0)
+        except FMICallException as error:
+            raise instance.failure(error, "in a step") from error
+
+
+def test_read_is_of_real_variables(plant: Fmu) -> None:
+    with started(plant) as instance:
+        assert read(instance, "last_event_time") == [0.0]
