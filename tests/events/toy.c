@@ -335,14 +335,15 @@ static const struct variable block_variables[] = {
 
 static const short row_of_reference[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
-#define DESCRIPTION(text, model_symbol, table)                                                     \
+#define DESCRIPTION(text, model_symbol, table, indicators)                                         \
     {                                                                                              \
         .name = (text), .guid = "{" text "}", .default_tolerance = 1e-8, .model = &(model_symbol), \
         .variables = (table), .variable_count = sizeof(table) / sizeof *(table),                   \
-        .row_of_reference = row_of_reference,                                                      \
+        .row_of_reference = row_of_reference, .indicator_count = (indicators),                     \
         .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],                   \
     }
 
-const struct model_description ball_description = DESCRIPTION("Ball", ball_model, ball_variables);
+const struct model_description ball_description =
+    DESCRIPTION("Ball", ball_model, ball_variables, 2);
 const struct model_description block_description =
-    DESCRIPTION("Block", block_model, block_variables);
+    DESCRIPTION("Block", block_model, block_variables, 3);
