@@ -67,6 +67,12 @@ enum component_status mode_enter_continuous_time(struct component *component, un
                  instance_enter_continuous_time(component->instance));
 }
 
+enum component_status mode_update_discrete_states(struct component *component,
+                                                  bool *states_changed) {
+    return component_result(component,
+                            instance_update_discrete_states(component->instance, states_changed));
+}
+
 enum component_status mode_enter_step(struct component *component, unsigned call) {
     if (!component_enter(component, call)) {
         return COMPONENT_ERROR;

@@ -17,6 +17,9 @@ enum component_status mode_exit_initialization(struct component *component, unsi
 
 enum component_status mode_enter_event(struct component *component, unsigned call);
 enum component_status mode_enter_continuous_time(struct component *component, unsigned call);
+/* *states_changed: whether continuous states have jumped. */
+enum component_status mode_update_discrete_states(struct component *component,
+                                                  bool *states_changed);
 enum component_status mode_enter_step(struct component *component, unsigned call);
 enum component_status mode_terminate(struct component *component, unsigned call);
 

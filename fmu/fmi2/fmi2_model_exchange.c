@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0 for Model Exchange only (section 3.2). Models have no events so far. */
+/* The functions of FMI 2.0 for Model Exchange only (section 3.2). */
 #include "continuous_time.h"
 #include "fmi2_component.h"
 #include "modes.h"
@@ -16,14 +16,16 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
         !component_has_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
         return fmi2Error;
     }
+    bool states_changed = false;
+    const enum component_status status = mode_update_discrete_states(component, &states_changed);
     *fmi2eventInfo = (fmi2EventInfo){
         .newDiscreteStatesNeeded = fmi2False,
         .terminateSimulation = fmi2False,
         .nominalsOfContinuousStatesChanged = fmi2False,
-        .valuesOfContinuousStatesChanged = fmi2False,
+        .valuesOfContinuousStatesChanged = states_changed ? fmi2True : fmi2False,
         .nextEventTimeDefined = fmi2False,
     };
-    return fmi2OK;
+    return fmi2_status(status);
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {

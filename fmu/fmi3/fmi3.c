@@ -239,7 +239,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
 }
 
-/* Models have no events so far: nothing is left to be done. */
+/* One update brings all modes to their end: nothing is left to be done. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
                                     fmi3Boolean *nominalsOfContinuousStatesChanged,
@@ -257,10 +257,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     *discreteStatesNeedUpdate = fmi3False;
     *terminateSimulation = fmi3False;
     *nominalsOfContinuousStatesChanged = fmi3False;
-    *valuesOfContinuousStatesChanged = fmi3False;
     *nextEventTimeDefined = fmi3False;
     *nextEventTime = 0.0;
-    return fmi3OK;
+    return fmi3_status(mode_update_discrete_states(component, valuesOfContinuousStatesChanged));
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {

@@ -1,4 +1,4 @@
-/* The functions of FMI 3.0 for Model Exchange only (section 3.2). Models have no events so far. */
+/* The functions of FMI 3.0 for Model Exchange only (section 3.2). */
 #include "continuous_states.h"
 #include "continuous_time.h"
 #include "fmi3_component.h"

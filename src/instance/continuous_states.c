@@ -1,6 +1,7 @@
 #include "continuous_states.h"
 
 #include "fields.h"
+#include "model_modes.h"
 #include "settings.h"
 
 #include <math.h>
@@ -16,6 +17,15 @@ enum status instance_enter_continuous_time(struct instance *instance) {
 
 void instance_enter_event_mode(struct instance *instance) {
     instance->state.phase = PHASE_STEPPING;
+}
+
+enum status instance_update_discrete_states(struct instance *instance, bool *states_changed) {
+    if (instance->is_integrated_outside) {
+        return instance_update_at_point(instance, states_changed);
+    }
+    // the steps pass events themselves
+    *states_changed = false;
+    return instance_update_modes(instance, NULL);
 }
 
 enum status instance_set_time(struct instance *instance, double time) {

@@ -8,6 +8,11 @@
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
 NONNULL void instance_enter_event_mode(struct instance *instance);
 
+/* In event mode: brings modes to what follows the values set, at an event where an event indicator
+ * is near 0 and falls. *states_changed: whether states have jumped. */
+MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *instance,
+                                                               bool *states_changed);
+
 MUST_CHECK NONNULL enum status instance_set_time(struct instance *instance, double time);
 
 /* count must be instance_state_count; the arrays may be NULL where it is 0. All or nothing. */

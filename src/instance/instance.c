@@ -90,13 +90,17 @@ static void place_values(struct instance *instance) {
 static bool setup_events(struct instance *instance) {
     const struct model *model = instance->model;
     const size_t state_count = count_of(model->states);
+    const size_t count = model->events->indicator_count;
     instance->absolute_tolerances =
-        calloc(state_count + count_of(model->inputs) + 1, sizeof(double));
-    instance->indicators = calloc(model->events->indicator_count, sizeof *instance->indicators);
-    if (instance->absolute_tolerances == NULL || instance->indicators == NULL) {
+        calloc(state_count + count_of(model->inputs) + 2 * count, sizeof(double));
+    instance->indicators = calloc(count, sizeof *instance->indicators);
+    instance->fired = calloc(count, sizeof *instance->fired);
+    if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
+        instance->fired == NULL) {
         return false;
     }
     instance->du = instance->absolute_tolerances + state_count;
+    instance->z = instance->du + count_of(model->inputs);
     instance->ode.indicator_count = model->events->indicator_count;
     instance->ode.indicators = instance_indicators;
     return true;
@@ -177,6 +181,7 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
+    free(instance->fired);
     free(instance->indicators);
     free(instance->absolute_tolerances);
     free(instance->places);
@@ -190,6 +195,7 @@ void instance_reset(struct instance *instance) {
     memset(instance->memory.block, 0, instance->memory.size);
     instance->state = (struct instance_state){.phase = PHASE_INSTANTIATED};
     instance->state.own.solver_method = INTEGRATOR_CVODE_ADAMS;
+    instance->state.own.max_events = 1000;
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         instance_write_field(instance, &instance->description->variables[i],
                              instance->description->variables[i].start);

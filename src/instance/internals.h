@@ -81,6 +81,8 @@ struct instance {
                                      no events */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
+    double *z;                    /* two per indicator */
+    bool *fired;                  /* one per indicator */
     bool inputs_move;             /* since the last restart; otherwise u holds their values */
     double *u;                    /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */

@@ -3,6 +3,7 @@
 #include "fields.h"
 
 #include <limits.h>
+#include <string.h>
 
 bool instance_is_searched(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
@@ -47,6 +48,69 @@ enum status instance_update_modes(struct instance *instance, const bool *fired) 
     }
     instance->outputs_are_valid = false;
     return update(instance, fired);
+}
+
+/* In the unit of an indicator: so far from 0 integrators end at its root. */
+static const double near_root = 1e-10;
+
+/* s: over this time the slope of an indicator is taken. */
+static const double slope_time = 1e-7;
+
+/* Writes which indicators are near 0 and fall while the inputs stay. */
+static enum status find_fired(struct instance *instance, bool *is_any) {
+    const struct model *model = instance->model;
+    char *values = instance->memory.values;
+    const double *x = doubles_of(values, model->states);
+    const double *u = doubles_of(values, model->inputs);
+    double *dx = doubles_of(instance->first_derivatives, model->derivatives);
+    double *ahead = doubles_of(instance->second_derivatives, model->states);
+    double *z = instance->z;
+    double *z_ahead = z + model->events->indicator_count;
+    const double t = instance->state.time.s;
+    enum status status = model->right_hand_side(values, t, x, u, dx);
+    for (size_t i = 0; i < count_of(model->states); i++) {
+        ahead[i] = x[i] + slope_time * dx[i];
+    }
+    if (status == STATUS_OK) {
+        status = model->events->indicators(values, t, x, u, z);
+    }
+    if (status == STATUS_OK) {
+        status = model->events->indicators(values, t, ahead, u, z_ahead);
+    }
+    *is_any = false;
+    for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
+        instance->fired[i] = z[i] <= near_root && z_ahead[i] <= z[i];
+        *is_any |= instance->fired[i];
+    }
+    return status;
+}
+
+enum status instance_update_at_point(struct instance *instance, bool *states_changed) {
+    const struct model_events *events = instance->model->events;
+    const struct span states = instance->model->states;
+    *states_changed = false;
+    if (events == NULL) {
+        return STATUS_OK;
+    }
+    bool is_any = false;
+    enum status status = STATUS_OK;
+    if (events->are_possible(instance->memory.values)) {
+        status = find_fired(instance, &is_any);
+    }
+    if (status != STATUS_OK) {
+        return instance_not_finite(instance, "an event indicator");
+    }
+    if (is_any) {
+        int none = 0;
+        status = instance_count_event(instance, instance->fired, &none);
+    }
+    char *before = instance->second_derivatives + states.offset;
+    memcpy(before, instance->memory.values + states.offset, states.size);
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, is_any ? instance->fired : NULL);
+    }
+    *states_changed = memcmp(before, instance->memory.values + states.offset, states.size) != 0;
+    return status;
 }
 
 enum status instance_count_event(struct instance *instance, const bool fired[],

@@ -15,6 +15,11 @@ NONNULL bool instance_is_at_rest(const struct instance *instance);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *fired);
 
+/* The same at a point that an integrator outside took for an event: an indicator that is near 0 and
+ * falls has fired. *states_changed: whether states have jumped. */
+MUST_CHECK NONNULL enum status instance_update_at_point(struct instance *instance,
+                                                        bool *states_changed);
+
 /* The indicators of the present modes, for the integrator; NULL: no events can be. */
 MUST_CHECK NONNULL const struct indicator *instance_describe_indicators(struct instance *instance);
 

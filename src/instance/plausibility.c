@@ -52,6 +52,9 @@ static bool has_possible_settings(const struct instance *instance,
         {"max_step", own->max_step, is_step(own->max_step)},
         {"max_internal_steps", own->max_internal_steps,
          instance->integrator == NULL || own->max_internal_steps >= 1},
+        {"max_events", own->max_events, own->max_events >= 1},
+        {"event_count", own->event_count, own->event_count >= 0},
+        {"last_event_time", own->last_event_time, isfinite(own->last_event_time)},
         {"solver_method", own->solver_method,
          own->solver_method > INTEGRATOR_NO_METHOD && own->solver_method < INTEGRATOR_METHODS &&
              (!instance_has_integrator(instance) ||

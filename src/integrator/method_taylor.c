@@ -470,8 +470,8 @@ static bool interpolate(void *memory, double t, double x[]) {
     return true;
 }
 
-/* The length of a step follows from the series. With events, it is expanded for what was left of the
- * last one. */
+/* The length of a step follows from the series. With events, it is expanded for what was left of
+ * the last one. */
 static double next_step(void *memory, const double x[]) {
     const struct taylor *taylor = memory;
     const struct problem *problem = taylor->problem;

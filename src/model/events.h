@@ -47,8 +47,8 @@ struct model_events {
     struct span sums;  /* double[]: sums over events, such as losses; as modes */
     struct span discrete_inputs; /* int[]: Boolean inputs */
 
-    /* Whether there can be events with these parameters. If not, update writes the modes in which the
-     * right-hand side is smooth everywhere. */
+    /* Whether there can be events with these parameters. If not, update writes the modes in which
+     * the right-hand side is smooth everywhere. */
     bool (*are_possible)(const void *values);
 
     /* In these modes no state moves, whatever the inputs are. */

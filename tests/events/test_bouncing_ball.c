@@ -1,5 +1,6 @@
 /* A ball that bounces: impacts at v1 / g + 2 v1 (e + ... + e^(k-1)) / g, rest at
  * v1 / g (1 + e) / (1 - e) from a height with v1 = sqrt(2 g h). */
+#include "continuous_states.h"
 #include "toy_run.h"
 
 #include <string.h>
@@ -144,6 +145,48 @@ static void test_the_lift_takes_it_from_the_floor(void) {
     }
 }
 
+/* An integrator outside ends a little before the impact or a little after it. */
+static void test_integrated_from_outside_it_bounces_once(void) {
+    static const double heights[] = {-1e-3, -1e-12, 0.0, 1e-12};
+    for (int i = 0; i < 4; i++) {
+        bool has_jumped = false;
+        prepare(&ball_description, 1, 1e-8);
+        instance_integrate_outside(toy);
+        initialize();
+        const double falling[2] = {heights[i], -2.0};
+        double x[2];
+        ASSERT_OK(instance_enter_continuous_time(toy));
+        ASSERT_OK(instance_set_time(toy, 0.4));
+        ASSERT_OK(instance_set_states(toy, falling, 2));
+        instance_enter_event_mode(toy);
+        for (int k = 0; k < 3; k++) {
+            ASSERT_OK(instance_update_discrete_states(toy, &has_jumped));
+            TEST_ASSERT_EQUAL_INT(k == 0, has_jumped);
+        }
+        ASSERT_OK(instance_get_states(toy, x, 2));
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, x[0]);
+        TEST_ASSERT_EQUAL_DOUBLE(1.6, x[1]);
+        TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
+        TEST_ASSERT_EQUAL_DOUBLE(0.4, get(TOY_LAST_EVENT));
+    }
+}
+
+static void test_integrated_from_outside_nothing_happens_elsewhere(void) {
+    static const double states[][2] = {{1e-3, -2.0}, {1e-12, 2.0}, {0.0, 2.0}};
+    for (int i = 0; i < 3; i++) {
+        bool has_jumped = true;
+        prepare(&ball_description, 1, 1e-8);
+        instance_integrate_outside(toy);
+        initialize();
+        ASSERT_OK(instance_enter_continuous_time(toy));
+        ASSERT_OK(instance_set_states(toy, states[i], 2));
+        instance_enter_event_mode(toy);
+        ASSERT_OK(instance_update_discrete_states(toy, &has_jumped));
+        TEST_ASSERT_FALSE(has_jumped);
+        TEST_ASSERT_EQUAL_INT(0, get_int(TOY_EVENTS));
+    }
+}
+
 int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_times_of_impacts);
@@ -153,5 +196,7 @@ int main(void) {
     RUN_TEST(test_restitution_1_keeps_the_energy);
     RUN_TEST(test_a_limit_of_events_ends_the_step);
     RUN_TEST(test_the_lift_takes_it_from_the_floor);
+    RUN_TEST(test_integrated_from_outside_it_bounces_once);
+    RUN_TEST(test_integrated_from_outside_nothing_happens_elsewhere);
     return UNITY_END();
 }

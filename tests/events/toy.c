@@ -27,10 +27,8 @@ static enum status jacobian(const void *values, double t, const double x[], cons
 
 static void extend_motion(const struct series_origin *origin, int k, double a,
                           double rows[][SERIES_LENGTH]) {
-    if (k > 0) {
-        rows[0][k] = origin->unit / k * rows[1][k - 1];
-        rows[1][k] = origin->unit / k * a;
-    }
+    rows[0][k] = origin->unit / k * rows[1][k - 1];
+    rows[1][k] = origin->unit / k * a;
 }
 
 static double input_order(const struct series_origin *origin, int k) {
@@ -40,7 +38,7 @@ static double input_order(const struct series_origin *origin, int k) {
 static enum status ball_extend(const struct series_origin *origin, int first, int last,
                                double rows[][SERIES_LENGTH]) {
     const struct ball_values *ball = origin->values;
-    for (int k = first; k <= last; k++) {
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
         const double pull = k == 1 ? ball->g : 0.0;
         extend_motion(origin, k, ball->is_resting ? 0.0 : input_order(origin, k - 1) - pull, rows);
     }
@@ -161,7 +159,7 @@ static enum status block_rhs(const void *values, double t, const double x[], con
 static enum status block_extend(const struct series_origin *origin, int first, int last,
                                 double rows[][SERIES_LENGTH]) {
     const struct block_values *block = origin->values;
-    for (int k = first; k <= last; k++) {
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
         const double friction = k == 1 ? block->direction * block->coulomb : 0.0;
         const double force = block->direction == 0 ? 0.0 : input_order(origin, k - 1) - friction;
         extend_motion(origin, k, force / block->m, rows);
@@ -335,14 +333,15 @@ static const struct variable block_variables[] = {
 
 static const short row_of_reference[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
 
-#define DESCRIPTION(text, model_symbol, table)                                                     \
+#define DESCRIPTION(text, model_symbol, table, indicators)                                         \
     {                                                                                              \
         .name = (text), .guid = "{" text "}", .default_tolerance = 1e-8, .model = &(model_symbol), \
         .variables = (table), .variable_count = sizeof(table) / sizeof *(table),                   \
-        .row_of_reference = row_of_reference,                                                      \
+        .row_of_reference = row_of_reference, .indicator_count = (indicators),                     \
         .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],                   \
     }
 
-const struct model_description ball_description = DESCRIPTION("Ball", ball_model, ball_variables);
+const struct model_description ball_description =
+    DESCRIPTION("Ball", ball_model, ball_variables, 2);
 const struct model_description block_description =
-    DESCRIPTION("Block", block_model, block_variables);
+    DESCRIPTION("Block", block_model, block_variables, 3);

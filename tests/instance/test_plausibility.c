@@ -81,6 +81,7 @@ static void test_times_are_finite(void) {
     check_real(&state.time.s, "time", finite, infinite);
     check_real(&state.time.rest, "rest of time", finite, infinite);
     check_real(&state.own.time, "variable time", finite, infinite);
+    check_real(&state.own.last_event_time, "last_event_time", finite, infinite);
     check_real(&state.restart_time.s, "restart_time", finite, infinite);
     check_real(&state.restart_time.rest, "rest of restart_time", finite, infinite);
     check_real(&state.statistics.last_step, "last_step", finite, infinite);
@@ -130,6 +131,12 @@ static void test_phase_method_and_limit_exist(void) {
     TEST_ASSERT_TRUE(is_plausible());
     state.own.max_internal_steps = 0;
     assert_refused("max_internal_steps = 0");
+    state = saved;
+    state.own.max_events = 0;
+    assert_refused("max_events = 0");
+    state = saved;
+    state.own.event_count = -1;
+    assert_refused("event_count = -1");
 }
 
 static void test_an_experiment_can_be_run(void) {
@@ -157,8 +164,8 @@ static void test_a_history_does_not_contradict_itself(void) {
     check_real(&state.span, "span", span, not_span);
 
     // internal steps since the restart: at least one, and no more than restart and step allow
-    const int64_t most =
-        integrator_longest_history(INTEGRATOR_CVODE_ADAMS, false) + (int64_t)state.own.max_internal_steps;
+    const int64_t most = integrator_longest_history(INTEGRATOR_CVODE_ADAMS, false) +
+                         (int64_t)state.own.max_internal_steps;
     state.statistics.steps = state.steps_before_restart + most;
     TEST_ASSERT_TRUE(is_plausible());
     state.statistics.steps++;

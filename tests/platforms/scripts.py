@@ -346,7 +346,7 @@ def restore(model: Model, state: str) -> Script:
 
 # ---- Failing allocations -------------------------------------------------------------------------
 
-MOST_ALLOCATIONS = 8  # in one call; more than any call needs
+MOST_ALLOCATIONS = 24  # in one call; more than any call needs
 
 
 def faults(model: Model) -> Script:
