@@ -140,8 +140,8 @@ def test_held_for_an_hour(plant: Fmu, method: str, h: float) -> None:
 def test_a_slide_bounces_to_rest(plant: Fmu, method: str, h: float) -> None:
     """Impact k at t1 + 2 v1 (e + ... + e^(k-1)) / g; at rest t1 (1 + e) / (1 - e) after the start.
 
-    Rest comes early by the bounces that go no higher than the absolute tolerance of q2; those before
-    them are not much higher, and as inexact.
+    Rest comes early by the bounces that go no higher than the absolute tolerance of q2; those
+    before them are not much higher, and as inexact.
     """
     g, e, height = 9.81, 0.8, 0.5
     t1 = math.sqrt(2 * height / g)
