@@ -1,5 +1,6 @@
 """RPPlant beside RPManipulator: the same interface, and with start values the same bits."""
 
+import re
 import xml.etree.ElementTree as ET
 from zipfile import ZipFile
 
@@ -14,6 +15,7 @@ from cosim.scenario import Scenario
 from cosim.simulation import initialize
 from tests.rp_plant.plant_runs import METHODS, NONE, RIGID, started
 from tests.support.cosim_project import load, names_of
+from tests.support.paths import ROOT
 
 COUNTS = (
     "solver_steps",
@@ -23,7 +25,7 @@ COUNTS = (
     "solver_last_order",
 )
 INDICATORS = [
-    f"{kind}"
+    kind
     for i in (1, 2)
     for kind in (f"slip{i}_forward", f"slip{i}_backward", f"stop{i}_lower", f"stop{i}_upper")
 ]
@@ -166,3 +168,26 @@ def test_values_that_do_not_fit_each_other_are_refused(
 def test_limits_play_no_role_without_stops(plant: Fmu) -> None:
     with started(plant, stops2=NONE, lower2=1.0, upper2=-1.0, q2=5.0) as instance:
         instance.do_step(0.0, 1e-3)
+
+
+def test_the_page_names_every_variable(plant: Fmu, arm: Fmu) -> None:
+    """Of those that the arm does not have."""
+    page = (ROOT / "models" / "rp_plant" / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"`(\w+)`", page))
+    assert set(plant.model.variables) - set(arm.model.variables) <= named
+
+
+def test_terminals_fit_those_of_the_arm(plant: Fmu, arm: Fmu) -> None:
+    """The joints have the same members; the end effector takes a wrench, too."""
+    members = {}
+    for fmu in (plant, arm):
+        with ZipFile(fmu.path) as archive:
+            root = ET.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        members[fmu] = {
+            terminal.get("name"): {
+                m.get("variableName") for m in terminal.iter() if "variableName" in m.attrib
+            }
+            for terminal in root.find("Terminals")
+        }
+    assert members[plant]["arm"] == members[arm]["arm"]
+    assert members[plant]["end_effector"] > members[arm]["end_effector"] | {"ee_fx", "ee_mz"}
