@@ -46,13 +46,15 @@ static bool goes_on(const struct instance *instance, double target) {
            parameters_are_held(instance);
 }
 
+int64_t instance_longest_history(const struct instance *instance) {
+    return integrator_longest_history(instance->configured.method, instance_is_searched(instance));
+}
+
 /* Beyond what the internal steps have passed, one more would make the history too long. */
 static bool is_at_end(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
-    return target > state->passed_time &&
-           steps >= integrator_longest_history(instance->configured.method,
-                                               instance_is_searched(instance));
+    return target > state->passed_time && steps >= instance_longest_history(instance);
 }
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
@@ -76,7 +78,9 @@ static struct integrator_start start_of(struct instance *instance) {
     return (struct integrator_start){.span = state->span,
                                      .first_step = state->restart_step,
                                      .goes_on = state->restart_goes_on,
-                                     .indicators = instance_describe_indicators(instance)};
+                                     .indicators = instance->model->events != NULL
+                                                       ? instance_describe_indicators(instance)
+                                                       : NULL};
 }
 
 /* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
@@ -92,12 +96,12 @@ static void hold_bytes(struct instance *instance, struct span span) {
     memcpy(instance->memory.held + span.offset, instance->memory.values + span.offset, span.size);
 }
 
-void instance_hold(struct instance *instance, struct clock_time end,
-                   const struct polynomial inputs[]) {
+static inline void hold_all(struct instance *instance, struct clock_time end,
+                            const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
     const struct model *model = instance->model;
-    if (!parameters_are_held(instance)) {
+    if (has_new_parameters) {
         hold_bytes(instance, model->parameters);
     }
     if (model->events != NULL) {
@@ -120,23 +124,28 @@ void instance_hold(struct instance *instance, struct clock_time end,
     }
     state->restart_time = state->time;
     state->first_time = target;
-    state->latest_time = 0.0;
-    instance->history_is_lost = false;
     state->has_history = false; // until the first advance has succeeded
+    instance->history_is_lost = false;
+}
+
+void instance_hold(struct instance *instance, struct clock_time end,
+                   const struct polynomial inputs[]) {
+    hold_all(instance, end, inputs, !parameters_are_held(instance));
 }
 
 static enum status restart(struct instance *instance, struct clock_time end,
                            enum continuation continuation) {
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
+    const bool is_event = continuation == CONTINUE_AFTER_EVENT;
+    const bool has_new_parameters = !parameters_are_held(instance);
     // the last step gives the length of the first one, unless the parameters have changed
-    if (!parameters_are_held(instance)) {
+    if (has_new_parameters) {
         state->next_step = 0.0;
-    } else if (continuation != CONTINUE_AFTER_EVENT) {
+    } else if (!is_event) {
         instance_update_next_step(instance);
     }
-    const bool is_event = continuation == CONTINUE_AFTER_EVENT;
-    instance_hold(instance, end, is_event ? memory->current : memory->pending);
+    hold_all(instance, end, is_event ? memory->current : memory->pending, has_new_parameters);
 
     // note what a replay needs
     state->steps_before_restart = state->statistics.steps;

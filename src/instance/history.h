@@ -20,6 +20,9 @@ enum continuation {
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
                                                            double target);
 
+/* integrator_longest_history of the method, in the present modes. */
+NONNULL int64_t instance_longest_history(const struct instance *instance);
+
 /* What is set now holds from the present time on, the inputs being these polynomials of time, up to
  * the time end at least: the history is over. */
 NONNULL void instance_hold(struct instance *instance, struct clock_time end,

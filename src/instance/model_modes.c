@@ -5,11 +5,6 @@
 #include <limits.h>
 #include <string.h>
 
-bool instance_is_searched(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return events != NULL && events->are_possible(instance->memory.held);
-}
-
 bool instance_is_at_rest(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
     return events != NULL && events->is_at_rest(instance->memory.values);

@@ -4,8 +4,12 @@
 
 #include "internals.h"
 
-/* There can be events with the parameters that the integrator runs with. */
-NONNULL bool instance_is_searched(const struct instance *instance);
+/* There can be events with the parameters that the integrator runs with. Inline, as it is part of
+ * each step of models without events too. */
+static inline bool instance_is_searched(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->are_possible(instance->memory.held);
+}
 
 /* No state moves in the present modes. */
 NONNULL bool instance_is_at_rest(const struct instance *instance);

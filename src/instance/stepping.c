@@ -181,6 +181,10 @@ static bool observe(void *step_pointer, double t, const double x[]) {
     return report(step);
 }
 
+static bool is_at_event(const struct instance *instance) {
+    return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
+}
+
 /* To step->end, which may come forward on the way. */
 static enum status advance(struct step *step) {
     struct instance *instance = step->instance;
@@ -196,8 +200,7 @@ static enum status advance(struct step *step) {
         status = integrator_advance(instance->integrator,
                                     clock_difference(step->end, state->restart_time), steps,
                                     &state->latest_time, x);
-        if (status != STATUS_OK || step->is_over ||
-            integrator_event(instance->integrator) != NULL ||
+        if (status != STATUS_OK || step->is_over || is_at_event(instance) ||
             !(state->latest_time < clock_difference(step->end, state->restart_time))) {
             break;
         }
@@ -231,8 +234,8 @@ static bool interpolate(const struct step *step, double target) {
     return true;
 }
 
-/* To step->end, or to an event; *fired: what has fired there; NULL: the end is reached. */
-static enum status move(struct step *step, enum continuation continuation, const bool **fired) {
+/* To step->end, or to an event before it. */
+static enum status move(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
     enum status status = instance_prepare_history(instance, step->end, continuation);
@@ -240,12 +243,10 @@ static enum status move(struct step *step, enum continuation continuation, const
         return status;
     }
     status = advance(step);
-    *fired = status == STATUS_OK ? integrator_event(instance->integrator) : NULL;
 
     // a step that ended early cannot be replayed: its end was not known when it began
-    state->has_history =
-        status == STATUS_OK && !step->is_early && *fired == NULL &&
-        integrator_longest_history(instance->configured.method, instance_is_searched(instance)) > 0;
+    const bool is_whole = !step->is_early && !is_at_event(instance);
+    state->has_history = status == STATUS_OK && is_whole && instance_longest_history(instance) > 0;
     state->passed_time = integrator_passed_time(instance->integrator);
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
@@ -255,24 +256,21 @@ static enum status move(struct step *step, enum continuation continuation, const
 }
 
 /* The same where no state moves: time passes until an input sets them free. */
-static enum status rest(struct step *step, const bool **fired) {
+static enum status rest(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
+    const bool is_after_event = step->events > 0;
     instance_hold(instance, step->end,
-                  step->events > 0 ? instance->memory.current : instance->memory.pending);
+                  is_after_event ? instance->memory.current : instance->memory.pending);
+    const struct integrator_start start = {
+        .span = state->span,
+        // inputs that are held leave the modes as they are
+        .indicators = instance->inputs_move ? instance_describe_indicators(instance) : NULL,
+    };
     state->next_step = 0.0;
-    *fired = NULL;
-    state->latest_time = state->first_time;
-    if (!instance->inputs_move) {
-        return STATUS_OK;
-    }
-    const struct integrator_start start = {.span = state->span,
-                                           .indicators = instance_describe_indicators(instance)};
-    const enum status status = integrator_rest(
-        instance->integrator, doubles_of(instance->memory.held, instance->model->states), &start,
-        state->first_time, &state->latest_time);
-    *fired = status == STATUS_OK ? integrator_event(instance->integrator) : NULL;
-    return status;
+    return integrator_rest(instance->integrator,
+                           doubles_of(instance->memory.held, instance->model->states), &start,
+                           state->first_time, &state->latest_time);
 }
 
 /* The instance goes to the time of an event, and its modes change. */
@@ -288,32 +286,40 @@ static enum status pass_event(struct step *step, const bool fired[]) {
     return status == STATUS_OK ? instance_update_modes(instance, fired) : status;
 }
 
-static enum status integrate(struct step *step) {
+/* To step->end over all events on the way. */
+static enum status move_over_events(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    const double target = clock_difference(step->end, state->restart_time);
-    enum continuation continuation = instance_continuation(instance, target);
-    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
-        return STATUS_OK;
-    }
-    keep(step);
     enum status status = STATUS_OK;
     if (continuation == CONTINUE_AFTER_CHANGE) {
         status = instance_update_modes(instance, NULL);
     }
     while (status == STATUS_OK) {
-        const bool *fired = NULL;
-        status =
-            instance_is_at_rest(instance) ? rest(step, &fired) : move(step, continuation, &fired);
-        if (status != STATUS_OK || fired == NULL) {
+        const bool is_at_rest = instance_is_at_rest(instance);
+        status = is_at_rest ? rest(step) : move(step, continuation);
+        if (status != STATUS_OK || integrator_event(instance->integrator) == NULL) {
             break;
         }
-        status = pass_event(step, fired);
-        if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
+        status = pass_event(step, integrator_event(instance->integrator));
+        if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
             break;
         }
         continuation = CONTINUE_AFTER_EVENT;
     }
+    return status;
+}
+
+static enum status integrate(struct step *step) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const double target = clock_difference(step->end, state->restart_time);
+    const enum continuation continuation = instance_continuation(instance, target);
+    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
+        return STATUS_OK;
+    }
+    keep(step);
+    const enum status status = instance->model->events == NULL
+                                   ? move(step, continuation)
+                                   : move_over_events(step, continuation);
     arrive(step,
            status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
     return status;

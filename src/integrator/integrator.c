@@ -147,7 +147,10 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     problem->reached = 0.0;
     problem->failed_at = -INFINITY;
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));
-    const enum status status = location_restart(&problem->location, start->indicators, x);
+    enum status status = STATUS_OK;
+    if (start->indicators != NULL || location_is_active(&problem->location)) {
+        status = location_restart(&problem->location, start->indicators, x);
+    }
     return status == STATUS_OK ? integrator->method->restart(integrator->memory, x) : status;
 }
 
