@@ -156,7 +156,7 @@ static void arrive(struct rp_plant_values *values, const struct fired *fired, in
     }
 }
 
-/* Bouncing comes to rest where the next bounce goes no higher than the absolute tolerance of q: at
+/* Bouncing comes to rest where the next bounce goes no higher than the tolerance of q there: at
  * v^2 / (2 |q''|), where q'' points into the stop. Such an impact is a plastic one. */
 static bool makes_last_impact_plastic(const struct rp_plant_values *values,
                                       const struct event *event, const double dq_after[2],

@@ -92,14 +92,15 @@ static bool setup_events(struct instance *instance) {
     const size_t state_count = count_of(model->states);
     const size_t count = model->events->indicator_count;
     instance->absolute_tolerances =
-        calloc(state_count + count_of(model->inputs) + 2 * count, sizeof(double));
+        calloc(2 * state_count + count_of(model->inputs) + 2 * count, sizeof(double));
     instance->indicators = calloc(count, sizeof *instance->indicators);
     instance->fired = calloc(count, sizeof *instance->fired);
     if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
         instance->fired == NULL) {
         return false;
     }
-    instance->du = instance->absolute_tolerances + state_count;
+    instance->tolerances = instance->absolute_tolerances + state_count;
+    instance->du = instance->tolerances + state_count;
     instance->z = instance->du + count_of(model->inputs);
     instance->ode.indicator_count = model->events->indicator_count;
     instance->ode.indicators = instance_indicators;

@@ -79,6 +79,7 @@ struct instance {
                                               tolerances of the states */
     double *absolute_tolerances;  /* one per state, as the integrator has them; NULL: the model has
                                      no events */
+    double *tolerances;           /* one per state, at its value at the last event */
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* two per indicator */

@@ -3,6 +3,7 @@
 #include "fields.h"
 
 #include <limits.h>
+#include <math.h>
 #include <string.h>
 
 bool instance_is_at_rest(const struct instance *instance) {
@@ -18,8 +19,20 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
     return instance->indicators;
 }
 
+/* What the integrator may miss a state by: away from 0 the relative tolerance is the larger part.
+ */
+static void write_tolerances(struct instance *instance) {
+    const struct span states = instance->model->states;
+    const double *x = doubles_of(instance->memory.values, states);
+    for (size_t i = 0; i < count_of(states); i++) {
+        instance->tolerances[i] = instance->absolute_tolerances[i] +
+                                  instance->state.own.effective_relative_tolerance * fabs(x[i]);
+    }
+}
+
 static enum status update(struct instance *instance, const bool *fired) {
     const struct model_events *events = instance->model->events;
+    write_tolerances(instance);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         instance->du[i] = instance->memory.current[i].d[1];
     }
@@ -27,7 +40,7 @@ static enum status update(struct instance *instance, const bool *fired) {
         .t = instance->state.time.s,
         .fired = fired,
         .du = instance->du,
-        .tolerance = instance->absolute_tolerances,
+        .tolerance = instance->tolerances,
     };
     const enum status status = events->update(instance->memory.values, &event);
     if (status != STATUS_OK) {

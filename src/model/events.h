@@ -36,7 +36,7 @@ struct event {
     const bool *fired;       /* one per indicator: it falls to 0 here. NULL: none does; inputs or
                                 parameters have changed, or the initialization ends */
     const double *du;        /* derivative of each input by the time after the event */
-    const double *tolerance; /* absolute tolerance of each state, in its unit */
+    const double *tolerance; /* of each state, in its unit: relative part and absolute one */
 };
 
 struct model_events {
