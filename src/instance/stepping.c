@@ -235,7 +235,7 @@ static bool interpolate(const struct step *step, double target) {
 }
 
 /* To step->end, or to an event before it. */
-static enum status move(struct step *step, enum continuation continuation) {
+ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
     enum status status = instance_prepare_history(instance, step->end, continuation);

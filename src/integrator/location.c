@@ -79,7 +79,7 @@ static double first_fall(const struct roots_polynomial *p, bool *is_armed) {
         end += p->c[k];
     }
     *is_armed = end > 0.0;
-    return end < 0.0 && count == 0 ? 0.0 : INFINITY;
+    return end < 0.0 ? 0.0 : INFINITY;
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */

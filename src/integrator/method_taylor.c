@@ -36,6 +36,7 @@ struct taylor {
     int largest_order;
     double begin;        /* of the series, s since the restart */
     double unit;         /* of its coefficients, s */
+    bool is_searched;    /* for events, since the restart */
     double longest_unit; /* s: of the next step of the running advance */
     int order;
     int noted_order;    /* the largest whose size is noted */
@@ -107,6 +108,7 @@ static enum status restart(void *memory, const double x[]) {
     struct taylor *taylor = memory;
     (void)x;
     taylor->passed = -INFINITY;
+    taylor->is_searched = location_is_active(&taylor->problem->location);
     taylor->last_length = taylor->problem->first_step;
     return STATUS_OK;
 }
@@ -346,7 +348,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
  * on t: there it is the length of the step before. */
 static double length_to_expand(const struct taylor *taylor, double now, double t, bool is_long) {
     const double longest = longest_step(taylor->problem, now);
-    if (is_long && location_is_active(&taylor->problem->location) && taylor->last_length > 0.0) {
+    if (is_long && taylor->is_searched && taylor->last_length > 0.0) {
         return taylor->last_length < longest ? taylor->last_length : longest;
     }
     // parts of equal length leave no sliver at the end; nor does rounding
@@ -408,8 +410,7 @@ static enum status search(struct taylor *taylor, double end) {
 /* Where an advance begins, with the state there: with events, at the end of the last step. */
 static double begin_advance(struct taylor *taylor, const double begin_x[], double x[]) {
     const struct problem *problem = taylor->problem;
-    const bool has_passed =
-        location_is_active(&problem->location) && taylor->passed > problem->reached;
+    const bool has_passed = taylor->is_searched && taylor->passed > problem->reached;
     memcpy(x, has_passed ? taylor->end_x : begin_x, problem->ode.state_count * sizeof(double));
     const double begin = has_passed ? taylor->passed : problem->reached;
     taylor->passed = -INFINITY;
@@ -421,7 +422,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
                            double *stopped_at, double x[], struct method_work *work) {
     struct taylor *taylor = memory;
     const struct problem *problem = taylor->problem;
-    const bool is_searched = location_is_active(&problem->location);
+    const bool is_searched = taylor->is_searched;
     bool is_long = problem->reached == 0.0 ? problem->goes_on : is_searched;
     *stopped_at = begin_advance(taylor, begin_x, x);
     work->internal = *stopped_at;
@@ -440,7 +441,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         if (status != STATUS_OK) {
             return status;
         }
-        if (problem->location.time <= t) {
+        if (is_searched && problem->location.time <= t) {
             taylor->passed = end;
             *stopped_at = problem->location.time;
             evaluate(taylor, (*stopped_at - taylor->begin) / taylor->unit, x, NULL);
