@@ -131,9 +131,9 @@ enum status instance_count_event(struct instance *instance, const bool fired[],
             first++;
         }
         message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
-                      "event %d of the step, %s at t = %.17g, is one more than max_events = %d",
-                      *count_in_step + 1, events->indicator_names[first], own->time,
-                      own->max_events);
+                      "the step ended at %.17g: there %s fell to 0, one more event than "
+                      "max_events = %d",
+                      own->time, events->indicator_names[first], own->max_events);
         return STATUS_TOO_MANY_EVENTS;
     }
     ++*count_in_step;

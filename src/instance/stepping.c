@@ -280,9 +280,6 @@ static enum status pass_event(struct step *step, const bool fired[]) {
     instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
     place_inputs(instance, clock_difference(state->time, step->begin));
     const enum status status = instance_count_event(instance, fired, &step->events);
-    if (state->next_step == 0.0) {
-        state->next_step = state->statistics.last_step;
-    }
     return status == STATUS_OK ? instance_update_modes(instance, fired) : status;
 }
 
@@ -341,6 +338,9 @@ static enum status do_step(struct step *step, double communication_point, double
         arrive(step, step->end);
     } else {
         status = integrate(step);
+    }
+    if (status == STATUS_TOO_MANY_EVENTS) {
+        return status; // the message has been sent
     }
     if (status != STATUS_OK) {
         message_write(

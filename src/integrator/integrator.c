@@ -72,7 +72,8 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->reached_x = created->values + n;
     created->x = created->values + 2 * n;
     if (!reserve_create(&created->reserve, reserve_size(ode)) ||
-        !location_create(&created->problem.ode, &created->problem.location)) {
+        !location_create(&created->problem.ode, created->absolute_tolerances,
+                         &created->problem.location)) {
         integrator_destroy(created);
         return STATUS_OUT_OF_MEMORY;
     }

@@ -7,10 +7,10 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-bool location_create(const struct ode *ode, struct location *location) {
+bool location_create(const struct ode *ode, const double tolerances[], struct location *location) {
     const size_t states = ode->state_count;
     const size_t count = ode->indicator_count;
-    *location = (struct location){.ode = ode, .time = INFINITY};
+    *location = (struct location){.ode = ode, .tolerances = tolerances, .time = INFINITY};
     if (count == 0) {
         return true;
     }
@@ -45,6 +45,13 @@ static enum status evaluate(struct location *location, double t, const double x[
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
 
+/* An indicator as small as this may be 0. */
+static double noise_of_state(const struct location *location, const struct indicator *indicator) {
+    return indicator->kind == INDICATOR_OF_STATE
+               ? fabs(indicator->factor) * location->tolerances[indicator->state]
+               : 0.0;
+}
+
 enum status location_restart(struct location *location, const struct indicator *indicators,
                              const double x[]) {
     location->indicators = indicators;
@@ -54,32 +61,52 @@ enum status location_restart(struct location *location, const struct indicator *
     }
     const enum status status = evaluate(location, 0.0, x);
     for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
-        location->is_armed[i] = location->z[i] > 0.0;
+        location->is_armed[i] = location->z[i] > noise_of_state(location, &indicators[i]);
     }
     return status;
 }
 
 /* ---- Roots ---------------------------------------------------------------------------------- */
 
-/* The first s at which an indicator falls to 0; INFINITY: it does not. Before the step it has been
- * above 0, or else it is about 0 since the restart and is to rise. */
-static double first_fall(const struct roots_polynomial *p, bool *is_armed) {
-    if (*is_armed) {
-        return roots_first(p);
+static double value_at_end(const double c[], int degree) {
+    double value = 0.0;
+    for (int k = degree; k >= 0; k--) {
+        value += c[k];
     }
+    return value;
+}
+
+/* The last fall to 0 up to this s; INFINITY: there is none. */
+static double last_fall(const struct roots_polynomial *p, double s) {
     struct root roots[ROOTS_LENGTH];
     const int count = roots_find(p, roots);
-    for (int i = 0; i < count; i++) {
-        if (roots[i].kind == ROOT_FALLS) {
-            return roots[i].s;
-        }
+    double last = INFINITY;
+    for (int i = 0; i < count && roots[i].s <= s; i++) {
+        last = roots[i].kind == ROOT_FALLS ? roots[i].s : last;
     }
-    double end = 0.0;
-    for (int k = p->degree; k >= 0; k--) {
-        end += p->c[k];
+    return last;
+}
+
+/* The first fall of an indicator that is 0 at a restart and is to rise. As small as the noise it
+ * may have either sign; it has fallen where it is below the noise, and did so where it was 0 last.
+ */
+static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
+    double c[ROOTS_LENGTH];
+    memcpy(c, p->c, ((size_t)p->degree + 1) * sizeof *c);
+    c[0] += noise;
+    const struct roots_polynomial above = {.c = c, .degree = p->degree, .noise = -1.0};
+    const double below = roots_first(&above);
+    if (below == INFINITY) {
+        *is_armed = value_at_end(p->c, p->degree) > noise;
+        return INFINITY;
     }
-    *is_armed = end > 0.0;
-    return end < 0.0 ? 0.0 : INFINITY;
+    return fmin(below, last_fall(p, below));
+}
+
+/* The first s at which an indicator falls to 0; INFINITY: it does not. Where it is armed it has
+ * been above 0 before the step. */
+static double first_fall(const struct roots_polynomial *p, double noise, bool *is_armed) {
+    return *is_armed ? roots_first(p) : first_fall_from_zero(p, noise, is_armed);
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */
@@ -94,7 +121,7 @@ static void shift(double c[], int degree) {
 }
 
 static double first_of_state(const struct step_polynomial *step, const struct indicator *indicator,
-                             bool *is_armed) {
+                             double noise, bool *is_armed) {
     const double *row = step->row[indicator->state];
     double c[ROOTS_LENGTH];
     const struct roots_polynomial p = {.c = c, .degree = step->degree, .noise = -1.0};
@@ -103,7 +130,7 @@ static double first_of_state(const struct step_polynomial *step, const struct in
         for (int k = 1; k <= step->degree; k++) {
             c[k] = indicator->factor * row[k];
         }
-        return first_fall(&p, is_armed);
+        return first_fall(&p, noise, is_armed);
     }
     // backwards in time a proof needs no shift
     for (int k = 1; k <= step->degree; k++) {
@@ -117,7 +144,7 @@ static double first_of_state(const struct step_polynomial *step, const struct in
         c[k] = indicator->factor * row[k];
     }
     shift(c, step->degree);
-    return first_fall(&p, is_armed);
+    return first_fall(&p, noise, is_armed);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -179,22 +206,21 @@ static enum status begin_piece(struct location *location, double begin, double l
     return status;
 }
 
-/* Whether the polynomial through the samples shows where the indicator falls. */
-static bool is_represented(const double samples[], int count, double c[], double *error) {
+static double largest(const double samples[], int count) {
     double scale = 0.0;
     for (int k = 0; k < count; k++) {
         scale = fmax(scale, fabs(samples[k]));
     }
-    *error = chebyshev_interpolate(count, samples, c);
-    return *error <= representation * scale;
+    return scale;
 }
 
 /* Searches one indicator in a piece; false: the piece needs more points. */
 static bool search_piece(struct location *location, const struct piece *piece, size_t i,
                          bool is_last_try) {
     double c[ROOTS_LENGTH] = {0};
-    double error;
-    const bool is_exact = is_represented(location->samples[i], piece->count, c, &error);
+    const double error = chebyshev_interpolate(piece->count, location->samples[i], c);
+    const double noise = representation * largest(location->samples[i], piece->count);
+    const bool is_exact = error <= noise;
     struct roots_polynomial p = {.c = c, .degree = piece->count - 1, .noise = -1.0};
     if (!is_exact && !is_last_try) {
         // far enough above 0
@@ -205,7 +231,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
         }
         return false;
     }
-    const double s = first_fall(&p, &location->is_armed[i]);
+    const double s = first_fall(&p, noise, &location->is_armed[i]);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -250,9 +276,11 @@ enum status location_search(struct location *location) {
     bool needs_model = false;
     for (size_t i = 0; i < count; i++) {
         const struct indicator *indicator = &location->indicators[i];
-        location->first[i] = indicator->kind == INDICATOR_OF_STATE
-                                 ? first_of_state(step, indicator, &location->is_armed[i])
-                                 : INFINITY;
+        location->first[i] =
+            indicator->kind == INDICATOR_OF_STATE
+                ? first_of_state(step, indicator, location->tolerances[indicator->state],
+                                 &location->is_armed[i])
+                : INFINITY;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
     }
     const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;

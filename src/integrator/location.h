@@ -25,6 +25,7 @@ struct step_polynomial {
 struct location {
     const struct ode *ode;
     const struct indicator *indicators;  /* since the restart; NULL: none is searched */
+    const double *tolerances;            /* absolute ones, of the states */
     bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
     bool *fired;                         /* by indicator: it is at 0 at `time` */
     double time;                         /* of the event, s since the restart; INFINITY: none */
@@ -35,8 +36,10 @@ struct location {
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */
 };
 
-/* False where memory is short: then nothing has to be freed. */
-MUST_CHECK NONNULL bool location_create(const struct ode *ode, struct location *location);
+/* False where memory is short: then nothing has to be freed. tolerances: absolute ones of the
+ * states, which must stay. */
+MUST_CHECK NONNULL bool location_create(const struct ode *ode, const double tolerances[],
+                                        struct location *location);
 NONNULL void location_destroy(struct location *location);
 
 /* No event so far; indicators: those in force from now on, at the state x. */

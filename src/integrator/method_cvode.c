@@ -230,6 +230,17 @@ static enum status search(struct cvode *cvode, double begin, double end) {
     return location_search(&problem->location);
 }
 
+/* After an event the first internal step does not depend on where the next requested time is. */
+static bool does_not_depend_on_points(const struct problem *problem) {
+    return problem->goes_on && location_is_active(&problem->location);
+}
+
+/* A time to which CVODE's first step is looked for, s: it decides nothing but its longest length.
+ */
+static double longest_first_step(const struct problem *problem) {
+    return fmin(problem->span, 1.0);
+}
+
 /* Takes the internal steps to t, which CVode in normal mode would take, one by one, searches each
  * and asks the observer about each that changes the time. */
 static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
@@ -243,13 +254,15 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
     (void)CVodeGetCurrentTime(cvode->solver, &internal);
     int flag = CV_SUCCESS;
     while (flag >= 0 && internal < t && !*is_cut_short) {
+        const bool is_independent = internal == 0.0 && does_not_depend_on_points(problem);
         (void)CVodeGetNumSteps(cvode->solver, &steps);
         if (steps - begin == max_steps) {
             return CV_TOO_MUCH_WORK;
         }
         // the first one may have been taken by the advance before, which has not returned its end
         const double before = internal;
-        flag = CVode(cvode->solver, t, cvode->base.x, stopped_at, CV_ONE_STEP);
+        flag = CVode(cvode->solver, is_independent ? longest_first_step(problem) : t, cvode->base.x,
+                     stopped_at, CV_ONE_STEP);
         sundials_get_state(&cvode->base, x);
         internal = *stopped_at;
         if (flag >= 0 && location_is_active(&problem->location) && internal > before) {
@@ -278,7 +291,7 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
     const bool is_searched = location_is_active(&problem->location);
     int flag = CVodeSetMaxNumSteps(cvode->solver, sundials_steps(max_steps));
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
-        const double longest = is_searched && problem->goes_on ? problem->span : t;
+        const double longest = does_not_depend_on_points(problem) ? problem->span : t;
         flag = CVodeSetInitStep(cvode->solver, fmin(problem->first_step, longest));
     }
     if (flag == CV_SUCCESS) {
@@ -348,7 +361,8 @@ static double next_step(void *memory, const double x[]) {
     const double relative = problem->settings.relative_tolerance;
     const double *absolute = problem->settings.absolute_tolerances;
     const double *ddx = small_vector_data(cvode->base.work);
-    if (cvode->counted.last_order < 2 ||
+    // after an event the motion is another one
+    if (cvode->counted.last_order < 2 || problem->location.time == problem->reached ||
         CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
     }

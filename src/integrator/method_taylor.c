@@ -344,12 +344,16 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     return STATUS_NOT_FINITE;
 }
 
+/* s: where no step was before. */
+static const double first_length = 1e-3;
+
 /* Length that a step from now towards t is expanded for, s. With events, long steps must not depend
  * on t: there it is the length of the step before. */
 static double length_to_expand(const struct taylor *taylor, double now, double t, bool is_long) {
     const double longest = longest_step(taylor->problem, now);
-    if (is_long && taylor->is_searched && taylor->last_length > 0.0) {
-        return taylor->last_length < longest ? taylor->last_length : longest;
+    if (is_long && taylor->is_searched) {
+        const double last = taylor->last_length > 0.0 ? taylor->last_length : first_length;
+        return last < longest ? last : longest;
     }
     // parts of equal length leave no sliver at the end; nor does rounding
     const double parts = (t - now) / longest * (1.0 - 1e-14);
