@@ -17,7 +17,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->step.row = calloc(states, sizeof *location->step.row);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
-    location->x = calloc(states, sizeof *location->x);
+    location->x = calloc(2 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->is_armed = calloc(count, sizeof *location->is_armed);
     location->fired = calloc(count, sizeof *location->fired);
@@ -27,6 +27,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
         location_destroy(location);
         return false;
     }
+    location->dx = location->x + states;
     return true;
 }
 

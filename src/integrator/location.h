@@ -31,6 +31,7 @@ struct location {
     double time;                         /* of the event, s since the restart; INFINITY: none */
     struct step_polynomial step;         /* the last one; methods write it */
     double *x;                           /* at one point */
+    double *dx;                          /* room for another one */
     double *z;                           /* by indicator, at one point */
     double *first;                       /* by indicator: s of its first root in the step */
     double (*samples)[CHEBYSHEV_LENGTH]; /* by indicator */

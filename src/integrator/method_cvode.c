@@ -177,6 +177,53 @@ static enum status configure(void *memory) {
 
 /* ---- Integration ---------------------------------------------------------------------------- */
 
+/* Length of a first step from x, of order 1, whose error is about h^2 x'' / 2; 0: unknown. */
+static double step_of_curvature(const struct problem *problem, const double x[],
+                                const double ddx[]) {
+    const double relative = problem->settings.relative_tolerance;
+    const double *absolute = problem->settings.absolute_tolerances;
+    double sum = 0.0;
+    for (size_t i = 0; i < problem->ode.state_count; i++) {
+        const double weighted = ddx[i] / (relative * fabs(x[i]) + absolute[i]);
+        sum += weighted * weighted;
+    }
+    const double norm = sqrt(sum / (double)problem->ode.state_count);
+    const double step = first_step_fraction * sqrt(2.0 / norm);
+    return isfinite(step) ? step : 0.0;
+}
+
+/* After an event the first internal step does not depend on where the next requested time is. */
+static bool does_not_depend_on_points(const struct problem *problem) {
+    return problem->goes_on && location_is_active(&problem->location);
+}
+
+/* s: over this time x'' is taken. */
+static const double curvature_time = 1e-6;
+
+/* The length of a first step after an event, from its state, which is CVODE's; 0: unknown. */
+static double step_after_event(struct cvode *cvode) {
+    struct problem *problem = cvode->base.problem;
+    const size_t n = problem->ode.state_count;
+    const double *x = small_vector_data(cvode->base.x);
+    const double ahead = fmin(curvature_time, problem->span);
+    double *dx = problem->location.x;
+    double *ddx = small_vector_data(cvode->base.work);
+    if (problem_rhs(problem, 0.0, x, dx) != STATUS_OK) {
+        return 0.0;
+    }
+    double *moved = problem->location.dx;
+    for (size_t i = 0; i < n; i++) {
+        moved[i] = x[i] + ahead * dx[i];
+    }
+    if (problem_rhs(problem, ahead, moved, ddx) != STATUS_OK) {
+        return 0.0;
+    }
+    for (size_t i = 0; i < n; i++) {
+        ddx[i] = (ddx[i] - dx[i]) / ahead;
+    }
+    return step_of_curvature(problem, x, ddx);
+}
+
 static enum status restart(void *memory, const double x[]) {
     struct cvode *cvode = memory;
     sundials_set_state(&cvode->base, x);
@@ -228,11 +275,6 @@ static enum status search(struct cvode *cvode, double begin, double end) {
         }
     }
     return location_search(&problem->location);
-}
-
-/* After an event the first internal step does not depend on where the next requested time is. */
-static bool does_not_depend_on_points(const struct problem *problem) {
-    return problem->goes_on && location_is_active(&problem->location);
 }
 
 /* A time to which CVODE's first step is looked for, s: it decides nothing but its longest length.
@@ -291,8 +333,9 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
     const bool is_searched = location_is_active(&problem->location);
     int flag = CVodeSetMaxNumSteps(cvode->solver, sundials_steps(max_steps));
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
-        const double longest = does_not_depend_on_points(problem) ? problem->span : t;
-        flag = CVodeSetInitStep(cvode->solver, fmin(problem->first_step, longest));
+        flag = does_not_depend_on_points(problem)
+                   ? CVodeSetInitStep(cvode->solver, fmin(step_after_event(cvode), problem->span))
+                   : CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
     }
     if (flag == CV_SUCCESS) {
         // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
@@ -354,26 +397,15 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
                                              : status_of_flag(cvode->base.problem, flag);
 }
 
-/* The error of a step h of order 1 is about h^2 x'' / 2. */
 static double next_step(void *memory, const double x[]) {
     const struct cvode *cvode = memory;
     const struct problem *problem = cvode->base.problem;
-    const double relative = problem->settings.relative_tolerance;
-    const double *absolute = problem->settings.absolute_tolerances;
-    const double *ddx = small_vector_data(cvode->base.work);
     // after an event the motion is another one
     if (cvode->counted.last_order < 2 || problem->location.time == problem->reached ||
         CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
     }
-    double sum = 0.0;
-    for (size_t i = 0; i < problem->ode.state_count; i++) {
-        const double weighted = ddx[i] / (relative * fabs(x[i]) + absolute[i]);
-        sum += weighted * weighted;
-    }
-    const double norm = sqrt(sum / (double)problem->ode.state_count);
-    const double step = first_step_fraction * sqrt(2.0 / norm);
-    return isfinite(step) ? step : 0.0;
+    return step_of_curvature(problem, x, small_vector_data(cvode->base.work));
 }
 
 /* Measured over the scenarios: at 1/500 of the requested tolerance the error after 5000 restarts is
