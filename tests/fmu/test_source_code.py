@@ -23,13 +23,19 @@ from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-FMUS = ("RPManipulator", "RPController", "RPTrajectory")
+FMUS = ("RPManipulator", "RPPlant", "RPController", "RPTrajectory")
 SCENARIOS = {
     "RPManipulator": ["sine_efforts", "irregular_steps", "constant_effort"],
+    "RPPlant": ["sine_efforts", "irregular_steps"],
     "RPController": ["controller_computed_torque", "controller_limited_integral"],
     "RPTrajectory": ["arc_near_joint", "point_to_point_joint"],
 }
-METHODS = {"RPManipulator": (1, 2, 3, 4), "RPController": (1, 2, 3), "RPTrajectory": (1, 2, 3)}
+METHODS = {
+    "RPManipulator": (1, 2, 3, 4),
+    "RPPlant": (1, 2, 3),
+    "RPController": (1, 2, 3),
+    "RPTrajectory": (1, 2, 3),
+}
 STEPS = 250  # of each scenario
 
 # of the C runtime of mingw, which is linked statically: they look at bits
@@ -157,6 +163,7 @@ class Build:
 
 
 BUILDS = (
+    Build("RPPlant", "gcc", ("-O1", "-fPIC")),
     Build("RPController", "gcc", ("-O2", "-fPIC")),
     Build("RPTrajectory", "clang", ("-fPIC",)),
     Build("RPManipulator", "aarch64-linux-gnu-gcc", ("-O2", "-fPIC"), "aarch64-linux-gnu-"),
