@@ -1,0 +1,57 @@
+"""Events of the built FMU at communication points, and after long internal steps."""
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from cosim.fmu_file import Fmu
+from tests.rp_plant.plant_runs import FIRM, METHODS, RIGID, events, read, started
+
+each_method = pytest.mark.parametrize("method", METHODS)
+
+
+@each_method
+@pytest.mark.parametrize("h", [1e-3, 1e-2])
+def test_joint_2_breaks_away_once_at_a_communication_point(
+    plant: Fmu, method: str, h: float
+) -> None:
+    friction = {"coulomb_friction2": 3.3, "coulomb_friction1": FIRM}
+    with started(plant, method, smooth_inputs=("f2",), **friction) as instance:
+        found = events(instance, h, 2.0, {"f2": 2.0})
+        assert found == [(1, pytest.approx(1.65, rel=0, abs=1e-9))]
+
+
+@each_method
+def test_joint_1_breaks_away_at_a_communication_point(plant: Fmu, method: str) -> None:
+    """At (24.9 + 11.772) / 12 = 3.056 s, with steps of 1 ms."""
+    friction = {"coulomb_friction1": 24.9, "coulomb_friction2": FIRM}
+    with started(plant, method, smooth_inputs=("tau1",), q2=0.2, **friction) as instance:
+        try:
+            found = events(instance, 1e-3, 3.1, {"tau1": 12.0})
+        except FMICallException as error:
+            raise instance.failure(error, "in a step") from error
+        assert found == [(1, pytest.approx(3.056, rel=0, abs=1e-9))]
+
+
+@each_method
+def test_a_motion_goes_on_after_an_impact_that_ends_a_long_step(plant: Fmu, method: str) -> None:
+    """Before it the motion is uniform, and internal steps grow to seconds."""
+    stops = {"stops1": RIGID, "lower1": -0.5, "upper1": 0.5}
+    values = {"g": 0.0, "a": 0.15, "dq1": 0.8, "coulomb_friction2": 2.0}
+    with started(plant, method, **stops, **values) as instance:
+        try:
+            instance.do_step(0.0, 0.5)
+            instance.do_step(0.5, 0.5)
+        except FMICallException as error:
+            raise instance.failure(error, "in a step") from error
+        # plastic: q1 stays, the slide moves at -a dq1 and friction stops it
+        assert read(instance, "dq1", "dq2") == [0.0, 0.0]
+
+
+@each_method
+def test_a_held_joint_stays_where_it_is_while_the_other_one_slides(plant: Fmu, method: str) -> None:
+    """Not one bit of its position changes."""
+    friction = {"coulomb_friction1": FIRM, "coulomb_friction2": 1.1}
+    with started(plant, method, m2=1.3, a=0.0, dq2=1.5, **friction) as instance:
+        for i in range(2000):
+            instance.do_step(i * 1e-3, 1e-3)
+            assert read(instance, "q1", "dq1") == [0.0, 0.0]
