@@ -131,7 +131,7 @@ enum status instance_count_event(struct instance *instance, const bool fired[],
             first++;
         }
         message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
-                      "the step ended at %.17g: there %s fell to 0, one more event than "
+                      "the step ended at t = %.17g: %s fell to 0, one more event than "
                       "max_events = %d",
                       own->time, events->indicator_names[first], own->max_events);
         return STATUS_TOO_MANY_EVENTS;
