@@ -1,5 +1,6 @@
 #include "continuous_states.h"
 
+#include "event_point.h"
 #include "fields.h"
 #include "model_modes.h"
 #include "settings.h"
@@ -23,9 +24,12 @@ enum status instance_update_discrete_states(struct instance *instance, bool *sta
     if (instance->is_integrated_outside) {
         return instance_update_at_point(instance, states_changed);
     }
-    // the steps pass events themselves
-    *states_changed = false;
-    return instance_update_modes(instance, NULL);
+    *states_changed = false; // continuous states are the integrator's own
+    if (instance->state.event_point == EVENT_DUE) {
+        int none = 0;
+        return instance_pass_due_event(instance, &none);
+    }
+    return instance_is_unchanged(instance) ? STATUS_OK : instance_update_modes(instance, NULL);
 }
 
 enum status instance_set_time(struct instance *instance, double time) {

@@ -8,8 +8,9 @@
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
 NONNULL void instance_enter_event_mode(struct instance *instance);
 
-/* In event mode: brings modes to what follows the values set, at an event where an event indicator
- * is near 0 and falls. *states_changed: whether states have jumped. */
+/* In event mode: brings modes to what follows the values set and the event at the present time.
+ * That is the one that a step has left; with integration from outside, one where an event indicator
+ * is near 0 and falls. *states_changed: whether states integrated outside have jumped. */
 MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *instance,
                                                                bool *states_changed);
 

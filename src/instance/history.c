@@ -1,5 +1,6 @@
 #include "history.h"
 
+#include "event_point.h"
 #include "model_modes.h"
 #include "right_hand_side.h"
 
@@ -30,6 +31,11 @@ static bool parameters_are_held(const struct instance *instance) {
            (events == NULL || is_held(instance, events->discrete_inputs));
 }
 
+bool instance_holds_all(const struct instance *instance) {
+    return inputs_are_held(&instance->memory, count_of(instance->model->inputs)) &&
+           parameters_are_held(instance);
+}
+
 /* Whether the motion to target is the one of the integrator's history. It depends only on the
  * values set now and those that the integrator runs with, not on how often or in what order they
  * were set.
@@ -39,11 +45,8 @@ static bool parameters_are_held(const struct instance *instance) {
  * are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only below
  * 1e-9, and rollback would have to replay every jump. */
 static bool goes_on(const struct instance *instance, double target) {
-    const struct instance_memory *memory = &instance->memory;
     const struct instance_state *state = &instance->state;
-    const size_t input_count = count_of(instance->model->inputs);
-    return state->has_history && target <= state->span && inputs_are_held(memory, input_count) &&
-           parameters_are_held(instance);
+    return state->has_history && target <= state->span && instance_holds_all(instance);
 }
 
 int64_t instance_longest_history(const struct instance *instance) {
@@ -59,7 +62,9 @@ static bool is_at_end(const struct instance *instance, double target) {
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
     if (!goes_on(instance, target)) {
-        return CONTINUE_AFTER_CHANGE;
+        return instance->state.event_point == EVENT_PASSED && instance_is_unchanged(instance)
+                   ? CONTINUE_AFTER_EVENT
+                   : CONTINUE_AFTER_CHANGE;
     }
     if (is_at_end(instance, target)) {
         return CONTINUE_AFTER_RESTART;

@@ -113,7 +113,8 @@ static enum status setup(struct instance *instance) {
     const size_t input_count = count_of(model->inputs);
     struct instance_memory *memory = &instance->memory;
 
-    memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial);
+    memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial) +
+                   events_of(model).indicator_count * sizeof(bool);
     memory->block = calloc(1, memory->size);
     instance->first_derivatives = calloc(2, values_size);
     instance->u =
@@ -132,6 +133,7 @@ static enum status setup(struct instance *instance) {
     memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
     memory->current = memory->pending + input_count;
     memory->running = memory->current + input_count;
+    memory->due = (bool *)(void *)(memory->running + input_count);
     place_values(instance);
     if (model->events != NULL && !setup_events(instance)) {
         return STATUS_OUT_OF_MEMORY;

@@ -16,6 +16,13 @@
  * (Maestro's is 0.1), and results would lose their digits. */
 #define INSTANCE_COARSEST_EXPERIMENT_TOLERANCE 1e-4
 
+/* Whether the present time is that of an event at which a step has ended. */
+enum event_point {
+    NO_EVENT,
+    EVENT_DUE,    /* nothing has followed from it so far */
+    EVENT_PASSED, /* the modes are those after it */
+};
+
 /* All that later results depend on, but for the values in struct instance_memory. A plain value: a
  * snapshot is a copy of it. */
 struct instance_state {
@@ -38,6 +45,9 @@ struct instance_state {
     double restart_step;  /* s: first internal step of the last restart; 0: the method found one */
     double next_step;     /* s: the same, for a restart now */
     bool restart_goes_on; /* the last restart was on the solution before it */
+
+    enum event_point event_point;
+    struct clock_time cut_end; /* where the step would have ended without that event */
 };
 
 /* Parts of one block of memory, of which a snapshot is a copy. */
@@ -51,6 +61,7 @@ struct instance_memory {
     struct polynomial *pending; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current; /* inputs at the current time */
     struct polynomial *running; /* inputs since the last restart */
+    bool *due;                  /* one per indicator: it falls to 0 in the event that is due */
 };
 
 /* Where the value of a Real lies, and when the value of any variable is up to date. */
@@ -70,6 +81,7 @@ struct instance {
 
     bool is_integrated_outside;
     bool states_are_settable;  /* after initialization, too */
+    bool step_met_event;       /* the last one */
     bool outputs_are_valid;    /* the calculated values belong to the others */
     bool parameters_are_valid; /* they are consistent; false: not known */
     bool history_is_lost;      /* the integrator is not where state says: replay first */

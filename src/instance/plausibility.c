@@ -160,6 +160,27 @@ static bool is_possible_structure(const struct instance *instance, const char *v
     return are_within_limits(instance, values) && are_finite_sums(instance, values);
 }
 
+/* Some indicator falls to 0 in an event that is due, none does in no such event. */
+static bool is_possible_event_point(const struct instance *instance,
+                                    const struct instance_state *state, const bool due[]) {
+    int count = 0;
+    for (size_t i = 0; i < events_of(instance->model).indicator_count; i++) {
+        count += due[i];
+    }
+    const bool is_due = state->event_point == EVENT_DUE;
+    const bool is_stepping = state->phase == PHASE_STEPPING && instance_has_integrator(instance);
+    const struct clock_time end = state->cut_end;
+    const struct named_value values[] = {
+        {"event_point", state->event_point,
+         state->event_point == NO_EVENT ||
+             (is_stepping && (is_due || state->event_point == EVENT_PASSED))},
+        {"the number of indicators of the event that is due", count, is_due == (count > 0)},
+        {"the end of the step cut short", end.s, isfinite(end.s)},
+        {"the rest of the end of the step cut short", end.rest, isfinite(end.rest)},
+    };
+    return are_possible(instance, values, COUNT(values));
+}
+
 enum status instance_check_plausible(const struct instance *instance,
                                      const struct instance_state *state, const char *block) {
     // places in block as in the instance's own
@@ -176,6 +197,8 @@ enum status instance_check_plausible(const struct instance *instance,
         are_finite_inputs(instance, "an input", (const void *)pending) &&
         are_finite_inputs(instance, "an input since the restart", (const void *)running) &&
         is_possible_structure(instance, values) &&
-        (!state->has_history || is_possible_structure(instance, held));
+        (!state->has_history || is_possible_structure(instance, held)) &&
+        is_possible_event_point(
+            instance, state, (const void *)(block + ((const char *)memory->due - memory->block)));
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

@@ -69,6 +69,19 @@ static void transfer_kept(struct codec *codec, const struct model *model, char *
     }
 }
 
+/* The event at which the last step ended. */
+static void transfer_event_point(struct codec *codec, const struct model *model,
+                                 struct instance_state *state, bool due[]) {
+    int event_point = (int)state->event_point;
+    codec_int(codec, "event_point", &event_point);
+    state->event_point = (enum event_point)event_point;
+    codec_real(codec, &state->cut_end.s);
+    codec_real(codec, &state->cut_end.rest);
+    for (size_t i = 0; i < model->events->indicator_count; i++) {
+        codec_bool(codec, "an indicator of the event that is due", &due[i]);
+    }
+}
+
 static void transfer_polynomials(struct codec *codec, struct polynomial polynomials[],
                                  size_t count) {
     for (size_t i = 0; i < count; i++) {
@@ -116,6 +129,10 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     transfer_polynomials(
         codec, (struct polynomial *)(void *)(block + ((char *)memory->pending - memory->block)),
         3 * input_count);
+    if (instance->model->events != NULL) {
+        transfer_event_point(codec, instance->model, state,
+                             (bool *)(void *)(block + ((char *)memory->due - memory->block)));
+    }
 }
 
 size_t instance_serialized_size(const struct instance *instance) {

@@ -1,5 +1,6 @@
 #include "stepping.h"
 
+#include "event_point.h"
 #include "fields.h"
 #include "history.h"
 #include "model_modes.h"
@@ -273,30 +274,60 @@ static enum status rest(struct step *step) {
                            state->first_time, &state->latest_time);
 }
 
-/* The instance goes to the time of an event, and its modes change. */
-static enum status pass_event(struct step *step, const bool fired[]) {
+/* The instance goes to the time of an event, and its modes change, unless the event is left. */
+static enum status meet_event(struct step *step, const bool fired[]) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
+    const struct clock_time end = step->end;
     instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
     place_inputs(instance, clock_difference(state->time, step->begin));
-    const enum status status = instance_count_event(instance, fired, &step->events);
-    return status == STATUS_OK ? instance_update_modes(instance, fired) : status;
+    instance->step_met_event = true;
+    if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
+        step->is_early = clock_difference(end, state->time) > 0.0;
+        step->end = state->time;
+        if (step->options->at_event == EVENTS_LEFT) {
+            instance_leave_event(instance, fired, end);
+            return STATUS_OK;
+        }
+    }
+    enum status status = instance_count_event(instance, fired, &step->events);
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, fired);
+    }
+    if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
+        instance_note_event(instance, end);
+    }
+    return status;
+}
+
+/* The modes at the beginning of a step, and how the integrator goes on from there. */
+static enum status begin_modes(struct step *step, enum continuation *continuation) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    if (state->event_point == EVENT_DUE) {
+        const enum status status = instance_pass_due_event(instance, &step->events);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        *continuation =
+            instance_continuation(instance, clock_difference(step->end, state->restart_time));
+    }
+    state->event_point = NO_EVENT;
+    return *continuation == CONTINUE_AFTER_CHANGE ? instance_update_modes(instance, NULL)
+                                                  : STATUS_OK;
 }
 
 /* To step->end over all events on the way. */
 static enum status move_over_events(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
-    enum status status = STATUS_OK;
-    if (continuation == CONTINUE_AFTER_CHANGE) {
-        status = instance_update_modes(instance, NULL);
-    }
+    enum status status = begin_modes(step, &continuation);
     while (status == STATUS_OK) {
         const bool is_at_rest = instance_is_at_rest(instance);
         status = is_at_rest ? rest(step) : move(step, continuation);
         if (status != STATUS_OK || integrator_event(instance->integrator) == NULL) {
             break;
         }
-        status = pass_event(step, integrator_event(instance->integrator));
+        status = meet_event(step, integrator_event(instance->integrator));
         if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
             break;
         }
@@ -351,7 +382,8 @@ static enum status do_step(struct step *step, double communication_point, double
     if (step->options->ask_inputs != NULL) {
         hold_last_nodes(step);
     }
-    if (step->options->accept != NULL && !step->is_early) {
+    const bool is_at_event = instance->state.event_point != NO_EVENT;
+    if (step->options->accept != NULL && (!step->is_early || is_at_event)) {
         (void)report(step);
     }
     return step->answer;
@@ -373,6 +405,10 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
         .end = clock_add((struct clock_time){.s = communication_point}, step_size),
         .answer = STATUS_OK,
     };
+    if (instance->state.event_point != NO_EVENT) {
+        step.end = instance_resumed_end(instance, step.end);
+    }
+    instance->step_met_event = false;
     status = do_step(&step, communication_point, step_size);
     if (step.kept != NULL && status_severity(status) == SEVERITY_DISCARD) {
         const enum status restored = instance_undo(instance, step.kept);
@@ -384,4 +420,8 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
 enum status instance_do_step(struct instance *instance, double communication_point, double step) {
     static const struct step_options none = {0};
     return instance_do_step_with(instance, communication_point, step, &none);
+}
+
+bool instance_met_event(const struct instance *instance) {
+    return instance->step_met_event;
 }

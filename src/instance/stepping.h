@@ -12,6 +12,15 @@
 MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
                                                 double communication_point, double step);
 
+/* What a step does at an event. Where that is at its beginning, it passes it, so that every step
+ * gets on. */
+enum event_handling {
+    EVENTS_PASSED, /* it passes the event and goes on */
+    EVENTS_END,    /* it passes the event and ends there */
+    EVENTS_LEFT,   /* it ends there. The event is due: instance_update_discrete_states passes it, or
+                      the next step does first */
+};
+
 /* What a step does on its way; what is NULL is left out. The functions may read values of the
  * instance and return STATUS_OK, or a status that ends the step and is returned by it. */
 struct step_options {
@@ -29,11 +38,16 @@ struct step_options {
     enum status (*accept)(void *context, double time, double *end);
 
     void *context; /* of these functions */
+
+    enum event_handling at_event;
 };
 
 /* As instance_do_step; instance_time says where the step has ended. */
 MUST_CHECK NONNULL enum status instance_do_step_with(struct instance *instance,
                                                      double communication_point, double step,
                                                      const struct step_options *options);
+
+/* The last step passed an event, or left it. */
+NONNULL bool instance_met_event(const struct instance *instance);
 
 #endif

@@ -1,0 +1,55 @@
+#include "event_point.h"
+
+#include "history.h"
+#include "model_modes.h"
+
+#include <math.h>
+#include <string.h>
+
+static size_t count_of_indicators(const struct instance *instance) {
+    return events_of(instance->model).indicator_count;
+}
+
+void instance_leave_event(struct instance *instance, const bool fired[], struct clock_time end) {
+    memcpy(instance->memory.due, fired, count_of_indicators(instance) * sizeof *fired);
+    instance->state.event_point = EVENT_DUE;
+    instance->state.cut_end = end;
+}
+
+void instance_note_event(struct instance *instance, struct clock_time end) {
+    instance->state.event_point = EVENT_PASSED;
+    instance->state.cut_end = end;
+}
+
+enum status instance_pass_due_event(struct instance *instance, int *count_in_step) {
+    struct instance_state *state = &instance->state;
+    if (state->event_point != EVENT_DUE) {
+        return STATUS_OK;
+    }
+    const bool is_unchanged = instance_is_unchanged(instance);
+    enum status status = instance_count_event(instance, instance->memory.due, count_in_step);
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, instance->memory.due);
+    }
+    if (status == STATUS_OK) {
+        state->event_point = is_unchanged ? EVENT_PASSED : NO_EVENT;
+        memset(instance->memory.due, 0, count_of_indicators(instance) * sizeof(bool));
+    }
+    return status;
+}
+
+bool instance_is_unchanged(const struct instance *instance) {
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        if (polynomial_moves(&instance->memory.running[i])) {
+            return false;
+        }
+    }
+    return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
+           instance_holds_all(instance);
+}
+
+struct clock_time instance_resumed_end(const struct instance *instance, struct clock_time end) {
+    const struct instance_state *state = &instance->state;
+    const double difference = clock_difference(end, state->cut_end);
+    return fabs(difference) <= clock_spacing(end.s) ? state->cut_end : end;
+}
