@@ -69,6 +69,10 @@ static enum status accept(void *component_pointer, double time, double *end) {
 
 enum status fmi3_prepare_steps(struct fmi3_component *component) {
     component->options.context = component;
+    if (component->early_return_allowed) {
+        const bool handles_events = component->base.kind == KIND_CO_SIMULATION_WITH_EVENTS;
+        component->options.at_event = handles_events ? EVENTS_LEFT : EVENTS_END;
+    }
     if (component->update != NULL) {
         component->options.ask_inputs = component->asks_inputs ? ask_inputs : NULL;
         component->options.accept = accept;
@@ -95,7 +99,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     const enum status status = instance_do_step_with(base->instance, currentCommunicationPoint,
                                                      communicationStepSize, &component->options);
     if (status == STATUS_OK) {
-        *eventHandlingNeeded = fmi3False;
+        *eventHandlingNeeded =
+            base->kind == KIND_CO_SIMULATION_WITH_EVENTS && instance_met_event(base->instance);
         *terminateSimulation = fmi3False;
         *lastSuccessfulTime = instance_time(base->instance);
         *earlyReturn = *lastSuccessfulTime < currentCommunicationPoint + communicationStepSize;

@@ -36,7 +36,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         **texts_of(declaration, provenance),
         variableNamingConvention="flat",
     )
-    add_interfaces(root, model.name)
+    add_interfaces(root, model.name, has_events=bool(model.event_indicators))
     add_units(root, declaration.units)
     add_types(root, declaration)
     add_log_categories(root, "fmi3")
@@ -48,7 +48,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
     return document(root)
 
 
-def add_interfaces(root: ET.Element, identifier: str) -> None:
+def add_interfaces(root: ET.Element, identifier: str, *, has_events: bool) -> None:
     """Write ModelExchange and CoSimulation with what they can do."""
     shared = {
         "modelIdentifier": identifier,
@@ -58,7 +58,7 @@ def add_interfaces(root: ET.Element, identifier: str) -> None:
         "providesAdjointDerivatives": "true",
     }
     ET.SubElement(root, "ModelExchange", shared)
-    ET.SubElement(
+    co_simulation = ET.SubElement(
         root,
         "CoSimulation",
         shared,
@@ -68,6 +68,8 @@ def add_interfaces(root: ET.Element, identifier: str) -> None:
         canReturnEarlyAfterIntermediateUpdate="true",
         hasEventMode="true",
     )
+    if has_events:
+        co_simulation.set("mightReturnEarlyFromDoStep", "true")
 
 
 def add_types(root: ET.Element, declaration: Declaration) -> None:
