@@ -78,6 +78,24 @@ static void assert_forged_is_refused(const char *text) {
     instance_destroy(other);
 }
 
+static void assert_event_points_are_possible(void) {
+    const struct instance_state kept = instance->state;
+    instance->state.event_point = EVENT_PASSED;
+    assert_forged_is_refused("event_point = 2 is impossible"); // before initialization ends
+    instance->state.phase = PHASE_STEPPING;
+    instance->state.event_point = (enum event_point)3;
+    assert_forged_is_refused("event_point = 3 is impossible");
+    instance->state.event_point = EVENT_DUE;
+    assert_forged_is_refused("indicators of the event that is due = 0 is impossible");
+    instance->state = kept;
+    instance->memory.due[1] = true;
+    assert_forged_is_refused("indicators of the event that is due = 1 is impossible");
+    instance->memory.due[1] = false;
+    instance->state.cut_end.s = NAN;
+    assert_forged_is_refused("the end of the step cut short = nan is impossible");
+    instance->state = kept;
+}
+
 static void test_forged_states_are_refused_with_the_value(void) {
     const struct {
         int *field;
@@ -99,6 +117,7 @@ static void test_forged_states_are_refused_with_the_value(void) {
     assert_forged_is_refused("lost_speed = inf is impossible");
     values_of(instance)->lost_speed = 0.0;
     values_of(instance)->turns = 1234; // calculated: not among the bytes
+    assert_event_points_are_possible();
     struct instance *other;
     ASSERT_OK(transfer(&other));
     instance_destroy(other);
