@@ -1,5 +1,7 @@
 #include "fields.h"
 
+#include "model_modes.h"
+
 const struct variable *instance_refuse_reference(const struct instance *instance,
                                                  unsigned reference, enum variable_type type) {
     const struct variable *variable = variable_find(instance->description, reference);
@@ -31,6 +33,8 @@ enum status instance_update_outputs(struct instance *instance) {
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no outputs at t = %.17g: %s",
                       instance->state.time.s, status_text(status));
+    } else if (instance->is_integrated_outside && instance->model->events != NULL) {
+        instance_add_bands(instance);
     }
     return status;
 }

@@ -61,10 +61,44 @@ enum status instance_update_modes(struct instance *instance, const bool *fired) 
 /* In the unit of an indicator: so far from 0 integrators end at its root. */
 static const double near_root = 1e-10;
 
+/* So far beyond its root an indicator of a state falls to 0 for an integrator outside: a mode may
+ * begin at the root, and integrators miss falls from 0. Far above the rounding of its two parts,
+ * which are the state's nominal value and the offset; far below what integrators get right. */
+static double band_of(const struct instance *instance, const struct indicator *indicator) {
+    if (indicator->kind != INDICATOR_OF_STATE) {
+        return 0.0;
+    }
+    // the absolute tolerance is 1e-2 of the nominal value times the relative tolerance
+    const double nominal = 1e2 * instance->absolute_tolerances[indicator->state] /
+                           instance->state.own.effective_relative_tolerance;
+    return 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
+}
+
+void instance_add_bands(struct instance *instance) {
+    const struct model_description *description = instance->description;
+    instance->model->events->describe(instance->memory.values, instance->indicators);
+    for (size_t i = 0; i < description->indicator_count; i++) {
+        double *z = instance_field(instance, variable_of(description, description->indicators[i]));
+        *z += band_of(instance, &instance->indicators[i]);
+    }
+}
+
 /* s: over this time the slope of an indicator is taken. */
 static const double slope_time = 1e-7;
 
-/* Writes which indicators are near 0 and fall while the inputs stay. */
+/* Indicator i has come to 0 and falls on; z_ahead: after slope_time. An integrator outside sees
+ * that where the band is passed; other events may come just before. Rounding does not pass the
+ * band. */
+static bool has_fired(const struct instance *instance, size_t i, double z, double z_ahead) {
+    const struct indicator *indicator = &instance->indicators[i];
+    if (indicator->kind != INDICATOR_OF_STATE) {
+        return z <= near_root && z_ahead <= z;
+    }
+    const double band = band_of(instance, indicator);
+    return (z + band <= 0.0 && z_ahead <= z) || (z <= 0.0 && z_ahead + band <= 0.0);
+}
+
+/* Writes which indicators are at 0 and fall while the inputs stay. */
 static enum status find_fired(struct instance *instance, bool *is_any) {
     const struct model *model = instance->model;
     char *values = instance->memory.values;
@@ -86,8 +120,9 @@ static enum status find_fired(struct instance *instance, bool *is_any) {
         status = model->events->indicators(values, t, ahead, u, z_ahead);
     }
     *is_any = false;
+    model->events->describe(values, instance->indicators);
     for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
-        instance->fired[i] = z[i] <= near_root && z_ahead[i] <= z[i];
+        instance->fired[i] = has_fired(instance, i, z[i], z_ahead[i]);
         *is_any |= instance->fired[i];
     }
     return status;

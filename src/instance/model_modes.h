@@ -19,8 +19,12 @@ NONNULL bool instance_is_at_rest(const struct instance *instance);
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *fired);
 
-/* The same at a point that an integrator outside took for an event: an indicator that is near 0 and
- * falls has fired. *states_changed: whether states have jumped. */
+/* For an integrator outside: adds to the calculated indicators what keeps them from being 0 where a
+ * mode begins. */
+NONNULL void instance_add_bands(struct instance *instance);
+
+/* As instance_update_modes at a point that an integrator outside took for an event: an indicator
+ * that is at 0 and falls has fired. *states_changed: whether states have jumped. */
 MUST_CHECK NONNULL enum status instance_update_at_point(struct instance *instance,
                                                         bool *states_changed);
 
