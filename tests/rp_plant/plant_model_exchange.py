@@ -3,6 +3,7 @@ parameters in event mode only. fmpy's own loop sets Booleans in continuous-time 
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from ctypes import c_double
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,6 +14,17 @@ from fmpy.simulation import instantiate_fmu
 from fmpy.sundials import CVodeSolver
 
 STATES = ("q1", "q2", "dq1", "dq2")
+
+
+def unknowns(description: Any) -> list[str]:
+    """Real variables that follow from states and inputs, of fmpy's model description."""
+    return [
+        v.name
+        for v in description.modelVariables
+        if v.type in ("Real", "Float64")
+        and v.variability == "continuous"
+        and v.initial == "calculated"
+    ]
 
 
 class NoInput:
@@ -57,6 +69,10 @@ class PlantModel:
         """Value of a variable."""
         variable = self.variables[name]
         return getattr(self.fmu, f"get{variable.type}")([variable.valueReference])[0]
+
+    def set_states(self, x: np.ndarray) -> None:
+        """Set q1, q2, dq1, dq2 (4,); modes stay."""
+        self.fmu.setContinuousStates((c_double * len(x))(*x), len(x))
 
     def handle_event(self, changes: Mapping[str, float | bool]) -> None:
         """Set `changes` in event mode and update the discrete states."""
