@@ -128,3 +128,14 @@ def test_a_boolean_parameter(version: str) -> None:
         output=["turns"],
     )
     assert set(result["turns"]) == {-3}
+
+
+def test_early_return_is_announced_with_events_only(fmu: Path) -> None:
+    flags = {}
+    for path in FMUS["fmi3"], fmu.parent / "fmi3" / fmu.name:
+        with ZipFile(path) as archive:
+            root = ET.fromstring(archive.read("modelDescription.xml"))
+        kind = root.find("CoSimulation")
+        assert kind.get("hasEventMode") == "true"
+        flags[root.get("modelName")] = kind.get("mightReturnEarlyFromDoStep")
+    assert flags == {"Wheel": "true", "RPManipulator": None}
