@@ -86,15 +86,11 @@ void instance_add_bands(struct instance *instance) {
 /* s: over this time the slope of an indicator is taken. */
 static const double slope_time = 1e-7;
 
-/* Indicator i has come to 0 and falls on; z_ahead: after slope_time. Where a mode has just begun
- * at 0, rounding may let it fall, but not past the band. */
+/* Indicator i has come to 0 and falls on; z_ahead: after slope_time. Where a mode has just begun at
+ * 0, rounding may let it fall, but not past the band. */
 static bool has_fired(const struct instance *instance, size_t i, double z, double z_ahead) {
-    const struct indicator *indicator = &instance->indicators[i];
-    if (indicator->kind != INDICATOR_OF_STATE) {
-        return z <= near_root && z_ahead <= z;
-    }
-    const double band = band_of(instance, indicator);
-    return (z + band <= 0.0 && z_ahead <= z) || (z <= near_root && z_ahead + band <= 0.0);
+    const double band = band_of(instance, &instance->indicators[i]);
+    return z <= near_root && z_ahead <= z && (band == 0.0 || z_ahead + band <= 0.0);
 }
 
 /* Writes which indicators are at 0 and fall while the inputs stay. */

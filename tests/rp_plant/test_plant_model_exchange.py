@@ -134,6 +134,18 @@ def test_inputs_that_jump_in_event_mode(plant: Fmu, name: str, updates: int) -> 
         np.testing.assert_allclose(found[:, i], expected[:, i], rtol=0, atol=BOUND, err_msg=column)
 
 
+def test_a_joint_past_its_stop_that_leaves_is_no_event(plant: Fmu) -> None:
+    """An importer may enter event mode there; the joint is put on its stop and goes on."""
+    upper = STOPS["upper2"]
+    with model(plant.path, **STOPS, dq2=0.1) as instance:
+        for dq, count in (-0.1, 0), (0.1, 1):
+            instance.set_states(np.array([0.0, upper + 1e-3, 0.0, dq]))
+            instance.handle_event({})
+            assert instance.get("q2") == upper
+            assert instance.get("event_count") == count
+        assert instance.get("dq2") == pytest.approx(-0.1 * STOPS["restitution2"], rel=1e-14)
+
+
 # ---- Euler's method --------------------------------------------------------------------------
 
 

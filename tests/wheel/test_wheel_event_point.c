@@ -62,6 +62,18 @@ static void test_another_end_is_taken_as_it_is(void) {
     TEST_ASSERT_TRUE(instance->state.time.rest == 0.0);
 }
 
+/* The step after an event goes on from it, unless something has changed there. */
+static void test_a_change_at_the_event_is_noticed(void) {
+    for (int changes = 0; changes < 2; changes++) {
+        start();
+        step(EVENTS_LEFT);
+        TEST_ASSERT_EQUAL_INT(EVENT_DUE, instance->state.event_point);
+        set_real(WHEEL_speed, changes ? 1.5 : 1.0);
+        update();
+        TEST_ASSERT_EQUAL_INT(changes ? NO_EVENT : EVENT_PASSED, instance->state.event_point);
+    }
+}
+
 /* Between events modes change where something is set, and only there. */
 static void test_event_mode_without_a_change_changes_nothing(void) {
     start();
