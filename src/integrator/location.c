@@ -140,31 +140,32 @@ static void shift(double c[], int degree) {
     }
 }
 
+/* Coefficients of an indicator, but c[0], from those of its state; sign: of those of odd orders. */
+static void expand(const struct step_polynomial *step, const struct indicator *indicator,
+                   double sign, double c[]) {
+    const double *row = step->row[indicator->state];
+    for (int k = 1; k <= step->degree; k++) {
+        c[k] = (k % 2 == 0 ? 1.0 : sign) * indicator->factor * row[k];
+    }
+}
+
 static double first_of_state(const struct step_polynomial *step, const struct indicator *indicator,
                              double noise, bool *is_armed) {
-    const double *row = step->row[indicator->state];
     double c[ROOTS_LENGTH];
-    const struct roots_polynomial p = {.c = c, .degree = step->degree, .noise = -1.0};
-    c[0] = indicator->offset + indicator->factor * row[0];
-    if (!step->is_from_end) {
-        for (int k = 1; k <= step->degree; k++) {
-            c[k] = indicator->factor * row[k];
+    c[0] = indicator->offset + indicator->factor * step->row[indicator->state][0];
+    if (step->is_from_end) {
+        // backwards in time a proof needs no shift
+        expand(step, indicator, -1.0, c);
+        if (roots_is_above(&(struct roots_polynomial){c, step->degree, -1.0})) {
+            *is_armed = true;
+            return INFINITY;
         }
-        return first_fall(&p, noise, is_armed);
     }
-    // backwards in time a proof needs no shift
-    for (int k = 1; k <= step->degree; k++) {
-        c[k] = (k % 2 == 0 ? indicator->factor : -indicator->factor) * row[k];
+    expand(step, indicator, 1.0, c);
+    if (step->is_from_end) {
+        shift(c, step->degree);
     }
-    if (roots_is_above(&p)) {
-        *is_armed = true;
-        return INFINITY;
-    }
-    for (int k = 1; k <= step->degree; k++) {
-        c[k] = indicator->factor * row[k];
-    }
-    shift(c, step->degree);
-    return first_fall(&p, noise, is_armed);
+    return first_fall(&(struct roots_polynomial){c, step->degree, -1.0}, noise, is_armed);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -241,17 +242,16 @@ static bool search_piece(struct location *location, const struct piece *piece, s
     const double error = chebyshev_interpolate(piece->count, location->samples[i], c);
     const double noise = representation * largest(location->samples[i], piece->count);
     const bool is_exact = error <= noise;
-    struct roots_polynomial p = {.c = c, .degree = piece->count - 1, .noise = -1.0};
+    const int degree = piece->count - 1;
     if (!is_exact && !is_last_try) {
         // far enough above 0
         c[0] -= 16.0 * error;
-        if (roots_is_above(&p)) {
-            location->is_armed[i] = true;
-            return true;
-        }
-        return false;
+        const bool is_above = roots_is_above(&(struct roots_polynomial){c, degree, -1.0});
+        location->is_armed[i] |= is_above;
+        return is_above;
     }
-    const double s = first_fall(&p, noise, &location->is_armed[i]);
+    const double s =
+        first_fall(&(struct roots_polynomial){c, degree, -1.0}, noise, &location->is_armed[i]);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
