@@ -17,7 +17,7 @@ from tests.rp_plant.plant_rows import FREE, INPUTS, ORDERS, STATES, STUCK, expan
 from tests.rp_plant.plant_symbolic import NAMES, SmoothPlant
 from tests.rp_plant.test_plant_lagrangian import Case, random_case
 
-CASES = 96
+CASES = 64
 MODES = (-1.0, STUCK, 1.0, FREE)
 BOUND = 1e-12
 
