@@ -20,7 +20,9 @@
 
 #include <math.h>
 
-enum row { Q1, Q2, W, V, L, P, S, C, ROWS };
+enum row { Q1, Q2, W, V, L, P, S, C };
+
+_Static_assert(C + 1 == RP_SERIES_ROWS, "the rows");
 
 /* Sums over i = 0 .. n of a product of two series, x_i z_(n-i), or x_(i+1) z_(n-i) where `ahead`
  * stands in the name. */
@@ -62,10 +64,10 @@ static inline void efforts(const struct series_origin *origin, const struct rp_p
     }
 }
 
-static enum status extend(const struct series_origin *origin, int first, int last,
-                          double row[][SERIES_LENGTH]) {
+void rp_series_extend(const struct rp_parameters *parameters, const struct series_origin *origin,
+                      int first, int last, double row[][SERIES_LENGTH]) {
     // a copy, which no coefficient overwrites
-    const struct rp_parameters p = ((const struct rp_values *)origin->values)->parameters;
+    const struct rp_parameters p = *parameters;
     if (first == 0) {
         begin(&p, row);
     }
@@ -92,7 +94,13 @@ static enum status extend(const struct series_origin *origin, int first, int las
         row[P][k] = L0 * row[W][k] + sum.ahead_L_w;
         row[V][k] = y + p.a * row[W][k];
     }
+}
+
+static enum status extend(const struct series_origin *origin, int first, int last,
+                          double row[][SERIES_LENGTH]) {
+    const struct rp_values *values = origin->values;
+    rp_series_extend(&values->parameters, origin, first, last, row);
     return STATUS_OK;
 }
 
-const struct series rp_series = {.row_count = ROWS, .extend = extend};
+const struct series rp_series = {.row_count = RP_SERIES_ROWS, .extend = extend};

@@ -2,9 +2,17 @@
 #ifndef RP_SERIES_H
 #define RP_SERIES_H
 
+#include "rp_manipulator.h"
 #include "series.h"
 
-/* Of struct rp_values: states q1, q2, q1', q2', inputs tau1, f2. */
+/* The states q1, q2, q1', q2', then l1 + q2, (l1 + q2) q1', sin q1, cos q1. */
+enum { RP_SERIES_ROWS = 8 };
+
+/* Of struct rp_values: inputs tau1, f2. */
 extern const struct series rp_series;
+
+/* extend of rp_series with these parameters instead of those of the origin's values. */
+void rp_series_extend(const struct rp_parameters *parameters, const struct series_origin *origin,
+                      int first, int last, double row[][SERIES_LENGTH]);
 
 #endif

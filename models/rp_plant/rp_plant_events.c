@@ -4,6 +4,7 @@
 #include "rp_plant_equations.h"
 #include "rp_plant_impact.h"
 #include "rp_plant_rest.h"
+#include "rp_plant_series.h"
 
 #include <string.h>
 
@@ -418,5 +419,6 @@ const struct model_events rp_plant_events = {
     .is_at_rest = is_at_rest,
     .describe = describe,
     .indicators = indicators,
+    .reach = rp_plant_reach,
     .update = update,
 };

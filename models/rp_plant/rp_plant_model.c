@@ -5,6 +5,7 @@
 #include "rp_plant_check.h"
 #include "rp_plant_events.h"
 #include "rp_plant_propagation.h"
+#include "rp_plant_series.h"
 
 #include <string.h>
 
@@ -93,6 +94,7 @@ const struct model rp_plant_model = {
     .derivatives = {offsetof(struct rp_plant_values, dq), sizeof(double[4])},
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
+    .series = &rp_plant_series,
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = rp_plant_check_parameters,

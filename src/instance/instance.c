@@ -104,6 +104,7 @@ static bool setup_events(struct instance *instance) {
     instance->z = instance->du + count_of(model->inputs);
     instance->ode.indicator_count = model->events->indicator_count;
     instance->ode.indicators = instance_indicators;
+    instance->ode.reach = model->events->reach != NULL ? instance_reach : NULL;
     return true;
 }
 
@@ -149,6 +150,7 @@ static enum status setup(struct instance *instance) {
     if (model->series != NULL) {
         instance->ode.series = instance_series;
         instance->ode.series_row_count = model->series->row_count;
+        instance->ode.row_of_indicator = model->series->row_of_indicator;
     }
     return integrator_create(&instance->ode, &instance->sink, &instance->integrator);
 }

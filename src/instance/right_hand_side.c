@@ -51,6 +51,11 @@ enum status instance_indicators(double t, const double x[], double z[], void *in
         instance->memory.held, instance->state.restart_time.s + t, x, instance->u, z);
 }
 
+void instance_reach(const double x[], double reach[], void *instance_pointer) {
+    const struct instance *instance = instance_pointer;
+    instance->model->events->reach(instance->memory.held, x, reach);
+}
+
 /* Coefficients of the inputs at t, in units of time of unit. */
 static void expand_inputs(const struct instance *instance, double t, double unit) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {

@@ -13,5 +13,6 @@ ode_rhs instance_rhs;
 ode_jacobian instance_jacobian;
 ode_series instance_series;
 ode_indicators instance_indicators;
+ode_reach instance_reach;
 
 #endif

@@ -15,15 +15,16 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
         return true;
     }
     location->step.row = calloc(states, sizeof *location->step.row);
+    location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
     location->x = calloc(2 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->is_armed = calloc(count, sizeof *location->is_armed);
     location->fired = calloc(count, sizeof *location->fired);
-    if (location->step.row == NULL || location->first == NULL || location->samples == NULL ||
-        location->x == NULL || location->z == NULL || location->is_armed == NULL ||
-        location->fired == NULL) {
+    if (location->step.row == NULL || location->step.indicator_row == NULL ||
+        location->first == NULL || location->samples == NULL || location->x == NULL ||
+        location->z == NULL || location->is_armed == NULL || location->fired == NULL) {
         location_destroy(location);
         return false;
     }
@@ -38,6 +39,7 @@ void location_destroy(struct location *location) {
     free(location->x);
     free(location->samples);
     free(location->first);
+    free(location->step.indicator_row);
     free(location->step.row);
     *location = (struct location){.time = INFINITY};
 }
@@ -50,6 +52,7 @@ enum status location_restart(struct location *location, const struct indicator *
                              const double x[]) {
     location->indicators = indicators;
     location->time = INFINITY;
+    location->step.has_indicators = false;
     if (indicators == NULL) {
         return STATUS_OK;
     }
@@ -172,6 +175,16 @@ static double first_of_state(const struct step_polynomial *step, const struct in
 
 /* Of the values' scale: how well a polynomial must represent an indicator. */
 static const double representation = 1e-12;
+
+/* One whose polynomial is given. */
+static double first_of_model(const struct step_polynomial *step, size_t i, bool *is_armed) {
+    const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
+    double size = 0.0;
+    for (int k = 0; k <= step->degree; k++) {
+        size += fabs(p.c[k]);
+    }
+    return first_fall(&p, representation * size, is_armed);
+}
 
 /* Writes all indicators at s, of the whole step, to column k of samples. */
 static enum status sample(struct location *location, double s, int k) {
@@ -296,12 +309,14 @@ enum status location_search(struct location *location) {
     bool needs_model = false;
     for (size_t i = 0; i < count; i++) {
         const struct indicator *indicator = &location->indicators[i];
-        location->first[i] =
-            indicator->kind == INDICATOR_OF_STATE
-                ? first_of_state(step, indicator, location->tolerances[indicator->state],
-                                 &location->is_armed[i])
-                : INFINITY;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+        location->first[i] = INFINITY;
+        if (indicator->kind == INDICATOR_OF_STATE) {
+            location->first[i] = first_of_state(
+                step, indicator, location->tolerances[indicator->state], &location->is_armed[i]);
+        } else if (indicator->kind == INDICATOR_OF_MODEL && step->has_indicators) {
+            location->first[i] = first_of_model(step, i, &location->is_armed[i]);
+        }
+        needs_model |= indicator->kind == INDICATOR_OF_MODEL && !step->has_indicators;
     }
     const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;
     if (status != STATUS_OK) {

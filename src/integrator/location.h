@@ -20,6 +20,9 @@ struct step_polynomial {
     bool is_from_end;
     int degree;
     double (*row)[SERIES_LENGTH];
+    bool has_indicators;
+    double (*indicator_row)[SERIES_LENGTH]; /* where `has_indicators`: those of the model, over s as
+                                               the states; else they are interpolated */
 };
 
 struct location {

@@ -344,6 +344,32 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
     return STATUS_NOT_FINITE;
 }
 
+/* The shortest step that a way shortens, over the time since the restart. */
+static const double resolution = 0x1p-40;
+
+/* A step (in units) in which no state moves farther from x, where it begins, than it may. */
+static double step_within_reach(struct taylor *taylor, const double x[], double step) {
+    const struct ode *ode = &taylor->problem->ode;
+    if (!taylor->is_searched || ode->reach == NULL) {
+        return step;
+    }
+    double *reach = taylor->problem->location.dx;
+    ode->reach(x, reach, ode->context);
+    double within = step;
+    for (size_t i = 0; i < ode->state_count; i++) {
+        double way = 0.0;
+        for (int k = taylor->order; k >= 1 && reach[i] < INFINITY; k--) {
+            way = (way + fabs(taylor->row[i][k])) * step;
+        }
+        if (way > reach[i]) {
+            // the way grows at least in proportion to the step
+            within = fmin(within, step * (reach[i] / way));
+        }
+    }
+    const double shortest = resolution * taylor->begin / taylor->unit;
+    return fmax(within, fmin(step, shortest));
+}
+
 /* s: where no step was before. */
 static const double first_length = 1e-3;
 
@@ -368,6 +394,7 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     double step;
     enum status status = expand(taylor, now, length, is_long, x, &step, work);
     if (status == STATUS_OK) {
+        step = step_within_reach(taylor, x, step);
         status = fit_step(taylor, is_long, &step, work);
     }
     if (status != STATUS_OK) {
@@ -392,21 +419,37 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     return STATUS_OK;
 }
 
+/* Writes the coefficients of a row over time in units of this length. */
+static void copy_row(const struct taylor *taylor, const double from[], double length, double to[]) {
+    if (length == 1.0) {
+        memcpy(to, from, ((size_t)taylor->order + 1) * sizeof *to);
+        return;
+    }
+    double power = 1.0;
+    for (int k = 0; k <= taylor->order; k++) {
+        to[k] = from[k] * power;
+        power *= length;
+    }
+}
+
 /* Searches the step that has ended at the time end for an event. */
 static enum status search(struct taylor *taylor, double end) {
     struct location *location = &taylor->problem->location;
     struct step_polynomial *step = &location->step;
+    const size_t *row_of_indicator = taylor->problem->ode.row_of_indicator;
     const double length = (end - taylor->begin) / taylor->unit;
     step->begin = taylor->begin;
     step->end = end;
     step->is_from_end = false;
     step->degree = taylor->order;
-    double power = 1.0;
-    for (int k = 0; k <= taylor->order; k++) {
-        for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
-            step->row[i][k] = taylor->row[i][k] * power;
+    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+        copy_row(taylor, taylor->row[i], length, step->row[i]);
+    }
+    step->has_indicators = row_of_indicator != NULL;
+    for (size_t i = 0; step->has_indicators && i < taylor->problem->ode.indicator_count; i++) {
+        if (location->indicators[i].kind == INDICATOR_OF_MODEL) {
+            copy_row(taylor, taylor->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }
-        power *= length;
     }
     return location_search(location);
 }

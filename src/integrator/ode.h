@@ -24,14 +24,20 @@ typedef enum status ode_series(double t, double unit, int first, int last,
 /* Writes all indicators at the time t and the state x to z. As ode_rhs else. */
 typedef enum status ode_indicators(double t, const double x[], double z[], void *context);
 
+/* Writes how far each state may move from x within an internal step, as struct model_events does.
+ */
+typedef void ode_reach(const double x[], double reach[], void *context);
+
 struct ode {
     size_t state_count; /* > 0 */
     ode_rhs *rhs;
-    ode_jacobian *jacobian;  /* for INTEGRATOR_CVODE_BDF only */
-    ode_series *series;      /* for INTEGRATOR_TAYLOR only; NULL: there is none */
-    size_t series_row_count; /* >= state_count, where there is one */
-    size_t indicator_count;  /* 0: no events */
+    ode_jacobian *jacobian;         /* for INTEGRATOR_CVODE_BDF only */
+    ode_series *series;             /* for INTEGRATOR_TAYLOR only; NULL: there is none */
+    size_t series_row_count;        /* >= state_count, where there is one */
+    const size_t *row_of_indicator; /* as in struct series */
+    size_t indicator_count;         /* 0: no events */
     ode_indicators *indicators;
+    ode_reach *reach; /* NULL: any way; asked where events are looked for */
     void *context;
 };
 

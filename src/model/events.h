@@ -63,6 +63,11 @@ struct model_events {
     enum status (*indicators)(const void *values, double t, const double x[], const double u[],
                               double z[]);
 
+    /* Writes how far each state may move from x within one internal step, INFINITY for any way: on
+     * a longer one the right-hand side could change and change back between the points at which it
+     * is evaluated. NULL: any way. */
+    void (*reach)(const void *values, const double x[], double reach[]);
+
     /* Writes the modes, states and sums that follow an event, from all that is set: parameters,
      * inputs, states, modes. Where nothing has fired, a second call changes nothing. */
     enum status (*update)(void *values, const struct event *event);

@@ -23,8 +23,13 @@ struct series_origin {
 
 struct series {
     /* Rows that extend writes: the states in their order, then other quantities: what it needs
-     * itself, and functions of the motion that others want to follow over a step. */
+     * itself, and functions of the motion that others want to follow over a step. It may leave out
+     * rows that play no role. */
     size_t row_count;
+
+    /* Of each event indicator (events.h) the row that is this indicator while its kind is
+     * INDICATOR_OF_MODEL. NULL: rows have no indicators. */
+    const size_t *row_of_indicator;
 
     /* Writes the coefficients of the orders first to last (< SERIES_LENGTH) of all rows, from those
      * of lower orders; first is 0, with the states' coefficients of order 0 given, or follows the

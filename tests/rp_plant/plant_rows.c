@@ -1,5 +1,5 @@
-/* plant_rows model|rest: reads rows of doubles from standard input, in the order of the structures
- * below, and writes a row of doubles for each to standard output. */
+/* plant_rows model|rest|series: reads rows of doubles from standard input, in the order of the
+ * structures below, and writes a row of doubles for each to standard output. */
 #include "rp_plant_model.h"
 #include "rp_plant_rest.h"
 
@@ -30,8 +30,8 @@ struct model_results {
 _Static_assert(offsetof(struct rp_plant_parameters, stops) == sizeof(double[28]),
                "28 parameters are doubles and come first");
 
-static void evaluate_model(const struct model_row *row, struct model_results *results) {
-    struct rp_plant_values v = {.inputs.tau = {row->inputs[0], row->inputs[1]}};
+static struct rp_plant_values values_of(const struct model_row *row) {
+    struct rp_plant_values v = {.payload_attached = row->attached != 0.0};
     memcpy(&v.parameters, row->parameters, sizeof row->parameters);
     memcpy(&v.inputs, row->inputs, sizeof row->inputs);
     memcpy(v.q, row->q, sizeof v.q);
@@ -39,6 +39,12 @@ static void evaluate_model(const struct model_row *row, struct model_results *re
     v.modes.payload = row->attached != 0.0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
     v.modes.joint[0] = (int)row->joint[0];
     v.modes.joint[1] = (int)row->joint[1];
+    return v;
+}
+
+static void evaluate_model(const void *row, void *results_pointer) {
+    struct model_results *results = results_pointer;
+    struct rp_plant_values v = values_of(row);
     (void)rp_plant_model.outputs(&v, 0.0);
 
     const struct rp_joint_loads *loads = &v.loads;
@@ -69,7 +75,9 @@ struct rest_results {
     double reaction[2];
 };
 
-static void evaluate_rest(const struct rest_row *row, struct rest_results *results) {
+static void evaluate_rest(const void *row_pointer, void *results_pointer) {
+    const struct rest_row *row = row_pointer;
+    struct rest_results *results = results_pointer;
     const double *D = row->D;
     const struct rp_plant_rest rest = {
         .inertia = {.D = {{D[0], D[1]}, {D[1], D[2]}}, .determinant = D[0] * D[2] - D[1] * D[1]},
@@ -87,27 +95,73 @@ static void evaluate_rest(const struct rest_row *row, struct rest_results *resul
     };
 }
 
+enum { ORDERS = 13 };
+
+struct series_row {
+    struct model_row model;
+    double unit;
+    double inputs[5][SERIES_INPUT_LENGTH];
+};
+
+struct series_results {
+    double states[4][ORDERS];
+    double indicators[RP_PLANT_INDICATORS][ORDERS];
+};
+
+static void evaluate_series(const void *row_pointer, void *results_pointer) {
+    static double rows[64][SERIES_LENGTH];
+    const struct series_row *row = row_pointer;
+    struct series_results *results = results_pointer;
+    const struct rp_plant_values v = values_of(&row->model);
+    const struct series *series = rp_plant_model.series;
+    const struct series_origin origin = {.values = &v, .unit = row->unit, .inputs = row->inputs};
+    for (int i = 0; i < 2; i++) {
+        rows[i][0] = v.q[i];
+        rows[2 + i][0] = v.dq[i];
+    }
+    (void)series->extend(&origin, 0, ORDERS - 1, rows);
+    for (int i = 0; i < 4; i++) {
+        memcpy(results->states[i], rows[i], sizeof results->states[i]);
+    }
+    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
+        memcpy(results->indicators[i], rows[series->row_of_indicator[i]],
+               sizeof results->indicators[i]);
+    }
+}
+
+static const struct {
+    const char *name;
+    size_t row_size;
+    size_t result_size;
+    void (*evaluate)(const void *row, void *results);
+} commands[] = {
+    {"model", sizeof(struct model_row), sizeof(struct model_results), evaluate_model},
+    {"rest", sizeof(struct rest_row), sizeof(struct rest_results), evaluate_rest},
+    {"series", sizeof(struct series_row), sizeof(struct series_results), evaluate_series},
+};
+
 int main(int argc, char **argv) {
-    const bool model = argc == 2 && strcmp(argv[1], "model") == 0;
-    if (!model && (argc != 2 || strcmp(argv[1], "rest") != 0)) {
-        (void)fprintf(stderr, "usage: plant_rows model|rest\n");
-        return 2;
-    }
-    struct model_row model_row;
-    struct model_results model_results;
-    struct rest_row rest_row;
-    struct rest_results rest_results;
-    size_t written = 1;
-    if (model) {
-        while (written == 1 && fread(&model_row, sizeof model_row, 1, stdin) == 1) {
-            evaluate_model(&model_row, &model_results);
-            written = fwrite(&model_results, sizeof model_results, 1, stdout);
+    static union {
+        struct model_row model;
+        struct rest_row rest;
+        struct series_row series;
+    } row;
+    static union {
+        struct model_results model;
+        struct rest_results rest;
+        struct series_results series;
+    } results;
+    for (size_t i = 0; argc == 2 && i < sizeof commands / sizeof commands[0]; i++) {
+        if (strcmp(argv[1], commands[i].name) != 0) {
+            continue;
         }
-    } else {
-        while (written == 1 && fread(&rest_row, sizeof rest_row, 1, stdin) == 1) {
-            evaluate_rest(&rest_row, &rest_results);
-            written = fwrite(&rest_results, sizeof rest_results, 1, stdout);
+        size_t written = 1;
+        while (written == 1 && fread(&row, commands[i].row_size, 1, stdin) == 1) {
+            commands[i].evaluate(&row, &results);
+            written = fwrite(&results, commands[i].result_size, 1, stdout);
         }
+        return written == 1 && fflush(stdout) == 0 ? 0 : 1;
     }
-    return written == 1 && fflush(stdout) == 0 ? 0 : 1;
+    (void)fprintf(stderr, "usage: plant_rows model|rest|series\n");
+    return 2;
 }

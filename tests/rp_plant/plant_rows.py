@@ -23,6 +23,7 @@ RESULTS = (
     "tau2_y", "friction1", "friction2",
 )  # fmt: skip
 FREE, STUCK = 2.0, 0.0
+ORDERS = 13  # of series, from 0 on
 DEFAULT = {
     "m1": 2.0, "m2": 1.0, "I1z": 0.1, "I2z": 0.05, "l1": 0.5, "lc1": 0.25, "a": 0.1, "g": 9.81,
     "mode1": FREE, "mode2": FREE,
@@ -53,6 +54,20 @@ def evaluate(program: Path, cases: list[Mapping[str, float]]) -> list[dict[str, 
     rows = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values])
     found = _run(program, "model", rows, len(RESULTS))
     return [dict(zip(RESULTS, row, strict=True)) for row in found.tolist()]
+
+
+def expand(
+    program: Path, cases: list[Mapping[str, float]], units: np.ndarray, inputs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of the states, (n, 4, ORDERS), and of the indicators, (n, 8, ORDERS).
+
+    `units`: (n,) s; `inputs`: (n, 5, 4) coefficients in these units.
+    """
+    values = [DEFAULT | dict(case) for case in cases]
+    knowns = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values])
+    rows = np.hstack([knowns, units[:, np.newaxis], inputs.reshape(len(inputs), -1)])
+    found = _run(program, "series", rows, 12 * ORDERS).reshape(-1, 12, ORDERS)
+    return found[:, :4], found[:, 4:]
 
 
 def decide(

@@ -106,6 +106,10 @@ class SmoothPlant:
              across.dot(force2), along.dot(force2), moment2]
         )  # fmt: skip
 
+    def expression(self, name: str) -> sp.Expr | sp.Matrix:
+        """In the symbols NAMES."""
+        return self._expressions[name]
+
     def evaluate(self, name: str, case: Mapping[str, float]) -> mpmath.matrix | mpmath.mpf:
         """An expression at exact rationals."""
         return self._functions[name](*(mpmath.mpf(case.get(key, 0.0)) for key in NAMES))

@@ -6,6 +6,7 @@ One joint is held by firm friction where the form is that of the other one.
 
 import math
 
+import mpmath
 import pytest
 
 from cosim.fmu_file import Fmu
@@ -56,6 +57,27 @@ def test_a_block_stops(plant: Fmu, method: str, h: float, damping: float, v0: fl
         assert events(instance, h, 3.0) == [(1, near(stop))]
         assert read(instance, "dq1", "dq2") == [0, 0]
         assert read(instance, "q2") == [near(way)]
+        assert modes(instance) == (0, 0)
+
+
+def time_to_rest(m: float, v0: float, Fc: float, Fb: float, vs: float) -> float:
+    """Integral of m / F(v) over the velocity, in parts, as F changes near 0 only."""
+    ends = [k * vs for k in (0, 0.5, 1, 2, 3, 4, 6, 9) if k * vs < v0] + [v0]
+    return float(mpmath.quad(lambda v: m / (Fc + (Fb - Fc) * mpmath.exp(-((v / vs) ** 2))), ends))
+
+
+@each_method
+@each_step
+@pytest.mark.parametrize(("vs", "v0"), [(0.3, 1.5), (0.1, -1.5), (0.01, 1.5), (1e-4, -1.5)])
+def test_a_block_stops_by_stribecks_law(
+    plant: Fmu, method: str, h: float, vs: float, v0: float
+) -> None:
+    """However small the velocity is below which friction grows: no step passes over it."""
+    m, Fc, Fb = 1.3, 1.0, 2.0
+    friction = {"coulomb_friction2": Fc, "breakaway_friction2": Fb, "stribeck_velocity2": vs}
+    values = {"m2": m, "a": 0.0, "dq2": v0, "coulomb_friction1": FIRM}
+    with started(plant, method, **values, **friction) as instance:
+        assert events(instance, h, 3.0) == [(1, near(time_to_rest(m, abs(v0), Fc, Fb, vs)))]
         assert modes(instance) == (0, 0)
 
 

@@ -106,15 +106,6 @@ def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method
     assert counts[-1, 0] > 0
 
 
-def test_taylor_is_refused(plant: Fmu) -> None:
-    with plant.instance("plant") as instance:
-        instance.set_up(0.0, None)
-        instance.set("solver_method", 4)
-        instance.enter_initialization()
-        with pytest.raises(UserError, match="taylor"):
-            instance.exit_initialization()
-
-
 # ---- Refused ---------------------------------------------------------------------------------
 
 OUT_OF_RANGE = {

@@ -59,7 +59,7 @@ MOTIONS = {
 }
 
 
-@pytest.mark.parametrize("method", ["cvode_adams", "cvode_bdf"])
+@pytest.mark.parametrize("method", ["cvode_adams", "cvode_bdf", "taylor"])
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_later_communication_points_do_not_matter(plant: Fmu, method: str, motion: str) -> None:
     """With constant inputs and the same first step: all event times, and the state at the end."""

@@ -1,0 +1,397 @@
+/* Recurrences for the coefficients of a motion in given modes. Symbols are those of rp_series.c,
+ * with link 2 and its payload as one body and the armature b1 in J. With the armature b2 and the
+ * efforts E_i = tau_i + Q_i - d_i q_i' - f_i, row 1 plus a times row 2 of the equations of motion,
+ * and row 2 over m2, are
+ *
+ *   (N + a b2 v)' = E1 + a E2 + a m2 P w - g c1 (m1 lc1 + m2 L)
+ *   (v - a w + (b2 / m2) v)' = E2 / m2 + P w - g s1
+ *
+ * Their right sides give coefficient k of what stands in the brackets, R1 and R2. With
+ * N_k = J_0 w_k + K, where K has the terms that are known, and mu = m2 / (m2 + b2),
+ *
+ *   (J_0 + a^2 mu b2) w_k = R1 - K - a mu b2 R2          v_k = mu (R2 + a w_k)
+ *
+ * Where joint 1 is stuck, w_k = 0 and v_k is the same. Where joint 2 is stuck, v_k = 0, and row 1
+ * gives w_k:
+ *
+ *   (N + m2 a^2 w)' = E1 - g c1 (m1 lc1 + m2 L) + m2 g a s1
+ *
+ * What holds a stuck joint is the rest of its row of the equations, as in plant_motion. */
+#include "rp_plant_series.h"
+
+#include "arithmetic_double.h"
+#include "jet.h"
+#include "rp_plant_equations.h"
+#include "rp_plant_model.h"
+#include "rp_series.h"
+
+#include <string.h>
+
+/* Inputs: tau1, f2, and the wrench. */
+enum { FX = 2, FY, MZ };
+
+/* Those of the manipulator come first. Pairs: of joint 1 and of joint 2. */
+enum row {
+    Q1,
+    Q2,
+    W,
+    V,
+    L,
+    P,
+    S,
+    C,
+    X, // end effector, where there is a wrench
+    Y,
+    E1, // efforts
+    E2,
+    RATIO,                     // r = q' / vs of a sliding joint whose friction depends on it
+    RATE = RATIO + 2,          // k r_k
+    EXPONENTIAL = RATE + 2,    // e = exp(-r^2)
+    RATIO_E = EXPONENTIAL + 2, // r e
+    FORWARD = RATIO_E + 2,     // indicators of a stuck joint
+    BACKWARD = FORWARD + 2,
+    ROWS = BACKWARD + 2
+};
+
+_Static_assert(X == (int)RP_SERIES_ROWS, "the rows of the manipulator come first");
+
+/* Where q' is so many times vs, friction is that of a fast joint: exp(-36) of the difference is
+ * left. */
+static const double fast = 6.0;
+
+/* What all orders share. */
+struct motion {
+    const struct series_origin *origin;
+    const struct rp_plant_parameters *p;
+    struct rp_plant_modes modes;
+    bool has_wrench;
+    bool depends_on_velocity[2]; /* friction of the joint, where it slides */
+    double per_vs[2];
+    double m2, a, g, m1_lc1; /* m2, a: of link 2 with payload */
+    double L0;
+    double offset_z; /* m: of the payload */
+    double mu, a_mu_b2;
+    double per_m2, per_inertia; /* 1 over what stands before w_k */
+};
+
+/* ---- Constants ------------------------------------------------------------------------------ */
+
+static bool has_wrench(const struct series_origin *origin) {
+    for (int i = FX; i <= MZ; i++) {
+        for (int k = 0; k < SERIES_INPUT_LENGTH; k++) {
+            if (origin->inputs[i][k] != 0.0) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+static bool is_stuck(const struct motion *m, int joint) {
+    return m->modes.joint[joint] == RP_PLANT_STUCK;
+}
+
+static bool has_breakaway(const struct rp_plant_parameters *p, int joint) {
+    return p->breakaway_friction[joint] > p->coulomb_friction[joint];
+}
+
+static bool slides(const struct motion *m, int joint) {
+    const int mode = m->modes.joint[joint];
+    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+}
+
+static bool has_payload(const struct motion *m) {
+    return m->modes.payload == RP_PLANT_ATTACHED &&
+           (m->p->payload_mass > 0.0 || m->p->payload_inertia > 0.0);
+}
+
+/* The motion is that of the manipulator. */
+static bool is_plain(const struct motion *m) {
+    const struct rp_plant_parameters *p = m->p;
+    return m->modes.joint[0] == RP_PLANT_FREE && m->modes.joint[1] == RP_PLANT_FREE &&
+           p->armature[0] == 0.0 && p->armature[1] == 0.0 && p->damping[0] == 0.0 &&
+           p->damping[1] == 0.0 && !m->has_wrench && !has_payload(m);
+}
+
+/* The bodies at this q2. */
+static void set_bodies(struct motion *m, double q2) {
+    const struct rp_plant_parameters *p = m->p;
+    const struct rp_parameters *arm = &p->arm;
+    struct plant plant = {
+        .arm = {.m1 = arm->m1,
+                .m2 = arm->m2,
+                .I1z = arm->I1z,
+                .I2z = arm->I2z,
+                .l1 = arm->l1,
+                .lc1 = arm->lc1,
+                .a = arm->a,
+                .q = {0.0, q2}},
+    };
+    plant.arm.L = arm->l1 + q2;
+    plant.arm.J = rp_fixed_inertia(arm) + arm->m2 * plant.arm.L * plant.arm.L;
+    if (has_payload(m)) {
+        plant_attach(&plant, &p);
+    }
+    const double m2 = plant.arm.m2;
+    const double a = plant.arm.a;
+    const double b2 = p->armature[1];
+    const double J0 = plant.arm.J + p->armature[0];
+    m->m2 = m2;
+    m->a = a;
+    m->g = arm->g;
+    m->m1_lc1 = arm->m1 * arm->lc1;
+    m->L0 = plant.arm.L;
+    m->offset_z = has_payload(m) ? plant.offset_z : 0.0;
+    m->mu = b2 > 0.0 ? m2 / (m2 + b2) : 1.0;
+    m->a_mu_b2 = a * m->mu * b2;
+    m->per_m2 = 1.0 / m2;
+    m->per_inertia = 1.0 / (J0 + a * (is_stuck(m, 1) ? a * m2 : m->a_mu_b2));
+}
+
+static void begin_motion(const struct series_origin *origin, double row[][SERIES_LENGTH],
+                         struct motion *m) {
+    const struct rp_plant_values *values = origin->values;
+    const double q[2] = {row[Q1][0], row[Q2][0]};
+    const double dq[2] = {row[W][0], row[V][0]};
+    const double(*u)[SERIES_INPUT_LENGTH] = origin->inputs;
+    const struct rp_plant_inputs inputs = {
+        .tau = {u[0][0], u[1][0]},
+        .wrench = {u[FX][0], u[FY][0], u[MZ][0]},
+    };
+    m->origin = origin;
+    m->p = &values->parameters;
+    m->modes = rp_plant_modes_in_effect(values, q, dq, &inputs);
+    m->has_wrench = has_wrench(origin);
+    for (int i = 0; i < 2; i++) {
+        m->depends_on_velocity[i] =
+            has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
+        m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
+    }
+}
+
+/* ---- Efforts -------------------------------------------------------------------------------- */
+
+/* Order k of the product of an input and a row. */
+static double with_input(const struct motion *m, int input, const double x[], int k) {
+    const double *u = m->origin->inputs[input];
+    double sum = 0.0;
+    for (int i = 0; i < SERIES_INPUT_LENGTH && i <= k; i++) {
+        sum += u[i] * x[k - i];
+    }
+    return sum;
+}
+
+/* Adds Q1 = x fy - y fx + mz and Q2 = c1 fx + s1 fy. */
+static void add_wrench(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
+    const double a = m->p->arm.a;
+    const double L_c = jet_product(row[L], row[C], k) - m->offset_z * row[C][k];
+    const double L_s = jet_product(row[L], row[S], k) - m->offset_z * row[S][k];
+    row[X][k] = L_c - a * row[S][k];
+    row[Y][k] = L_s + a * row[C][k];
+    const double moment = with_input(m, FY, row[X], k) - with_input(m, FX, row[Y], k);
+    row[E1][k] += moment + jet_input(m->origin, MZ, k);
+    row[E2][k] += with_input(m, FX, row[C], k) + with_input(m, FY, row[S], k);
+}
+
+/* Order k of e = exp(-r^2), from e' = -2 r' (r e). */
+static double exponential(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
+    double *r = row[RATIO + i];
+    double *rate = row[RATE + i];
+    double *e = row[EXPONENTIAL + i];
+    double *r_e = row[RATIO_E + i];
+    r[k] = row[W + i][k] * m->per_vs[i];
+    rate[k] = k * r[k];
+    if (k == 0) {
+        e[0] = exp(-r[0] * r[0]);
+        r_e[0] = r[0] * e[0];
+        return e[0];
+    }
+    double rate_r_e = 0.0;
+    double product = 0.0;
+    for (int j = 1; j <= k; j++) {
+        rate_r_e += rate[j] * r_e[k - j];
+        product += r[j] * e[k - j];
+    }
+    e[k] = -2.0 / k * rate_r_e;
+    r_e[k] = product + r[0] * e[k];
+    return e[k];
+}
+
+/* As plant_sliding_friction. */
+static double sliding_friction(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
+    const double coulomb = m->p->coulomb_friction[i];
+    const double e = m->depends_on_velocity[i] ? exponential(m, i, k, row) : 0.0;
+    const double breakaway = m->p->breakaway_friction[i];
+    return k == 0 ? breakaway * e + coulomb * (1.0 - e) : (breakaway - coulomb) * e;
+}
+
+static void write_efforts(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
+    for (int i = 0; i < 2; i++) {
+        double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
+        if (slides(m, i)) {
+            effort -= m->modes.joint[i] * sliding_friction(m, i, k, row);
+        }
+        row[E1 + i][k] = effort;
+    }
+    if (m->has_wrench) {
+        add_wrench(m, k, row);
+    }
+}
+
+/* ---- Motion --------------------------------------------------------------------------------- */
+
+/* Sums over i = 0 .. n of a product of two series, x_i z_(n-i), or x_(i+1) z_(n-i) where `ahead`
+ * stands in the name. */
+struct products {
+    double P_w, L_c, w_s, w_c;
+    double ahead_L_w, ahead_L_P;
+};
+
+static inline struct products products_of_order(double row[][SERIES_LENGTH], double next_L, int n) {
+    struct products sum = {0};
+    for (int i = 0; i < n; i++) {
+        const int j = n - i;
+        sum.P_w += row[P][i] * row[W][j];
+        sum.L_c += row[L][i] * row[C][j];
+        sum.w_s += row[W][i] * row[S][j];
+        sum.w_c += row[W][i] * row[C][j];
+        sum.ahead_L_w += row[L][i + 1] * row[W][j];
+        sum.ahead_L_P += row[L][i + 1] * row[P][j];
+    }
+    sum.P_w += row[P][n] * row[W][0];
+    sum.L_c += row[L][n] * row[C][0];
+    sum.w_s += row[W][n] * row[S][0];
+    sum.w_c += row[W][n] * row[C][0];
+    sum.ahead_L_w += next_L * row[W][0];
+    sum.ahead_L_P += next_L * row[P][0];
+    return sum;
+}
+
+/* What follows from the orders up to n: coefficients of order n + 1, and two terms of order n. */
+struct next {
+    double L, s, c, w, v, P;
+    double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
+};
+
+static inline struct next next_order(const struct motion *m, int n, double row[][SERIES_LENGTH]) {
+    const double h = m->origin->unit / (n + 1);
+    struct next next = {.L = h * row[V][n]};
+    const struct products sum = products_of_order(row, next.L, n);
+    const double L0 = row[L][0];
+    next.s = h * sum.w_c;
+    next.c = -h * sum.w_s;
+    next.P_w = sum.P_w;
+    next.weight = m->g * (m->m1_lc1 * row[C][n] + m->m2 * sum.L_c);
+    const double known = m->m2 * (L0 * sum.ahead_L_w + sum.ahead_L_P);
+    const double R2 = h * (row[E2][n] * m->per_m2 + sum.P_w - m->g * row[S][n]);
+    if (is_stuck(m, 1)) {
+        const double fall = m->m2 * m->g * m->a * row[S][n];
+        const double R = h * (row[E1][n] - next.weight + fall);
+        next.w = is_stuck(m, 0) ? 0.0 : (R - known) * m->per_inertia;
+    } else {
+        const double pushed = row[E1][n] + m->a * row[E2][n];
+        const double R1 = h * (pushed + m->a * m->m2 * sum.P_w - next.weight);
+        next.w = is_stuck(m, 0) ? 0.0 : (R1 - known - m->a_mu_b2 * R2) * m->per_inertia;
+        next.v = m->mu * (R2 + m->a * next.w);
+    }
+    next.P = L0 * next.w + sum.ahead_L_w;
+    return next;
+}
+
+static inline void write_order(const struct motion *m, int k, const struct next *next,
+                               double row[][SERIES_LENGTH]) {
+    row[Q1][k] = jet_integral(row[W], m->origin->unit, k);
+    row[Q2][k] = next->L;
+    row[L][k] = next->L;
+    row[W][k] = next->w;
+    row[V][k] = next->v;
+    row[P][k] = next->P;
+    row[S][k] = next->s;
+    row[C][k] = next->c;
+}
+
+/* ---- Indicators ----------------------------------------------------------------------------- */
+
+/* As plant_stuck_indicators with both sides in use; those of other joints are not of the model. */
+static void write_indicators(const struct motion *m, int k, const struct next *next,
+                             double row[][SERIES_LENGTH]) {
+    const double rate = (k + 1) / m->origin->unit;
+    const double a_m2 = m->a * m->m2;
+    const double coriolis = 2.0 * m->m2 * jet_product(row[P], row[V], k);
+    const double fall = m->g * row[S][k];
+    const double reaction[2] = {
+        row[E1][k] - coriolis - next->weight + a_m2 * (fall + rate * next->v),
+        row[E2][k] + m->m2 * (next->P_w - fall) + a_m2 * rate * next->w,
+    };
+    for (int i = 0; i < 2; i++) {
+        if (is_stuck(m, i)) {
+            const double breakaway = k == 0 ? rp_plant_breakaway(m->p, i) : 0.0;
+            row[FORWARD + i][k] = breakaway - reaction[i];
+            row[BACKWARD + i][k] = breakaway + reaction[i];
+        }
+    }
+}
+
+/* ---- Series --------------------------------------------------------------------------------- */
+
+static void begin_rows(const struct motion *m, double row[][SERIES_LENGTH]) {
+    row[L][0] = m->L0;
+    row[P][0] = row[L][0] * row[W][0];
+    row[S][0] = sin(row[Q1][0]);
+    row[C][0] = cos(row[Q1][0]);
+}
+
+static enum status extend(const struct series_origin *origin, int first, int last,
+                          double row[][SERIES_LENGTH]) {
+    struct motion m;
+    begin_motion(origin, row, &m);
+    if (is_plain(&m)) {
+        rp_series_extend(&m.p->arm, origin, first, last, row);
+        return STATUS_OK;
+    }
+    set_bodies(&m, row[Q2][0]);
+    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
+    struct next next;
+    if (first == 0) {
+        begin_rows(&m, row);
+    } else if (is_held) {
+        next = next_order(&m, first - 1, row);
+    }
+    for (int k = first; k <= last; k++) {
+        if (k > 0) {
+            if (!is_held) {
+                next = next_order(&m, k - 1, row);
+            }
+            write_order(&m, k, &next, row);
+        }
+        write_efforts(&m, k, row);
+        if (is_held) {
+            next = next_order(&m, k, row);
+            write_indicators(&m, k, &next, row);
+        }
+    }
+    return STATUS_OK;
+}
+
+/* Over steps in which the velocity changes by vs at most, the series shows the friction near rest.
+ * Those of a fast joint, which show nothing of it, end before. */
+void rp_plant_reach(const void *values_pointer, const double x[], double reach[]) {
+    const struct rp_plant_values *values = values_pointer;
+    const struct rp_plant_parameters *p = &values->parameters;
+    for (int i = 0; i < 2; i++) {
+        const int mode = values->modes.joint[i];
+        const bool slides = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+        const double vs = p->stribeck_velocity[i];
+        reach[i] = INFINITY;
+        reach[2 + i] =
+            slides && has_breakaway(p, i) ? fmax(vs, fabs(x[2 + i]) - fast * vs) : INFINITY;
+    }
+}
+
+/* 0: one that is never of the model. */
+static const size_t row_of_indicator[RP_PLANT_INDICATORS] = {
+    FORWARD, BACKWARD, 0, 0, FORWARD + 1, BACKWARD + 1, 0, 0,
+};
+
+const struct series rp_plant_series = {
+    .row_count = ROWS, .row_of_indicator = row_of_indicator, .extend = extend};

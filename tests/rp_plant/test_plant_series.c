@@ -1,0 +1,320 @@
+/* The series of the plant against its right-hand side, its indicators, and the manipulator's
+ * series. In test_plant_series.py its coefficients are those of the Lagrangian. */
+#include "plant_test_support.h"
+#include "rp_model.h"
+#include "rp_plant_series.h"
+#include "rp_series.h"
+#include "unity.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+enum { MAX_ROWS = 64 };
+
+typedef double row[SERIES_LENGTH];
+
+static struct rp_test_random random_source;
+static struct rp_plant_values plant;
+static double unit;
+static double inputs[PLANT_INPUTS][SERIES_INPUT_LENGTH];
+static row rows[MAX_ROWS];
+
+void setUp(void) {
+    random_source.state = 37;
+}
+
+static void clear(row all[MAX_ROWS]) {
+    memset(all, 0xff, sizeof(row) * MAX_ROWS); // NaN: what is read has been written
+    for (int i = 0; i < 2; i++) {
+        all[i][0] = plant.q[i];
+        all[2 + i][0] = plant.dq[i];
+    }
+}
+
+/* The inputs of the sample, which move in one of two draws. */
+static void next_inputs(void) {
+    const bool move = rp_test_random_bits(&random_source) % 2 == 0;
+    unit = pow(2.0, rp_test_uniform(&random_source, -12.0, -6.0));
+    double u[PLANT_INPUTS];
+    memcpy(u, &plant.inputs, sizeof u);
+    for (int i = 0; i < PLANT_INPUTS; i++) {
+        inputs[i][0] = u[i];
+        for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
+            inputs[i][k] = move ? rp_test_uniform(&random_source, -20.0, 20.0) * pow(unit, k) : 0.0;
+        }
+    }
+}
+
+static void next_plant(void) {
+    plant_test_random_plant(&random_source, &plant);
+    next_inputs();
+}
+
+static void extend(const struct series *series, const void *values, int first, int last,
+                   row all[MAX_ROWS]) {
+    const struct series_origin origin = {
+        .values = values,
+        .unit = unit,
+        .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
+    };
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, series->row_count);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, series->extend(&origin, first, last, all));
+}
+
+static void test_any_number_of_orders_at_once_gives_the_same_bits(void) {
+    static row at_once[MAX_ROWS];
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_plant();
+        clear(at_once);
+        clear(rows);
+        extend(&rp_plant_series, &plant, 0, SERIES_LENGTH - 1, at_once);
+        for (int first = 0; first < SERIES_LENGTH;) {
+            const int more = n == 0 ? 0 : (int)(rp_test_random_bits(&random_source) % 5);
+            const int last = first + more < SERIES_LENGTH ? first + more : SERIES_LENGTH - 1;
+            extend(&rp_plant_series, &plant, first, last, rows);
+            first = last + 1;
+        }
+        TEST_ASSERT_EQUAL_MEMORY(at_once, rows, rp_plant_series.row_count * sizeof rows[0]);
+    }
+}
+
+/* With every feature off it is the manipulator's. */
+static void test_start_values_give_the_bits_of_the_manipulator(void) {
+    static row of_arm[MAX_ROWS];
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        plant_test_random_arm(&random_source, &plant);
+        plant.payload_attached = n % 2;
+        plant.parameters.payload_x = rp_test_uniform(&random_source, -1.0, 1.0);
+        if (n % 4 < 2) {
+            plant_test_update(&plant, -1);
+        }
+        next_inputs();
+        memset(inputs[2], 0, 3 * sizeof inputs[0]);
+        struct rp_values arm;
+        memset(&arm, 0xff, sizeof arm);
+        arm.parameters = plant.parameters.arm;
+        clear(rows);
+        clear(of_arm);
+        extend(&rp_plant_series, &plant, 0, SERIES_LENGTH - 1, rows);
+        extend(&rp_series, &arm, 0, SERIES_LENGTH - 1, of_arm);
+        TEST_ASSERT_EQUAL_MEMORY(of_arm, rows, PLANT_STATES * sizeof rows[0]);
+    }
+}
+
+/* Each feature that is on adds to the series what it adds to the right-hand side. */
+static void test_each_feature_counts(void) {
+    double *const features[] = {
+        &plant.parameters.armature[0],     &plant.parameters.armature[1],
+        &plant.parameters.damping[0],      &plant.parameters.damping[1],
+        &plant.inputs.wrench[0],           &plant.inputs.wrench[1],
+        &plant.inputs.wrench[2],           &plant.parameters.payload_mass,
+        &plant.parameters.payload_inertia,
+    };
+    for (size_t i = 0; i < sizeof features / sizeof features[0]; i++) {
+        double expected[PLANT_STATES];
+        plant_test_random_arm(&random_source, &plant);
+        plant.payload_attached = 1;
+        *features[i] = 1.0;
+        plant_test_update(&plant, -1);
+        next_inputs();
+        clear(rows);
+        extend(&rp_plant_series, &plant, 0, 1, rows);
+        const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
+        TEST_ASSERT_EQUAL_INT(
+            STATUS_OK, rp_plant_model.right_hand_side(&plant, 3.0, x, (const double *)&plant.inputs,
+                                                      expected));
+        for (int k = 0; k < PLANT_STATES; k++) {
+            ASSERT_CLOSE(expected[k], rows[k][1] / unit, 1e-12 * (1.0 + fabs(expected[k])));
+        }
+    }
+}
+
+/* ---- Equations of motion -------------------------------------------------------------------- */
+
+enum { DEGREE = 20 };
+
+/* The value at s units; its derivative by s; the sum of the absolute terms of both at s = 1. */
+struct sum {
+    double value, derivative, size;
+};
+
+static struct sum sum_of(const double c[], double s) {
+    struct sum sum = {0};
+    for (int k = DEGREE; k >= 0; k--) {
+        sum.derivative = sum.derivative * s + sum.value;
+        sum.value = sum.value * s + c[k];
+        sum.size += (k + 1) * fabs(c[k]);
+    }
+    return sum;
+}
+
+static bool row_has_converged(const double c[]) {
+    const double last = fabs(c[DEGREE]) + fabs(c[DEGREE - 1]);
+    return last <= 1e-18 * (1.0 + sum_of(c, 1.0).size);
+}
+
+/* The terms at the end are nothing beside the others, and velocities move no farther than they may.
+ */
+static bool has_converged(const struct indicator kinds[]) {
+    double reach[PLANT_STATES];
+    const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
+    rp_plant_reach(&plant, x, reach);
+    for (int i = 0; i < PLANT_STATES; i++) {
+        double way = 0.0;
+        for (int k = 1; k <= DEGREE; k++) {
+            way += fabs(rows[i][k]);
+        }
+        if (!row_has_converged(rows[i]) || !(way <= reach[i])) {
+            return false;
+        }
+    }
+    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
+        if (kinds[i].kind == INDICATOR_OF_MODEL &&
+            !row_has_converged(rows[rp_plant_series.row_of_indicator[i]])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The series with a unit as long as it converges fast. */
+static void expand_far(void) {
+    double begin[PLANT_INPUTS][SERIES_INPUT_LENGTH];
+    struct indicator kinds[RP_PLANT_INDICATORS];
+    memcpy(begin, inputs, sizeof begin);
+    rp_plant_model.events->describe(&plant, kinds);
+    const double first_unit = unit;
+    for (double part = 1024.0; part > 1e-6; part *= 0.5) {
+        unit = part * first_unit;
+        for (int i = 0; i < PLANT_INPUTS; i++) {
+            for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
+                inputs[i][k] = begin[i][k] * pow(part, k);
+            }
+        }
+        clear(rows);
+        extend(&rp_plant_series, &plant, 0, DEGREE, rows);
+        if (has_converged(kinds)) {
+            return;
+        }
+    }
+    TEST_FAIL_MESSAGE("the series does not converge");
+}
+
+static void assert_model_at(double s) {
+    double x[PLANT_STATES];
+    double u[PLANT_INPUTS];
+    double dx[PLANT_STATES];
+    double z[RP_PLANT_INDICATORS];
+    struct indicator kinds[RP_PLANT_INDICATORS];
+    for (int i = 0; i < PLANT_STATES; i++) {
+        x[i] = sum_of(rows[i], s).value;
+    }
+    for (int i = 0; i < PLANT_INPUTS; i++) {
+        u[i] = inputs[i][0] + s * (inputs[i][1] + s * (inputs[i][2] + s * inputs[i][3]));
+    }
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.events->indicators(&plant, 3.0, x, u, z));
+    rp_plant_model.events->describe(&plant, kinds);
+    for (int i = 0; i < PLANT_STATES; i++) {
+        const struct sum sum = sum_of(rows[i], s);
+        ASSERT_CLOSE(dx[i] * unit, sum.derivative, 1e-11 * (unit + sum.size));
+    }
+    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
+        if (kinds[i].kind == INDICATOR_OF_MODEL) {
+            const struct sum sum = sum_of(rows[rp_plant_series.row_of_indicator[i]], s);
+            ASSERT_CLOSE(z[i], sum.value, 1e-11 * (100.0 + sum.size));
+        }
+    }
+}
+
+static void test_the_polynomials_satisfy_the_equations(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_plant();
+        if (n % 3 == 0) { // on a stop
+            plant.parameters.stops[n % 2] = RP_PLANT_STOPS_RIGID;
+            plant.parameters.lower[n % 2] = plant.q[n % 2];
+            plant.parameters.upper[n % 2] = plant.q[n % 2] + 1.0;
+            plant.dq[n % 2] = 0.0;
+            plant.modes.joint[n % 2] = RP_PLANT_STUCK;
+        }
+        expand_far();
+        assert_model_at(0.0);
+        assert_model_at(0.5);
+        assert_model_at(1.0);
+    }
+}
+
+static void test_modes_that_are_not_decided_yet(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        next_plant();
+        plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
+        plant.dq[n % 2] = 0.0;
+        unit = 1e-3;
+        clear(rows);
+        extend(&rp_plant_series, &plant, 0, DEGREE, rows);
+        assert_model_at(0.0);
+    }
+}
+
+static void test_rows_of_indicators_exist(void) {
+    for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
+        TEST_ASSERT_LESS_THAN_size_t(rp_plant_series.row_count,
+                                     rp_plant_series.row_of_indicator[i]);
+    }
+}
+
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+static void assert_reach(double expected, double dq2) {
+    double reach[PLANT_STATES];
+    const double x[PLANT_STATES] = {1.0, 2.0, 3.0, dq2};
+    rp_plant_reach(&plant, x, reach);
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_TRUE(reach[i] == INFINITY);
+    }
+    TEST_ASSERT_TRUE(reach[3] == INFINITY ? expected == INFINITY
+                                          : fabs(reach[3] - expected) < 1e-14);
+}
+
+/* Where friction depends on the velocity, it changes by vs at most, but 6 vs from rest. */
+static void test_reach_of_a_velocity(void) {
+    plant_test_start(&plant);
+    plant.modes = (struct rp_plant_modes){{RP_PLANT_FORWARD, RP_PLANT_FORWARD}, RP_PLANT_RELEASED};
+    plant.parameters.coulomb_friction[1] = 1.0;
+    plant.parameters.stribeck_velocity[1] = 0.25;
+    assert_reach(INFINITY, 0.5);
+    plant.parameters.breakaway_friction[1] = 2.0;
+    assert_reach(0.25, 0.0);
+    assert_reach(0.25, 1.5);
+    assert_reach(0.5, 2.0);
+    assert_reach(8.5, -10.0);
+    plant.modes.joint[1] = RP_PLANT_BACKWARD;
+    assert_reach(0.25, -0.5);
+    plant.modes.joint[1] = RP_PLANT_STUCK;
+    assert_reach(INFINITY, 0.0);
+}
+
+/* Where nothing of it is left, friction is constant over a step: no coefficient has any. */
+static void test_friction_of_a_fast_joint_is_constant(void) {
+    static row constant[MAX_ROWS];
+    plant_test_start(&plant);
+    plant.modes = (struct rp_plant_modes){{RP_PLANT_STUCK, RP_PLANT_FORWARD}, RP_PLANT_RELEASED};
+    plant.parameters.coulomb_friction[0] = 100.0;
+    plant.parameters.coulomb_friction[1] = 1.0;
+    plant.parameters.stribeck_velocity[1] = 0.25;
+    plant.q[0] = 1.0;
+    unit = 0.001;
+    memset(inputs, 0, sizeof inputs);
+    for (int n = 0; n < 2; n++) {
+        plant.dq[1] = n == 0 ? 2.0 : 1.5; // 8 vs, 6 vs
+        clear(rows);
+        clear(constant);
+        plant.parameters.breakaway_friction[1] = 1.0;
+        extend(&rp_plant_series, &plant, 0, 8, constant);
+        plant.parameters.breakaway_friction[1] = 1000.0;
+        extend(&rp_plant_series, &plant, 0, 8, rows);
+        const bool same = memcmp(constant[3], rows[3], 9 * sizeof(double)) == 0;
+        TEST_ASSERT_TRUE(same == (n == 0));
+    }
+}
