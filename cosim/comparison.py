@@ -126,6 +126,7 @@ def differing(one: Result, other: Result) -> tuple[str, ...]:
     """Outputs that are not in both, or whose values differ in a bit."""
     columns, others = (
         {name: column.tobytes() for name, column in zip(r.names, r.values.T, strict=True)}
+        | {name: column.tobytes() for name, column in r.integers.items()}
         for r in (one, other)
     )
     names = dict.fromkeys((*columns, *others))

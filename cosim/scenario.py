@@ -56,6 +56,7 @@ class Scenario:
     inputs: dict[str, np.ndarray]  # (n + 1,) each: held over the step that begins at times[i]
     reference_every: int  # every k-th communication point is in the reference
     defaults: dict[str, Value]  # start values in the FMU
+    panels: tuple[tuple[str, ...], ...] = ()  # variables to draw beside the states, by diagram
 
     @property
     def start_values(self) -> dict[str, Value]:
@@ -111,7 +112,7 @@ def load(path: Path, model: Model) -> Scenario:
         content,
         "",
         required=("title", "description", "tolerance", "time"),
-        optional=("reference_every", PARAMETERS, INITIAL, INPUTS),
+        optional=("reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
     )
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
@@ -142,6 +143,7 @@ def load(path: Path, model: Model) -> Scenario:
         inputs=reader.sampled(signals, times - start, model),
         reference_every=min(every, MAX_STEPS),
         defaults=model.start_values,
+        panels=reader.panels(content, model),
     )
 
 
@@ -204,6 +206,33 @@ class _Reader:
             except WrongValueError as error:
                 self.fail(f"{where}: {error}")
         return result
+
+    # pictures
+
+    def panels(self, content: dict[str, Any], model: Model) -> tuple[tuple[str, ...], ...]:
+        """Key panels: lists of variables that are drawn into one diagram, of one unit."""
+        if "panels" not in content:
+            return ()
+        drawn = [
+            v.name
+            for v in model.variables.values()
+            if (v.causality == "output" and v.type in ("Real", "Integer"))
+            or (v.causality == "input" and v.type == "Real")
+        ]
+        result = []
+        for i, names in enumerate(self.array(content["panels"], "panels", "lists of variables")):
+            key = f"panels[{i}]"
+            for name in self.array(names, key, "variables"):
+                if name not in drawn:
+                    guess = did_you_mean(name, drawn) if isinstance(name, str) else ""
+                    self.fail(f"{key}: {show(name)} cannot be drawn{guess}")
+            if (
+                len({(model.variables[name].type, model.variables[name].unit) for name in names})
+                > 1
+            ):
+                self.fail(f"{key}: expected variables of one type and unit")
+            result.append(tuple(names))
+        return tuple(result)
 
     # time
 

@@ -1,8 +1,9 @@
 """Runs scenarios on FMUs."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -28,6 +29,7 @@ class Result:
     solver_steps: int | None  # None: the FMU has no such variable
     solver_rhs_evaluations: int | None
     messages: tuple[str, ...]  # warnings from the FMU, the last ones
+    integers: dict[str, np.ndarray] = field(default_factory=dict)  # (rows,): those to be drawn
 
 
 def simulate(
@@ -59,7 +61,12 @@ def simulate(
         raise UserError(f"{fmu.path}: has no Real outputs, nothing can be recorded")
     with fmu.instance(scenario.name) as instance:
         initialize(instance, scenario, tolerance)
-        values, wall_time = _step_through(instance, scenario, progress)
+        drawn = [
+            name
+            for name in dict.fromkeys(chain.from_iterable(scenario.panels))
+            if fmu.model.variables[name].type == "Integer"
+        ]
+        values, integers, wall_time = _step_through(instance, scenario, drawn, progress)
         return Result(
             tolerance=tolerance,
             times=scenario.times[scenario.reference_rows],
@@ -70,6 +77,7 @@ def simulate(
             solver_steps=instance.integer("solver_steps"),
             solver_rhs_evaluations=instance.integer("solver_rhs_evaluations"),
             messages=tuple(instance.messages),
+            integers=dict(zip(drawn, integers.T, strict=True)),
         )
 
 
@@ -85,9 +93,12 @@ def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None
 
 
 def _step_through(
-    instance: Instance, scenario: Scenario, progress: Callable[[int], object] | None
-) -> tuple[np.ndarray, float]:
-    """All steps: recorded outputs (rows, outputs), and the seconds that the loop took."""
+    instance: Instance,
+    scenario: Scenario,
+    drawn: Sequence[str],
+    progress: Callable[[int], object] | None,
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """All steps: recorded outputs (rows, outputs), Integers (rows, drawn), seconds of the loop."""
     switches = {name: values for name, values in scenario.inputs.items() if values.dtype == bool}
     inputs = instance.reals([name for name in scenario.inputs if name not in switches])
     outputs = instance.reals(instance.fmu.model.real_outputs)
@@ -98,12 +109,14 @@ def _step_through(
     times, lengths = scenario.times, np.diff(scenario.times)
     rows = scenario.reference_rows
     values = np.empty((len(rows), len(outputs.names)))
+    integers = np.empty((len(rows), len(drawn)), int)
     recorded, reported, i = 0, 0, -1
     begin = time.perf_counter()
     due = begin + PROGRESS_EVERY
     try:
         outputs.get()
         values[0] = outputs.view
+        integers[0] = [instance.integer(name) for name in drawn]
         for i, length in enumerate(lengths):
             if held is not None:
                 inputs.view[:] = held[i]
@@ -115,6 +128,7 @@ def _step_through(
                 outputs.get()
                 recorded += 1
                 values[recorded] = outputs.view
+                integers[recorded] = [instance.integer(name) for name in drawn]
             if progress is not None and time.perf_counter() >= due:
                 progress(i + 1 - reported)
                 reported = i + 1
@@ -125,7 +139,7 @@ def _step_through(
     wall_time = time.perf_counter() - begin
     if progress is not None:
         progress(len(lengths) - reported)
-    return values, wall_time
+    return values, integers, wall_time
 
 
 def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:

@@ -1,19 +1,22 @@
-"""The picture of a scenario: states on their references, errors below."""
+"""The picture of a scenario: states on their references, errors below, then what it asks for."""
 
 import textwrap
 from collections.abc import Sequence
+from itertools import cycle
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from cosim.comparison import Run
 from cosim.report.style import (
     DASHED,
     ERRORS,
     FLOOR,
+    LINES,
     MUTED,
     REFERENCE,
     RUN,
@@ -32,27 +35,37 @@ COLUMNS = 2
 
 
 def scenario_figure(runs: Sequence[Run]) -> Figure:
-    """Each state of the first run over its reference, and below it the errors of all `runs`."""
+    """Each state of the first run over its reference, and below it the errors of all `runs`.
+
+    Below them are the scenario's own panels.
+    """
     scenario = runs[0].scenario
     outputs = runs[0].result.names
     states = [name for name in runs[0].fmu.model.states if name in outputs] or outputs
     blocks = -(-len(states) // COLUMNS)
+    panels = scenario.panels
+    panel_rows = -(-len(panels) // COLUMNS)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11, 1.9 + 3.7 * blocks), layout="constrained")
+        figure = Figure(figsize=(11, 1.9 + 3.7 * blocks + 2.3 * panel_rows), layout="constrained")
         figure.get_layout_engine().set(w_pad=0.08, h_pad=0.05, hspace=0.02, wspace=0.04)
         axes = figure.subplots(
-            2 * blocks,
-            min(COLUMNS, len(states)),
+            2 * blocks + panel_rows,
+            COLUMNS if panels else min(COLUMNS, len(states)),
             sharex=True,
             squeeze=False,
-            height_ratios=[2, 1.1] * blocks,
+            height_ratios=[2, 1.1] * blocks + [1.9] * panel_rows,
         )
         for i, name in enumerate(states):
             block, column = divmod(i, COLUMNS)
             _draw_state(axes[2 * block, column], runs[0], name)
             _draw_errors(axes[2 * block + 1, column], runs, name)
-        for unused in axes.T.ravel()[len(states) * 2 :] if len(states) % COLUMNS else ():
-            unused.set_axis_off()
+        for i, names in enumerate(panels):
+            _draw_panel(axes[2 * blocks + i // COLUMNS, i % COLUMNS], runs[0], names)
+        if len(states) % COLUMNS:
+            for unused in axes[2 * (blocks - 1) : 2 * blocks, len(states) % COLUMNS :].flat:
+                unused.set_axis_off()
+        if len(panels) % COLUMNS:
+            axes[-1, -1].set_axis_off()
         for bottom in axes[-1]:
             bottom.set_xlabel(_time_label(scenario))
         figure.align_ylabels(axes)
@@ -118,6 +131,30 @@ def _draw_state(axes: Axes, run: Run, name: str) -> None:
     axes.margins(x=0.02, y=0.12)
     if np.ptp(values) < SMALLEST_SPAN:
         axes.set_ylim(values[0] - 0.1, values[0] + 0.1)
+
+
+def _draw_panel(axes: Axes, run: Run, names: Sequence[str]) -> None:
+    """Variables of one unit: outputs over their references, Integers and inputs as steps."""
+    scenario, variables = run.scenario, run.fmu.model.variables
+    times = run.result.times - _origin(scenario)
+    for name, (color, light) in zip(names, cycle(LINES), strict=False):
+        style = {"color": color, "linewidth": 1.3, "label": name}
+        if name in run.result.integers:
+            # each row ends a step: so was the value there
+            axes.step(times, run.result.integers[name], where="pre", **style)
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        elif name in run.result.names:
+            axes.plot(times, run.reference.column(name), color=light, linewidth=4.5)
+            axes.plot(times, run.result.values[:, run.result.names.index(name)], **style)
+        else:
+            held = scenario.times - _origin(scenario)
+            axes.step(held, scenario.input(name), where="post", linestyle=DASHED, **style)
+    unit = variables[names[0]].unit
+    label = names[0] if len(names) == 1 else ""
+    axes.set_ylabel(f"{label} ({unit})".strip() if unit else label)
+    if len(names) > 1:
+        axes.legend(loc="best", fontsize=9.5, ncols=len(names))
+    axes.margins(x=0.02, y=0.14)
 
 
 def _draw_errors(axes: Axes, runs: Sequence[Run], name: str) -> None:

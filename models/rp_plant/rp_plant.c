@@ -25,8 +25,8 @@ double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint) {
     return plant_breakaway(&p, joint);
 }
 
-double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double dq) {
-    return plant_sliding_friction(&p, joint, dq);
+double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double speed) {
+    return plant_sliding_friction(&p, joint, speed);
 }
 
 int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q) {

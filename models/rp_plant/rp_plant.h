@@ -84,9 +84,10 @@ struct rp_plant_motion {
 /* Friction of a joint at rest at most (N.m, N). */
 double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint);
 
-/* Friction of a joint that slides at the velocity dq, by Stribeck's law. Its value at dq = 0 is the
- * breakaway friction: there is no jump when a joint breaks away. */
-double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double dq);
+/* Friction of a joint that slides at a speed >= 0, by Stribeck's law. Its value at 0 is the
+ * breakaway friction: there is no jump when a joint breaks away. Below 0 it is what integrators see
+ * past the event that ends the mode. */
+double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double speed);
 
 /* +1: the joint rests on its lower stop and can only move forward; -1: on its upper one; 0. */
 int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q);

@@ -26,7 +26,11 @@ from tests.support.cosim_project import (
 @pytest.fixture(scope="module")
 def runs(opened: Fmu) -> Iterator[Runs]:
     """Of all models, whose FMUs lie in one folder."""
-    others = {"rp_controller": "RPController.fmu", "rp_trajectory": "RPTrajectory.fmu"}
+    others = {
+        "rp_controller": "RPController.fmu",
+        "rp_plant": "RPPlant.fmu",
+        "rp_trajectory": "RPTrajectory.fmu",
+    }
     with ExitStack() as stack:
         fmus = {
             model: stack.enter_context(Fmu(opened.path.parent / name))

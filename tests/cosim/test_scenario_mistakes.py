@@ -57,6 +57,12 @@ MISTAKES = {
     ),
     "reference_every 1.0": (f"{HEAD}reference_every = 1.0\n{TIME}", "whole number from 1 on"),
     "reference_every true": (f"{HEAD}reference_every = true\n{TIME}", "on, got true"),
+    "panels of a number": (f"{HEAD}panels = 1\n{TIME}", "panels: expected a list of lists of"),
+    "panel of an unknown variable": (
+        f'{HEAD}panels = [["speed", "sped"]]\n{TIME}',
+        "panels[0]: 'sped' cannot be drawn",
+    ),
+    "panel of a parameter": (f'{HEAD}panels = [["mass"]]\n{TIME}', "'mass' cannot be drawn"),
     "start inf": (timed("-inf", 1, 0.1), "[time] start: expected a finite number, got -inf"),
     "stop nan": (timed(0, "nan", 0.1), "[time] stop: expected a finite number, got nan"),
     "stop too large": (timed(0, "1" + "0" * 400, 0.1), "[time] stop: expected a finite number"),

@@ -21,6 +21,7 @@ from tests.support.paths import ROOT
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
 FMUS = {
     "rp_manipulator": BUILD / "RPManipulator.fmu",
+    "rp_plant": BUILD / "RPPlant.fmu",
     "rp_controller": BUILD / "RPController.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
 }

@@ -1,0 +1,218 @@
+"""Energy of the built FMU: its change is the work of efforts and wrench less the losses.
+
+Losses of friction and damping are quadratures here, in steps that end beside the events; those of
+impacts and grasps are outputs. A payload brings its energy along, and takes it away.
+"""
+
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import simulation
+from cosim.fmi_instance import Instance
+from cosim.fmu_file import Fmu
+from models.rp_plant.references.equations import INPUTS
+from tests.rp_plant.plant_runs import AT_REST, METHODS, RIGID, read, started
+from tests.rp_plant.random_motions import Case, random_case
+from tests.support.cosim_project import load, names_of
+from tests.support.paths import ROOT
+
+TOLERANCE, ALLOWED = 1e-8, 100.0  # error in tolerances of the largest energy
+BESIDE = 1e-9  # s, from an event to the ends of the steps around it
+BOOLE = np.array([7, 32, 12, 32, 7]) / 90
+POWERS = ("actuator_power", "friction_power", "ee_vx", "ee_vy", "ee_rate")
+ENERGIES = ("kinetic_energy", "potential_energy", "impact_loss", "grasp_loss")
+CASES = 10
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Fmu]:
+    path = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu"))
+    with Fmu(path.with_name("RPPlant.fmu")) as fmu:
+        yield fmu
+
+
+class Balance:
+    """Steps an instance and adds up the work done on it less what friction and damping take (J).
+
+    `drive(t)` sets the inputs of a step that begins at t, `wrench(t)` is that at the end effector.
+    """
+
+    def __init__(
+        self,
+        instance: Instance,
+        drive: Callable[[float], None],
+        wrench: Callable[[float], Sequence[float]],
+    ) -> None:
+        self.work = 0.0
+        self.largest = 0.0  # |K| + |P|
+        self._instance, self._drive, self._wrench = instance, drive, wrench
+        self._powers, self._energies = instance.reals(POWERS), instance.reals(ENERGIES)
+
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential energy, losses of impacts and grasps."""
+        self._energies.get()
+        found = self._energies.view.copy()
+        self.largest = max(self.largest, abs(found[0]) + abs(found[1]))
+        return found
+
+    def step(self, t: float, end: float) -> None:
+        """From t to `end`, in parts without events and short ones around each."""
+        while t < end:
+            t = self._part(t, end)
+        self.energy()
+
+    def _part(self, t: float, end: float) -> float:
+        saved = self._instance.saved_state()
+        saved.take()
+        try:
+            while self._has_event(t, end):
+                (event,) = read(self._instance, "last_event_time")
+                saved.restore()
+                if event <= t + 2 * BESIDE:
+                    return self.jump(t, min(end, event + BESIDE))
+                end = event - BESIDE
+            saved.restore()
+            self.work += self._quadrature(t, end)
+            return end
+        finally:
+            saved.free()
+
+    def jump(self, t: float, end: float) -> float:
+        """A short step in which velocities may jump; return its end."""
+        self._advance(t, end)
+        self.work += (end - t) * self._power(end)
+        return end
+
+    def _has_event(self, t: float, end: float) -> bool:
+        before = self._instance.integer("event_count")
+        self._advance(t, end)
+        return self._instance.integer("event_count") != before
+
+    def _advance(self, t: float, end: float) -> None:
+        self._drive(t)
+        self._instance.do_step(t, end - t, goes_back=True)
+
+    def _quadrature(self, t: float, end: float) -> float:
+        nodes = np.linspace(t, end, 5).tolist()
+        self._drive(t)
+        powers = [self._power(t)]
+        for at, then in zip(nodes, nodes[1:], strict=False):
+            self._advance(at, then)
+            powers.append(self._power(then))
+        return (end - t) * float(BOOLE @ powers)
+
+    def _power(self, t: float) -> float:
+        self._powers.get()
+        drives, friction, vx, vy, rate = self._powers.view
+        fx, fy, mz = self._wrench(t)
+        return drives - friction + fx * vx + fy * vy + mz * rate
+
+
+def payload_energy(instance: Instance, values: Mapping[str, float], moves: bool) -> float:
+    """Energy of the payload at the end effector, in motion with it or at rest, J."""
+    angle, slide, spin, speed = read(instance, "q1", "q2", "dq1", "dq2")
+    along, across = values["l1"] + slide + values["payload_z"], values["a"] + values["payload_x"]
+    height = math.sin(angle) * along + math.cos(angle) * across
+    energy = values["payload_mass"] * values["g"] * height
+    if moves:
+        square = (speed - across * spin) ** 2 + (along * spin) ** 2
+        energy += (values["payload_mass"] * square + values["payload_inertia"] * spin**2) / 2
+    return energy
+
+
+def brought(instance: Instance, values: Mapping[str, float], attach: bool) -> float:
+    """What a payload that is grasped brings, or one that is released takes (negative), J."""
+    if not attach:
+        return -payload_energy(instance, values, True)
+    return payload_energy(instance, values, values["grasp"] != AT_REST)
+
+
+def check(balance: Balance, start: np.ndarray, extra: float) -> None:
+    change = balance.energy() - start
+    missing = change[0] + change[1] - balance.work - extra + change[2] + change[3]
+    assert abs(missing) <= ALLOWED * TOLERANCE * balance.largest
+
+
+@pytest.mark.parametrize("name", names_of("rp_plant"))
+def test_energy_of_a_scenario(opened: Fmu, name: str) -> None:
+    scenario = load(name)
+    with opened.instance(name) as instance:
+        simulation.initialize(instance, scenario, scenario.tolerance)
+
+        def drive(t: float) -> None:
+            i = int(np.searchsorted(scenario.times, t, side="right")) - 1
+            for name, values in scenario.inputs.items():
+                if values.dtype != bool:
+                    instance.set(name, values[i].item())
+
+        balance, extra = Balance(instance, drive, lambda _: (0.0, 0.0, 0.0)), 0.0
+        start = balance.energy()
+        attached = scenario.input("payload_attached")
+        for i, t in enumerate(scenario.times[:-1].tolist()):
+            if i and attached[i] != attached[i - 1]:
+                extra += brought(instance, scenario.start_values, attached[i])
+                instance.set("payload_attached", bool(attached[i]))
+                t = balance.jump(t, t + BESIDE)
+            balance.step(t, float(scenario.times[i + 1]))
+        assert balance.largest > 0.1
+        check(balance, start, extra)
+
+
+@pytest.mark.parametrize("number", range(CASES))
+def test_energy_of_a_random_motion(opened: Fmu, number: int) -> None:
+    """Inputs are ramps in about every second case."""
+    case = random_case(np.random.default_rng((15, number)))
+    smooth = INPUTS if case.rates else ()
+    with started(opened, tolerance=TOLERANCE, smooth_inputs=smooth, **case.values) as instance:
+        check_random(instance, case, dict(opened.model.start_values) | case.values)
+
+
+def check_random(instance: Instance, case: Case, values: Mapping[str, float]) -> None:
+    polynomials = instance.input_polynomials(list(INPUTS), 1) if case.rates else None
+
+    def drive(t: float) -> None:
+        now = case.inputs(t)
+        if polynomials is not None:
+            polynomials.view[:] = [[now[x] for x in INPUTS], [case.rates[x] for x in INPUTS]]
+            polynomials.set()
+        else:
+            for name in INPUTS:
+                instance.set(name, now[name])
+
+    def wrench(t: float) -> list[float]:
+        return [case.inputs(t)[name] for name in INPUTS[2:]]
+
+    balance, extra = Balance(instance, drive, wrench), 0.0
+    start = balance.energy()
+    points = sorted({*(np.arange(1001) / 1000).tolist(), *(at for at, _ in case.changes if at < 1)})
+    changes = dict(case.changes)
+    for t, end in zip(points, points[1:], strict=False):
+        if t in changes:
+            attach = changes[t]["payload_attached"]
+            extra += brought(instance, values, attach)
+            instance.set("payload_attached", attach)
+            t = balance.jump(t, t + BESIDE)
+        balance.step(t, end)
+    check(balance, start, extra)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_elastic_impacts_keep_the_energy(opened: Fmu, method: str) -> None:
+    """Ten thousand of them, of a slide between its stops under gravity."""
+    impacts, tolerance = 10_000, 1e-10
+    values = {"a": 0.0, "q1": math.pi / 2, "q2": 0.1, "dq2": 6.0, "coulomb_friction1": 1000.0}
+    stops = {"stops2": RIGID, "lower2": -0.2, "upper2": 0.3, "restitution2": 1.0}
+    with started(opened, method, tolerance, **values, **stops) as instance:
+        (start,) = read(instance, "total_energy")
+        t, count = 0.0, 0
+        while count < impacts:
+            instance.do_step(t, 8.0)
+            t += 8.0
+            count = instance.integer("event_count")
+        end, loss = read(instance, "total_energy", "impact_loss")
+        assert (end, loss) == (pytest.approx(start, rel=ALLOWED * tolerance), 0.0)
