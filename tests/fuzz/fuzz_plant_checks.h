@@ -16,7 +16,7 @@ void fuzz_check_stops(const struct fuzz_values *values);
 void fuzz_check_losses(const struct fuzz_values *before, const struct fuzz_values *after,
                        double tolerance);
 
-/* The text of a step with too many events names an indicator and the time that was reached (s). */
-void fuzz_check_event_text(const char *text, double reached);
+/* The text of a step with too many events names an indicator, and a time between these (s). */
+void fuzz_check_event_text(const char *text, double earliest, double latest);
 
 #endif
