@@ -350,8 +350,11 @@ static void describe_joint(const struct rp_plant_values *values, int mode, int j
             (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
     }
     if (p->stops[joint] == RP_PLANT_STOPS_RIGID) {
-        indicators[LOWER] = (struct indicator){INDICATOR_OF_STATE, q, 1.0, -p->lower[joint]};
-        indicators[UPPER] = (struct indicator){INDICATOR_OF_STATE, q, -1.0, p->upper[joint]};
+        const double dq = values->dq[joint];
+        indicators[LOWER] =
+            (struct indicator){INDICATOR_OF_STATE, q, 1.0, -p->lower[joint], dq > 0.0};
+        indicators[UPPER] =
+            (struct indicator){INDICATOR_OF_STATE, q, -1.0, p->upper[joint], dq < 0.0};
     }
 }
 

@@ -186,7 +186,7 @@ static bool is_at_event(const struct instance *instance) {
 }
 
 /* To step->end, which may come forward on the way. */
-static enum status advance(struct step *step) {
+ALWAYS_INLINE enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
     double *x = doubles_of(instance->memory.values, instance->model->states);

@@ -62,20 +62,13 @@ enum status location_restart(struct location *location, const struct indicator *
     }
     const enum status status = evaluate(location, 0.0, x);
     for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
-        location->is_armed[i] = location->z[i] > noise_of_state(location, &indicators[i]);
+        location->is_armed[i] =
+            indicators[i].rises || location->z[i] > noise_of_state(location, &indicators[i]);
     }
     return status;
 }
 
 /* ---- Roots ---------------------------------------------------------------------------------- */
-
-static double value_at_end(const double c[], int degree) {
-    double value = 0.0;
-    for (int k = degree; k >= 0; k--) {
-        value += c[k];
-    }
-    return value;
-}
 
 /* The last fall to 0 up to this s; INFINITY: there is none. */
 static double last_fall(const struct roots_polynomial *p, double s) {
@@ -88,26 +81,59 @@ static double last_fall(const struct roots_polynomial *p, double s) {
     return last;
 }
 
+/* The first fall to 0 behind this s; INFINITY: there is none. */
+static double fall_behind(const struct roots_polynomial *p, double s) {
+    struct root roots[ROOTS_LENGTH];
+    const int count = roots_find(p, roots);
+    for (int i = 0; i < count; i++) {
+        if (roots[i].s > s && roots[i].kind == ROOT_FALLS) {
+            return roots[i].s;
+        }
+    }
+    return INFINITY;
+}
+
+/* The first s at which p, below the level before, is above it; INFINITY: it stays below. */
+static double first_rise(const struct roots_polynomial *p, double level) {
+    double c[ROOTS_LENGTH];
+    for (int k = 0; k <= p->degree; k++) {
+        c[k] = -p->c[k];
+    }
+    c[0] += level;
+    const struct roots_polynomial below = {.c = c, .degree = p->degree, .noise = -1.0};
+    return roots_first(&below);
+}
+
+/* The first s at which p is below the level; INFINITY: it stays above. */
+static double first_below(const struct roots_polynomial *p, double level) {
+    double c[ROOTS_LENGTH];
+    memcpy(c, p->c, ((size_t)p->degree + 1) * sizeof *c);
+    c[0] -= level;
+    const struct roots_polynomial above = {.c = c, .degree = p->degree, .noise = -1.0};
+    return roots_first(&above);
+}
+
 /* The first fall of an indicator that is 0 at a restart and is to rise. As small as the noise it
  * may have either sign; it has fallen where it is below the noise, and did so where it was 0 last.
  */
 static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
-    double c[ROOTS_LENGTH];
-    memcpy(c, p->c, ((size_t)p->degree + 1) * sizeof *c);
-    c[0] += noise;
-    const struct roots_polynomial above = {.c = c, .degree = p->degree, .noise = -1.0};
-    const double below = roots_first(&above);
-    if (below == INFINITY) {
-        *is_armed = value_at_end(p->c, p->degree) > noise;
-        return INFINITY;
+    const double below = first_below(p, -noise);
+    const double above = first_rise(p, noise);
+    if (above < below) {
+        *is_armed = true;
+        return fall_behind(p, above);
     }
-    return fmin(below, last_fall(p, below));
+    return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
 }
 
 /* The first s at which an indicator falls to 0; INFINITY: it does not. Where it is armed it has
- * been above 0 before the step. */
+ * been above 0 before the step: where it rises from below 0, that is the error of the polynomial. */
 static double first_fall(const struct roots_polynomial *p, double noise, bool *is_armed) {
-    return *is_armed ? roots_first(p) : first_fall_from_zero(p, noise, is_armed);
+    if (!*is_armed) {
+        return first_fall_from_zero(p, noise, is_armed);
+    }
+    const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
+    return rises ? fall_behind(p, 0.0) : roots_first(p);
 }
 
 /* ---- Indicators of states ------------------------------------------------------------------- */

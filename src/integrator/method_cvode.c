@@ -23,6 +23,14 @@ static const double adams_iteration_error = 0.2;
  * ms, the error of the trajectory at 0.1 is a third of that at 0.5, for as many internal steps. */
 static const double first_step_fraction = 0.1;
 
+/* After an event errors add up in another way: each bounce adds to the error of the height, and the
+ * last bounces are as low as the tolerance. So the first steps are short, and do not grow to the
+ * tolerance before the order does: bouncing then rests 1.7e-7 s early, as its cut-off says, and not
+ * 2.8e-7 s, for 5 % more time. */
+static const double first_step_fraction_after_event = 0.003;
+static const double growth_after_event = 10.0;
+static const double usual_growth = 1e4; // CVODE's own
+
 struct cvode {
     struct sundials base; /* first */
     void *solver;
@@ -177,8 +185,9 @@ static enum status configure(void *memory) {
 
 /* ---- Integration ---------------------------------------------------------------------------- */
 
-/* Length of a first step from x, of order 1, whose error is about h^2 x'' / 2; 0: unknown. */
-static double step_of_curvature(const struct problem *problem, const double x[],
+/* Length of a first step from x, of order 1, whose error is about h^2 x'' / 2, as a fraction of the
+ * one at which that would be the tolerance; 0: unknown. */
+static double step_of_curvature(const struct problem *problem, double fraction, const double x[],
                                 const double ddx[]) {
     const double relative = problem->settings.relative_tolerance;
     const double *absolute = problem->settings.absolute_tolerances;
@@ -188,7 +197,7 @@ static double step_of_curvature(const struct problem *problem, const double x[],
         sum += weighted * weighted;
     }
     const double norm = sqrt(sum / (double)problem->ode.state_count);
-    const double step = first_step_fraction * sqrt(2.0 / norm);
+    const double step = fraction * sqrt(2.0 / norm);
     return isfinite(step) ? step : 0.0;
 }
 
@@ -221,15 +230,24 @@ static double step_after_event(struct cvode *cvode) {
     for (size_t i = 0; i < n; i++) {
         ddx[i] = (ddx[i] - dx[i]) / ahead;
     }
-    return step_of_curvature(problem, x, ddx);
+    return step_of_curvature(problem, first_step_fraction_after_event, x, ddx);
 }
 
 static enum status restart(void *memory, const double x[]) {
     struct cvode *cvode = memory;
+    const struct problem *problem = cvode->base.problem;
     sundials_set_state(&cvode->base, x);
     cvode->counted = (struct method_work){0};
     cvode->search_status = STATUS_OK;
-    return status_of_flag(cvode->base.problem, CVodeReInit(cvode->solver, 0.0, cvode->base.x));
+    int flag = CV_SUCCESS;
+    if (problem->ode.indicator_count > 0) {
+        flag = CVodeSetEtaMaxFirstStep(
+            cvode->solver, does_not_depend_on_points(problem) ? growth_after_event : usual_growth);
+    }
+    if (flag == CV_SUCCESS) {
+        flag = CVodeReInit(cvode->solver, 0.0, cvode->base.x);
+    }
+    return status_of_flag(problem, flag);
 }
 
 /* CVODE interpolates by combining the columns of its Nordsieck array, up to 13, which stay as they
@@ -405,7 +423,8 @@ static double next_step(void *memory, const double x[]) {
         CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
     }
-    return step_of_curvature(problem, x, small_vector_data(cvode->base.work));
+    return step_of_curvature(problem, first_step_fraction, x,
+                             small_vector_data(cvode->base.work));
 }
 
 /* Measured over the scenarios: at 1/500 of the requested tolerance the error after 5000 restarts is

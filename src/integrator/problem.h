@@ -17,9 +17,9 @@ struct problem {
     double reached;           /* where the last advance ended; 0 after a restart */
     double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
     int64_t evaluation_count; /* calls of the right-hand side; series begun */
-    struct location location;
     integrator_observer *observer; /* NULL: none */
     void *observer_context;
+    struct location location;
 };
 
 /* Whether the observer ends the advance at t, the end of an internal step, where the state is x. */

@@ -29,6 +29,7 @@ struct indicator {
     size_t state;
     double factor;
     double offset;
+    bool rises; /* it may be 0 now, and its slope is above 0 */
 };
 
 struct event {

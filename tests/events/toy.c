@@ -81,7 +81,11 @@ enum { BALL_HEIGHT, BALL_LOAD };
 static void ball_describe(const void *values, struct indicator indicators[]) {
     const bool is_resting = ball_is_resting(values);
     indicators[BALL_HEIGHT] = (struct indicator){
-        .kind = is_resting ? INDICATOR_UNUSED : INDICATOR_OF_STATE, .state = 0, .factor = 1.0};
+        .kind = is_resting ? INDICATOR_UNUSED : INDICATOR_OF_STATE,
+        .state = 0,
+        .factor = 1.0,
+        .rises = ((const struct ball_values *)values)->v > 0.0,
+    };
     indicators[BALL_LOAD] =
         (struct indicator){.kind = is_resting ? INDICATOR_OF_MODEL : INDICATOR_UNUSED};
 }

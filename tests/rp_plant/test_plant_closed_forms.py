@@ -140,8 +140,8 @@ def test_held_for_an_hour(plant: Fmu, method: str, h: float) -> None:
 def test_a_slide_bounces_to_rest(plant: Fmu, method: str, h: float) -> None:
     """Impact k at t1 + 2 v1 (e + ... + e^(k-1)) / g; at rest t1 (1 + e) / (1 - e) after the start.
 
-    Rest comes early by the bounces that go no higher than the absolute tolerance of q2; those
-    before them are not much higher, and as inexact.
+    Rest comes early by the bounces that go no higher than the absolute tolerance of q2. Those
+    before them are not much higher, and with cvode_bdf as inexact.
     """
     g, e, height = 9.81, 0.8, 0.5
     t1 = math.sqrt(2 * height / g)
@@ -156,7 +156,8 @@ def test_a_slide_bounces_to_rest(plant: Fmu, method: str, h: float) -> None:
         (tolerance,) = read(instance, "effective_relative_tolerance")
         left_out = 2 * math.sqrt(2 * 1e-2 * tolerance / g) / (1 - e)
         rest = t1 * (1 + e) / (1 - e)
-        assert found[-1].time == pytest.approx(rest - left_out, rel=0, abs=2 * left_out)
+        early = rest - found[-1].time
+        assert 0 < early <= (1.5 if method == "cvode_bdf" else 1) * left_out
         assert found[-1].count < 100
         assert read(instance, "q2", "dq2", "stop_force2") == [0.0, 0.0, pytest.approx(g)]
         assert modes(instance) == (0, 0)

@@ -193,6 +193,12 @@ static double rate_at(const void *context, double value) {
 
 /* No more than a sign or a factor is at stake: the arithmetics that differentiate are tested in
  * tests/rp_manipulator. */
+/* The joint of a state rests, so that nothing depends on the state while the modes last. */
+static bool state_rests(int state) {
+    const struct rp_plant_modes modes = rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs);
+    return modes.joint[state % 2] == RP_PLANT_STUCK;
+}
+
 static void test_jacobian_is_that_of_the_right_hand_side(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         double J[PLANT_STATES][PLANT_STATES];
@@ -205,6 +211,10 @@ static void test_jacobian_is_that_of_the_right_hand_side(void) {
         for (int j = 0; j < PLANT_STATES; j++) {
             for (int i = 0; i < PLANT_STATES; i++) {
                 const struct rate rate = {i, j};
+                if (state_rests(j) && i >= 2) {
+                    TEST_ASSERT_EQUAL_DOUBLE(0.0, J[j][i]);
+                    continue;
+                }
                 const double expected = rp_test_derivative(rate_at, &rate, x[j], 1.0 / 256);
                 const double scale = 1.0 + fabs(rate_at(&rate, x[j])) + fabs(expected);
                 ASSERT_CLOSE(expected, J[j][i], 1e-8 * scale);
@@ -227,7 +237,7 @@ static void test_jacobian_is_what_propagation_gives(void) {
             TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
             for (int i = 0; i < 2; i++) {
                 ASSERT_SAME(first.dq[i], J[j][i]);
-                ASSERT_SAME(first.ddq[i], J[j][2 + i]);
+                ASSERT_SAME(state_rests(j) ? 0.0 : first.ddq[i], J[j][2 + i]);
             }
         }
     }
