@@ -10,7 +10,7 @@
 
 const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 
-enum { MAX_OPERATIONS = 24, MAX_INTERNAL_STEPS = 300, BYTES_CAPACITY = 4096 };
+enum { MAX_OPERATIONS = 20, MAX_INTERNAL_STEPS = 200, BYTES_CAPACITY = 4096 };
 
 struct plant {
     struct fuzz_input *input;
@@ -79,7 +79,7 @@ static void set_payload(struct plant *plant) {
 static void begin(struct plant *plant) {
     const fmi2ValueReference integers[] = {RP_PLANT_solver_method, RP_PLANT_max_events};
     const fmi2Integer limits[] = {fuzz_method(fuzz_byte(plant->input)),
-                                  1 + (fmi2Integer)fuzz_below(plant->input, 40)};
+                                  1 + (fmi2Integer)fuzz_below(plant->input, 20)};
     plant->tolerance = fuzz_magnitude(plant->input, 1e-12, 1e-3);
     fuzz_limit_steps(plant->instance, MAX_INTERNAL_STEPS);
     require(FUZZ_CHECKED(plant->instance, SetInteger, integers, 2, limits), plant, "limits");
