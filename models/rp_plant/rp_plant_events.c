@@ -156,21 +156,27 @@ static void arrive(struct rp_plant_values *values, const struct fired *fired, in
     }
 }
 
-/* Bouncing comes to rest where the next bounce goes no higher than the tolerance of q there: at
- * v^2 / (2 |q''|), where q'' points into the stop. Such an impact is a plastic one. */
+/* Whether a joint on a stop that leaves with velocities dq comes back from no more than the
+ * tolerance of q: at v^2 / (2 |q''|), where q'' points into the stop. */
+static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
+                          const double dq[2], int joint, int side) {
+    struct rp_plant_modes modes = values->modes;
+    struct decision decision;
+    decide(&values->parameters, values->q, dq, &values->inputs, &modes, &decision);
+    const double into = -side * decision.outcome.ddq[joint];
+    return into > 0.0 && dq[joint] * dq[joint] <= 2.0 * into * event->tolerance[joint];
+}
+
+/* Bouncing comes to rest with the first impact after which a joint hardly leaves. It is a plastic
+ * one. */
 static bool makes_last_impact_plastic(const struct rp_plant_values *values,
                                       const struct event *event, const double dq_after[2],
                                       struct rp_plant_contacts *contacts) {
-    struct rp_plant_modes modes = values->modes;
-    struct decision decision;
-    decide(&values->parameters, values->q, dq_after, &values->inputs, &modes, &decision);
     bool found = false;
     for (int i = 0; i < 2; i++) {
         const int side = contacts->side[i];
-        const double away = side * dq_after[i];
-        const double into = -side * decision.outcome.ddq[i];
         const bool bounces = side * values->dq[i] < 0.0 && contacts->restitution[i] > 0.0;
-        if (bounces && into > 0.0 && away * away <= 2.0 * into * event->tolerance[i]) {
+        if (bounces && hardly_leaves(values, event, dq_after, i, side)) {
             contacts->restitution[i] = 0.0;
             found = true;
         }
@@ -182,21 +188,48 @@ static bool moves_into_stop(const struct rp_plant_values *values, const int side
     return side[0] * values->dq[0] < 0.0 || side[1] * values->dq[1] < 0.0;
 }
 
-static void strike_stops(struct rp_plant_values *values, const struct event *event,
-                         struct rp_plant_contacts contacts) {
+static struct rp_plant_inertia inertia_of(const struct rp_plant_values *values) {
     struct rp_plant_inertia inertia;
-    struct rp_plant_impact impact;
     const bool attached = values->modes.payload == RP_PLANT_ATTACHED;
     rp_plant_inertia(&values->parameters, attached, values->q[1], &inertia);
+    return inertia;
+}
+
+static void suffer(struct rp_plant_values *values, const struct rp_plant_impact *impact) {
+    for (int i = 0; i < 2; i++) {
+        values->dq[i] = impact->dq[i];
+        values->sums.stop_impulse[i] += impact->impulse[i];
+    }
+    values->sums.impact_loss += impact->loss;
+}
+
+static void strike_stops(struct rp_plant_values *values, const struct event *event,
+                         struct rp_plant_contacts contacts) {
+    const struct rp_plant_inertia inertia = inertia_of(values);
+    struct rp_plant_impact impact;
     do {
         rp_plant_impact(&inertia, &contacts, values->dq, &impact);
     } while (makes_last_impact_plastic(values, event, impact.dq, &contacts));
+    suffer(values, &impact);
+}
 
+/* A joint that another one's impact kicks off its stop may come back before the double q has
+ * changed: what fires then is its departure, again and again. It stays. True if velocities jump. */
+static bool settle(struct rp_plant_values *values, const struct event *event,
+                   const struct fired *fired, const int side[2]) {
+    bool jumps = false;
     for (int i = 0; i < 2; i++) {
-        values->dq[i] = impact.dq[i];
-        values->sums.stop_impulse[i] += impact.impulse[i];
+        const bool leaves =
+            fired->hit[i] != 0 && fired->hit[i] == side[i] && side[i] * values->dq[i] > 0.0;
+        if (leaves && hardly_leaves(values, event, values->dq, i, side[i])) {
+            const struct rp_plant_inertia inertia = inertia_of(values);
+            struct rp_plant_impact impact;
+            rp_plant_catch(&inertia, i, values->dq, &impact);
+            suffer(values, &impact);
+            jumps = true;
+        }
     }
-    values->sums.impact_loss += impact.loss;
+    return jumps;
 }
 
 /* True if velocities jump. With both joints on stops, an impact of one can drive the other, which
@@ -302,6 +335,9 @@ static enum status update(void *values_pointer, const struct event *event) {
     }
     int side[2];
     arrive(values, &fired, side);
+    if (settle(values, event, &fired, side)) {
+        jumps = true;
+    }
     if (collide(values, event, side)) {
         jumps = true;
     }

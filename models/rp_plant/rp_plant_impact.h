@@ -30,6 +30,11 @@ void rp_plant_impact(const struct rp_plant_inertia *inertia,
                      const struct rp_plant_contacts *contacts, const double dq[2],
                      struct rp_plant_impact *impact);
 
+/* The impact that takes all velocity of one joint, whatever its direction: the same laws, with an
+ * impulse at this joint only, which may pull. */
+void rp_plant_catch(const struct rp_plant_inertia *inertia, int joint, const double dq[2],
+                    struct rp_plant_impact *impact);
+
 /* Velocities after the arm has grasped a payload that was at rest, D+ q'+ = D- q'-, and the kinetic
  * energy that this takes, (q'-^T D- q'- - q'+^T D+ q'+) / 2 >= 0 (J). */
 double rp_plant_grasp_at_rest(const struct rp_plant_parameters *p, const double q[2],

@@ -46,13 +46,6 @@ static enum status evaluate(struct location *location, double t, const double x[
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
 
-/* An indicator as small as this may be 0. */
-static double noise_of_state(const struct location *location, const struct indicator *indicator) {
-    return indicator->kind == INDICATOR_OF_STATE
-               ? fabs(indicator->factor) * location->tolerances[indicator->state]
-               : 0.0;
-}
-
 enum status location_restart(struct location *location, const struct indicator *indicators,
                              const double x[]) {
     location->indicators = indicators;
@@ -62,8 +55,7 @@ enum status location_restart(struct location *location, const struct indicator *
     }
     const enum status status = evaluate(location, 0.0, x);
     for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
-        location->is_armed[i] =
-            indicators[i].rises || location->z[i] > noise_of_state(location, &indicators[i]);
+        location->is_armed[i] = indicators[i].rises || location->z[i] > 0.0;
     }
     return status;
 }
@@ -127,7 +119,8 @@ static double first_fall_from_zero(const struct roots_polynomial *p, double nois
 }
 
 /* The first s at which an indicator falls to 0; INFINITY: it does not. Where it is armed it has
- * been above 0 before the step: where it rises from below 0, that is the error of the polynomial. */
+ * been above 0 before the step: where it rises from below 0, that is the error of the polynomial.
+ */
 static double first_fall(const struct roots_polynomial *p, double noise, bool *is_armed) {
     if (!*is_armed) {
         return first_fall_from_zero(p, noise, is_armed);

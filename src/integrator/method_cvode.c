@@ -423,8 +423,7 @@ static double next_step(void *memory, const double x[]) {
         CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
     }
-    return step_of_curvature(problem, first_step_fraction, x,
-                             small_vector_data(cvode->base.work));
+    return step_of_curvature(problem, first_step_fraction, x, small_vector_data(cvode->base.work));
 }
 
 /* Measured over the scenarios: at 1/500 of the requested tolerance the error after 5000 restarts is

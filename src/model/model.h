@@ -24,7 +24,8 @@ struct model {
                                    double dx[]);
 
     /* Writes the derivatives of f by the states to J: J[i + state_count j] is that of x'_i by x_j,
-     * or 0 where x_j rests in these modes. Implicit methods need it. Pure as right_hand_side; NULL if the model has no states. */
+     * or 0 where x_j rests in these modes. Implicit methods need it. Pure as right_hand_side; NULL
+     * if the model has no states. */
     enum status (*jacobian)(const void *values, double t, const double x[], const double u[],
                             double J[]);
 

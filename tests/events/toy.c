@@ -320,9 +320,17 @@ static const struct model block_model = {
          COUNTER,                                                                                   \
          0.0,                                                                                       \
          ANY},                                                                                      \
+        {TOY_MAX_STEPS,                                                                             \
+         "max_internal_steps",                                                                      \
+         OF_INSTANCE(VARIABLE_INT32, max_internal_steps),                                           \
+         FIXED,                                                                                     \
+         100000.0,                                                                                  \
+         1.0,                                                                                       \
+         INFINITY,                                                                                  \
+         1.0},                                                                                      \
     {                                                                                               \
-        TOY_MAX_STEPS, "max_internal_steps", OF_INSTANCE(VARIABLE_INT32, max_internal_steps),       \
-            FIXED, 100000.0, 1.0, INFINITY, 1.0                                                     \
+        TOY_MAX_STEP, "max_step", OF_INSTANCE(VARIABLE_FLOAT64, max_step), FIXED, 0.0, 0.0,         \
+            INFINITY, 1.0                                                                           \
     }
 
 static const struct variable ball_variables[] = {
@@ -350,7 +358,7 @@ static const struct variable block_variables[] = {
     OWN,
 };
 
-static const short row_of_reference[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+static const short row_of_reference[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16};
 
 #define DESCRIPTION(text, model_symbol, table, indicators)                                         \
     {                                                                                              \

@@ -48,6 +48,7 @@ enum toy_reference {
     TOY_STEPS,
     TOY_RESTARTS,
     TOY_MAX_STEPS,
+    TOY_MAX_STEP,
 };
 
 extern const struct model_description ball_description;

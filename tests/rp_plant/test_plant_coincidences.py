@@ -1,10 +1,13 @@
 """Events of the built FMU at communication points, and after long internal steps."""
 
+import random
+
 import pytest
 from fmpy.fmi1 import FMICallException
 
 from cosim.fmu_file import Fmu
-from tests.rp_plant.plant_runs import FIRM, METHODS, RIGID, events, read, started
+from tests.rp_plant.plant_runs import FIRM, METHODS, RIGID, events, last_event, read, started
+from tests.rp_plant.test_plant_rollback import busy, sequence, times
 
 each_method = pytest.mark.parametrize("method", METHODS)
 
@@ -55,3 +58,19 @@ def test_a_held_joint_stays_where_it_is_while_the_other_one_slides(plant: Fmu, m
         for i in range(2000):
             instance.do_step(i * 1e-3, 1e-3)
             assert read(instance, "q1", "dq1") == [0.0, 0.0]
+
+
+@each_method
+@pytest.mark.parametrize("seed", ["cvode_adams", 56])
+def test_joints_that_kick_each_other_off_their_stops_come_to_rest(
+    plant: Fmu, method: str, seed: str | int
+) -> None:
+    """From random sequences: bounces lower than the rounding of a position, which never ended."""
+    moves = sequence(150, random.Random(seed))
+    with busy(plant, method) as run:
+        for t, move in zip(times(moves), moves, strict=False):
+            try:
+                run.do(t, move)
+            except FMICallException as error:
+                raise run.instance.failure(error, "in a step") from error
+        assert last_event(run.instance).count > 50

@@ -173,11 +173,32 @@ static void test_a_limit_that_passes_the_joint(void) {
 static void test_grazing_a_stop_changes_no_velocity(void) {
     set_stops(1, -1.0, 1.0, 0.5);
     v.q[1] = nextafter(-1.0, 0.0);
-    v.dq[1] = 1e-9; // already on its way back
+    v.dq[1] = 1e-3; // already on its way back
     v.modes.joint[1] = RP_PLANT_FORWARD;
     plant_test_update(&v, LOWER2);
-    TEST_ASSERT_TRUE(v.q[1] == -1.0 && v.dq[1] == 1e-9);
+    TEST_ASSERT_TRUE(v.q[1] == -1.0 && v.dq[1] == 1e-3);
     assert_modes(RP_PLANT_STUCK, RP_PLANT_FORWARD);
+}
+
+/* It would come back before its position had changed by a bit. The momentum of joint 1 is kept. */
+static void test_a_joint_that_hardly_leaves_its_stop_stays(void) {
+    set_stops(1, -1.0, 1.0, 0.5);
+    v.parameters.arm.a = 0.3;
+    v.q[1] = -1.0;
+    v.dq[0] = 0.2;
+    v.dq[1] = 1e-9;
+    v.modes.joint[0] = v.modes.joint[1] = RP_PLANT_FORWARD;
+    struct rp_plant_inertia inertia;
+    rp_plant_inertia(&v.parameters, false, v.q[1], &inertia);
+    const double before = rp_plant_kinetic_energy(&v.parameters, false, v.q, v.dq);
+    const double p1 = inertia.D[0][0] * v.dq[0] + inertia.D[0][1] * v.dq[1];
+    plant_test_update(&v, LOWER2);
+    const double after = rp_plant_kinetic_energy(&v.parameters, false, v.q, v.dq);
+    TEST_ASSERT_TRUE(v.q[1] == -1.0 && v.dq[1] == 0.0);
+    assert_modes(RP_PLANT_FORWARD, RP_PLANT_STUCK);
+    ASSERT_CLOSE(p1, inertia.D[0][0] * v.dq[0], 1e-15 * p1);
+    ASSERT_CLOSE(before - after, v.sums.impact_loss, 1e-15 * before);
+    TEST_ASSERT_TRUE(v.sums.impact_loss >= 0.0);
 }
 
 /* Both joints on stops: the impact of joint 1 drives the slide, which was leaving, back into its
