@@ -113,10 +113,12 @@ static void check_discard(struct plant *plant, const struct fuzz_values *after, 
     if (is_undone && reached != begin) {
         fuzz_fail("a discarded step from %.17g leaves the time %.17g", begin, reached);
     }
+    if (!is_undone) { // stops that were moved before the step have not moved the joints yet
+        fuzz_check_stops(after);
+    }
     if (strstr(instance->text, "max_events") != NULL) {
         fuzz_check_event_text(instance->text, reached, is_undone ? begin + length : reached);
     }
-    fuzz_check_stops(after);
 }
 
 static double any_length(struct fuzz_input *input) {
