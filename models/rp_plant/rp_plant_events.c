@@ -300,6 +300,25 @@ bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
            modes->payload >= RP_PLANT_UNDECIDED && modes->payload <= RP_PLANT_RELEASED;
 }
 
+/* A joint slides only where there is friction, and is free only where there is none; one that is
+ * held stands still, by friction or on a stop. */
+static bool fits(const struct rp_plant_values *values, int joint) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const bool has_friction = rp_plant_breakaway(p, joint) > 0.0;
+    const int mode = values->modes.joint[joint];
+    if (mode == RP_PLANT_STUCK) {
+        return values->dq[joint] == 0.0 &&
+               (has_friction || rp_plant_closed_stop(p, joint, values->q[joint]) != 0);
+    }
+    return slides(mode) == has_friction;
+}
+
+static bool modes_are_possible(const void *values_pointer, bool is_held) {
+    const struct rp_plant_values *values = values_pointer;
+    return rp_plant_modes_exist(&values->modes) && values->modes.payload != RP_PLANT_UNDECIDED &&
+           (!is_held || (fits(values, 0) && fits(values, 1)));
+}
+
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
@@ -416,6 +435,7 @@ const struct model_events rp_plant_events = {
     .sums = {offsetof(struct rp_plant_values, sums), sizeof(struct rp_plant_sums)},
     .discrete_inputs = {offsetof(struct rp_plant_values, payload_attached), sizeof(int)},
     .are_possible = are_possible,
+    .modes_are_possible = modes_are_possible,
     .is_at_rest = is_at_rest,
     .describe = describe,
     .indicators = indicators,

@@ -7,7 +7,7 @@
 
 extern const struct model_events rp_plant_events;
 
-/* Whether all modes are of their enumerations: those of a saved state may be anything. */
+/* Whether all modes are of their enumerations. */
 bool rp_plant_modes_exist(const struct rp_plant_modes *modes);
 
 #endif

@@ -4,6 +4,7 @@
 
 #include <limits.h>
 #include <math.h>
+#include <string.h>
 
 /* A value by its name, and whether an instance can have it. */
 struct named_value {
@@ -155,6 +156,42 @@ static bool are_finite_sums(const struct instance *instance, const char *values)
     return true;
 }
 
+static bool refuse_modes(const struct instance *instance, const char *name) {
+    message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                  "the serialized state is refused: %s are impossible", name);
+    return false;
+}
+
+static bool are_zeros(const char *values, struct span span) {
+    for (size_t i = 0; i < span.size; i++) {
+        if (values[span.offset + i] != 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Modes of values, which may have been set since the last event, and those that the integrator runs
+ * with. While it goes on no event has been. */
+static bool has_possible_modes(const struct instance *instance, const struct instance_state *state,
+                               const char *values, const char *held) {
+    const struct model_events *events = instance->model->events;
+    if (events == NULL) {
+        return true;
+    }
+    const struct span modes = events->modes;
+    const bool is_decided = state->phase >= PHASE_STEPPING;
+    if (is_decided ? !events->modes_are_possible(values, false) : !are_zeros(values, modes)) {
+        return refuse_modes(instance, "the modes");
+    }
+    if (state->has_history &&
+        (memcmp(values + modes.offset, held + modes.offset, modes.size) != 0 ||
+         !events->modes_are_possible(held, true))) {
+        return refuse_modes(instance, "the modes since the restart");
+    }
+    return true;
+}
+
 /* A value structure that the instance can have. */
 static bool is_possible_structure(const struct instance *instance, const char *values) {
     return are_within_limits(instance, values) && are_finite_sums(instance, values);
@@ -198,6 +235,7 @@ enum status instance_check_plausible(const struct instance *instance,
         are_finite_inputs(instance, "an input since the restart", (const void *)running) &&
         is_possible_structure(instance, values) &&
         (!state->has_history || is_possible_structure(instance, held)) &&
+        has_possible_modes(instance, state, values, held) &&
         is_possible_event_point(
             instance, state, (const void *)(block + ((const char *)memory->due - memory->block)));
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;

@@ -52,6 +52,11 @@ struct model_events {
      * the right-hand side is smooth everywhere. */
     bool (*are_possible)(const void *values);
 
+    /* Whether update can have left these modes: those of a saved state may be anything. is_held:
+     * parameters and states are still those that it left with them; otherwise some may have been
+     * set since. */
+    bool (*modes_are_possible)(const void *values, bool is_held);
+
     /* In these modes no state moves, whatever the inputs are. */
     bool (*is_at_rest)(const void *values);
 

@@ -69,6 +69,13 @@ static bool ball_is_resting(const void *values) {
     return ((const struct ball_values *)values)->is_resting;
 }
 
+/* It rests on the floor. */
+static bool ball_mode_is_possible(const void *values, bool is_held) {
+    const struct ball_values *ball = values;
+    const bool can_rest = !is_held || (ball_has_floor(values) && ball->h == 0.0 && ball->v == 0.0);
+    return ball->is_resting == 0 || (ball->is_resting == 1 && can_rest);
+}
+
 enum { BALL_HEIGHT, BALL_LOAD };
 
 static void ball_describe(const void *values, struct indicator indicators[]) {
@@ -125,6 +132,7 @@ static const struct model_events ball_events = {
     .modes = {offsetof(struct ball_values, is_resting), sizeof(int)},
     .sums = {offsetof(struct ball_values, impulse), sizeof(double)},
     .are_possible = ball_has_floor,
+    .modes_are_possible = ball_mode_is_possible,
     .is_at_rest = ball_is_resting,
     .describe = ball_describe,
     .indicators = ball_indicators,
@@ -189,6 +197,12 @@ static bool block_sticks(const void *values) {
     return ((const struct block_values *)values)->direction == 0;
 }
 
+static bool block_mode_is_possible(const void *values, bool is_held) {
+    const struct block_values *block = values;
+    const bool exists = block->direction >= -1 && block->direction <= 1;
+    return exists && (!is_held || block->direction * block->v > 0.0 || block->v == 0.0);
+}
+
 enum { BLOCK_SPEED, BLOCK_FORWARD, BLOCK_BACKWARD };
 
 static void block_describe(const void *values, struct indicator indicators[]) {
@@ -240,6 +254,7 @@ static const struct model_events block_events = {
     .indicator_names = block_names,
     .modes = {offsetof(struct block_values, direction), sizeof(int)},
     .are_possible = block_always,
+    .modes_are_possible = block_mode_is_possible,
     .is_at_rest = block_sticks,
     .describe = block_describe,
     .indicators = block_indicators,

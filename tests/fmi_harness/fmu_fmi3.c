@@ -4,8 +4,8 @@
  * otherwise; the status of a step, of which only the time is known. */
 #include "fmu_fmi3.h"
 
+#include "fmu_model.h"
 #include "fmu_version.h"
-#include "value_references.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +17,7 @@ static struct fmu3_functions fmi3;
 struct fmu_fmi3_options fmu_fmi3_options;
 
 enum { INPUTS = 2, ORDERS = 4 };
-static const fmi3ValueReference inputs[INPUTS] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
+static const fmi3ValueReference inputs[INPUTS] = {FMU_NAME(tau1), FMU_NAME(f2)};
 
 struct adapted {
     fmi3Instance instance;
@@ -89,8 +89,8 @@ static fmi2Component Instantiate(fmi2String name, fmi2Type type, fmi2String guid
                                  fmi2String location, const fmi2CallbackFunctions *functions,
                                  fmi2Boolean visible, fmi2Boolean logging_on) {
     const char *token = guid;
-    if (guid != NULL && strcmp(guid, RP_MANIPULATOR_GUID) == 0) {
-        token = RP_MANIPULATOR_TOKEN_FMI3;
+    if (guid != NULL && strcmp(guid, FMU_NAME(GUID)) == 0) {
+        token = FMU_NAME(TOKEN_FMI3);
     }
     struct adapted *adapted = calloc(1, sizeof *adapted + (name != NULL ? strlen(name) : 0) + 1);
     if (adapted == NULL) {
@@ -220,12 +220,22 @@ static fmi2Status SetReal(fmi2Component c, const fmi2ValueReference references[]
     return status_of(status);
 }
 
+static bool is_enumeration(fmi2ValueReference reference) {
+    static const fmi2ValueReference enumerations[] = {FMU_ENUMERATIONS};
+    for (size_t i = 0; i < sizeof enumerations / sizeof enumerations[0]; i++) {
+        if (reference == enumerations[i]) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Enumerations have functions of their own type. */
 static bool has_enumeration(const fmi2ValueReference references[], size_t count,
                             const void *values) {
     bool found = false;
     for (size_t i = 0; references != NULL && values != NULL && count < 8 && i < count; i++) {
-        found |= references[i] == RP_MANIPULATOR_solver_method;
+        found |= is_enumeration(references[i]);
     }
     return found;
 }
@@ -238,10 +248,10 @@ static fmi2Status GetInteger(fmi2Component c, const fmi2ValueReference reference
     fmi3Status status = fmi3OK;
     for (size_t i = 0; i < count && status == fmi3OK; i++) {
         fmi3Int64 item = values[i];
-        status = references[i] == RP_MANIPULATOR_solver_method
+        status = is_enumeration(references[i])
                      ? fmi3.GetInt64(instance_of(c), &references[i], 1, &item, 1)
                      : fmi3.GetInt32(instance_of(c), &references[i], 1, &values[i], 1);
-        values[i] = references[i] == RP_MANIPULATOR_solver_method ? (fmi2Integer)item : values[i];
+        values[i] = is_enumeration(references[i]) ? (fmi2Integer)item : values[i];
     }
     return status_of(status);
 }
@@ -254,24 +264,38 @@ static fmi2Status SetInteger(fmi2Component c, const fmi2ValueReference reference
     fmi3Status status = fmi3OK;
     for (size_t i = 0; i < count && status == fmi3OK; i++) {
         const fmi3Int64 item = values[i];
-        status = references[i] == RP_MANIPULATOR_solver_method
+        status = is_enumeration(references[i])
                      ? fmi3.SetInt64(instance_of(c), &references[i], 1, &item, 1)
                      : fmi3.SetInt32(instance_of(c), &references[i], 1, &values[i], 1);
     }
     return status_of(status);
 }
 
-/* There is no variable of this type: no value is read or written through the pointer. */
+/* Of another size in FMI 3.0; more of them than any model has are passed on as they are, to be
+ * refused. */
+enum { MOST_BOOLEANS = 8 };
+
 static fmi2Status GetBoolean(fmi2Component c, const fmi2ValueReference references[], size_t count,
                              fmi2Boolean values[]) {
-    return status_of(
-        fmi3.GetBoolean(instance_of(c), references, count, (fmi3Boolean *)values, count));
+    fmi3Boolean flags[MOST_BOOLEANS] = {false};
+    const bool is_usual = values != NULL && count <= MOST_BOOLEANS;
+    const fmi3Status status = fmi3.GetBoolean(instance_of(c), references, count,
+                                              is_usual ? flags : (fmi3Boolean *)values, count);
+    for (size_t i = 0; is_usual && status == fmi3OK && i < count; i++) {
+        values[i] = flags[i];
+    }
+    return status_of(status);
 }
 
 static fmi2Status SetBoolean(fmi2Component c, const fmi2ValueReference references[], size_t count,
                              const fmi2Boolean values[]) {
-    return status_of(
-        fmi3.SetBoolean(instance_of(c), references, count, (const fmi3Boolean *)values, count));
+    fmi3Boolean flags[MOST_BOOLEANS] = {false};
+    const bool is_usual = values != NULL && count <= MOST_BOOLEANS;
+    for (size_t i = 0; is_usual && i < count; i++) {
+        flags[i] = values[i] != fmi2False;
+    }
+    return status_of(fmi3.SetBoolean(instance_of(c), references, count,
+                                     is_usual ? flags : (const fmi3Boolean *)values, count));
 }
 
 static fmi2Status GetString(fmi2Component c, const fmi2ValueReference references[], size_t count,
@@ -383,7 +407,7 @@ static fmi2Status GetStatus(fmi2Component c, fmi2StatusKind kind, fmi2Status *va
 }
 
 static fmi2Status GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Real *value) {
-    const fmi2ValueReference time = RP_MANIPULATOR_time;
+    const fmi2ValueReference time = FMU_NAME(time);
     return kind == fmi2LastSuccessfulTime ? GetReal(c, &time, 1, value) : fmi2Discard;
 }
 

@@ -74,7 +74,7 @@ struct fuzz_instance *fuzz_instance_create_variety(fmi2Type kind, unsigned varie
     instance->tells_refusals = has_logger;
     choose(variety);
     instance->component =
-        FUZZ_CALL(fuzz_fmu.Instantiate(instance_name, kind, RP_MANIPULATOR_GUID, NULL, callbacks,
+        FUZZ_CALL(fuzz_fmu.Instantiate(instance_name, kind, FMU_NAME(GUID), NULL, callbacks,
                                        fmi2False, logging_on ? fmi2True : fmi2False));
     choose(0);
     free(callbacks); // valid during the call only
@@ -152,7 +152,7 @@ fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, boo
 }
 
 void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit) {
-    const fmi2ValueReference reference = RP_MANIPULATOR_max_internal_steps;
+    const fmi2ValueReference reference = FMU_NAME(max_internal_steps);
     if (FUZZ_CHECKED(instance, SetInteger, &reference, 1, &limit) != fmi2OK) {
         fuzz_fail("max_internal_steps of a new instance cannot be set");
     }
@@ -218,6 +218,17 @@ static fmi2Status read_real(struct fuzz_instance *instance, fmi2ValueReference r
     return status;
 }
 
+static void read_integer(struct fuzz_instance *instance, const struct variable *variable,
+                         fmi2Integer *value) {
+    const fmi2Status status =
+        variable->type == VARIABLE_BOOLEAN
+            ? FUZZ_CHECKED(instance, GetBoolean, &variable->reference, 1, value)
+            : FUZZ_CHECKED(instance, GetInteger, &variable->reference, 1, value);
+    if (status != fmi2OK) {
+        fuzz_fail("%s cannot be read", variable->name);
+    }
+}
+
 void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
     fmi2ValueReference references[FUZZ_VARIABLE_CAPACITY];
     double reals[FUZZ_VARIABLE_CAPACITY];
@@ -230,9 +241,8 @@ void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
     for (size_t i = 0; i < model_description.variable_count; i++) {
         if (model_description.variables[i].type == VARIABLE_FLOAT64) {
             references[count++] = model_description.variables[i].reference;
-        } else if (FUZZ_CHECKED(instance, GetInteger, &model_description.variables[i].reference, 1,
-                                &values->integers[i]) != fmi2OK) {
-            fuzz_fail("%s cannot be read", model_description.variables[i].name);
+        } else {
+            read_integer(instance, &model_description.variables[i], &values->integers[i]);
         }
     }
     fuzz_poison(reals, count);
@@ -279,6 +289,12 @@ void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_valu
     }
 }
 
+fmi2Integer fuzz_method(unsigned selector) {
+    const unsigned count =
+        model_description.model->series != NULL ? FUZZ_METHODS : FUZZ_METHODS - 1;
+    return 1 + (fmi2Integer)(selector % count);
+}
+
 /* ---- After an error -------------------------------------------------------------------------- */
 
 enum { RUN_STEPS = 6, BYTES_CAPACITY = 4096 };
@@ -312,7 +328,7 @@ static void serialize(struct fuzz_instance *instance, struct run *run) {
 
 static void run_co_simulation(struct fuzz_instance *instance, struct run *run) {
     static const double lengths[RUN_STEPS] = {1.0 / 64, 1.0 / 64, 0.25, 1e-3, 1e-3, 0.5};
-    const fmi2ValueReference inputs[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
+    const fmi2ValueReference inputs[] = {FMU_NAME(tau1), FMU_NAME(f2)};
     const fmi2Integer orders[] = {1, 2};
     for (int i = 0; i < RUN_STEPS; i++) {
         const double efforts[] = {0.5 * i, 9.81 - i};
@@ -347,10 +363,10 @@ static void run_model_exchange(struct fuzz_instance *instance, struct run *run) 
 
 /* From an instance that was just made or reset. */
 static void make_run(struct fuzz_instance *instance, unsigned variant, struct run *run) {
-    const fmi2ValueReference starts[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_dq2, RP_MANIPULATOR_m2};
+    const fmi2ValueReference starts[] = {FMU_NAME(q1), FMU_NAME(dq2), FMU_NAME(m2)};
     const double values[] = {-1.0, 0.25, 1.5};
-    const fmi2ValueReference method = RP_MANIPULATOR_solver_method;
-    const fmi2Integer method_value = 1 + (fmi2Integer)(variant % FUZZ_METHODS);
+    const fmi2ValueReference method = FMU_NAME(solver_method);
+    const fmi2Integer method_value = fuzz_method(variant);
     serialize(instance, run);
     if (variant < FUZZ_METHODS) {
         require(FUZZ_CHECKED(instance, SetReal, starts, FUZZ_COUNT(starts), values), "fmi2SetReal");

@@ -3,9 +3,9 @@
 #ifndef FUZZ_INSTANCE_H
 #define FUZZ_INSTANCE_H
 
+#include "fmu_model.h"
 #include "fmu_version.h"
 #include "fuzz.h"
-#include "value_references.h"
 
 /* Internal steps that one communication step may take here, so that executions are quick. */
 enum { FUZZ_MAX_INTERNAL_STEPS = 300 };
@@ -74,7 +74,7 @@ fmi2Status fuzz_step(struct fuzz_instance *instance, double length);
 
 /* ---- Values ---------------------------------------------------------------------------------- */
 
-enum { FUZZ_VARIABLE_CAPACITY = 64 };
+enum { FUZZ_VARIABLE_CAPACITY = 160 };
 
 /* All variables, in the order of the table; what is not of the type, or cannot be computed,
  * is 0. */
@@ -102,6 +102,9 @@ void fuzz_assert_written(fmi2Status status, const double values[], size_t count,
 
 enum { FUZZ_METHODS = 4 }; /* items of solver_method */
 enum { FUZZ_RUN_VARIANTS = 2 * FUZZ_METHODS };
+
+/* One of the methods that can integrate the model. */
+fmi2Integer fuzz_method(unsigned selector);
 
 /* fmi2Reset makes the instance equal to a fresh one of its kind: same bytes when serialized, same
  * bits in a run. Resets it again at the end. */

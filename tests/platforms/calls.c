@@ -86,6 +86,7 @@ static void call_GetBoolean(struct run *run) {
     const fmi2Component c = run_read_instance(run);
     const size_t count = run_read_references(run, run->references);
     run_write_status(run, run->fmi->GetBoolean(c, run->references, count, run->integers));
+    run_write_integers(run, run->integers, count);
 }
 
 static void call_GetString(struct run *run) {

@@ -25,7 +25,7 @@ def bits(value: float) -> str:
 class Variable:
     name: str
     reference: int
-    kind: str  # Real, Integer or Enumeration
+    kind: str  # Real, Integer, Enumeration or Boolean
     causality: str
     variability: str
     initial: str | None
@@ -39,6 +39,7 @@ class Model:
     guid: str
     variables: tuple[Variable, ...]
     states: int
+    indicators: int
 
     def __getitem__(self, name: str) -> Variable:
         return next(v for v in self.variables if v.name == name)
@@ -57,7 +58,12 @@ class Model:
 
     @property
     def integers(self) -> list[int]:
-        return [v.reference for v in self.variables if v.kind != "Real"]
+        return [v.reference for v in self.variables if v.kind in {"Integer", "Enumeration"}]
+
+    @property
+    def booleans(self) -> list[int]:
+        """References of Boolean inputs."""
+        return [v.reference for v in self.variables if v.kind == "Boolean"]
 
     @property
     def methods(self) -> tuple[int, ...]:
@@ -70,7 +76,9 @@ class Model:
 
     @property
     def outputs(self) -> list[int]:
-        return self.reals("output")
+        """Those that have derivatives."""
+        discrete = {v.reference for v in self.variables if v.variability == "discrete"}
+        return [r for r in self.reals("output") if r not in discrete]
 
 
 def read_model(fmu: Path) -> Model:
@@ -88,7 +96,8 @@ def read_model(fmu: Path) -> Model:
         for element in root.iter("ScalarVariable")
     )
     states = len(root.findall("ModelStructure/Derivatives/Unknown"))
-    return Model(root.attrib["modelName"], root.attrib["guid"], variables, states)
+    indicators = int(root.attrib.get("numberOfEventIndicators", "0"))
+    return Model(root.attrib["modelName"], root.attrib["guid"], variables, states, indicators)
 
 
 @dataclass
@@ -144,6 +153,17 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "mode": [1, 2, 3, 3], "solver_method": [1, 2, 3, 1],
     },
     "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3, 1]},
+    # falls onto its stops, slides and is held
+    "RPPlant": {
+        "m2": 1.25, "a": 0.15, "q1": 0.3, "q2": 0.1, "dq1": -0.4, "dq2": 0.2, "g": 2.5,
+        "armature1": 0.03, "damping2": 0.2,
+        "coulomb_friction1": 0.25, "breakaway_friction1": 0.375, "stribeck_velocity1": 0.1,
+        "coulomb_friction2": 0.125, "stops1": [2, 2, 2, 1], "lower1": -0.75, "upper1": 0.5,
+        "restitution1": 0.5, "stops2": [2, 2, 2, 2], "lower2": -0.1, "upper2": 0.2,
+        "restitution2": 0.625, "payload_mass": 0.75, "payload_inertia": 0.01,
+        "payload_x": 0.05, "payload_z": -0.1, "grasp": [1, 2, 2, 1],
+        "solver_method": [1, 2, 3, 1],
+    },
 }  # fmt: skip
 
 # parameters that are allowed one by one, and inconsistent together
@@ -151,6 +171,7 @@ INCONSISTENT: dict[str, dict[str, float]] = {
     "RPManipulator": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
     "RPController": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
     "RPTrajectory": {"turns": 1.0, "frequency": 3.0},
+    "RPPlant": {"coulomb_friction2": 2.0, "breakaway_friction2": 1.0},
 }
 
 
@@ -168,6 +189,8 @@ def change(script: Script, model: Model, place: int, variant: int, shift: float 
 def get_all(script: Script, model: Model, place: int) -> None:
     script.call("GetReal", place, *model.reals())
     script.call("GetInteger", place, *model.integers)
+    if model.booleans:
+        script.call("GetBoolean", place, *model.booleans)
 
 
 def instantiate(
@@ -207,6 +230,9 @@ def step(script: Script, model: Model, place: int, i: int, time: float, shift: i
             for word in (r, 1 + (i // 5 + j) % 3, bits((i % 13 - 6) / 4))
         ]
         script.call("SetRealInputDerivatives", place, *slopes)
+    for boolean in model.booleans:
+        if i % 9 == 4:
+            script.call("SetBoolean", place, boolean, 1 - i // 9 % 2)
     length = LENGTHS[i // 7 % len(LENGTHS)]
     script.call("DoStep", place, bits(time), bits(length))
     get_all(script, model, place)
@@ -289,6 +315,8 @@ def model_exchange(model: Model) -> Script:
     for i in range(STEPS):
         if i % 50 == 49:
             script.call("EnterEventMode", place)
+            for boolean in model.booleans:
+                script.call("SetBoolean", place, boolean, 1 - i // 50 % 2)
             script.call("NewDiscreteStates", place)
             script.call("EnterContinuousTimeMode", place)
         if i == 100:
@@ -296,7 +324,7 @@ def model_exchange(model: Model) -> Script:
         script.call("SetTime", place, bits(i * length))
         if model.inputs:
             script.call("SetReal", place, *pairs(model.inputs, input_values(model, i)))
-        script.call("GetEventIndicators", place, 0)
+        script.call("GetEventIndicators", place, model.indicators)
         script.call("GetDerivatives", place, model.states)
         script.call("Euler", place, model.states, bits(length))
         get_all(script, model, place)

@@ -2,8 +2,8 @@
  * steps with snapshots, and loading and unloading of the shared object. */
 #define _GNU_SOURCE // mallinfo2, RTLD_NOLOAD
 
+#include "fmu_model.h"
 #include "fmu_version.h"
-#include "value_references.h"
 
 #include <dlfcn.h>
 #include <malloc.h>
@@ -63,31 +63,48 @@ static struct memory memory_now(void) {
 
 /* ---- Instances ------------------------------------------------------------------------------ */
 
+#ifdef FMU_IS_PLANT
+/* The slide is pushed to and fro, against friction and both its stops, without end. */
+static const fmi2ValueReference start_references[] = {
+    RP_PLANT_g,      RP_PLANT_coulomb_friction1, RP_PLANT_coulomb_friction2, RP_PLANT_lower2,
+    RP_PLANT_upper2, RP_PLANT_restitution2};
+static const double starts[] = {0.0, 1000.0, 5.0, -5e-5, 5e-5, 0.5};
+static const fmi2ValueReference items[] = {RP_PLANT_solver_method, RP_PLANT_stops2};
+static const fmi2ValueReference driven = RP_PLANT_f2;
+static const double effort = 20.0;
+#else
+/* The slide oscillates between a constant force inward and the centrifugal one, without end. */
+static const fmi2ValueReference start_references[] = {RP_MANIPULATOR_g, RP_MANIPULATOR_dq1,
+                                                      RP_MANIPULATOR_f2};
+static const double starts[] = {0.0, 10.0, -20.0};
+static const fmi2ValueReference items[] = {RP_MANIPULATOR_solver_method};
+static const fmi2ValueReference driven = RP_MANIPULATOR_tau1;
+static const double effort = 0.5;
+#endif
+
+#define COUNT(array) (sizeof(array) / sizeof(array)[0])
+
 static fmi2Component initialized(fmi2Type kind, fmi2Integer method) {
     const fmi2CallbackFunctions callbacks = {.logger = receive};
-    const fmi2ValueReference integer = RP_MANIPULATOR_solver_method;
-    const fmi2ValueReference references[] = {RP_MANIPULATOR_g, RP_MANIPULATOR_dq1,
-                                             RP_MANIPULATOR_f2};
-    // the slide oscillates between a constant force inward and the centrifugal one, without end
-    const double values[] = {0.0, 10.0, -20.0};
+    const fmi2Integer rigid = 2;
+    const fmi2Integer numbers[] = {method, rigid};
     const fmi2Component c =
-        fmu.Instantiate("soak", kind, RP_MANIPULATOR_GUID, NULL, &callbacks, fmi2False, fmi2False);
+        fmu.Instantiate("soak", kind, FMU_NAME(GUID), NULL, &callbacks, fmi2False, fmi2False);
     expect(c != NULL, "no instance");
-    expect(fmu.SetReal(c, references, 3, values) == fmi2OK, "start values");
-    expect(fmu.SetInteger(c, &integer, 1, &method) == fmi2OK, "method");
+    expect(fmu.SetReal(c, start_references, COUNT(starts), starts) == fmi2OK, "start values");
+    expect(fmu.SetInteger(c, items, COUNT(items), numbers) == fmi2OK, "method");
     expect(fmu.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0) == fmi2OK, "experiment");
     expect(fmu.EnterInitializationMode(c) == fmi2OK, "initialization");
     expect(fmu.ExitInitializationMode(c) == fmi2OK, "end of initialization");
     return c;
 }
 
-/* One step of 1 ms; the torque changes its sign at every third. */
+/* One step of 1 ms; the effort changes its sign at every third. */
 static double step(fmi2Component c, unsigned long i) {
-    const fmi2ValueReference input = RP_MANIPULATOR_tau1;
-    const fmi2ValueReference output = RP_MANIPULATOR_q2;
-    const double torque = i / 3 % 2 == 0 ? 0.5 : -0.5;
+    const fmi2ValueReference output = FMU_NAME(q2);
+    const double value = i / 3 % 2 == 0 ? effort : -effort;
     double q2 = NAN;
-    expect(fmu.SetReal(c, &input, 1, &torque) == fmi2OK, "input");
+    expect(fmu.SetReal(c, &driven, 1, &value) == fmi2OK, "input");
     expect(fmu.DoStep(c, (double)i * 1e-3, 1e-3, fmi2True) == fmi2OK, "step");
     expect(fmu.GetReal(c, &output, 1, &q2) == fmi2OK && isfinite(q2), "output");
     return q2;
@@ -97,7 +114,7 @@ static double step(fmi2Component c, unsigned long i) {
 static double step_again(fmi2Component c, unsigned long i, bool as_bytes) {
     fmi2FMUstate state = NULL;
     fmi2FMUstate read = NULL;
-    fmi2Byte bytes[2048];
+    fmi2Byte bytes[4096];
     size_t size = 0;
     expect(fmu.GetFMUstate(c, &state) == fmi2OK, "saving");
     if (as_bytes) {
@@ -207,14 +224,15 @@ static void run(const struct campaign *campaign, unsigned long count) {
     const long growth = after.own - before.own;
     expect(growth <= growth_limit, "the resident memory grows");
     expect(after.used - before.used <= growth_limit * 1024, "the allocated memory grows");
-    printf("figures: soak %s, FMI %u.0; cycles %lu; seconds %.1f; findings %lu; resident memory "
-           "%ld KiB; memory growth %ld KiB; growth with pages of files %ld KiB; growth of "
-           "allocated memory "
-           "%ld bytes\n",
-           campaign->name, fmu_version, count,
-           (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec),
-           findings, after.resident, growth, after.resident - before.resident,
-           after.used - before.used);
+    printf(
+        "figures: soak %s, %s, FMI %u.0; cycles %lu; seconds %.1f; findings %lu; resident memory "
+        "%ld KiB; memory growth %ld KiB; growth with pages of files %ld KiB; growth of "
+        "allocated memory "
+        "%ld bytes\n",
+        campaign->name, FMU_NAME(NAME), fmu_version, count,
+        (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec),
+        findings, after.resident, growth, after.resident - before.resident,
+        after.used - before.used);
 }
 
 int main(int argc, char **argv) {

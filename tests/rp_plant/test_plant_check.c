@@ -128,6 +128,9 @@ static void test_offset_of_the_payload(void) {
     v.parameters.payload_x = NAN;
     v.parameters.payload_z = 0.5;
     assert_refused("payload_x = nan and payload_z = 0.5 are refused: they must be finite");
+    v.parameters.payload_x = -0.5;
+    v.parameters.payload_z = INFINITY;
+    assert_refused("payload_x = -0.5 and payload_z = inf are refused: they must be finite");
 }
 
 static void test_start_outside_the_stops(void) {

@@ -315,3 +315,64 @@ static void test_modes_that_exist(void) {
                               rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, mode}));
     }
 }
+
+/* With parameters that have been set since, any decided mode is possible; with those that it was
+ * decided with, only what can hold, slide or move freely there. */
+static void test_modes_that_fit_parameters_and_states(void) {
+    static const bool has_friction[] = {true, false};
+    for (int k = 0; k < 2; k++) {
+        for (int joint = 0; joint < 2; joint++) {
+            plant_test_start(&v);
+            v.parameters.coulomb_friction[joint] = has_friction[k] ? 1.0 : 0.0;
+            v.dq[1 - joint] = 1.0;
+            plant_test_update(&v, -1);
+            TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
+            for (int mode = RP_PLANT_BACKWARD; mode <= RP_PLANT_FREE; mode++) {
+                v.modes.joint[joint] = mode;
+                TEST_ASSERT_TRUE(events->modes_are_possible(&v, false));
+                TEST_ASSERT_EQUAL_INT((mode != RP_PLANT_FREE) == has_friction[k],
+                                      events->modes_are_possible(&v, true));
+            }
+        }
+    }
+}
+
+static void test_a_joint_is_held_at_rest_by_friction_or_on_a_stop(void) {
+    for (int joint = 0; joint < 2; joint++) {
+        plant_test_start(&v);
+        v.modes = (struct rp_plant_modes){{RP_PLANT_FREE, RP_PLANT_FREE}, RP_PLANT_RELEASED};
+        v.modes.joint[joint] = RP_PLANT_STUCK;
+        v.parameters.lower[joint] = -1.0;
+        v.parameters.upper[joint] = 0.5;
+        v.q[joint] = 0.5;
+        TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
+        v.parameters.stops[joint] = RP_PLANT_STOPS_RIGID;
+        TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
+        v.q[joint] = 0.49;
+        TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
+        v.q[joint] = -1.0;
+        TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
+        v.dq[joint] = 1e-300;
+        TEST_ASSERT_FALSE(events->modes_are_possible(&v, true));
+        v.modes.payload = RP_PLANT_UNDECIDED;
+        TEST_ASSERT_FALSE(events->modes_are_possible(&v, false));
+    }
+}
+
+/* What update leaves is possible, wherever it starts from. */
+static void test_modes_after_an_update_are_possible(void) {
+    for (int i = 0; i < 20000; i++) {
+        plant_test_random_plant(&random_source, &v);
+        for (int joint = 0; joint < 2; joint++) {
+            v.dq[joint] = i / (2 + 2 * joint) % 3 == 0 ? 0.0 : v.dq[joint];
+            if (i % 5 < 3) {
+                v.parameters.stops[joint] = RP_PLANT_STOPS_RIGID;
+                v.parameters.lower[joint] = v.q[joint] - (i % 5 == 0 ? 0.0 : 0.5);
+                v.parameters.upper[joint] = v.q[joint] + (i % 5 == 1 ? 0.0 : 0.5);
+                v.parameters.restitution[joint] = 0.5 * joint;
+            }
+        }
+        plant_test_update(&v, i % 11 < RP_PLANT_INDICATORS ? i % 11 : -1);
+        TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
+    }
+}

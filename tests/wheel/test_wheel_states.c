@@ -1,6 +1,7 @@
 /* What events keep, in snapshots and serialized states, and which bindings and states are refused.
  */
 #include "serialization.h"
+#include "stepping.h"
 #include "wheel_instance.h"
 
 #include <stdlib.h>
@@ -38,6 +39,10 @@ static void test_snapshots_keep_modes_and_sums(void) {
     TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_counting));
 }
 
+static struct wheel_values *held(void) {
+    return (void *)instance->memory.held;
+}
+
 /* What a second instance makes of the serialized state of the first one. */
 static enum status transfer(struct instance **other) {
     struct instance_snapshot *snapshot = NULL;
@@ -61,7 +66,8 @@ static void test_serialized_states_keep_modes_and_sums(void) {
     ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
     ASSERT_OK(set_boolean(WHEEL_is_reversed, 1));
     catch_wheel();
-    ((struct wheel_values *)(void *)instance->memory.held)->catches = 5;
+    held()->catches = 5;
+    ASSERT_OK(instance_exit_initialization(instance));
     ASSERT_OK(transfer(&other));
     assert_caught(other, 1);
     TEST_ASSERT_EQUAL_INT(0, get_boolean(other, WHEEL_is_counting));
@@ -121,6 +127,42 @@ static void test_forged_states_are_refused_with_the_value(void) {
     struct instance *other;
     ASSERT_OK(transfer(&other));
     instance_destroy(other);
+}
+
+static void assert_accepted(void) {
+    struct instance *other;
+    ASSERT_OK(transfer(&other));
+    instance_destroy(other);
+}
+
+static void test_no_mode_is_decided_before_the_initialization_ends(void) {
+    assert_accepted();
+    values_of(instance)->is_caught = 1;
+    assert_forged_is_refused("the modes are impossible");
+    ASSERT_OK(instance_exit_initialization(instance));
+    values_of(instance)->is_caught = 1; // nothing has been held so far
+    assert_accepted();
+}
+
+/* While the integrator goes on, the modes are those of its restart and fit its parameters. */
+static void test_forged_modes_since_the_restart_are_refused(void) {
+    set_real(WHEEL_stop, 1.0);
+    ASSERT_OK(instance_exit_initialization(instance));
+    ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
+    TEST_ASSERT_TRUE(instance->state.has_history);
+    assert_accepted();
+    values_of(instance)->catches = 1;
+    assert_forged_is_refused("the modes since the restart are impossible");
+    held()->catches = 1;
+    assert_accepted();
+    values_of(instance)->is_caught = held()->is_caught = 1;
+    assert_accepted(); // as far as one can see from here
+    held()->stop = 0.0;
+    assert_forged_is_refused("the modes since the restart are impossible");
+    values_of(instance)->stop = 0.0; // set after the restart it would not matter
+    assert_forged_is_refused("the modes since the restart are impossible");
+    instance->state.has_history = false;
+    assert_accepted();
 }
 
 /* ---- Bindings ------------------------------------------------------------------------------- */

@@ -32,6 +32,13 @@ static bool are_possible(const void *values_pointer) {
     return values->stop > 0.0;
 }
 
+/* Only a stop catches a wheel. */
+static bool modes_are_possible(const void *values_pointer, bool is_held) {
+    const struct wheel_values *values = values_pointer;
+    return (values->is_caught == 0 || values->is_caught == 1) && values->catches >= 0 &&
+           (!is_held || !values->is_caught || are_possible(values));
+}
+
 static bool is_at_rest(const void *values_pointer) {
     const struct wheel_values *values = values_pointer;
     return values->is_caught;
@@ -91,6 +98,7 @@ static const struct model_events events = {
     .sums = {offsetof(struct wheel_values, lost_speed), sizeof(double)},
     .discrete_inputs = {offsetof(struct wheel_values, is_counting), sizeof(int)},
     .are_possible = are_possible,
+    .modes_are_possible = modes_are_possible,
     .is_at_rest = is_at_rest,
     .describe = describe,
     .indicators = indicators,
