@@ -301,41 +301,6 @@ static double longest_first_step(const struct problem *problem) {
     return fmin(problem->span, 1.0);
 }
 
-/* Of the way that a state may move, since its derivative may grow within the step. */
-static const double part_of_reach = 0.5;
-
-/* A stop time is never nearer, over the time since the restart. */
-static const double resolution = 0x1p-40;
-
-/* The time at which the next internal step is to end at the latest, so that no state moves farther
- * than the model allows. The step before, unless it is the first one, has been searched. */
-static double end_within_reach(struct cvode *cvode, double internal) {
-    struct problem *problem = cvode->base.problem;
-    const struct ode *ode = &problem->ode;
-    const struct step_polynomial *step = &problem->location.step;
-    const bool is_first = internal == 0.0;
-    double *reach = problem->location.dx;
-    double *x = problem->location.x;
-    for (size_t i = 0; i < ode->state_count; i++) {
-        x[i] = is_first ? small_vector_data(cvode->base.x)[i] : step->row[i][0];
-    }
-    ode->reach(x, reach, ode->context);
-    bool is_limited = false;
-    for (size_t i = 0; i < ode->state_count; i++) {
-        is_limited |= reach[i] < INFINITY;
-    }
-    double *dx = small_vector_data(cvode->base.work);
-    if (!is_limited || (is_first && problem_rhs(problem, 0.0, x, dx) != STATUS_OK)) {
-        return problem->span;
-    }
-    double longest = INFINITY;
-    for (size_t i = 0; i < ode->state_count; i++) {
-        const double rate = is_first ? dx[i] : step->row[i][1] / (step->end - step->begin);
-        longest = fmin(longest, part_of_reach * reach[i] / fabs(rate));
-    }
-    return fmin(problem->span, internal + fmax(longest, resolution * internal));
-}
-
 /* Takes the internal steps to t, which CVode in normal mode would take, one by one, searches each
  * and asks the observer about each that changes the time. */
 static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, double *stopped_at,
@@ -345,8 +310,6 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
     long steps = 0;
     double internal = 0.0;
     double watched = problem->reached;
-    double stop = problem->span;
-    const bool is_limited = location_is_active(&problem->location) && problem->ode.reach != NULL;
     (void)CVodeGetNumSteps(cvode->solver, &begin);
     (void)CVodeGetCurrentTime(cvode->solver, &internal);
     int flag = CV_SUCCESS;
@@ -355,14 +318,6 @@ static int integrate_watched(struct cvode *cvode, double t, int64_t max_steps, d
         (void)CVodeGetNumSteps(cvode->solver, &steps);
         if (steps - begin == max_steps) {
             return CV_TOO_MUCH_WORK;
-        }
-        const double end = is_limited ? end_within_reach(cvode, internal) : stop;
-        if (end != stop) {
-            stop = end;
-            flag = CVodeSetStopTime(cvode->solver, stop);
-            if (flag != CV_SUCCESS) {
-                return flag;
-            }
         }
         // the first one may have been taken by the advance before, which has not returned its end
         const double before = internal;

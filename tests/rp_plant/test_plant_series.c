@@ -210,6 +210,12 @@ static void assert_model_at(double s) {
     for (int i = 0; i < PLANT_STATES; i++) {
         x[i] = sum_of(rows[i], s).value;
     }
+    for (int i = 0; i < 2; i++) {
+        const int mode = plant.modes.joint[i];
+        if ((mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) && mode * x[2 + i] < 0.0) {
+            return; // the mode has ended: what friction would be is another matter
+        }
+    }
     for (int i = 0; i < PLANT_INPUTS; i++) {
         u[i] = inputs[i][0] + s * (inputs[i][1] + s * (inputs[i][2] + s * inputs[i][3]));
     }
