@@ -43,11 +43,9 @@ struct decision {
     struct rp_plant_outcome outcome;
 };
 
-/* Writes the joints' modes; that of the payload is given. */
-static void decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
-                   const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
-                   struct decision *decision) {
-    struct rp_plant_rest *rest = &decision->rest;
+/* Writes which joints are at rest, and the joints' modes as long as these stay. True: one is. */
+static bool find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                      struct rp_plant_modes *modes, struct rp_plant_rest *rest) {
     for (int i = 0; i < 2; i++) {
         rest->breakaway[i] = rp_plant_breakaway(p, i);
         rest->closed[i] = rp_plant_closed_stop(p, i, q[i]);
@@ -55,6 +53,15 @@ static void decide(const struct rp_plant_parameters *p, const double q[2], const
         modes->joint[i] =
             rest->at_rest[i] ? RP_PLANT_STUCK : moving_mode(p, i, dq[i] > 0.0 ? 1 : -1);
     }
+    return rest->at_rest[0] || rest->at_rest[1];
+}
+
+/* After find_rest: the accelerations, and the modes of the joints that begin to move. That of the
+ * payload is given. */
+static void decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                   const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
+                   struct decision *decision) {
+    struct rp_plant_rest *rest = &decision->rest;
     const bool attached = modes->payload == RP_PLANT_ATTACHED;
     rp_plant_inertia(p, attached, q[1], &rest->inertia);
     rp_plant_forces(p, modes, q, dq, inputs, rest->forces);
@@ -76,7 +83,9 @@ struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *val
         modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
         if (can_be_held(p, 0) || can_be_held(p, 1)) {
             struct decision decision;
-            decide(p, q, dq, inputs, &modes, &decision);
+            if (find_rest(p, q, dq, &modes, &decision.rest)) {
+                decide(p, q, dq, inputs, &modes, &decision);
+            }
             return modes;
         }
     }
@@ -163,6 +172,7 @@ static bool hardly_leaves(const struct rp_plant_values *values, const struct eve
                           const double dq[2], int joint, int side) {
     struct rp_plant_modes modes = values->modes;
     struct decision decision;
+    (void)find_rest(&values->parameters, values->q, dq, &modes, &decision.rest);
     decide(&values->parameters, values->q, dq, &values->inputs, &modes, &decision);
     const double into = -side * decision.outcome.ddq[joint];
     return into > 0.0 && dq[joint] * dq[joint] <= 2.0 * into * event->tolerance[joint];
@@ -344,9 +354,12 @@ static enum status update(void *values_pointer, const struct event *event) {
     }
 
     // what has fired counts where the forces of the stuck joints have not changed since
+    const struct rp_plant_parameters *p = &values->parameters;
     struct decision decision;
-    decide(&values->parameters, values->q, values->dq, &values->inputs, &values->modes, &decision);
-    break_away(values, event, &decision, jumps ? none : fired.leaves);
+    if (find_rest(p, values->q, values->dq, &values->modes, &decision.rest)) {
+        decide(p, values->q, values->dq, &values->inputs, &values->modes, &decision);
+        break_away(values, event, &decision, jumps ? none : fired.leaves);
+    }
     return STATUS_OK;
 }
 

@@ -56,9 +56,20 @@ enum status location_restart(struct location *location, const struct indicator *
     if (indicators == NULL) {
         return STATUS_OK;
     }
+    bool needs_model = false;
+    for (size_t i = 0; i < location->ode->indicator_count; i++) {
+        const struct indicator *indicator = &indicators[i];
+        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
+        location->is_armed[i] =
+            indicator->kind == INDICATOR_OF_STATE &&
+            (indicator->rises || indicator->offset + indicator->factor * x[indicator->state] > 0.0);
+    }
+    if (!needs_model) {
+        return STATUS_OK;
+    }
     const enum status status = evaluate(location, 0.0, x);
     for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
-        location->is_armed[i] = indicators[i].rises || location->z[i] > 0.0;
+        location->is_armed[i] |= indicators[i].kind == INDICATOR_OF_MODEL && location->z[i] > 0.0;
     }
     return status;
 }
@@ -325,7 +336,7 @@ enum status location_search(struct location *location) {
 
     double s = INFINITY;
     for (size_t i = 0; i < count; i++) {
-        s = fmin(s, location->first[i]);
+        s = location->first[i] < s ? location->first[i] : s;
     }
     if (!(s <= 1.0)) {
         return STATUS_OK;

@@ -366,6 +366,9 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
             within = fmin(within, step * (reach[i] / way));
         }
     }
+    if (within == step) {
+        return step;
+    }
     const double shortest = resolution * taylor->begin / taylor->unit;
     return fmax(within, fmin(step, shortest));
 }
