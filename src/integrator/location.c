@@ -2,6 +2,7 @@
 
 #include "roots.h"
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,10 +22,12 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->x = calloc(2 * states, sizeof *location->x);
     location->z = calloc(count, sizeof *location->z);
     location->is_armed = calloc(count, sizeof *location->is_armed);
+    location->noise = calloc(count, sizeof *location->noise);
     location->fired = calloc(count, sizeof *location->fired);
     if (location->step.row == NULL || location->step.indicator_row == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
-        location->z == NULL || location->is_armed == NULL || location->fired == NULL) {
+        location->z == NULL || location->is_armed == NULL || location->noise == NULL ||
+        location->fired == NULL) {
         location_destroy(location);
         return false;
     }
@@ -34,6 +37,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
 
 void location_destroy(struct location *location) {
     free(location->fired);
+    free(location->noise);
     free(location->is_armed);
     free(location->z);
     free(location->x);
@@ -60,9 +64,16 @@ enum status location_restart(struct location *location, const struct indicator *
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         const struct indicator *indicator = &indicators[i];
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
-        location->is_armed[i] =
-            indicator->kind == INDICATOR_OF_STATE &&
-            (indicator->rises || indicator->offset + indicator->factor * x[indicator->state] > 0.0);
+        location->is_armed[i] = false;
+        if (indicator->kind == INDICATOR_OF_STATE) {
+            const double z = indicator->offset + indicator->factor * x[indicator->state];
+            const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
+            const bool is_sure = indicator->rises || z > 0.0;
+            location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
+            location->noise[i] =
+                is_sure ? rounding
+                        : fabs(indicator->factor) * location->tolerances[indicator->state];
+        }
     }
     if (!needs_model) {
         return STATUS_OK;
@@ -322,8 +333,8 @@ enum status location_search(struct location *location) {
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            location->first[i] = first_of_state(
-                step, indicator, location->tolerances[indicator->state], &location->is_armed[i]);
+            location->first[i] =
+                first_of_state(step, indicator, location->noise[i], &location->is_armed[i]);
         } else if (indicator->kind == INDICATOR_OF_MODEL && step->has_indicators) {
             location->first[i] = first_of_model(step, i, &location->is_armed[i]);
         }

@@ -30,6 +30,8 @@ struct location {
     const struct indicator *indicators;  /* since the restart; NULL: none is searched */
     const double *tolerances;            /* absolute ones, of the states */
     bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
+    double *noise;                       /* by indicator of a state: one that is 0 at the restart
+                                            may have either sign as long as it is within this */
     bool *fired;                         /* by indicator: it is at 0 at `time` */
     double time;                         /* of the event, s since the restart; INFINITY: none */
     struct step_polynomial step;         /* the last one; methods write it */

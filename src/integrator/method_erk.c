@@ -286,13 +286,18 @@ static int advance_carefully(struct erk *erk, double begin, double end, int64_t 
     return flag;
 }
 
+/* ARKODE refuses steps that change the time by hardly more than its rounding. */
+static bool is_too_close(double begin, double end) {
+    return end - begin <= 8.0 * DBL_EPSILON * end;
+}
+
 /* From the begin of the step in which the event is to the time t. Writes the state to x and the
  * right-hand side to erk->dx. */
 static int step_to(struct erk *erk, double t, double x[]) {
     struct problem *problem = erk->base.problem;
     double reached;
     sundials_set_state(&erk->base, erk->step_x);
-    if (t > erk->step_begin) {
+    if (!is_too_close(erk->step_begin, t)) {
         int flag = start(erk, erk->step_begin, t, t - erk->step_begin);
         if (flag == ARK_SUCCESS) {
             flag = ERKStepEvolve(erk->solver, t, erk->base.x, &reached, ARK_NORMAL);

@@ -12,7 +12,7 @@ from pathlib import Path
 
 MODEL_EXCHANGE, CO_SIMULATION = 0, 1
 METHODS = (1, 2, 3, 4)  # cvode_adams, cvode_bdf, erk, taylor
-WITH_SERIES = ("RPManipulator",)  # the models that taylor, the last method, can integrate
+WITH_SERIES = ("RPManipulator", "RPPlant")  # the models that taylor, the last method, can integrate
 STEPS = 200
 
 
