@@ -72,14 +72,14 @@ static inline void jet_sine_cosine(const double x[], double s[], double c[], int
         c[0] = cos(x[0]);
         return;
     }
-    double sine = 0.0;
-    double cosine = 0.0;
+    double s_sum = 0.0;
+    double c_sum = 0.0;
     for (int i = 1; i <= k; i++) {
-        sine += i * x[i] * c[k - i];
-        cosine -= i * x[i] * s[k - i];
+        s_sum += i * x[i] * c[k - i];
+        c_sum -= i * x[i] * s[k - i];
     }
-    s[k] = sine / k;
-    c[k] = cosine / k;
+    s[k] = s_sum / k;
+    c[k] = c_sum / k;
 }
 
 /* z = atan2(y, x) with r2 = x^2 + y^2 and r2_0 > 0, from r2 z' = x y' - y x':

@@ -380,11 +380,11 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
         const int mode = values->modes.joint[i];
-        const bool slides = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+        const bool is_sliding = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
         const double vs = p->stribeck_velocity[i];
         reach[i] = INFINITY;
         reach[2 + i] =
-            slides && has_breakaway(p, i) ? fmax(vs, fabs(x[2 + i]) - fast * vs) : INFINITY;
+            is_sliding && has_breakaway(p, i) ? fmax(vs, fabs(x[2 + i]) - fast * vs) : INFINITY;
     }
 }
 

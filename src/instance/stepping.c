@@ -382,8 +382,8 @@ static enum status do_step(struct step *step, double communication_point, double
     if (step->options->ask_inputs != NULL) {
         hold_last_nodes(step);
     }
-    const bool is_at_event = instance->state.event_point != NO_EVENT;
-    if (step->options->accept != NULL && (!step->is_early || is_at_event)) {
+    const bool ends_at_event = instance->state.event_point != NO_EVENT;
+    if (step->options->accept != NULL && (!step->is_early || ends_at_event)) {
         (void)report(step);
     }
     return step->answer;

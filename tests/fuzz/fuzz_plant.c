@@ -76,7 +76,7 @@ static void set_payload(struct plant *plant) {
     plant->is_disturbed = true;
 }
 
-static void begin(struct plant *plant) {
+static void initialize(struct plant *plant) {
     const fmi2ValueReference integers[] = {RP_PLANT_solver_method, RP_PLANT_max_events};
     const fmi2Integer limits[] = {fuzz_method(fuzz_byte(plant->input)),
                                   1 + (fmi2Integer)fuzz_below(plant->input, 20)};
@@ -348,7 +348,7 @@ void fuzz_target_run(struct fuzz_input *input) {
     const unsigned selector = fuzz_byte(input);
     const fmi2Type kind = selector % 4 == 3 ? fmi2ModelExchange : fmi2CoSimulation;
     struct plant plant = {.input = input, .instance = fuzz_instance_create(kind, true, false)};
-    begin(&plant);
+    initialize(&plant);
     if (kind == fmi2CoSimulation) {
         run_co_simulation(&plant);
     } else {

@@ -35,7 +35,6 @@ static void handle_event(struct exchange *run) {
     static const fmi2ValueReference efforts[] = {RP_PLANT_tau1, RP_PLANT_f2};
     const fmi2ValueReference payload = RP_PLANT_payload_attached;
     double before[STATES];
-    double limits[2][2];
     double z[FUZZ_PLANT_INDICATORS];
     fmi2EventInfo info;
     require(FUZZ_CHECKED_PLAIN(run->instance, EnterEventMode), run, "fmi2EnterEventMode");
@@ -50,6 +49,7 @@ static void handle_event(struct exchange *run) {
                 "fmi2SetBoolean");
     }
     if (fuzz_below(run->input, 8) == 0) {
+        double limits[2][2];
         fuzz_plant_set(run->input, run->instance, fuzz_below(run->input, FUZZ_PLANT_GROUPS),
                        limits);
     }

@@ -3,6 +3,7 @@
 #include "rp_plant_model.h"
 #include "rp_plant_rest.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -140,25 +141,26 @@ static const struct {
     {"series", sizeof(struct series_row), sizeof(struct series_results), evaluate_series},
 };
 
+enum { MOST_BYTES = 1 << 16 }; // of a row, and of results
+
+_Static_assert(sizeof(struct model_row) <= MOST_BYTES && sizeof(struct rest_row) <= MOST_BYTES &&
+                   sizeof(struct series_row) <= MOST_BYTES &&
+                   sizeof(struct model_results) <= MOST_BYTES &&
+                   sizeof(struct rest_results) <= MOST_BYTES &&
+                   sizeof(struct series_results) <= MOST_BYTES,
+               "every row fits");
+
 int main(int argc, char **argv) {
-    static union {
-        struct model_row model;
-        struct rest_row rest;
-        struct series_row series;
-    } row;
-    static union {
-        struct model_results model;
-        struct rest_results rest;
-        struct series_results series;
-    } results;
+    static _Alignas(max_align_t) char row[MOST_BYTES];
+    static _Alignas(max_align_t) char results[MOST_BYTES];
     for (size_t i = 0; argc == 2 && i < sizeof commands / sizeof commands[0]; i++) {
         if (strcmp(argv[1], commands[i].name) != 0) {
             continue;
         }
         size_t written = 1;
-        while (written == 1 && fread(&row, commands[i].row_size, 1, stdin) == 1) {
-            commands[i].evaluate(&row, &results);
-            written = fwrite(&results, commands[i].result_size, 1, stdout);
+        while (written == 1 && fread(row, commands[i].row_size, 1, stdin) == 1) {
+            commands[i].evaluate(row, results);
+            written = fwrite(results, commands[i].result_size, 1, stdout);
         }
         return written == 1 && fflush(stdout) == 0 ? 0 : 1;
     }
