@@ -3,7 +3,7 @@
 #include "arithmetic_double.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_impact.h"
-#include "rp_plant_rest.h"
+#include "rp_plant_modes.h"
 #include "rp_plant_series.h"
 
 #include <string.h>
@@ -16,139 +16,6 @@ struct fired {
     int leaves[2];  /* the direction in which a stuck joint breaks away, else 0 */
     int hit[2];     /* +1: the lower stop is reached, -1: the upper one, else 0 */
 };
-
-/* Whether anything can hold a joint: dry friction or stops. Each right-hand side asks. */
-static bool can_be_held(const struct rp_plant_parameters *p, int joint) {
-    return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
-           p->stops[joint] == RP_PLANT_STOPS_RIGID;
-}
-
-static bool slides(int mode) {
-    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
-}
-
-/* ---- Modes from velocities and forces ------------------------------------------------------- */
-
-/* Of a joint that moves, or begins to, in a direction. */
-static int moving_mode(const struct rp_plant_parameters *p, int joint, int direction) {
-    if (rp_plant_breakaway(p, joint) > 0.0) {
-        return direction > 0 ? RP_PLANT_FORWARD : RP_PLANT_BACKWARD;
-    }
-    return RP_PLANT_FREE;
-}
-
-/* A decision about the joints at rest, and what it was made from. */
-struct decision {
-    struct rp_plant_rest rest;
-    struct rp_plant_outcome outcome;
-};
-
-/* Writes which joints are at rest, and the joints' modes as long as these stay. True: one is. */
-static bool find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
-                      struct rp_plant_modes *modes, struct rp_plant_rest *rest) {
-    for (int i = 0; i < 2; i++) {
-        rest->breakaway[i] = rp_plant_breakaway(p, i);
-        rest->closed[i] = rp_plant_closed_stop(p, i, q[i]);
-        rest->at_rest[i] = dq[i] == 0.0 && (rest->breakaway[i] > 0.0 || rest->closed[i] != 0);
-        modes->joint[i] =
-            rest->at_rest[i] ? RP_PLANT_STUCK : moving_mode(p, i, dq[i] > 0.0 ? 1 : -1);
-    }
-    return rest->at_rest[0] || rest->at_rest[1];
-}
-
-/* After find_rest: the accelerations, and the modes of the joints that begin to move. That of the
- * payload is given. */
-static void decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
-                   const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
-                   struct decision *decision) {
-    struct rp_plant_rest *rest = &decision->rest;
-    const bool attached = modes->payload == RP_PLANT_ATTACHED;
-    rp_plant_inertia(p, attached, q[1], &rest->inertia);
-    rp_plant_forces(p, modes, q, dq, inputs, rest->forces);
-    rp_plant_rest_decide(rest, &decision->outcome);
-    for (int i = 0; i < 2; i++) {
-        const int direction = decision->outcome.pattern[i];
-        if (direction != 0) {
-            modes->joint[i] = moving_mode(p, i, direction);
-        }
-    }
-}
-
-struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
-                                               const double q[2], const double dq[2],
-                                               const struct rp_plant_inputs *inputs) {
-    const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_modes modes = values->modes;
-    if (modes.payload == RP_PLANT_UNDECIDED) {
-        modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
-        if (can_be_held(p, 0) || can_be_held(p, 1)) {
-            struct decision decision;
-            if (find_rest(p, q, dq, &modes, &decision.rest)) {
-                decide(p, q, dq, inputs, &modes, &decision);
-            }
-            return modes;
-        }
-    }
-    for (int i = 0; i < 2; i++) {
-        if (!can_be_held(p, i)) {
-            modes.joint[i] = RP_PLANT_FREE;
-        }
-    }
-    return modes;
-}
-
-/* ---- Breaking away -------------------------------------------------------------------------- */
-
-/* The side on which a joint that stays is at its limit: that which has fired, or where the reaction
- * is the breakaway friction. */
-static int side_at_limit(const struct decision *decision, int joint, int leaves) {
-    const struct rp_plant_rest *rest = &decision->rest;
-    if (!rest->at_rest[joint] || decision->outcome.pattern[joint] != 0) {
-        return 0;
-    }
-    if (leaves != 0) {
-        return leaves;
-    }
-    const double reaction = decision->outcome.reaction[joint];
-    if (reaction >= rest->breakaway[joint] && rest->closed[joint] >= 0) {
-        return 1;
-    }
-    return -reaction >= rest->breakaway[joint] && rest->closed[joint] <= 0 ? -1 : 0;
-}
-
-/* At the limit with no acceleration, stuck and sliding fit both: the next derivative decides. It
- * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
- * go to that side, and without friction, since that does not change at breakaway. A joint whose
- * indicator has fired leaves unless the rate points back; otherwise it would fire again. */
-static void break_away(struct rp_plant_values *values, const struct event *event,
-                       const struct decision *decision, const int leaves[2]) {
-    const int side[2] = {side_at_limit(decision, 0, leaves[0]),
-                         side_at_limit(decision, 1, leaves[1])};
-    if (side[0] == 0 && side[1] == 0) {
-        return;
-    }
-    const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_inputs du;
-    memcpy(&du, event->du, sizeof du);
-    struct rp_plant_rest next = {.inertia = decision->rest.inertia};
-    rp_plant_reaction_rates(p, &values->modes, values->q, values->dq, &values->inputs, &du,
-                            next.forces);
-    struct rp_plant_outcome outcome = {.reaction = {next.forces[0], next.forces[1]}};
-    if (side[0] != 0 && side[1] != 0) {
-        for (int i = 0; i < 2; i++) {
-            next.at_rest[i] = true;
-            next.closed[i] = side[i];
-        }
-        rp_plant_rest_decide(&next, &outcome);
-    }
-    for (int i = 0; i < 2; i++) {
-        const double push = side[i] * outcome.reaction[i];
-        if (side[i] != 0 &&
-            (outcome.pattern[i] != 0 || push > 0.0 || (leaves[i] != 0 && push == 0.0))) {
-            values->modes.joint[i] = moving_mode(p, i, side[i]);
-        }
-    }
-}
 
 /* ---- Stops ---------------------------------------------------------------------------------- */
 
@@ -171,9 +38,9 @@ static void arrive(struct rp_plant_values *values, const struct fired *fired, in
 static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
                           const double dq[2], int joint, int side) {
     struct rp_plant_modes modes = values->modes;
-    struct decision decision;
-    (void)find_rest(&values->parameters, values->q, dq, &modes, &decision.rest);
-    decide(&values->parameters, values->q, dq, &values->inputs, &modes, &decision);
+    struct rp_plant_decision decision;
+    (void)rp_plant_find_rest(&values->parameters, values->q, dq, &modes, &decision.rest);
+    rp_plant_decide(&values->parameters, values->q, dq, &values->inputs, &modes, &decision);
     const double into = -side * decision.outcome.ddq[joint];
     return into > 0.0 && dq[joint] * dq[joint] <= 2.0 * into * event->tolerance[joint];
 }
@@ -292,7 +159,7 @@ static struct fired read_fired(const struct rp_plant_values *values, const bool 
     for (int i = 0; i < 2; i++) {
         const bool *of_joint = at_zero + PLANT_INDICATORS * (size_t)i;
         const int mode = values->modes.joint[i];
-        fired.halted[i] = slides(mode) && of_joint[SLIP_FORWARD];
+        fired.halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
             fired.leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
         }
@@ -320,7 +187,7 @@ static bool fits(const struct rp_plant_values *values, int joint) {
         return values->dq[joint] == 0.0 &&
                (has_friction || rp_plant_closed_stop(p, joint, values->q[joint]) != 0);
     }
-    return slides(mode) == has_friction;
+    return rp_plant_slides(mode) == has_friction;
 }
 
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
@@ -355,10 +222,10 @@ static enum status update(void *values_pointer, const struct event *event) {
 
     // what has fired counts where the forces of the stuck joints have not changed since
     const struct rp_plant_parameters *p = &values->parameters;
-    struct decision decision;
-    if (find_rest(p, values->q, values->dq, &values->modes, &decision.rest)) {
-        decide(p, values->q, values->dq, &values->inputs, &values->modes, &decision);
-        break_away(values, event, &decision, jumps ? none : fired.leaves);
+    struct rp_plant_decision decision;
+    if (rp_plant_find_rest(p, values->q, values->dq, &values->modes, &decision.rest)) {
+        rp_plant_decide(p, values->q, values->dq, &values->inputs, &values->modes, &decision);
+        rp_plant_break_away(values, event, &decision, jumps ? none : fired.leaves);
     }
     return STATUS_OK;
 }
@@ -366,7 +233,7 @@ static enum status update(void *values_pointer, const struct event *event) {
 static bool are_possible(const void *values_pointer) {
     const struct rp_plant_parameters *p =
         &((const struct rp_plant_values *)values_pointer)->parameters;
-    return can_be_held(p, 0) || can_be_held(p, 1) || p->payload_mass > 0.0 ||
+    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) || p->payload_mass > 0.0 ||
            p->payload_inertia > 0.0;
 }
 
@@ -395,7 +262,7 @@ static void describe_joint(const struct rp_plant_values *values, int mode, int j
         }
         return;
     }
-    if (slides(mode)) {
+    if (rp_plant_slides(mode)) {
         indicators[SLIP_FORWARD] =
             (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
     }

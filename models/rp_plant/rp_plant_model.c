@@ -4,6 +4,7 @@
 #include "rp_plant_calculated.h"
 #include "rp_plant_check.h"
 #include "rp_plant_events.h"
+#include "rp_plant_modes.h"
 #include "rp_plant_propagation.h"
 #include "rp_plant_series.h"
 

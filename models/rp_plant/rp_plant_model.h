@@ -48,10 +48,4 @@ struct rp_plant_values {
 
 extern const struct model rp_plant_model;
 
-/* The modes that hold: those of the last event, or during initialization, when none has been, those
- * that follow from parameters, states and inputs. */
-struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
-                                               const double q[2], const double dq[2],
-                                               const struct rp_plant_inputs *inputs);
-
 #endif

@@ -22,7 +22,7 @@
 #include "arithmetic_double.h"
 #include "jet.h"
 #include "rp_plant_equations.h"
-#include "rp_plant_model.h"
+#include "rp_plant_modes.h"
 #include "rp_series.h"
 
 #include <string.h>
@@ -93,11 +93,6 @@ static bool is_stuck(const struct motion *m, int joint) {
 
 static bool has_breakaway(const struct rp_plant_parameters *p, int joint) {
     return p->breakaway_friction[joint] > p->coulomb_friction[joint];
-}
-
-static bool slides(const struct motion *m, int joint) {
-    const int mode = m->modes.joint[joint];
-    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
 }
 
 static bool has_payload(const struct motion *m) {
@@ -228,7 +223,7 @@ static double sliding_friction(const struct motion *m, int i, int k, double row[
 static void write_efforts(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
     for (int i = 0; i < 2; i++) {
         double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
-        if (slides(m, i)) {
+        if (rp_plant_slides(m->modes.joint[i])) {
             effort -= m->modes.joint[i] * sliding_friction(m, i, k, row);
         }
         row[E1 + i][k] = effort;
@@ -379,8 +374,7 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
-        const int mode = values->modes.joint[i];
-        const bool is_sliding = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+        const bool is_sliding = rp_plant_slides(values->modes.joint[i]);
         const double vs = p->stribeck_velocity[i];
         reach[i] = INFINITY;
         reach[2 + i] =

@@ -1,5 +1,6 @@
 /* The smooth part: friction law, mass matrix, balance of power, joint loads, derivatives. */
 #include "plant_test_support.h"
+#include "rp_plant_modes.h"
 #include "unity.h"
 
 #include <float.h>

@@ -1,0 +1,113 @@
+#include "rp_plant_modes.h"
+
+#include <string.h>
+
+/* ---- Modes from velocities and forces ------------------------------------------------------- */
+
+/* Of a joint that moves, or begins to, in a direction. */
+static int moving_mode(const struct rp_plant_parameters *p, int joint, int direction) {
+    if (rp_plant_breakaway(p, joint) > 0.0) {
+        return direction > 0 ? RP_PLANT_FORWARD : RP_PLANT_BACKWARD;
+    }
+    return RP_PLANT_FREE;
+}
+
+bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                        struct rp_plant_modes *modes, struct rp_plant_rest *rest) {
+    for (int i = 0; i < 2; i++) {
+        rest->breakaway[i] = rp_plant_breakaway(p, i);
+        rest->closed[i] = rp_plant_closed_stop(p, i, q[i]);
+        rest->at_rest[i] = dq[i] == 0.0 && (rest->breakaway[i] > 0.0 || rest->closed[i] != 0);
+        modes->joint[i] =
+            rest->at_rest[i] ? RP_PLANT_STUCK : moving_mode(p, i, dq[i] > 0.0 ? 1 : -1);
+    }
+    return rest->at_rest[0] || rest->at_rest[1];
+}
+
+void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                     const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
+                     struct rp_plant_decision *decision) {
+    struct rp_plant_rest *rest = &decision->rest;
+    const bool attached = modes->payload == RP_PLANT_ATTACHED;
+    rp_plant_inertia(p, attached, q[1], &rest->inertia);
+    rp_plant_forces(p, modes, q, dq, inputs, rest->forces);
+    rp_plant_rest_decide(rest, &decision->outcome);
+    for (int i = 0; i < 2; i++) {
+        const int direction = decision->outcome.pattern[i];
+        if (direction != 0) {
+            modes->joint[i] = moving_mode(p, i, direction);
+        }
+    }
+}
+
+struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
+                                               const double q[2], const double dq[2],
+                                               const struct rp_plant_inputs *inputs) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    struct rp_plant_modes modes = values->modes;
+    if (modes.payload == RP_PLANT_UNDECIDED) {
+        modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+        if (rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1)) {
+            struct rp_plant_decision decision;
+            if (rp_plant_find_rest(p, q, dq, &modes, &decision.rest)) {
+                rp_plant_decide(p, q, dq, inputs, &modes, &decision);
+            }
+            return modes;
+        }
+    }
+    for (int i = 0; i < 2; i++) {
+        if (!rp_plant_can_be_held(p, i)) {
+            modes.joint[i] = RP_PLANT_FREE;
+        }
+    }
+    return modes;
+}
+
+/* ---- Breaking away -------------------------------------------------------------------------- */
+
+/* The side on which a joint that stays is at its limit: that which has fired, or where the reaction
+ * is the breakaway friction. */
+static int side_at_limit(const struct rp_plant_decision *decision, int joint, int leaves) {
+    const struct rp_plant_rest *rest = &decision->rest;
+    if (!rest->at_rest[joint] || decision->outcome.pattern[joint] != 0) {
+        return 0;
+    }
+    if (leaves != 0) {
+        return leaves;
+    }
+    const double reaction = decision->outcome.reaction[joint];
+    if (reaction >= rest->breakaway[joint] && rest->closed[joint] >= 0) {
+        return 1;
+    }
+    return -reaction >= rest->breakaway[joint] && rest->closed[joint] <= 0 ? -1 : 0;
+}
+
+void rp_plant_break_away(struct rp_plant_values *values, const struct event *event,
+                         const struct rp_plant_decision *decision, const int leaves[2]) {
+    const int side[2] = {side_at_limit(decision, 0, leaves[0]),
+                         side_at_limit(decision, 1, leaves[1])};
+    if (side[0] == 0 && side[1] == 0) {
+        return;
+    }
+    const struct rp_plant_parameters *p = &values->parameters;
+    struct rp_plant_inputs du;
+    memcpy(&du, event->du, sizeof du);
+    struct rp_plant_rest next = {.inertia = decision->rest.inertia};
+    rp_plant_reaction_rates(p, &values->modes, values->q, values->dq, &values->inputs, &du,
+                            next.forces);
+    struct rp_plant_outcome outcome = {.reaction = {next.forces[0], next.forces[1]}};
+    if (side[0] != 0 && side[1] != 0) {
+        for (int i = 0; i < 2; i++) {
+            next.at_rest[i] = true;
+            next.closed[i] = side[i];
+        }
+        rp_plant_rest_decide(&next, &outcome);
+    }
+    for (int i = 0; i < 2; i++) {
+        const double push = side[i] * outcome.reaction[i];
+        if (side[i] != 0 &&
+            (outcome.pattern[i] != 0 || push > 0.0 || (leaves[i] != 0 && push == 0.0))) {
+            values->modes.joint[i] = moving_mode(p, i, side[i]);
+        }
+    }
+}

@@ -1,0 +1,50 @@
+/* Which joints stick, slide or move freely: decided for both at once, from velocities and forces.
+ */
+#ifndef RP_PLANT_MODES_H
+#define RP_PLANT_MODES_H
+
+#include "events.h"
+#include "rp_plant_model.h"
+#include "rp_plant_rest.h"
+
+/* A decision about the joints at rest, and what it was made from. */
+struct rp_plant_decision {
+    struct rp_plant_rest rest;
+    struct rp_plant_outcome outcome;
+};
+
+/* Whether anything can hold a joint: dry friction or stops. */
+static inline bool rp_plant_can_be_held(const struct rp_plant_parameters *p, int joint) {
+    return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
+           p->stops[joint] == RP_PLANT_STOPS_RIGID;
+}
+
+static inline bool rp_plant_slides(int mode) {
+    return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+}
+
+/* Writes which joints are at rest, and the joints' modes as long as these stay. True: one is. */
+bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                        struct rp_plant_modes *modes, struct rp_plant_rest *rest);
+
+/* After rp_plant_find_rest: the accelerations, and the modes of the joints that begin to move. That
+ * of the payload is given. */
+void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
+                     const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
+                     struct rp_plant_decision *decision);
+
+/* At the limit with no acceleration, stuck and sliding fit both: the next derivative decides. It
+ * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
+ * go to that side, and without friction, since that does not change at breakaway. A joint whose
+ * indicator has fired (leaves: 1 forward, -1 backward, otherwise 0) leaves unless the rate points
+ * back; otherwise it would fire again. */
+void rp_plant_break_away(struct rp_plant_values *values, const struct event *event,
+                         const struct rp_plant_decision *decision, const int leaves[2]);
+
+/* The modes that hold: those of the last event, or during initialization, when none has been, those
+ * that follow from parameters, states and inputs. */
+struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
+                                               const double q[2], const double dq[2],
+                                               const struct rp_plant_inputs *inputs);
+
+#endif
