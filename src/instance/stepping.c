@@ -71,6 +71,7 @@ struct step {
     struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
     enum status answer;             /* of options->accept */
     int events;                     /* so far */
+    int64_t steps_before;           /* internal ones, since initialization */
 };
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
@@ -186,29 +187,32 @@ static bool is_at_event(const struct instance *instance) {
     return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
 }
 
+/* Internal steps that the step may still take. */
+static int64_t steps_left(const struct step *step) {
+    const struct instance_state *state = &step->instance->state;
+    return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
+}
+
 /* To step->end, which may come forward on the way. */
 ALWAYS_INLINE enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
     double *x = doubles_of(instance->memory.values, instance->model->states);
-    const int64_t steps_before = state->statistics.steps;
-    int64_t steps = state->own.max_internal_steps;
     if (step->options->accept != NULL) {
         integrator_set_observer(instance->integrator, observe, step);
     }
     enum status status;
     for (;;) {
+        const int64_t left = steps_left(step);
         status = integrator_advance(instance->integrator,
-                                    clock_difference(step->end, state->restart_time), steps,
-                                    &state->latest_time, x);
+                                    clock_difference(step->end, state->restart_time),
+                                    left > 1 ? left : 1, &state->latest_time, x);
         if (status != STATUS_OK || step->is_over || is_at_event(instance) ||
             !(state->latest_time < clock_difference(step->end, state->restart_time))) {
             break;
         }
         // to the new end; the step that the observer cut short counts
         integrator_get_statistics(instance->integrator, &state->statistics);
-        steps = state->own.max_internal_steps - (state->statistics.steps - steps_before);
-        steps = steps > 1 ? steps : 1;
     }
     if (step->options->accept != NULL) {
         integrator_set_observer(instance->integrator, NULL, NULL);
@@ -322,8 +326,13 @@ static enum status move_over_events(struct step *step, enum continuation continu
     struct instance *instance = step->instance;
     enum status status = begin_modes(step, &continuation);
     while (status == STATUS_OK) {
-        const bool is_at_rest = instance_is_at_rest(instance);
-        status = is_at_rest ? rest(step) : move(step, continuation);
+        if (instance_is_at_rest(instance)) {
+            status = rest(step);
+        } else if (step->events > 0 && steps_left(step) <= 0) {
+            status = STATUS_TOO_MANY_STEPS;
+        } else {
+            status = move(step, continuation);
+        }
         if (status != STATUS_OK || integrator_event(instance->integrator) == NULL) {
             break;
         }
@@ -404,6 +413,7 @@ enum status instance_do_step_with(struct instance *instance, double communicatio
         .begin = instance->state.time,
         .end = clock_add((struct clock_time){.s = communication_point}, step_size),
         .answer = STATUS_OK,
+        .steps_before = instance->state.statistics.steps,
     };
     if (instance->state.event_point != NO_EVENT) {
         step.end = instance_resumed_end(instance, step.end);

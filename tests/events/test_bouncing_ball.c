@@ -151,6 +151,18 @@ static void test_a_limit_of_events_ends_the_step(void) {
     }
 }
 
+/* The internal steps of all flights count together. */
+static void test_a_limit_of_internal_steps_ends_the_step(void) {
+    for (int method = 1; method <= 4; method++) {
+        prepare(&ball_description, method, 1e-8);
+        set_int(TOY_MAX_STEPS, 30);
+        initialize();
+        TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(toy, 0.0, 5.0));
+        TEST_ASSERT_INT_WITHIN(2, 30, get_int(TOY_STEPS));
+        TEST_ASSERT_GREATER_THAN_INT(0, get_int(TOY_EVENTS));
+    }
+}
+
 static void test_the_lift_takes_it_from_the_floor(void) {
     for (int method = 1; method <= 4; method++) {
         prepare(&ball_description, method, 1e-10);
@@ -216,6 +228,7 @@ int main(void) {
     RUN_TEST(test_a_short_dip_is_found);
     RUN_TEST(test_restitution_1_keeps_the_energy);
     RUN_TEST(test_a_limit_of_events_ends_the_step);
+    RUN_TEST(test_a_limit_of_internal_steps_ends_the_step);
     RUN_TEST(test_the_lift_takes_it_from_the_floor);
     RUN_TEST(test_integrated_from_outside_it_bounces_once);
     RUN_TEST(test_integrated_from_outside_nothing_happens_elsewhere);
