@@ -1,6 +1,7 @@
 #include "model_modes.h"
 
 #include "fields.h"
+#include "settings.h"
 
 #include <limits.h>
 #include <math.h>
@@ -68,9 +69,9 @@ static double band_of(const struct instance *instance, const struct indicator *i
     if (indicator->kind != INDICATOR_OF_STATE) {
         return 0.0;
     }
-    // the absolute tolerance is 1e-2 of the nominal value times the relative tolerance
-    const double nominal = 1e2 * instance->absolute_tolerances[indicator->state] /
-                           instance->state.own.effective_relative_tolerance;
+    const double relative = instance->state.own.effective_relative_tolerance;
+    const double nominal =
+        instance->absolute_tolerances[indicator->state] / (INSTANCE_ABSOLUTE_FRACTION * relative);
     return 1e-12 * fabs(indicator->factor) * nominal + 1e-14 * fabs(indicator->offset);
 }
 

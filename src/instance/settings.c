@@ -2,9 +2,6 @@
 
 #include <math.h>
 
-/* Absolute tolerance of a state, over relative tolerance times nominal value. */
-static const double absolute_fraction = 1e-2;
-
 enum status instance_check_experiment(const struct instance *instance,
                                       const struct instance_experiment *experiment) {
     const double start = experiment->start_time;
@@ -54,7 +51,7 @@ static void write_absolute_tolerances(const struct instance *instance, double ab
         const size_t from_states = variable->offset - states.offset;
         if (variable->owner == VARIABLE_OF_MODEL && from_states < states.size) {
             absolute[from_states / sizeof(double)] =
-                absolute_fraction * variable->nominal * tolerance;
+                INSTANCE_ABSOLUTE_FRACTION * variable->nominal * tolerance;
         }
     }
 }

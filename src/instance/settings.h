@@ -5,6 +5,9 @@
 
 #include "internals.h"
 
+/* Absolute tolerance of a state, over relative tolerance times nominal value. */
+#define INSTANCE_ABSOLUTE_FRACTION 1e-2
+
 /* STATUS_OK if the experiment can be run; otherwise a message says why not. */
 MUST_CHECK NONNULL enum status
 instance_check_experiment(const struct instance *instance,
