@@ -13,6 +13,26 @@ NONE, RIGID = 1, 2  # stops
 KEEP_VELOCITY, AT_REST = 1, 2  # grasp
 FIRM = 1000.0  # N.m, N: dry friction that holds a joint whatever happens
 
+# friction and stops that give events of all kinds
+FRICTION = {
+    "coulomb_friction1": 1.5,
+    "breakaway_friction1": 2.0,
+    "stribeck_velocity1": 0.2,
+    "coulomb_friction2": 2.0,
+    "breakaway_friction2": 2.6,
+    "stribeck_velocity2": 0.1,
+}
+BOUNCY_STOPS = {
+    "stops1": RIGID,
+    "lower1": -0.6,
+    "upper1": 0.9,
+    "restitution1": 0.5,
+    "stops2": RIGID,
+    "lower2": -0.1,
+    "upper2": 0.2,
+    "restitution2": 0.7,
+}
+
 
 class Event(NamedTuple):
     """The last event at a communication point; several within one step are seen as the last."""

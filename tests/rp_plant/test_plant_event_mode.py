@@ -14,7 +14,7 @@ import pytest
 from fmpy import extract, read_model_description
 from fmpy.simulation import instantiate_fmu
 
-from tests.rp_plant.plant_runs import AT_REST, FIRM, METHODS, RIGID
+from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, METHODS
 from tests.support.cosim_project import fmi3_fmu
 
 STEP, STOP = 0.01, 1.5  # s
@@ -22,28 +22,10 @@ COMBINATIONS = [(False, False), (False, True), (True, False), (True, True)]
 OUTPUTS = ["q1", "q2", "dq1", "dq2", "ddq1", "ddq2", "friction1", "stop_force2", "impact_loss"]
 COUNTERS = ["event_count", "last_event_time", "mode1", "mode2", "solver_rhs_evaluations"]
 
-FRICTION = {
-    "coulomb_friction1": 1.5,
-    "breakaway_friction1": 2.0,
-    "stribeck_velocity1": 0.2,
-    "coulomb_friction2": 2.0,
-    "breakaway_friction2": 2.6,
-    "stribeck_velocity2": 0.1,
-}
-STOPS = {
-    "stops1": RIGID,
-    "lower1": -0.6,
-    "upper1": 0.9,
-    "restitution1": 0.5,
-    "stops2": RIGID,
-    "lower2": -0.1,
-    "upper2": 0.2,
-    "restitution2": 0.7,
-}
 GRASP = {"payload_mass": 0.8, "payload_x": 0.05, "payload_z": 0.1, "grasp": AT_REST}
 MOTIONS = {
-    "bounces to rest": STOPS | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM},
-    "both joints": FRICTION | STOPS | {"dq1": 1.2, "dq2": -0.4},
+    "bounces to rest": BOUNCY_STOPS | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM},
+    "both joints": FRICTION | BOUNCY_STOPS | {"dq1": 1.2, "dq2": -0.4},
     "slips and grasps": FRICTION | GRASP | {"g": 0.0, "dq1": -1.0, "dq2": 0.8},
 }
 
@@ -185,7 +167,7 @@ def started(path: Path, **values: float) -> Iterator[Plant]:
 
 def test_event_mode_shows_both_limits(paths: dict[str, Path]) -> None:
     """Of an impact at the slide's stop: the velocity before it, and after it."""
-    restitution = STOPS["restitution2"]
+    restitution = BOUNCY_STOPS["restitution2"]
     values = MOTIONS["bounces to rest"] | {"a": 0.0, "restitution2": restitution}
     impacts = 0
     with started(paths["fmi3"], **values) as plant:
@@ -195,7 +177,7 @@ def test_event_mode_shows_both_limits(paths: dict[str, Path]) -> None:
                 assert seen[1][4] == pytest.approx(-restitution * seen[0][4], rel=1e-14) or (
                     seen[1][4] == 0.0  # the last one
                 )
-                assert seen[1][2] in (STOPS["lower2"], STOPS["upper2"])
+                assert seen[1][2] in (BOUNCY_STOPS["lower2"], BOUNCY_STOPS["upper2"])
                 assert seen[1][-1] == seen[0][-1] + 1
                 impacts += 1
     assert impacts > 10

@@ -11,7 +11,7 @@ import pytest
 
 from cosim.fmu_file import Fmu
 from tests.rp_plant.plant_model_exchange import model
-from tests.rp_plant.plant_runs import AT_REST, FIRM, RIGID, started
+from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, started
 
 STEP = 0.01  # s
 TIGHT = 1e-10  # relative tolerance of CVode
@@ -21,24 +21,7 @@ EVENTS = ["event_count", "last_event_time", "mode1", "mode2"]
 
 # that of the plant, which ends bouncing where CVode can still follow it
 COARSE = {"relative_tolerance": 1e-6}
-FRICTION = {
-    "coulomb_friction1": 1.5,
-    "breakaway_friction1": 2.0,
-    "stribeck_velocity1": 0.2,
-    "coulomb_friction2": 2.0,
-    "breakaway_friction2": 2.6,
-    "stribeck_velocity2": 0.1,
-}
-STOPS = {
-    "stops1": RIGID,
-    "lower1": -0.6,
-    "upper1": 0.9,
-    "restitution1": 0.5,
-    "stops2": RIGID,
-    "lower2": -0.1,
-    "upper2": 0.2,
-    "restitution2": 0.5,
-}
+STOPS = BOUNCY_STOPS | {"restitution2": 0.5}
 MOTIONS = {
     "bounces to rest": STOPS | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM},
     "both joints": FRICTION | STOPS | {"dq1": 1.2, "dq2": -0.4},

@@ -15,7 +15,9 @@ from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from tests.rp_plant.plant_runs import (
     AT_REST,
+    BOUNCY_STOPS,
     FIRM,
+    FRICTION,
     METHODS,
     RIGID,
     events,
@@ -27,26 +29,8 @@ from tests.support.instances import DISCARD, LoadedFmu, status_of
 from tests.support.instances import Instance as Fmi2Instance
 
 SEQUENCES = int(os.environ.get("PLANT_SEQUENCES", "100"))
-FRICTION = {
-    "coulomb_friction1": 1.5,
-    "breakaway_friction1": 2.0,
-    "stribeck_velocity1": 0.2,
-    "coulomb_friction2": 2.0,
-    "breakaway_friction2": 2.6,
-    "stribeck_velocity2": 0.1,
-}
-STOPS = {
-    "stops1": RIGID,
-    "lower1": -0.6,
-    "upper1": 0.9,
-    "restitution1": 0.5,
-    "stops2": RIGID,
-    "lower2": -0.1,
-    "upper2": 0.2,
-    "restitution2": 0.7,
-}
 PAYLOAD = {"payload_mass": 0.8, "payload_inertia": 0.01, "payload_x": 0.05, "payload_z": 0.1}
-BUSY = FRICTION | STOPS | PAYLOAD | {"grasp": AT_REST, "dq1": 1.2, "dq2": -0.4}
+BUSY = FRICTION | BOUNCY_STOPS | PAYLOAD | {"grasp": AT_REST, "dq1": 1.2, "dq2": -0.4}
 
 each_method = pytest.mark.parametrize("method", METHODS)
 
@@ -54,9 +38,10 @@ each_method = pytest.mark.parametrize("method", METHODS)
 # ---- The same bits of every event time -------------------------------------------------------
 
 MOTIONS = {
-    "bounces": STOPS | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM, "restitution2": 0.8},
+    "bounces": BOUNCY_STOPS
+    | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM, "restitution2": 0.8},
     "slides": FRICTION | {"tau1": 14.0, "f2": 3.0, "dq1": -1.0, "dq2": 0.8},
-    "everything": FRICTION | STOPS | {"dq1": 1.2, "dq2": -0.4},
+    "everything": FRICTION | BOUNCY_STOPS | {"dq1": 1.2, "dq2": -0.4},
 }
 
 
