@@ -11,8 +11,8 @@ static enum status check_arm(const struct rp_plant_parameters *p, char *text, si
         return STATUS_OK;
     }
     (void)snprintf(text, size,
-                   "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-                   "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
+                   "the inertia m1 lc1^2 + I1z + I2z = %.17g is refused: it must be above 0 "
+                   "(m1 = %.17g, lc1 = %.17g, I1z = %.17g, I2z = %.17g)",
                    rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
     return STATUS_INVALID_PARAMETERS;
 }
@@ -43,7 +43,7 @@ static enum status check_not_negative(const struct rp_plant_parameters *p, char 
         if (isfinite(all[i].value) && all[i].value >= 0.0) {
             continue;
         }
-        (void)snprintf(text, size, "%s = %g is refused: it must be finite and not below 0",
+        (void)snprintf(text, size, "%s = %.17g is refused: it must be finite and not below 0",
                        all[i].name, all[i].value);
         return STATUS_INVALID_PARAMETERS;
     }
@@ -53,7 +53,7 @@ static enum status check_not_negative(const struct rp_plant_parameters *p, char 
 static enum status check_payload(const struct rp_plant_parameters *p, char *text, size_t size) {
     if (!isfinite(p->payload_x) || !isfinite(p->payload_z)) {
         (void)snprintf(text, size,
-                       "payload_x = %g and payload_z = %g are refused: they must be finite",
+                       "payload_x = %.17g and payload_z = %.17g are refused: they must be finite",
                        p->payload_x, p->payload_z);
         return STATUS_INVALID_PARAMETERS;
     }
@@ -72,15 +72,15 @@ static enum status check_friction(const struct rp_plant_parameters *p, int i, ch
     const int joint = i + 1;
     if (breakaway > 0.0 && breakaway < coulomb) {
         (void)snprintf(text, size,
-                       "breakaway_friction%d = %g is refused: it must not be below "
-                       "coulomb_friction%d = %g (0: the same)",
+                       "breakaway_friction%d = %.17g is refused: it must not be below "
+                       "coulomb_friction%d = %.17g (0: the same)",
                        joint, breakaway, joint, coulomb);
         return STATUS_INVALID_PARAMETERS;
     }
     if (breakaway > coulomb && p->stribeck_velocity[i] == 0.0) {
         (void)snprintf(text, size,
                        "stribeck_velocity%d = 0 is refused: it must be above 0 where "
-                       "breakaway_friction%d = %g is above coulomb_friction%d = %g",
+                       "breakaway_friction%d = %.17g is above coulomb_friction%d = %.17g",
                        joint, joint, breakaway, joint, coulomb);
         return STATUS_INVALID_PARAMETERS;
     }
@@ -96,16 +96,17 @@ static enum status check_stops(const struct rp_plant_parameters *p, int i, char 
         return STATUS_INVALID_PARAMETERS;
     }
     if (!(p->restitution[i] >= 0.0 && p->restitution[i] <= 1.0)) {
-        (void)snprintf(text, size, "restitution%d = %g is refused: it must be within 0 and 1",
+        (void)snprintf(text, size, "restitution%d = %.17g is refused: it must be within 0 and 1",
                        joint, p->restitution[i]);
         return STATUS_INVALID_PARAMETERS;
     }
     if (p->stops[i] == RP_PLANT_STOPS_RIGID &&
         !(isfinite(p->lower[i]) && isfinite(p->upper[i]) && p->lower[i] < p->upper[i])) {
-        (void)snprintf(text, size,
-                       "lower%d = %g and upper%d = %g are refused: with rigid stops they must be "
-                       "finite and lower%d below upper%d",
-                       joint, p->lower[i], joint, p->upper[i], joint, joint);
+        (void)snprintf(
+            text, size,
+            "lower%d = %.17g and upper%d = %.17g are refused: with rigid stops they must be "
+            "finite and lower%d below upper%d",
+            joint, p->lower[i], joint, p->upper[i], joint, joint);
         return STATUS_INVALID_PARAMETERS;
     }
     return STATUS_OK;
@@ -122,9 +123,10 @@ static enum status check_start(const struct rp_plant_values *values, int i, char
         (q >= p->lower[i] && q <= p->upper[i])) {
         return STATUS_OK;
     }
-    (void)snprintf(text, size,
-                   "q%d = %g is refused: a start must be within lower%d = %g and upper%d = %g",
-                   joint, q, joint, p->lower[i], joint, p->upper[i]);
+    (void)snprintf(
+        text, size,
+        "q%d = %.17g is refused: a start must be within lower%d = %.17g and upper%d = %.17g", joint,
+        q, joint, p->lower[i], joint, p->upper[i]);
     return STATUS_INVALID_PARAMETERS;
 }
 

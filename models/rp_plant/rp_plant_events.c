@@ -6,6 +6,7 @@
 #include "rp_plant_modes.h"
 #include "rp_plant_series.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { SLIP_FORWARD, SLIP_BACKWARD, LOWER, UPPER }; /* the indicators of a joint */
@@ -19,12 +20,18 @@ struct fired {
 
 /* ---- Stops ---------------------------------------------------------------------------------- */
 
+/* rad, m: an event is located far better. Where q is farther from the limit, the limit has been
+ * moved since. */
+static const double near_limit = 1e-9;
+
 /* Puts joints that have reached a stop, or are past it, on it. */
 static void arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
+        const double hit = fired->hit[i] > 0 ? p->lower[i] : p->upper[i];
         side[i] = rp_plant_closed_stop(p, i, values->q[i]);
-        if (side[i] == 0 && p->stops[i] == RP_PLANT_STOPS_RIGID) {
+        if (side[i] == 0 && p->stops[i] == RP_PLANT_STOPS_RIGID &&
+            fabs(values->q[i] - hit) <= near_limit) {
             side[i] = fired->hit[i];
         }
         if (side[i] != 0) {
@@ -33,33 +40,20 @@ static void arrive(struct rp_plant_values *values, const struct fired *fired, in
     }
 }
 
-/* Whether a joint on a stop that leaves with velocities dq comes back from no more than the
- * tolerance of q: at v^2 / (2 |q''|), where q'' points into the stop. */
+/* Whether a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
+ * (2 |q''|), where q'' points into the stop. */
 static bool hardly_leaves(const struct rp_plant_values *values, const struct event *event,
-                          const double dq[2], int joint, int side) {
+                          int joint, int side) {
+    const double dq = values->dq[joint];
+    if (!(side * dq > 0.0)) {
+        return false;
+    }
     struct rp_plant_modes modes = values->modes;
     struct rp_plant_decision decision;
-    (void)rp_plant_find_rest(&values->parameters, values->q, dq, &modes, &decision.rest);
-    rp_plant_decide(&values->parameters, values->q, dq, &values->inputs, &modes, &decision);
+    (void)rp_plant_find_rest(&values->parameters, values->q, values->dq, &modes, &decision.rest);
+    rp_plant_decide(&values->parameters, values->q, values->dq, &values->inputs, &modes, &decision);
     const double into = -side * decision.outcome.ddq[joint];
-    return into > 0.0 && dq[joint] * dq[joint] <= 2.0 * into * event->tolerance[joint];
-}
-
-/* Bouncing comes to rest with the first impact after which a joint hardly leaves. It is a plastic
- * one. */
-static bool makes_last_impact_plastic(const struct rp_plant_values *values,
-                                      const struct event *event, const double dq_after[2],
-                                      struct rp_plant_contacts *contacts) {
-    bool found = false;
-    for (int i = 0; i < 2; i++) {
-        const int side = contacts->side[i];
-        const bool bounces = side * values->dq[i] < 0.0 && contacts->restitution[i] > 0.0;
-        if (bounces && hardly_leaves(values, event, dq_after, i, side)) {
-            contacts->restitution[i] = 0.0;
-            found = true;
-        }
-    }
-    return found;
+    return into > 0.0 && dq * dq <= 2.0 * into * event->tolerance[joint];
 }
 
 static bool moves_into_stop(const struct rp_plant_values *values, const int side[2]) {
@@ -81,52 +75,47 @@ static void suffer(struct rp_plant_values *values, const struct rp_plant_impact 
     values->sums.impact_loss += impact->loss;
 }
 
-static void strike_stops(struct rp_plant_values *values, const struct event *event,
-                         struct rp_plant_contacts contacts) {
-    const struct rp_plant_inertia inertia = inertia_of(values);
-    struct rp_plant_impact impact;
-    do {
-        rp_plant_impact(&inertia, &contacts, values->dq, &impact);
-    } while (makes_last_impact_plastic(values, event, impact.dq, &contacts));
-    suffer(values, &impact);
-}
-
-/* A joint that another one's impact kicks off its stop may come back before the double q has
- * changed: what fires then is its departure, again and again. It stays. True if velocities jump. */
-static bool settle(struct rp_plant_values *values, const struct event *event,
-                   const struct fired *fired, const int side[2]) {
-    bool jumps = false;
+/* Bouncing comes to rest: a joint that hardly leaves its stop stays, whether it bounces or another
+ * joint's impact kicks it. One that rests on its own stop stays with it; otherwise each would kick
+ * the other, for ever. True if velocities jump. */
+static bool settle(struct rp_plant_values *values, const struct event *event, const int side[2]) {
+    bool leaves = false;
+    bool caught[2];
     for (int i = 0; i < 2; i++) {
-        const bool leaves =
-            fired->hit[i] != 0 && fired->hit[i] == side[i] && side[i] * values->dq[i] > 0.0;
-        if (leaves && hardly_leaves(values, event, values->dq, i, side[i])) {
-            const struct rp_plant_inertia inertia = inertia_of(values);
-            struct rp_plant_impact impact;
-            rp_plant_catch(&inertia, i, values->dq, &impact);
-            suffer(values, &impact);
-            jumps = true;
-        }
+        const bool hardly = hardly_leaves(values, event, i, side[i]);
+        caught[i] = hardly || (side[i] != 0 && values->dq[i] == 0.0);
+        leaves = leaves || hardly;
     }
-    return jumps;
+    if (leaves) {
+        const struct rp_plant_inertia inertia = inertia_of(values);
+        struct rp_plant_impact impact;
+        rp_plant_catch(&inertia, caught, values->dq, &impact);
+        suffer(values, &impact);
+    }
+    return leaves;
 }
 
 /* True if velocities jump. With both joints on stops, an impact of one can drive the other, which
  * was leaving, back into its stop: that is the next impact, at the same time. There may be many
- * before both leave; from some number on they are plastic, and one or two more end them. */
+ * before both leave or stay; from some number on they are plastic, and one or two more end them. */
 static bool collide(struct rp_plant_values *values, const struct event *event, const int side[2]) {
     enum { MOST_ELASTIC = 8, MOST = 16 };
     const struct rp_plant_parameters *p = &values->parameters;
-    int count = 0;
-    while (count < MOST && moves_into_stop(values, side)) {
+    bool jumps = settle(values, event, side);
+    for (int count = 0; count < MOST && moves_into_stop(values, side); count++) {
         const bool elastic = count < MOST_ELASTIC;
         const struct rp_plant_contacts contacts = {
             .side = {side[0], side[1]},
             .restitution = {elastic ? p->restitution[0] : 0.0, elastic ? p->restitution[1] : 0.0},
         };
-        strike_stops(values, event, contacts);
-        count++;
+        const struct rp_plant_inertia inertia = inertia_of(values);
+        struct rp_plant_impact impact;
+        rp_plant_impact(&inertia, &contacts, values->dq, &impact);
+        suffer(values, &impact);
+        (void)settle(values, event, side);
+        jumps = true;
     }
-    return count > 0;
+    return jumps;
 }
 
 /* ---- Payload -------------------------------------------------------------------------------- */
@@ -213,9 +202,6 @@ static enum status update(void *values_pointer, const struct event *event) {
     }
     int side[2];
     arrive(values, &fired, side);
-    if (settle(values, event, &fired, side)) {
-        jumps = true;
-    }
     if (collide(values, event, side)) {
         jumps = true;
     }

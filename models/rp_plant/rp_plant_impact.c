@@ -71,11 +71,10 @@ void rp_plant_impact(const struct rp_plant_inertia *inertia,
     }
 }
 
-void rp_plant_catch(const struct rp_plant_inertia *inertia, int joint, const double dq[2],
-                    struct rp_plant_impact *impact) {
+void rp_plant_catch(const struct rp_plant_inertia *inertia, const bool caught[2],
+                    const double dq[2], struct rp_plant_impact *impact) {
     static const double plastic[2] = {0.0, 0.0};
-    const bool struck[2] = {joint == 0, joint == 1};
-    strike(inertia, struck, plastic, dq, impact);
+    strike(inertia, caught, plastic, dq, impact);
 }
 
 /* The loss, written as two kinetic energies: of the arm at the velocities it loses, and of the

@@ -30,10 +30,10 @@ void rp_plant_impact(const struct rp_plant_inertia *inertia,
                      const struct rp_plant_contacts *contacts, const double dq[2],
                      struct rp_plant_impact *impact);
 
-/* The impact that takes all velocity of one joint, whatever its direction: the same laws, with an
- * impulse at this joint only, which may pull. */
-void rp_plant_catch(const struct rp_plant_inertia *inertia, int joint, const double dq[2],
-                    struct rp_plant_impact *impact);
+/* The impact that takes all velocity of some joints, whatever its direction: the same laws, with
+ * impulses at these joints only, which may pull. */
+void rp_plant_catch(const struct rp_plant_inertia *inertia, const bool caught[2],
+                    const double dq[2], struct rp_plant_impact *impact);
 
 /* Velocities after the arm has grasped a payload that was at rest, D+ q'+ = D- q'-, and the kinetic
  * energy that this takes, (q'-^T D- q'- - q'+^T D+ q'+) / 2 >= 0 (J). */

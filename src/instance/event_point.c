@@ -21,6 +21,16 @@ void instance_note_event(struct instance *instance, struct clock_time end) {
     instance->state.cut_end = end;
 }
 
+/* Forces that have changed at the event decide anew; what a state has reached, it has reached. */
+static void forget_due_forces(struct instance *instance) {
+    instance->model->events->describe(instance->memory.values, instance->indicators);
+    for (size_t i = 0; i < count_of_indicators(instance); i++) {
+        if (instance->indicators[i].kind == INDICATOR_OF_MODEL) {
+            instance->memory.due[i] = false;
+        }
+    }
+}
+
 enum status instance_pass_due_event(struct instance *instance, int *count_in_step) {
     struct instance_state *state = &instance->state;
     if (state->event_point != EVENT_DUE) {
@@ -28,6 +38,9 @@ enum status instance_pass_due_event(struct instance *instance, int *count_in_ste
     }
     const bool is_unchanged = instance_is_unchanged(instance);
     enum status status = instance_count_event(instance, instance->memory.due, count_in_step);
+    if (!is_unchanged) {
+        forget_due_forces(instance);
+    }
     if (status == STATUS_OK) {
         status = instance_update_modes(instance, instance->memory.due);
     }

@@ -21,13 +21,17 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
 }
 
 /* What the integrator may miss a state by: away from 0 the relative tolerance is the larger part.
- */
+ * One outside runs at the requested tolerance, not at the fraction that methods here take of it. */
 static void write_tolerances(struct instance *instance) {
     const struct span states = instance->model->states;
+    const struct instance_values *own = &instance->state.own;
     const double *x = doubles_of(instance->memory.values, states);
+    const enum integrator_method method = (enum integrator_method)own->solver_method;
+    const double scale =
+        instance->is_integrated_outside ? 1.0 / integrator_tolerance_fraction(method) : 1.0;
     for (size_t i = 0; i < count_of(states); i++) {
-        instance->tolerances[i] = instance->absolute_tolerances[i] +
-                                  instance->state.own.effective_relative_tolerance * fabs(x[i]);
+        instance->tolerances[i] = scale * (instance->absolute_tolerances[i] +
+                                           own->effective_relative_tolerance * fabs(x[i]));
     }
 }
 
@@ -91,7 +95,7 @@ static const double slope_time = 1e-7;
  * 0, rounding may let it fall, but not past the band. */
 static bool has_fired(const struct instance *instance, size_t i, double z, double z_ahead) {
     const double band = band_of(instance, &instance->indicators[i]);
-    return z <= near_root && z_ahead <= z && (band == 0.0 || z_ahead + band <= 0.0);
+    return z <= near_root && z_ahead < z && (band == 0.0 || z_ahead + band <= 0.0);
 }
 
 /* Writes which indicators are at 0 and fall while the inputs stay. */

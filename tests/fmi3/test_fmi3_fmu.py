@@ -83,7 +83,12 @@ def test_fmpy_finds_no_problem(path: Path) -> None:
 
 def test_variables_are_those_of_fmi_2(root: ET.Element, fmi2_root: ET.Element) -> None:
     """But for the aliases that FMI 2.0 needs."""
-    types = {"Real": "Float64", "Integer": "Int32", "Enumeration": "Enumeration"}
+    types = {
+        "Real": "Float64",
+        "Integer": "Int32",
+        "Enumeration": "Enumeration",
+        "Boolean": "Boolean",
+    }
     expected = {
         name: variable
         for name, variable in variables(fmi2_root).items()
@@ -105,7 +110,7 @@ def test_units_stand_in_types(root: ET.Element, fmi2_root: ET.Element) -> None:
     used = set()
     for name, variable in variables(root).items():
         assert not set(variable.attrib) & {"unit", "displayUnit", "nominal", "quantity"}
-        if variable.tag == "Int32":
+        if variable.tag in ("Int32", "Boolean"):
             continue
         declared = types[variable.get("declaredType")]
         used.add(variable.get("declaredType"))

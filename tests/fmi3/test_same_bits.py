@@ -63,13 +63,19 @@ def set_start(fmu, path: Path, scenario: Scenario, set_real, set_integer) -> Non
         (set_real if real else set_integer)([variables[name].valueReference], [value])
 
 
+def set_inputs_at(scenario: Scenario, i: int, known: dict[str, int], set_real, set_boolean) -> None:
+    """Inputs of step i, each by the call for its type."""
+    for name, values in scenario.inputs.items():
+        setter = set_boolean if values.dtype == bool else set_real
+        setter([known[name]], [values[i].item()])
+
+
 def step_through(scenario: Scenario, do_step, set_inputs, get) -> np.ndarray:
     """Values (points, variables) at all communication points."""
     rows = [get()]
-    inputs = np.column_stack([*scenario.inputs.values()]) if scenario.inputs else None
     for i, length in enumerate(np.diff(scenario.times)):
-        if inputs is not None:
-            set_inputs(inputs[i].tolist())
+        if scenario.inputs:
+            set_inputs(i)
         do_step(scenario.times[i], length)
         rows.append(get())
     return np.array(rows)
@@ -78,7 +84,10 @@ def step_through(scenario: Scenario, do_step, set_inputs, get) -> np.ndarray:
 def run_fmi2(path: Path, folder: Path, scenario: Scenario, names: Sequence[str]) -> np.ndarray:
     known = references(path)
     read = [known[name] for name in names]
-    driven = [known[name] for name in scenario.inputs]
+
+    def set_inputs(i: int) -> None:
+        set_inputs_at(scenario, i, known, fmu.setReal, fmu.setBoolean)
+
     with opened(path, folder, fmi2.FMU2Slave) as fmu:
         fmu.instantiate()
         fmu.setupExperiment(
@@ -86,13 +95,12 @@ def run_fmi2(path: Path, folder: Path, scenario: Scenario, names: Sequence[str])
         )
         set_start(fmu, path, scenario, fmu.setReal, fmu.setInteger)
         fmu.enterInitializationMode()
-        for reference, values in zip(driven, scenario.inputs.values(), strict=True):
-            fmu.setReal([reference], [float(values[0])])
+        set_inputs(0)
         fmu.exitInitializationMode()
         return step_through(
             scenario,
             lambda time, length: fmu.doStep(time, length),
-            lambda values: fmu.setReal(driven, values),
+            set_inputs,
             lambda: fmu.getReal(read),
         )
 
@@ -103,12 +111,11 @@ def run_fmi3(
     event_mode, early_return = MODES[mode]
     known = references(path)
     read = [known[name] for name in names]
-    driven = [known[name] for name in scenario.inputs]
 
-    def set_inputs(values: list[float]) -> None:
+    def set_inputs(i: int) -> None:
         if event_mode:
             fmu.enterEventMode()
-        fmu.setFloat64(driven, values)
+        set_inputs_at(scenario, i, known, fmu.setFloat64, fmu.setBoolean)
         if event_mode:
             assert fmu.updateDiscreteStates()[:5] == (False,) * 5
             fmu.enterStepMode()
@@ -131,8 +138,7 @@ def run_fmi3(
         fmu.enterInitializationMode(
             tolerance=scenario.tolerance, startTime=scenario.start, stopTime=scenario.stop
         )
-        for reference, values in zip(driven, scenario.inputs.values(), strict=True):
-            fmu.setFloat64([reference], [float(values[0])])
+        set_inputs_at(scenario, 0, known, fmu.setFloat64, fmu.setBoolean)
         fmu.exitInitializationMode()
         if event_mode:
             fmu.updateDiscreteStates()
@@ -181,6 +187,8 @@ def test_model_exchange(name: str) -> None:
     """By fmpy's CVode, over the first steps; fmpy gives no tolerance to the FMU."""
     path = FMUS[model_folder(FILES[name]).name]
     scenario = load(name)
+    if any(values.dtype == bool for values in scenario.inputs.values()):
+        pytest.skip("fmpy's CVode sets Booleans in continuous-time mode")
     points = min(300, len(scenario.times) - 1)
     stop = float(scenario.times[points])
     outputs = [n for n in float_names(fmi3_fmu(path)) if n != "effective_relative_tolerance"]
