@@ -21,17 +21,13 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
 }
 
 /* What the integrator may miss a state by: away from 0 the relative tolerance is the larger part.
- * One outside runs at the requested tolerance, not at the fraction that methods here take of it. */
+ */
 static void write_tolerances(struct instance *instance) {
     const struct span states = instance->model->states;
-    const struct instance_values *own = &instance->state.own;
     const double *x = doubles_of(instance->memory.values, states);
-    const enum integrator_method method = (enum integrator_method)own->solver_method;
-    const double scale =
-        instance->is_integrated_outside ? 1.0 / integrator_tolerance_fraction(method) : 1.0;
     for (size_t i = 0; i < count_of(states); i++) {
-        instance->tolerances[i] = scale * (instance->absolute_tolerances[i] +
-                                           own->effective_relative_tolerance * fabs(x[i]));
+        instance->tolerances[i] = instance->absolute_tolerances[i] +
+                                  instance->state.own.effective_relative_tolerance * fabs(x[i]);
     }
 }
 
