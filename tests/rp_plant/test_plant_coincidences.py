@@ -6,7 +6,16 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from cosim.fmu_file import Fmu
-from tests.rp_plant.plant_runs import FIRM, METHODS, RIGID, events, last_event, read, started
+from tests.rp_plant.plant_runs import (
+    FIRM,
+    METHODS,
+    RIGID,
+    events,
+    last_event,
+    modes,
+    read,
+    started,
+)
 from tests.rp_plant.test_plant_rollback import busy, sequence, times
 
 each_method = pytest.mark.parametrize("method", METHODS)
@@ -74,3 +83,27 @@ def test_joints_that_kick_each_other_off_their_stops_come_to_rest(
             except FMICallException as error:
                 raise run.instance.failure(error, "in a step") from error
         assert last_event(run.instance).count > 50
+
+
+@each_method
+@pytest.mark.parametrize("e", [0.0, 0.5])
+def test_two_joints_pushed_onto_their_stops_come_to_rest(plant: Fmu, method: str, e: float) -> None:
+    """Each impact of one kicks the other off its stop, and it comes back."""
+    stops = {"stops1": RIGID, "lower1": -0.5, "restitution1": e}
+    stops |= {"stops2": RIGID, "lower2": -0.5, "restitution2": e}
+    with started(plant, method, 1e-8, f2=-20.0, **stops) as instance:
+        before, _ = read(instance, "total_energy", "impact_loss")
+        try:
+            for i in range(100):
+                instance.do_step(i * 0.02, 0.02)
+        except FMICallException as error:
+            raise instance.failure(error, "in a step") from error
+        assert modes(instance) == (0, 0)
+        assert read(instance, "q1", "q2", "dq1", "dq2") == [-0.5, -0.5, 0.0, 0.0]
+        after, loss = read(instance, "total_energy", "impact_loss")
+        work = -20.0 * -0.5
+        assert after == pytest.approx(before + work - loss, rel=0, abs=1e-6 * (before + work))
+        # the stops carry gravity and f2
+        gravity1, gravity2 = read(instance, "gravity1", "gravity2")
+        forces = read(instance, "stop_force1", "stop_force2")
+        assert forces == pytest.approx([gravity1, gravity2 + 20.0], rel=1e-12)

@@ -14,7 +14,7 @@ import pytest
 from fmpy import extract, read_model_description
 from fmpy.simulation import instantiate_fmu
 
-from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, METHODS
+from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, METHODS, RIGID
 from tests.support.cosim_project import fmi3_fmu
 
 STEP, STOP = 0.01, 1.5  # s
@@ -206,6 +206,34 @@ def test_a_grasp_in_event_mode_is_one_between_steps(paths: dict[str, Path]) -> N
             found.append(grasp(plant, in_event_mode))
     assert found[0] == found[1]
     assert found[0][6] > 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_stop_that_is_moved_away_takes_nothing_along(paths: dict[str, Path], method: str) -> None:
+    """The impact was due; without the limit the slide goes on, at the same velocity."""
+    falling = {"q1": np.pi / 2, "coulomb_friction1": FIRM, "stops2": RIGID, "lower2": -0.5}
+    with started(paths["fmi3"], solver_method=METHODS[method], **falling) as plant:
+        assert plant.advance(1.0)
+        before = plant.values()
+        plant.fmu.setFloat64([plant.reference["lower2"]], [-5.0])
+        plant.update()
+        assert plant.values()[1:8] == before[1:8]
+        plant.step(plant.values()[0] + 0.1)
+        assert plant.values()[2] < -0.5
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_breakaway_that_is_due_sees_new_efforts(paths: dict[str, Path], method: str) -> None:
+    """The arm swings up until its slide is due to be thrown out; an effort then holds it."""
+    values = {"tau1": 14.0, "coulomb_friction2": 5.0}
+    with started(paths["fmi3"], solver_method=METHODS[method], **values) as plant:
+        assert plant.advance(2.0)
+        assert plant.values()[8:10] == [2, 0]
+        plant.fmu.enterEventMode()
+        plant.fmu.setFloat64([plant.reference["f2"]], [-5.0])
+        plant.fmu.updateDiscreteStates()
+        assert plant.values()[8:10] == [2, 0]
+        assert plant.fmu.getFloat64([plant.reference["ddq2"]]) == [0.0]
 
 
 @pytest.mark.parametrize("method", METHODS)
