@@ -185,7 +185,8 @@ static void expand_far(void) {
     memcpy(begin, inputs, sizeof begin);
     rp_plant_model.events->describe(&plant, kinds);
     const double first_unit = unit;
-    for (double part = 1024.0; part > 1e-6; part *= 0.5) {
+    double part = 1024.0;
+    for (int halvings = 0; halvings < 30; halvings++, part *= 0.5) {
         unit = part * first_unit;
         for (int i = 0; i < PLANT_INPUTS; i++) {
             for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
