@@ -146,15 +146,19 @@ EQUATION real plant_friction(const struct rp_plant_parameters *const p[SOURCES],
     return scaled(mode, plant_sliding_friction(p, i, scaled(mode, dq)));
 }
 
-/* tau + Q - damping q' - friction of sliding joints */
+/* tau + Q - damping q' - friction of the joint where it slides */
+EQUATION real plant_effort(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
+                           real dq, real applied) {
+    const real damped = minus(applied, times(READ(p, damping[i]), dq));
+    return minus(damped, plant_friction(p, mode, i, dq));
+}
+
 EQUATION void plant_efforts(const struct plant *plant,
                             const struct rp_plant_parameters *const p[SOURCES], const int mode[2],
                             const real tau[2], const real Q[2], real efforts[2]) {
-    for (int i = 0; i < 2; i++) {
-        const real dq = plant->arm.dq[i];
-        const real damped = minus(plus(tau[i], Q[i]), times(READ(p, damping[i]), dq));
-        efforts[i] = minus(damped, plant_friction(p, mode[i], i, dq));
-    }
+    const real *dq = plant->arm.dq;
+    efforts[0] = plant_effort(p, mode[0], 0, dq[0], plus(tau[0], Q[0]));
+    efforts[1] = plant_effort(p, mode[1], 1, dq[1], plus(tau[1], Q[1]));
 }
 
 /* efforts - C q' - g */
@@ -211,8 +215,11 @@ EQUATION void plant_forward_dynamics(const struct plant *plant, const real effor
 EQUATION void plant_motion(const struct plant *plant, const int mode[2], const real efforts[2],
                            real ddq[2], real reaction[2]) {
     const bool stuck[2] = {mode[0] == RP_PLANT_STUCK, mode[1] == RP_PLANT_STUCK};
-    ddq[0] = ddq[1] = constant(0.0);
-    reaction[0] = reaction[1] = constant(0.0);
+    const real zero = constant(0.0);
+    ddq[0] = zero;
+    ddq[1] = zero;
+    reaction[0] = zero;
+    reaction[1] = zero;
     if (!stuck[0] && !stuck[1]) {
         plant_forward_dynamics(plant, efforts, ddq);
         return;
@@ -250,7 +257,9 @@ EQUATION void plant_stuck_indicators(const struct rp_plant_parameters *const p[S
  * breaks away backward; reaches its lower stop; its upper stop. 1: unused. */
 EQUATION void plant_indicators(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
                                real q, real dq, real reaction, real z[PLANT_INDICATORS]) {
-    z[0] = z[1] = z[2] = z[3] = constant(1.0);
+    for (int k = 0; k < PLANT_INDICATORS; k++) {
+        z[k] = constant(1.0);
+    }
     if (mode == RP_PLANT_STUCK) {
         plant_stuck_indicators(p, i, q, reaction, z);
         return;
