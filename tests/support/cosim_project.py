@@ -24,6 +24,7 @@ FMUS = {
     "rp_plant": BUILD / "RPPlant.fmu",
     "rp_controller": BUILD / "RPController.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
+    "rp_environment": BUILD / "RPEnvironment.fmu",
 }
 FILES = project.scenario_files()
 NAMES = list(FILES)
