@@ -109,6 +109,29 @@ static void test_a_ramp_meets_the_limit_inside_a_step(void) {
     ASSERT_CLOSE(first_order(at_hit, i_max, 1.5 * hit), get(RP_ACTUATOR_current1), 1e-9);
 }
 
+/* Full command, and a velocity that grows by its derivative from the corner of the torque-speed
+ * line on: the limited current falls as i_max - s t, and the current follows by the same law, until
+ * -i_max is met, in the second case inside the step. */
+static void test_a_speed_that_grows_leads_along_the_line_inside_a_step(void) {
+    const double acceleration = 300.0, s = nk * acceleration / R, hit = 2.0 * i_max / s;
+    const unsigned reference = RP_ACTUATOR_dq1;
+    const int order = 1;
+    const double before = 0.75 * hit, after = 1.5 * hit;
+    const double ends[] = {before, after};
+    const double at_hit = i_max - s * (hit - T + T * exp(-hit / T));
+    const double expected[] = {i_max - s * (before - T + T * exp(-before / T)),
+                               first_order(at_hit, -i_max, after - hit)};
+    for (int i = 0; i < 2; i++) {
+        instance_reset(instance);
+        set(RP_ACTUATOR_tau1_cmd, 1e6);
+        set(RP_ACTUATOR_dq1, (u_max - R * i_max) / nk);
+        start_at(i_max);
+        ASSERT_OK(instance_set_input_derivatives(instance, &reference, 1, &order, &acceleration));
+        step_to(ends[i]);
+        ASSERT_CLOSE(expected[i], get(RP_ACTUATOR_current1), 1e-9);
+    }
+}
+
 /* ---- Limits --------------------------------------------------------------------------------- */
 
 /* Largest effort at a velocity: n k i_max up to the corner, then on the line that falls to 0 at the
