@@ -182,7 +182,7 @@ static void test_beyond_the_no_load_speed_the_drive_brakes(void) {
     }
 }
 
-/* By trial of 2049 currents within i_max: first the excess of the voltage counts, then the distance
+/* By trial of 513 currents within i_max: first the excess of the voltage counts, then the distance
  * from the command. */
 static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
     for (int sample = 0; sample < RP_TEST_SAMPLES; sample++) {
@@ -204,8 +204,8 @@ static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
             const double constant = p.gear_ratio[i] * p.torque_constant[i];
             const double commanded = in.effort_cmd[i] / constant;
             double best = 0.0, best_over = INFINITY, best_miss = INFINITY;
-            for (int step = -1024; step <= 1024; step++) {
-                const double current = p.current_max[i] * step / 1024.0;
+            for (int step = -256; step <= 256; step++) {
+                const double current = p.current_max[i] * step / 256.0;
                 const double voltage = p.resistance[i] * current + constant * in.dq[i];
                 const double over = fmax(fabs(voltage) - p.voltage_max[i], 0.0);
                 const double miss = fabs(current - commanded);
@@ -213,7 +213,7 @@ static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
                     best = current, best_over = over, best_miss = miss;
                 }
             }
-            ASSERT_CLOSE(best, limited[i], p.current_max[i] / 1024.0);
+            ASSERT_CLOSE(best, limited[i], p.current_max[i] / 256.0);
         }
     }
 }
