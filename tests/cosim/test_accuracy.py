@@ -28,6 +28,7 @@ def runs(opened: Fmu) -> Iterator[Runs]:
     """Of all models, whose FMUs lie in one folder."""
     others = {
         "rp_controller": "RPController.fmu",
+        "rp_environment": "RPEnvironment.fmu",
         "rp_plant": "RPPlant.fmu",
         "rp_trajectory": "RPTrajectory.fmu",
     }
