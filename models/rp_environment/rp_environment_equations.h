@@ -17,8 +17,8 @@ struct contact {
     real speed;    /* m/s: of the tip along the normal */
 };
 
-EQUATION real contact_dot(const real x[2], const real y[2]) {
-    return plus(times(x[0], y[0]), times(x[1], y[1]));
+EQUATION real contact_along(const real normal[2], real x, real y) {
+    return plus(times(normal[0], x), times(normal[1], y));
 }
 
 /* With z2 = (c, s) and x2 = (-s, c):
@@ -38,14 +38,13 @@ EQUATION struct contact contact_of_tip(const struct rp_environment_parameters *c
         .normal = {cosine(READ(p, angle)), sine(READ(p, angle))},
         .lever = {minus(times(z, c), times(x, s)), plus(times(z, s), times(x, c))},
     };
-    const real tip[2] = {plus(READ(inputs, position[0]), contact.lever[0]),
-                         plus(READ(inputs, position[1]), contact.lever[1])};
-    const real velocity[2] = {
-        minus(READ(inputs, velocity[0]), times(rate, contact.lever[1])),
-        plus(READ(inputs, velocity[1]), times(rate, contact.lever[0])),
-    };
-    contact.depth = minus(READ(p, position), contact_dot(contact.normal, tip));
-    contact.speed = contact_dot(contact.normal, velocity);
+    const real tip_x = plus(READ(inputs, position[0]), contact.lever[0]);
+    const real tip_y = plus(READ(inputs, position[1]), contact.lever[1]);
+    const real speed_x = minus(READ(inputs, velocity[0]), times(rate, contact.lever[1]));
+    const real speed_y = plus(READ(inputs, velocity[1]), times(rate, contact.lever[0]));
+    const real height = contact_along(contact.normal, tip_x, tip_y);
+    contact.depth = minus(READ(p, position), height);
+    contact.speed = contact_along(contact.normal, speed_x, speed_y);
     return contact;
 }
 

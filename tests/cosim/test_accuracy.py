@@ -29,6 +29,7 @@ def runs(opened: Fmu) -> Iterator[Runs]:
     others = {
         "rp_actuator": "RPActuator.fmu",
         "rp_controller": "RPController.fmu",
+        "rp_environment": "RPEnvironment.fmu",
         "rp_plant": "RPPlant.fmu",
         "rp_trajectory": "RPTrajectory.fmu",
     }
