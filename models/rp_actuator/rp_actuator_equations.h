@@ -1,5 +1,5 @@
-/* The equations of a drive in any arithmetic (equation.h): rp_actuator.h is this with doubles, and
- * says what it means. */
+/* The equations of a drive in any arithmetic (equation.h). rp_actuator.h, with doubles, explains
+ * symbols and limits. */
 #ifndef RP_ACTUATOR_EQUATIONS_H
 #define RP_ACTUATOR_EQUATIONS_H
 
@@ -11,6 +11,7 @@ EQUATION real drive_constant(const struct rp_actuator_parameters *const p[SOURCE
     return times(READ(p, gear_ratio[i]), READ(p, torque_constant[i]));
 }
 
+/* n k i */
 EQUATION real drive_effort(const struct rp_actuator_parameters *const p[SOURCES], real current,
                            int i) {
     return times(drive_constant(p, i), current);
@@ -21,6 +22,7 @@ EQUATION real drive_back_emf(const struct rp_actuator_parameters *const p[SOURCE
     return times(drive_constant(p, i), READ(inputs, dq[i]));
 }
 
+/* R i + n k dq */
 EQUATION real drive_voltage(const struct rp_actuator_parameters *const p[SOURCES],
                             const struct rp_actuator_inputs *const inputs[SOURCES], real current,
                             int i) {
