@@ -12,7 +12,7 @@ import pytest
 from fmpy.fmi3 import FMU3Model
 from fmpy.model_description import ModelDescription, ModelVariable
 
-NAMES = ("RPManipulator", "RPPlant", "RPController", "RPTrajectory")
+NAMES = ("RPManipulator", "RPPlant", "RPController", "RPTrajectory", "RPActuator")
 MODES = ("initialization", "event", "continuous-time")
 STEP = 1e-4  # of a value, relative to 1 + its absolute value
 BOUND = 2e-5  # of the largest value among the two ways, or 1

@@ -12,7 +12,7 @@ import pytest
 from tests.support.paths import ROOT
 from tests.support.source_copy import copy_sources, run, settings_of
 
-NAMES = ("RPManipulator", "RPPlant", "RPTrajectory", "RPController")
+NAMES = ("RPManipulator", "RPPlant", "RPTrajectory", "RPController", "RPActuator")
 FMUS = (*NAMES, *(f"fmi3/{name}" for name in NAMES))
 
 

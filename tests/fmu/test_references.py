@@ -24,6 +24,7 @@ SCHEMAS = Path(fmpy.__file__).parent
 MODELS = {
     "RPManipulator": ("rp_manipulator", ["irregular_steps", "sixtieth"]),
     "RPController": ("rp_controller", ["controller_computed_torque", "controller_pd_gravity"]),
+    "RPActuator": ("rp_actuator", ["actuator_torque_speed", "actuator_limits_irregular"]),
     "RPTrajectory": ("rp_trajectory", ["line_backward_branch", "point_to_point_joint"]),
 }
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"

@@ -17,7 +17,7 @@ import pytest
 
 from tests.support.paths import ROOT
 
-NAMES = ("RPManipulator", "RPPlant", "RPTrajectory", "RPController")
+NAMES = ("RPManipulator", "RPPlant", "RPTrajectory", "RPController", "RPActuator")
 BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
 LARGEST = {"fmi2": 2_500_000, "fmi3": 3_500_000}  # bytes of an FMU
 FUNCTIONS = {"fmi2": 44, "fmi3": 75}  # of the standard

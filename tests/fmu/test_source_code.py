@@ -23,17 +23,19 @@ from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-FMUS = ("RPManipulator", "RPPlant", "RPController", "RPTrajectory")
+FMUS = ("RPManipulator", "RPPlant", "RPController", "RPTrajectory", "RPActuator")
 SCENARIOS = {
     "RPManipulator": ["sine_efforts", "irregular_steps", "constant_effort"],
     "RPPlant": ["sine_efforts", "irregular_steps"],
     "RPController": ["controller_computed_torque", "controller_limited_integral"],
+    "RPActuator": ["actuator_limits_irregular"],
     "RPTrajectory": ["arc_near_joint", "point_to_point_joint"],
 }
 METHODS = {
     "RPManipulator": (1, 2, 3, 4),
     "RPPlant": (1, 2, 3),
     "RPController": (1, 2, 3),
+    "RPActuator": (1, 2, 3),
     "RPTrajectory": (1, 2, 3),
 }
 STEPS = 250  # of each scenario

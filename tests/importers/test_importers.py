@@ -218,7 +218,7 @@ def fmutool_check(fmu: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     return start([folder_of(CHECKER) / "bin" / "fmutool", "-check", "-input", fmu], folder)
 
 
-@pytest.mark.parametrize("name", ["RPManipulator", "RPPlant", "RPController", "RPTrajectory"])
+@pytest.mark.parametrize("name", ["RPManipulator", "RPPlant", "RPController", "RPTrajectory", "RPActuator"])
 @pytest.mark.parametrize("version", VERSIONS)
 def test_fmutool_finds_nothing(version: str, name: str, fmu: Path, tmp_path: Path) -> None:
     below = fmu.parent if version == "fmi2" else fmu.parent / version

@@ -152,6 +152,10 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "Ki1": 20.0, "Ki2": 10.0, "tau1_max": 300.0, "f2_max": 200.0, "integral1": 0.01,
         "mode": [1, 2, 3, 3], "solver_method": [1, 2, 3, 1],
     },
+    "RPActuator": {
+        "gear_ratio1": -80.0, "current_max1": 0.25, "voltage_max2": 30.0, "time_constant1": 0.02,
+        "current2": 12.0, "solver_method": [1, 2, 3, 1],
+    },
     "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3, 1]},
     # falls onto its stops, slides and is held
     "RPPlant": {
@@ -170,6 +174,7 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
 INCONSISTENT: dict[str, dict[str, float]] = {
     "RPManipulator": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
     "RPController": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
+    "RPActuator": {"gear_ratio1": 0.0},
     "RPTrajectory": {"turns": 1.0, "frequency": 3.0},
     "RPPlant": {"coulomb_friction2": 2.0, "breakaway_friction2": 1.0},
 }
