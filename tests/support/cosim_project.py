@@ -24,6 +24,7 @@ FMUS = {
     "rp_plant": BUILD / "RPPlant.fmu",
     "rp_controller": BUILD / "RPController.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
+    "rp_sensor": BUILD / "RPSensor.fmu",
 }
 FILES = project.scenario_files()
 NAMES = list(FILES)
