@@ -52,7 +52,7 @@ def test_values_that_are_not_finite(sensor: Fmu, name: str, value: float) -> Non
         assert name in instance.messages[-1]
 
 
-@pytest.mark.parametrize("name", [n for n in start_values() if n != "time"])
+@pytest.mark.parametrize("name", start_values())
 def test_parameters_are_fixed(sensor: Fmu, name: str) -> None:
     with started(sensor) as instance, pytest.raises(UserError):
         instance.set(name, declared(MODEL.name).variables[name].start)

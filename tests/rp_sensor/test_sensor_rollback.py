@@ -116,6 +116,7 @@ def test_forged_states_are_refused(sensor: Fmu) -> None:
             good.replace(ticks, struct.pack("<dd", *pair))
             for pair in [(0.0, 9.5), (0.0, -1.0), (0.0, 0.0), (0.0, 9.0), (0.0, 1e18)]
             + [(0.0, float("nan")), (float("inf"), 10.0), (float("nan"), 10.0)]
+            + [(-1e9, 10.0), (-0.0011, 10.0)]  # the next tick would be over
         ]
         for place, count in [(0, -(2**31)), (19, -(2**31)), (20, 1), (131, -1)]:
             other = [*samples[:place], count, *samples[place + 1 :]]
