@@ -45,6 +45,7 @@ static void test_the_counter_stops_at_its_ends(void) {
     assert_counts(2147483647, INFINITY, 1.0);
     assert_counts(-2147483646, -2147483646.5, 1.0);
     assert_counts(-2147483647, -2147483646.75, 1.0);
+    assert_counts(-2147483647, -2147483647.75, 1.0);
     assert_counts(-2147483647, -2147483648.0, 1.0);
     assert_counts(-2147483647, -1e300, 1e-12);
     assert_counts(-2147483647, -INFINITY, 1.0);

@@ -45,6 +45,20 @@ static void test_the_hash_is_splitmix64(void) {
     }
 }
 
+/* The start is the finalizer's word of seed and joint; each tick takes the next two numbers. */
+static void test_the_noise_is_made_of_two_numbers_of_the_hash(void) {
+    for (int i = 0; i < 2; i++) {
+        const uint64_t word = ((uint64_t)SEED << 32) + (uint64_t)i;
+        const uint64_t state = rp_sensor_hash(word - UINT64_C(0x9E3779B97F4A7C15), 0);
+        for (uint64_t k = 0; k < 1000; k++) {
+            const double u1 = (double)((rp_sensor_hash(state, 2 * k) >> 11) + 1) * 0x1p-53;
+            const double u2 = (double)(rp_sensor_hash(state, 2 * k + 1) >> 11) * 0x1p-53;
+            const double expected = sqrt(-2.0 * log(u1)) * cos(2.0 * acos(-1.0) * u2);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-14, expected, noise[i][k]);
+        }
+    }
+}
+
 static void test_mean_and_variance(void) {
     for (int i = 0; i < 2; i++) {
         double mean = 0.0;
