@@ -181,7 +181,8 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
     }
     const struct span modes = events->modes;
     const bool is_decided = state->phase >= PHASE_STEPPING;
-    if (is_decided ? !events->modes_are_possible(values, false) : !are_zeros(values, modes)) {
+    if (is_decided ? !events->modes_are_possible(values, false)
+                   : !are_zeros(values, modes) || !are_zeros(values, events->discrete_states)) {
         return refuse_modes(instance, "the modes");
     }
     if (state->has_history &&
@@ -190,6 +191,20 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
         return refuse_modes(instance, "the modes since the restart");
     }
     return true;
+}
+
+/* Steps pass time events as they come: none is left behind the present time. An importer that
+ * integrates outside may pass one over. */
+static bool has_possible_next_time(const struct instance *instance,
+                                   const struct instance_state *state, const char *values) {
+    const struct model_events *events = instance->model->events;
+    if (events == NULL || events->next_time == NULL || state->phase < PHASE_STEPPING ||
+        instance->is_integrated_outside) {
+        return true;
+    }
+    const double time = events->next_time(values);
+    const struct named_value value = {"the time of the next event", time, time >= state->time.s};
+    return are_possible(instance, &value, 1);
 }
 
 /* A value structure that the instance can have. */
@@ -237,6 +252,7 @@ enum status instance_check_plausible(const struct instance *instance,
         is_possible_structure(instance, values) &&
         (!state->has_history || is_possible_structure(instance, held)) &&
         has_possible_modes(instance, state, values, held) &&
+        has_possible_next_time(instance, state, values) &&
         is_possible_event_point(
             instance, state, (const void *)(block + ((const char *)memory->due - memory->block)));
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;

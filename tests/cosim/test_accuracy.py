@@ -32,6 +32,7 @@ def runs(opened: Fmu) -> Iterator[Runs]:
         "rp_environment": "RPEnvironment.fmu",
         "rp_plant": "RPPlant.fmu",
         "rp_trajectory": "RPTrajectory.fmu",
+        "rp_sensor": "RPSensor.fmu",
     }
     with ExitStack() as stack:
         fmus = {
