@@ -2,11 +2,10 @@
 
 #include "event_point.h"
 #include "fields.h"
-#include "history.h"
-#include "model_modes.h"
 #include "right_hand_side.h"
 #include "settings.h"
 #include "snapshot_contents.h"
+#include "step.h"
 
 #include <limits.h>
 #include <math.h>
@@ -60,33 +59,7 @@ static void update_statistics(struct instance *instance) {
     own->solver_last_order = statistics->last_order;
 }
 
-/* A step that is being done. */
-struct step {
-    struct instance *instance;
-    const struct step_options *options;
-    struct clock_time begin;
-    struct clock_time end;          /* where it is to end; it may come forward */
-    struct clock_time until;        /* end of its present part: that, or a time event before */
-    bool meets_time_event;          /* at the end of its present part */
-    bool is_early;                  /* it has come forward */
-    bool is_over;                   /* the step is to end where it is */
-    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
-    enum status answer;             /* of options->accept */
-    int events;                     /* so far */
-    int64_t steps_before;           /* internal ones, since initialization */
-};
-
 /* ---- Inputs --------------------------------------------------------------------------------- */
-
-/* Those at the time of the instance, elapsed s after the beginning of the step. */
-static void place_inputs(struct instance *instance, double elapsed) {
-    struct instance_memory *memory = &instance->memory;
-    double *u = doubles_of(memory->values, instance->model->inputs);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
-        u[i] = memory->current[i].d[0];
-    }
-}
 
 /* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
 static void end_inputs(struct instance *instance, double elapsed) {
@@ -102,53 +75,6 @@ static void end_inputs(struct instance *instance, double elapsed) {
         }
         u[i] = memory->current[i].d[0];
     }
-}
-
-/* From now on the last value of an input is the one that was set for the end of the step; where the
- * step ended earlier, the value that the input has there. */
-static void hold_last_nodes(const struct step *step) {
-    const struct instance *instance = step->instance;
-    const struct instance_memory *memory = &instance->memory;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
-        memory->pending[i].d[0] =
-            step->is_early ? memory->current[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
-    }
-}
-
-static enum status set_polynomials(struct instance *instance, double h) {
-    struct instance_memory *memory = &instance->memory;
-    double *u = doubles_of(memory->values, instance->model->inputs);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const struct polynomial input =
-            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
-        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
-            if (!isfinite(input.d[k])) {
-                return instance_not_finite(instance, "a derivative of an input");
-            }
-        }
-        memory->pending[i] = input;
-        memory->current[i] = input;
-        u[i] = input.d[0];
-    }
-    instance->outputs_are_valid = false;
-    return STATUS_OK;
-}
-
-static enum status ask_inputs(const struct step *step, double t, double h) {
-    struct instance *instance = step->instance;
-    for (int k = 0; k < POLYNOMIAL_NODES; k++) {
-        const double time =
-            k == POLYNOMIAL_NODES - 1 ? step->end.s : t + k * (h / (POLYNOMIAL_NODES - 1));
-        const enum status status = step->options->ask_inputs(step->options->context, time);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] = instance->memory.pending[i].d[0];
-        }
-    }
-    return set_polynomials(instance, clock_difference(step->end, step->begin));
 }
 
 /* ---- Integration ---------------------------------------------------------------------------- */
@@ -185,18 +111,12 @@ static bool observe(void *step_pointer, double t, const double x[]) {
     memcpy(doubles_of(instance->memory.values, instance->model->states), x,
            instance->model->states.size);
     instance_set_clock(instance, clock_add(instance->state.restart_time, t));
-    place_inputs(instance, clock_difference(instance->state.time, step->begin));
+    instance_place_inputs(instance, clock_difference(instance->state.time, step->begin));
     return report(step);
 }
 
 static bool is_at_event(const struct instance *instance) {
     return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
-}
-
-/* Internal steps that the step may still take. */
-static int64_t steps_left(const struct step *step) {
-    const struct instance_state *state = &step->instance->state;
-    return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
 }
 
 /* To step->until, which may come forward on the way. */
@@ -209,7 +129,7 @@ ALWAYS_INLINE enum status advance(struct step *step) {
     }
     enum status status;
     for (;;) {
-        const int64_t left = steps_left(step);
+        const int64_t left = instance_steps_left(step);
         status = integrator_advance(instance->integrator,
                                     clock_difference(step->until, state->restart_time),
                                     left > 1 ? left : 1, &state->latest_time, x);
@@ -266,135 +186,8 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
     return status;
 }
 
-/* The same where no state moves: time passes until an input sets them free. */
-static enum status rest(struct step *step, enum continuation continuation) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    instance_hold(instance, step->end,
-                  continuation == CONTINUE_AFTER_EVENT ? instance->memory.current
-                                                       : instance->memory.pending);
-    const struct integrator_start start = {
-        .span = state->span,
-        // inputs that are held leave the modes as they are
-        .indicators = instance->inputs_move ? instance_describe_indicators(instance) : NULL,
-    };
-    state->next_step = 0.0;
-    return integrator_rest(instance->integrator,
-                           doubles_of(instance->memory.held, instance->model->states), &start,
-                           clock_difference(step->until, state->restart_time), &state->latest_time);
-}
-
-/* The instance goes to the time of an event, and its modes change, unless the event is left. */
-static enum status meet_event(struct step *step, struct clock_time time) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    const bool *fired = instance->fired;
-    const struct clock_time end = step->end;
-    instance_set_clock(instance, time);
-    place_inputs(instance, clock_difference(state->time, step->begin));
-    instance->step_met_event = true;
-    if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
-        step->is_early = clock_difference(end, state->time) > 0.0;
-        step->end = state->time;
-        if (step->options->at_event == EVENTS_LEFT) {
-            instance_leave_event(instance, fired, end);
-            return STATUS_OK;
-        }
-    }
-    enum status status = instance_count_event(instance, fired, &step->events);
-    if (status == STATUS_OK) {
-        status = instance_update_modes(instance, fired);
-    }
-    if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
-        instance_note_event(instance, end);
-    }
-    return status;
-}
-
-/* The modes at the beginning of a step, and how the integrator goes on from there. */
-static enum status begin_modes(struct step *step, enum continuation *continuation) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    if (state->event_point == EVENT_DUE) {
-        const enum status status = instance_pass_due_event(instance, &step->events);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        *continuation =
-            instance_continuation(instance, clock_difference(step->end, state->restart_time));
-    }
-    state->event_point = NO_EVENT;
-    return *continuation == CONTINUE_AFTER_CHANGE ? instance_update_modes(instance, NULL)
-                                                  : STATUS_OK;
-}
-
-/* Sets the end of the next part of the step. A time event so little after the end of the step that
- * rounding may have put it there belongs to this step. */
-static void set_part(struct step *step) {
-    const double time = instance_next_time(step->instance);
-    step->until = step->end;
-    if (time == INFINITY) {
-        step->meets_time_event = false;
-        return;
-    }
-    const double h = clock_difference(step->end, step->begin);
-    step->meets_time_event = time - step->end.s <= clock_slack(step->end.s, h);
-    if (time < step->end.s) {
-        step->until = (struct clock_time){.s = time};
-    }
-}
-
-/* To the end of the present part of the step, or to a state event before it. */
-static enum status move_part(struct step *step, enum continuation continuation) {
-    struct instance *instance = step->instance;
-    if (instance->integrator == NULL) {
-        return STATUS_OK;
-    }
-    if (instance_is_at_rest(instance)) {
-        return rest(step, continuation);
-    }
-    return continuation == CONTINUE_AFTER_EVENT && steps_left(step) <= 0 ? STATUS_TOO_MANY_STEPS
-                                                                         : move(step, continuation);
-}
-
-/* Writes the event to which the last part has come, and its time; false: there is none. */
-static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
-    const struct instance *instance = step->instance;
-    const size_t count = instance->model->events->indicator_count;
-    const bool *fired =
-        has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
-    *time = step->until;
-    memset(instance->fired, 0, instance_event_size(instance->model));
-    if (fired != NULL) {
-        memcpy(instance->fired, fired, count * sizeof *fired);
-        *time = clock_add(instance->state.restart_time, instance->state.latest_time);
-    } else {
-        instance->fired[count] = step->meets_time_event;
-    }
-    return fired != NULL || step->meets_time_event;
-}
-
-/* To step->end over all events on the way. */
-static enum status move_over_events(struct step *step, enum continuation continuation) {
-    struct instance *instance = step->instance;
-    enum status status = begin_modes(step, &continuation);
-    while (status == STATUS_OK) {
-        set_part(step);
-        const bool moves = clock_difference(step->until, instance->state.time) > 0.0;
-        if (moves) {
-            status = move_part(step, continuation);
-        }
-        struct clock_time time;
-        if (status != STATUS_OK || !find_event(step, moves, &time)) {
-            break;
-        }
-        status = meet_event(step, time);
-        if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
-            break;
-        }
-        continuation = CONTINUE_AFTER_EVENT;
-    }
-    return status;
+enum status instance_move(struct step *step, enum continuation continuation) {
+    return move(step, continuation);
 }
 
 static enum status integrate(struct step *step) {
@@ -402,14 +195,14 @@ static enum status integrate(struct step *step) {
     struct instance_state *state = &instance->state;
     const double target = clock_difference(step->end, state->restart_time);
     const enum continuation continuation = instance_continuation(instance, target);
-    set_part(step);
+    instance_set_part(step);
     if (continuation == CONTINUE_NOW && !step->meets_time_event && interpolate(step, target)) {
         return STATUS_OK;
     }
     keep(step);
     const enum status status = instance->model->events == NULL
                                    ? move(step, continuation)
-                                   : move_over_events(step, continuation);
+                                   : instance_move_over_events(step, continuation);
     arrive(step,
            status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
     return status;
@@ -420,7 +213,7 @@ static enum status pass_time(struct step *step) {
     enum status status = STATUS_OK;
     if (step->instance->model->events != NULL) {
         keep(step);
-        status = move_over_events(step, CONTINUE_AFTER_CHANGE);
+        status = instance_move_over_events(step, CONTINUE_AFTER_CHANGE);
     }
     arrive(step, status == STATUS_OK ? step->end : step->instance->state.time);
     return status;
@@ -433,7 +226,7 @@ static enum status do_step(struct step *step, double communication_point, double
     enum status status = STATUS_OK;
     if (step->options->ask_inputs != NULL) {
         keep(step);
-        status = ask_inputs(step, communication_point, h);
+        status = instance_ask_inputs(step, communication_point, h);
         if (status != STATUS_OK) {
             return status;
         }
@@ -449,7 +242,7 @@ static enum status do_step(struct step *step, double communication_point, double
         return status;
     }
     if (step->options->ask_inputs != NULL) {
-        hold_last_nodes(step);
+        instance_hold_last_nodes(step);
     }
     const bool ends_at_event = instance->state.event_point != NO_EVENT;
     if (step->options->accept != NULL && (!step->is_early || ends_at_event)) {
