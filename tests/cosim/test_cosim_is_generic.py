@@ -13,6 +13,8 @@ SOLVER = {"time", "solver_steps", "solver_rhs_evaluations"}  # of every model wi
 # words of English, letters and an argument of Ecos that are names of variables too
 WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
 WORDS |= {"start_time", "position"}
+WORDS |= {"start_time"}
+WORDS |= {"delay"}  # an argument of tqdm
 
 
 @pytest.fixture(scope="module")
