@@ -1,13 +1,12 @@
 """Runs of a system's variants in Ecos, compared with their references."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from cosim import project, reference, trajectory_csv
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError
 from cosim.reference import Summed
 from cosim.system import ecos
 from cosim.system.ssp import Ssp
@@ -56,16 +55,6 @@ class Outcome:
     def column(self, name: str) -> np.ndarray:
         """Values of one variable, (rows,)."""
         return self.run.values[:, self.run.names.index(name)]
-
-
-def choose(ssp: Ssp, names: Sequence[str]) -> list[str]:
-    """Variants called `names`, or all of them; UserError for an unknown one."""
-    known = list(ssp.system.parameters)
-    for name in names:
-        if name not in known:
-            hint = did_you_mean(name, known)
-            raise UserError(f"no variant {name!r}{hint} (there are: {', '.join(known)})")
-    return list(dict.fromkeys(names)) or known
 
 
 def recorded(ssp: Ssp) -> list[str]:
