@@ -66,9 +66,19 @@ def recorded(ssp: Ssp) -> list[str]:
     return list(dict.fromkeys((*outputs, *states)))
 
 
+def discrete(ssp: Ssp) -> list[str]:
+    """All Integer and Boolean outputs of all components; references may have them or not."""
+    return [
+        f"{component}.{variable.name}"
+        for component, model in ssp.models.items()
+        for variable in model.variables.values()
+        if variable.causality == "output" and variable.type in ("Integer", "Boolean")
+    ]
+
+
 def simulate(ssp: Ssp, variant: str, expected: Reference) -> Outcome:
     """Run a variant and compare it; UserError if a component or Ecos fails."""
-    run = ecos.run(ssp, variant, recorded(ssp))
+    run = ecos.run(ssp, variant, [*recorded(ssp), *discrete(ssp)])
     errors = {}
     for name, values in expected.columns.items():
         actual = run.values[expected.steps, run.names.index(name)]
@@ -112,8 +122,9 @@ def load_reference(
     columns, table = trajectory_csv.read(path, wrong)
     names = columns[1:]
     known = recorded(ssp)
+    possible = {*known, *discrete(ssp)}
     for name in names:
-        if name not in known or names.count(name) > 1:
+        if name not in possible or names.count(name) > 1:
             raise wrong(f"column {name!r} is unknown or there twice", 1)
     for name in known:
         if name not in names:
