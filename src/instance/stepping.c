@@ -66,6 +66,8 @@ struct step {
     const struct step_options *options;
     struct clock_time begin;
     struct clock_time end;          /* where it is to end; it may come forward */
+    struct clock_time until;        /* end of its present part: that, or a time event before */
+    bool meets_time_event;          /* at the end of its present part */
     bool is_early;                  /* it has come forward */
     bool is_over;                   /* the step is to end where it is */
     struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
@@ -167,6 +169,10 @@ static bool report(struct step *step) {
         step->is_over = step->answer != STATUS_OK || !(end - now > clock_slack(now, end - now));
         step->end = step->is_over ? step->instance->state.time : (struct clock_time){.s = end};
         step->is_early = true;
+        if (clock_difference(step->until, step->end) > 0.0) {
+            step->until = step->end;
+            step->meets_time_event = false;
+        }
         return true;
     }
     return false;
@@ -193,7 +199,7 @@ static int64_t steps_left(const struct step *step) {
     return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
 }
 
-/* To step->end, which may come forward on the way. */
+/* To step->until, which may come forward on the way. */
 ALWAYS_INLINE enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -205,10 +211,10 @@ ALWAYS_INLINE enum status advance(struct step *step) {
     for (;;) {
         const int64_t left = steps_left(step);
         status = integrator_advance(instance->integrator,
-                                    clock_difference(step->end, state->restart_time),
+                                    clock_difference(step->until, state->restart_time),
                                     left > 1 ? left : 1, &state->latest_time, x);
         if (status != STATUS_OK || step->is_over || is_at_event(instance) ||
-            !(state->latest_time < clock_difference(step->end, state->restart_time))) {
+            !(state->latest_time < clock_difference(step->until, state->restart_time))) {
             break;
         }
         // to the new end; the step that the observer cut short counts
@@ -239,7 +245,7 @@ static bool interpolate(const struct step *step, double target) {
     return true;
 }
 
-/* To step->end, or to an event before it. */
+/* To step->until, or to an event before it. */
 ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -250,7 +256,7 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
     status = advance(step);
 
     // a step that ended early cannot be replayed: its end was not known when it began
-    const bool is_whole = !step->is_early && !is_at_event(instance);
+    const bool is_whole = !step->is_early && !step->meets_time_event && !is_at_event(instance);
     state->has_history = status == STATUS_OK && is_whole && instance_longest_history(instance) > 0;
     state->passed_time = integrator_passed_time(instance->integrator);
     if (!state->has_history) {
@@ -261,12 +267,12 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
 }
 
 /* The same where no state moves: time passes until an input sets them free. */
-static enum status rest(struct step *step) {
+static enum status rest(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    const bool is_after_event = step->events > 0;
     instance_hold(instance, step->end,
-                  is_after_event ? instance->memory.current : instance->memory.pending);
+                  continuation == CONTINUE_AFTER_EVENT ? instance->memory.current
+                                                       : instance->memory.pending);
     const struct integrator_start start = {
         .span = state->span,
         // inputs that are held leave the modes as they are
@@ -275,15 +281,16 @@ static enum status rest(struct step *step) {
     state->next_step = 0.0;
     return integrator_rest(instance->integrator,
                            doubles_of(instance->memory.held, instance->model->states), &start,
-                           state->first_time, &state->latest_time);
+                           clock_difference(step->until, state->restart_time), &state->latest_time);
 }
 
 /* The instance goes to the time of an event, and its modes change, unless the event is left. */
-static enum status meet_event(struct step *step, const bool fired[]) {
+static enum status meet_event(struct step *step, struct clock_time time) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
+    const bool *fired = instance->fired;
     const struct clock_time end = step->end;
-    instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+    instance_set_clock(instance, time);
     place_inputs(instance, clock_difference(state->time, step->begin));
     instance->step_met_event = true;
     if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
@@ -321,22 +328,67 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
                                                   : STATUS_OK;
 }
 
+/* Sets the end of the next part of the step. A time event so little after the end of the step that
+ * rounding may have put it there belongs to this step. */
+static void set_part(struct step *step) {
+    const double time = instance_next_time(step->instance);
+    step->until = step->end;
+    if (time == INFINITY) {
+        step->meets_time_event = false;
+        return;
+    }
+    const double h = clock_difference(step->end, step->begin);
+    step->meets_time_event = time - step->end.s <= clock_slack(step->end.s, h);
+    if (time < step->end.s) {
+        step->until = (struct clock_time){.s = time};
+    }
+}
+
+/* To the end of the present part of the step, or to a state event before it. */
+static enum status move_part(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    if (instance->integrator == NULL) {
+        return STATUS_OK;
+    }
+    if (instance_is_at_rest(instance)) {
+        return rest(step, continuation);
+    }
+    return continuation == CONTINUE_AFTER_EVENT && steps_left(step) <= 0 ? STATUS_TOO_MANY_STEPS
+                                                                         : move(step, continuation);
+}
+
+/* Writes the event to which the last part has come, and its time; false: there is none. */
+static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
+    const struct instance *instance = step->instance;
+    const size_t count = instance->model->events->indicator_count;
+    const bool *fired =
+        has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
+    *time = step->until;
+    memset(instance->fired, 0, instance_event_size(instance->model));
+    if (fired != NULL) {
+        memcpy(instance->fired, fired, count * sizeof *fired);
+        *time = clock_add(instance->state.restart_time, instance->state.latest_time);
+    } else {
+        instance->fired[count] = step->meets_time_event;
+    }
+    return fired != NULL || step->meets_time_event;
+}
+
 /* To step->end over all events on the way. */
 static enum status move_over_events(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     enum status status = begin_modes(step, &continuation);
     while (status == STATUS_OK) {
-        if (instance_is_at_rest(instance)) {
-            status = rest(step);
-        } else if (step->events > 0 && steps_left(step) <= 0) {
-            status = STATUS_TOO_MANY_STEPS;
-        } else {
-            status = move(step, continuation);
+        set_part(step);
+        const bool moves = clock_difference(step->until, instance->state.time) > 0.0;
+        if (moves) {
+            status = move_part(step, continuation);
         }
-        if (status != STATUS_OK || integrator_event(instance->integrator) == NULL) {
+        struct clock_time time;
+        if (status != STATUS_OK || !find_event(step, moves, &time)) {
             break;
         }
-        status = meet_event(step, integrator_event(instance->integrator));
+        status = meet_event(step, time);
         if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
             break;
         }
@@ -350,7 +402,8 @@ static enum status integrate(struct step *step) {
     struct instance_state *state = &instance->state;
     const double target = clock_difference(step->end, state->restart_time);
     const enum continuation continuation = instance_continuation(instance, target);
-    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
+    set_part(step);
+    if (continuation == CONTINUE_NOW && !step->meets_time_event && interpolate(step, target)) {
         return STATUS_OK;
     }
     keep(step);
@@ -359,6 +412,17 @@ static enum status integrate(struct step *step) {
                                    : move_over_events(step, continuation);
     arrive(step,
            status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
+    return status;
+}
+
+/* The same for a model without states. */
+static enum status pass_time(struct step *step) {
+    enum status status = STATUS_OK;
+    if (step->instance->model->events != NULL) {
+        keep(step);
+        status = move_over_events(step, CONTINUE_AFTER_CHANGE);
+    }
+    arrive(step, status == STATUS_OK ? step->end : step->instance->state.time);
     return status;
 }
 
@@ -374,11 +438,7 @@ static enum status do_step(struct step *step, double communication_point, double
             return status;
         }
     }
-    if (instance->integrator == NULL) {
-        arrive(step, step->end);
-    } else {
-        status = integrate(step);
-    }
+    status = instance->integrator == NULL ? pass_time(step) : integrate(step);
     if (status == STATUS_TOO_MANY_EVENTS) {
         return status; // the message has been sent
     }
