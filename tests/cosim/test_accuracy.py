@@ -27,6 +27,7 @@ from tests.support.cosim_project import (
 def runs(opened: Fmu) -> Iterator[Runs]:
     """Of all models, whose FMUs lie in one folder."""
     others = {
+        "rp_actuator": "RPActuator.fmu",
         "rp_controller": "RPController.fmu",
         "rp_plant": "RPPlant.fmu",
         "rp_trajectory": "RPTrajectory.fmu",

@@ -23,6 +23,7 @@ FMUS = {
     "rp_manipulator": BUILD / "RPManipulator.fmu",
     "rp_plant": BUILD / "RPPlant.fmu",
     "rp_controller": BUILD / "RPController.fmu",
+    "rp_actuator": BUILD / "RPActuator.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
 }
 FILES = project.scenario_files()

@@ -1,0 +1,106 @@
+"""Makes the reference trajectories of the drives, without the code that they check.
+
+Between two communication points the inputs rest, and with them the current that the loop follows:
+each current approaches it by exp(-t/T), in closed form with 40 digits. What the limits allow is
+solved from the voltages, one case after the other, and not by clipping currents as the C code does.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from mpmath import mp, mpf
+
+MODEL_FOLDER = Path(__file__).resolve().parents[1]
+ROOT = MODEL_FOLDER.parents[1]
+sys.path.insert(0, str(ROOT))
+
+from cosim.scenario import Scenario
+from models import reference_files
+
+MODEL = "RPActuator"
+INPUTS = ("tau1_cmd", "f2_cmd", "dq1", "dq2")
+OUTPUTS = ("tau1", "f2", "current1", "current2", "voltage1", "voltage2")
+
+mp.dps = 40
+
+
+class Drive:
+    """The drive of one joint, with the inputs of one step."""
+
+    def __init__(self, value: dict[str, mpf], joint: int) -> None:
+        """Take what concerns the joint (1, 2) from all values of the model."""
+        self.constant = value[f"torque_constant{joint}"] * value[f"gear_ratio{joint}"]
+        self.resistance = value[f"resistance{joint}"]
+        self.current_max = value[f"current_max{joint}"]
+        self.voltage_max = value[f"voltage_max{joint}"]
+        self.time_constant = value[f"time_constant{joint}"]
+        self.back_emf = self.constant * value[f"dq{joint}"]
+        self.commanded = value["tau1_cmd" if joint == 1 else "f2_cmd"] / self.constant
+
+    def voltage(self, current: mpf) -> mpf:
+        """Voltage in V at a current in A."""
+        return self.resistance * current + self.back_emf
+
+    @property
+    def limited(self) -> mpf:
+        """Current in A that the loop follows."""
+        # the voltages that the currents within the limit need
+        lowest, highest = self.voltage(-self.current_max), self.voltage(self.current_max)
+        if lowest >= self.voltage_max:
+            return -self.current_max
+        if highest <= -self.voltage_max:
+            return self.current_max
+        needed = self.voltage(self.commanded)
+        given = max(lowest, -self.voltage_max, min(highest, self.voltage_max, needed))
+        return (given - self.back_emf) / self.resistance
+
+    def after(self, current: mpf, h: mpf) -> mpf:
+        """Current in A a time h (s) after `current`."""
+        limited = self.limited
+        return limited + (current - limited) * mp.exp(-h / self.time_constant)
+
+
+def input_table(scenario: Scenario) -> np.ndarray:
+    """Inputs at every communication point, (n + 1, inputs)."""
+    return np.stack([scenario.input(name) for name in INPUTS], 1)
+
+
+def simulate(scenario: Scenario) -> np.ndarray:
+    """Outputs at every communication point, (n + 1, outputs).
+
+    The inputs of row i are those of the step that ends there; row 0 has those of the start.
+    """
+    start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
+    inputs = input_table(scenario)
+    times = [mpf(float(t)) for t in scenario.times]
+    currents = [start["current1"], start["current2"]]
+    rows = []
+    for i in range(len(times)):
+        held = inputs[max(i - 1, 0)]
+        value = start | {n: mpf(float(x)) for n, x in zip(INPUTS, held, strict=True)}
+        drives = [Drive(value, joint) for joint in (1, 2)]
+        if i > 0:
+            h = times[i] - times[i - 1]
+            currents = [drive.after(c, h) for drive, c in zip(drives, currents, strict=True)]
+        pairs = list(zip(drives, currents, strict=True))
+        efforts = [drive.constant * current for drive, current in pairs]
+        voltages = [drive.voltage(current) for drive, current in pairs]
+        rows.append([float(x) for x in (*efforts, *currents, *voltages)])
+    return np.array(rows)
+
+
+def prepare() -> Callable[[Scenario, Path], None]:
+    """Return what writes the reference of a scenario to a folder."""
+
+    def write(scenario: Scenario, folder: Path) -> None:
+        outputs = simulate(scenario)[scenario.reference_rows]
+        inputs = input_table(scenario)
+        reference_files.write(scenario, folder, MODEL, (OUTPUTS, outputs), (INPUTS, inputs))
+
+    return write
+
+
+if __name__ == "__main__":
+    reference_files.main(MODEL_FOLDER, prepare)

@@ -1,0 +1,271 @@
+/* The drives by closed forms, through the instance and the integrator: step response, limits,
+ * torque-speed line, energy. */
+#include "derivatives.h"
+#include "instance.h"
+#include "last_text.h"
+#include "model_description.h"
+#include "rp_actuator_model.h"
+#include "rp_test_support.h"
+#include "stepping.h"
+#include "value_references.h"
+#include "values.h"
+
+#include <float.h>
+#include <math.h>
+#include <unity.h>
+
+static struct instance *instance;
+static struct rp_test_random random_source;
+
+void setUp(void) {
+    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    random_source.state = 16;
+}
+
+void tearDown(void) {
+    instance_destroy(instance);
+}
+
+static double get(unsigned reference) {
+    double value = NAN;
+    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
+    return value;
+}
+
+static void set(unsigned reference, double value) {
+    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
+}
+
+/* Drive of joint 1. k and n are powers of two, so that commands of whole currents are exact. */
+static const double k = 0.0625, n = 64.0, R = 0.75, i_max = 8.0, u_max = 24.0, T = 0.004;
+static const double nk = 4.0;
+
+static void start_at(double current) {
+    set(RP_ACTUATOR_torque_constant1, k);
+    set(RP_ACTUATOR_gear_ratio1, n);
+    set(RP_ACTUATOR_resistance1, R);
+    set(RP_ACTUATOR_current_max1, i_max);
+    set(RP_ACTUATOR_voltage_max1, u_max);
+    set(RP_ACTUATOR_time_constant1, T);
+    set(RP_ACTUATOR_current1, current);
+    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
+}
+
+static void step_to(double t) {
+    ASSERT_OK(instance_do_step(instance, instance_time(instance), t - instance_time(instance)));
+}
+
+/* The current a time t after `current`, while the limited current rests. */
+static double first_order(double current, double limited, double t) {
+    return limited + (current - limited) * exp(-t / T);
+}
+
+/* ---- Current loop --------------------------------------------------------------------------- */
+
+static void test_steps_of_the_command_are_answered_in_first_order(void) {
+    for (int method = 1; method <= 3; method++) {
+        instance_reset(instance);
+        const unsigned reference = RP_ACTUATOR_solver_method;
+        ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
+        set(RP_ACTUATOR_tau1_cmd, nk * 5.0);
+        start_at(-3.0);
+        for (int i = 1; i <= 60; i++) {
+            step_to(i * 0.37e-3);
+            const double expected = first_order(-3.0, 5.0, instance_time(instance));
+            ASSERT_CLOSE(expected, get(RP_ACTUATOR_current1), 1e-9);
+            ASSERT_CLOSE(nk * expected, get(RP_ACTUATOR_tau1), 4e-9);
+        }
+    }
+}
+
+/* A screw with lead 5 mm that is left-handed: its motor turns backward. */
+static void test_a_left_handed_screw_reverses_current_and_voltage(void) {
+    const double ratio = -2.0 * RP_TEST_PI / 0.005, constant = 0.03;
+    set(RP_ACTUATOR_gear_ratio2, ratio);
+    set(RP_ACTUATOR_torque_constant2, constant);
+    set(RP_ACTUATOR_f2_cmd, 60.0);
+    set(RP_ACTUATOR_dq2, 0.2);
+    start_at(0.0);
+    step_to(0.1);
+    ASSERT_CLOSE(60.0 / (ratio * constant), get(RP_ACTUATOR_current2), 1e-10);
+    ASSERT_CLOSE(60.0, get(RP_ACTUATOR_f2), 1e-8);
+    TEST_ASSERT_TRUE(get(RP_ACTUATOR_current2) < 0.0 && get(RP_ACTUATOR_voltage2) < 0.0);
+}
+
+/* cmd = nk r t by its derivative: i = r (t - T + T exp(-t/T)) until the command meets the limit,
+ * which is inside the step. */
+static void test_a_ramp_meets_the_limit_inside_a_step(void) {
+    const double r = 2000.0, hit = i_max / r;
+    const unsigned reference = RP_ACTUATOR_tau1_cmd;
+    const int order = 1;
+    const double derivative = nk * r;
+    start_at(0.0);
+    ASSERT_OK(instance_set_input_derivatives(instance, &reference, 1, &order, &derivative));
+    step_to(2.5 * hit);
+    const double at_hit = r * (hit - T + T * exp(-hit / T));
+    ASSERT_CLOSE(first_order(at_hit, i_max, 1.5 * hit), get(RP_ACTUATOR_current1), 1e-9);
+}
+
+/* ---- Limits --------------------------------------------------------------------------------- */
+
+/* Largest effort at a velocity: n k i_max up to the corner, then on the line that falls to 0 at the
+ * no-load speed u_max / (n k), and goes on below it. */
+static double torque_speed_line(double dq) {
+    return nk * fmax(fmin(i_max, (u_max - nk * dq) / R), -i_max);
+}
+
+static void test_large_commands_end_on_the_torque_speed_line(void) {
+    const double no_load = u_max / nk, corner = (u_max - R * i_max) / nk;
+    const double speeds[] = {-1.0,    0.0,          0.9 * corner, corner, 0.5 * (corner + no_load),
+                             no_load, 1.1 * no_load};
+    for (size_t i = 0; i < sizeof speeds / sizeof speeds[0]; i++) {
+        for (int side = -1; side <= 1; side += 2) {
+            instance_reset(instance);
+            set(RP_ACTUATOR_tau1_cmd, side * 1e6);
+            set(RP_ACTUATOR_dq1, side * speeds[i]);
+            start_at(0.0);
+            step_to(40.0 * T);
+            ASSERT_CLOSE(side * torque_speed_line(speeds[i]), get(RP_ACTUATOR_tau1), 1e-8);
+            TEST_ASSERT_TRUE(fabs(get(RP_ACTUATOR_voltage1)) <= u_max + 1e-9);
+            TEST_ASSERT_TRUE(fabs(get(RP_ACTUATOR_current1)) <= i_max + 1e-9);
+        }
+    }
+    TEST_ASSERT_TRUE(torque_speed_line(no_load) == 0.0);
+}
+
+/* Beyond the no-load speed no voltage of the drive holds the current at 0: it brakes. Once even
+ * i_max is too small for the range of the voltage, the current stays at i_max and the voltage is
+ * what both make. */
+static void test_beyond_the_no_load_speed_the_drive_brakes(void) {
+    const double no_load = u_max / nk, last = (u_max + R * i_max) / nk;
+    const double commands[] = {0.0, 20.0, 1e6, -nk};
+    for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
+        instance_reset(instance);
+        set(RP_ACTUATOR_tau1_cmd, commands[i]);
+        set(RP_ACTUATOR_dq1, 0.5 * (no_load + last));
+        start_at(0.0);
+        step_to(40.0 * T);
+        ASSERT_CLOSE(-0.5 * i_max, get(RP_ACTUATOR_current1), 1e-9);
+        ASSERT_CLOSE(u_max, get(RP_ACTUATOR_voltage1), 1e-9);
+
+        set(RP_ACTUATOR_dq1, 2.0 * last);
+        TEST_ASSERT_TRUE(get(RP_ACTUATOR_current1_limited) == -i_max);
+        step_to(80.0 * T);
+        ASSERT_CLOSE(-i_max, get(RP_ACTUATOR_current1), 1e-9);
+        ASSERT_CLOSE(2.0 * u_max + R * i_max, get(RP_ACTUATOR_voltage1), 1e-8);
+    }
+}
+
+/* By trial of 2049 currents within i_max: first the excess of the voltage counts, then the distance
+ * from the command. */
+static void test_limited_currents_are_the_nearest_that_are_allowed(void) {
+    for (int sample = 0; sample < RP_TEST_SAMPLES; sample++) {
+        struct rp_actuator_parameters p;
+        struct rp_actuator_inputs in;
+        double limited[2];
+        for (int i = 0; i < 2; i++) {
+            p.torque_constant[i] = rp_test_uniform(&random_source, 0.25, 1.0);
+            p.gear_ratio[i] = rp_test_uniform(&random_source, 1.0, 3.0) * (i == 0 ? 1.0 : -1.0);
+            p.resistance[i] = rp_test_uniform(&random_source, 0.25, 2.0);
+            p.current_max[i] = rp_test_uniform(&random_source, 0.5, 8.0);
+            p.voltage_max[i] = rp_test_uniform(&random_source, 1.0, 8.0);
+            p.time_constant[i] = 1.0;
+            in.effort_cmd[i] = rp_test_uniform(&random_source, -40.0, 40.0);
+            in.dq[i] = rp_test_uniform(&random_source, -10.0, 10.0);
+        }
+        rp_actuator_limited_currents(&p, &in, limited);
+        for (int i = 0; i < 2; i++) {
+            const double constant = p.gear_ratio[i] * p.torque_constant[i];
+            const double commanded = in.effort_cmd[i] / constant;
+            double best = 0.0, best_over = INFINITY, best_miss = INFINITY;
+            for (int step = -1024; step <= 1024; step++) {
+                const double current = p.current_max[i] * step / 1024.0;
+                const double voltage = p.resistance[i] * current + constant * in.dq[i];
+                const double over = fmax(fabs(voltage) - p.voltage_max[i], 0.0);
+                const double miss = fabs(current - commanded);
+                if (over < best_over || (over == best_over && miss < best_miss)) {
+                    best = current, best_over = over, best_miss = miss;
+                }
+            }
+            ASSERT_CLOSE(best, limited[i], p.current_max[i] / 1024.0);
+        }
+    }
+}
+
+/* The time from the end of an exaggerated command until the current has come down to `half` is
+ * T ln((i_max - low) / (half - low)), however long and by however much the command was too large.
+ */
+static void test_limits_leave_no_windup(void) {
+    const double low = 1.0, half = 4.0;
+    const double excess[] = {1.5, 1e6}, duration[] = {0.1, 4.0};
+    for (int i = 0; i < 4; i++) {
+        instance_reset(instance);
+        set(RP_ACTUATOR_tau1_cmd, excess[i % 2] * nk * i_max);
+        start_at(0.0);
+        step_to(duration[i / 2]);
+        ASSERT_CLOSE(i_max, get(RP_ACTUATOR_current1), 1e-9);
+        set(RP_ACTUATOR_tau1_cmd, nk * low);
+        TEST_ASSERT_TRUE(get(RP_ACTUATOR_dcurrent1) < 0.0);
+        step_to(duration[i / 2] + T * log((i_max - low) / (half - low)));
+        ASSERT_CLOSE(half, get(RP_ACTUATOR_current1), 2e-9);
+    }
+}
+
+/* The same at the limit of the voltage, which is left because the arm slows down. */
+static void test_the_voltage_limit_leaves_no_windup(void) {
+    const double dq = 5.5, at_limit = (u_max - nk * dq) / R, half = 5.0;
+    set(RP_ACTUATOR_tau1_cmd, nk * 7.0);
+    set(RP_ACTUATOR_dq1, dq);
+    start_at(0.0);
+    step_to(3.0);
+    ASSERT_CLOSE(at_limit, get(RP_ACTUATOR_current1), 1e-9);
+    ASSERT_CLOSE(u_max, get(RP_ACTUATOR_voltage1), 1e-9);
+    set(RP_ACTUATOR_dq1, 0.0);
+    step_to(3.0 + T * log((7.0 - at_limit) / (7.0 - half)));
+    ASSERT_CLOSE(half, get(RP_ACTUATOR_current1), 2e-9);
+}
+
+/* A speed that jumps leaves the current behind: what the voltage is too high by decays with T. */
+static void test_excess_voltage_decays_with_the_time_constant(void) {
+    set(RP_ACTUATOR_tau1_cmd, nk * 7.0);
+    start_at(7.0);
+    set(RP_ACTUATOR_dq1, 5.5);
+    const double excess = R * 7.0 + nk * 5.5 - u_max;
+    TEST_ASSERT_TRUE(excess > 3.0);
+    for (int i = 0; i <= 20; i++) {
+        ASSERT_CLOSE(excess * exp(-instance_time(instance) / T), get(RP_ACTUATOR_voltage1) - u_max,
+                     1e-9);
+        step_to((i + 1) * 0.5e-3);
+    }
+}
+
+static void test_currents_within_their_limit_stay_there(void) {
+    start_at(i_max);
+    for (int i = 0; i < 2000; i++) {
+        set(RP_ACTUATOR_tau1_cmd, rp_test_uniform(&random_source, -90.0, 90.0));
+        set(RP_ACTUATOR_dq1, rp_test_uniform(&random_source, -12.0, 12.0));
+        step_to((i + 1) * 1e-3);
+        TEST_ASSERT_TRUE(fabs(get(RP_ACTUATOR_current1)) <= i_max + 1e-9);
+    }
+}
+
+/* ---- Energy --------------------------------------------------------------------------------- */
+
+/* Without inertia and inductance a motor stores nothing: u i = tau dq + R i^2, at every instant. */
+static void test_electrical_power_is_mechanical_power_and_heat(void) {
+    start_at(2.0);
+    for (int i = 0; i < 500; i++) {
+        const double dq = rp_test_uniform(&random_source, -12.0, 12.0);
+        set(RP_ACTUATOR_tau1_cmd, rp_test_uniform(&random_source, -90.0, 90.0));
+        set(RP_ACTUATOR_dq1, dq);
+        step_to((i + 1) * 1e-3);
+        const double current = get(RP_ACTUATOR_current1);
+        const double mechanical = get(RP_ACTUATOR_tau1) * dq;
+        const double heat = R * current * current;
+        const double electrical = get(RP_ACTUATOR_voltage1) * current;
+        ASSERT_CLOSE(mechanical + heat, electrical, 8 * DBL_EPSILON * (fabs(mechanical) + heat));
+    }
+}
