@@ -21,7 +21,8 @@ set(MUSL_LICENSE ${MUSL_SOURCE_DIR}/COPYRIGHT)
 set(files
   sin cos sincos __sin __cos __rem_pio2 __rem_pio2_large scalbn
   atan2 atan
-  pow pow_data exp exp_data __math_invalid __math_oflow __math_uflow __math_xflow
+  pow pow_data exp exp_data log log_data
+  __math_divzero __math_invalid __math_oflow __math_uflow __math_xflow
   sqrt sqrt_data
   ceil fabs floor fmax fmin remainder remquo)
 list(TRANSFORM files PREPEND ${MUSL_SOURCE_DIR}/src/math/)

@@ -31,6 +31,7 @@ def runs(opened: Fmu) -> Iterator[Runs]:
         "rp_controller": "RPController.fmu",
         "rp_plant": "RPPlant.fmu",
         "rp_trajectory": "RPTrajectory.fmu",
+        "rp_sensor": "RPSensor.fmu",
     }
     with ExitStack() as stack:
         fmus = {

@@ -126,8 +126,8 @@ static void compare_binary(const char *name, binary *own,
 /* ---- Tests ---------------------------------------------------------------------------------- */
 
 static void test_they_are_not_those_of_the_system(void) {
-    unary *const own[] = {sin, cos, sqrt, floor, ceil, fabs, exp};
-    const char *const names[] = {"sin", "cos", "sqrt", "floor", "ceil", "fabs", "exp"};
+    unary *const own[] = {sin, cos, sqrt, floor, ceil, fabs, exp, log};
+    const char *const names[] = {"sin", "cos", "sqrt", "floor", "ceil", "fabs", "exp", "log"};
     for (size_t i = 0; i < sizeof own / sizeof own[0]; i++) {
         TEST_ASSERT_TRUE_MESSAGE(own[i] != unary_of_system(names[i]), names[i]);
     }
@@ -166,6 +166,11 @@ static void test_arc_tangent(void) {
 static void test_power_and_exponential(void) {
     compare_binary("pow", pow, powl, 1.0, -8, 8);
     compare_unary("exp", exp, expl, -30, 10);
+}
+
+static void test_logarithm(void) {
+    compare_unary("log", log, logl, -1000, 1000);
+    compare_unary("log", log, logl, -1, 1); // near its root
 }
 
 static void test_exact_functions_of_one_argument(void) {

@@ -25,6 +25,7 @@ FMUS = {
     "rp_controller": BUILD / "RPController.fmu",
     "rp_actuator": BUILD / "RPActuator.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
+    "rp_sensor": BUILD / "RPSensor.fmu",
 }
 FILES = project.scenario_files()
 NAMES = list(FILES)

@@ -1,0 +1,170 @@
+#include "rp_sensor_model.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+_Static_assert(offsetof(struct rp_sensor_values, ticks) ==
+                   offsetof(struct rp_sensor_values, start) + sizeof(double),
+               "the discrete states are one array of doubles");
+
+static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
+                                   double dx[]) {
+    // there is no state
+    (void)values;
+    (void)t;
+    (void)x;
+    (void)u;
+    (void)dx;
+    return STATUS_OK;
+}
+
+/* ---- Ticks ---------------------------------------------------------------------------------- */
+
+/* Count of joint i at tick k, from the inputs. */
+static int sampled(const struct rp_sensor_values *values, int i, double k) {
+    const struct rp_sensor_parameters *p = &values->parameters;
+    const double noise = p->noise[i] * rp_sensor_noise(p->seed, i, (uint64_t)k);
+    return rp_sensor_count(values->q[i] + noise, p->resolution[i]);
+}
+
+/* Place of tick k. */
+static size_t place_of(double k) {
+    return (size_t)((uint64_t)k % RP_SENSOR_SAMPLES);
+}
+
+/* Count of joint i that is shown at tick k: of the start while none has come through. */
+static int shown(const struct rp_sensor_values *values, int i, double k) {
+    return values->samples[place_of(fmax(k - values->parameters.latency, 0.0))][i];
+}
+
+static double next_time(const void *values_pointer) {
+    const struct rp_sensor_values *values = values_pointer;
+    return values->start + values->ticks * values->parameters.sample_time;
+}
+
+/* Of the time at the start: a shorter sample time is refused, since ticks would be the less regular
+ * the fewer doubles lie between two of them. */
+static const double coarsest_time = 0x1p-40;
+
+/* Takes the sample of the start, at the end of the initialization, and that of each tick. */
+static enum status update(void *values_pointer, const struct event *event) {
+    struct rp_sensor_values *values = values_pointer;
+    const bool is_start = values->ticks == 0.0;
+    if (!is_start && !event->is_timed) {
+        return STATUS_OK;
+    }
+    if (!isfinite(values->q[0]) || !isfinite(values->q[1])) {
+        return STATUS_NOT_FINITE;
+    }
+    if (is_start) {
+        if (values->parameters.sample_time < coarsest_time * fabs(event->t)) {
+            return STATUS_INVALID_PARAMETERS;
+        }
+        values->start = event->t;
+    }
+    for (int i = 0; i < 2; i++) {
+        values->samples[place_of(values->ticks)][i] = sampled(values, i, values->ticks);
+    }
+    values->ticks += 1.0;
+    return STATUS_OK;
+}
+
+static bool are_possible(const void *values) {
+    (void)values;
+    return false; // no state ends a mode
+}
+
+/* Ticks are counted in whole numbers, no count is beyond the last, and where none has been written
+ * there is none. */
+static bool modes_are_possible(const void *values_pointer, bool is_held) {
+    const struct rp_sensor_values *values = values_pointer;
+    (void)is_held; // parameters of the modes are fixed
+    if (!(values->ticks >= 1.0 && values->ticks <= 0x1p53 &&
+          values->ticks == floor(values->ticks))) {
+        return false;
+    }
+    for (size_t k = 0; k < RP_SENSOR_SAMPLES; k++) {
+        for (size_t i = 0; i < 2; i++) {
+            const int count = values->samples[k][i];
+            if (count < -RP_SENSOR_COUNT_MAX || ((double)k >= values->ticks && count != 0)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static const struct model_events events = {
+    .modes = {offsetof(struct rp_sensor_values, samples), sizeof(int[RP_SENSOR_SAMPLES][2])},
+    .discrete_states = {offsetof(struct rp_sensor_values, start), 2 * sizeof(double)},
+    .are_possible = are_possible,
+    .modes_are_possible = modes_are_possible,
+    .update = update,
+    .next_time = next_time,
+};
+
+/* ---- Calculated values ---------------------------------------------------------------------- */
+
+static enum status outputs(void *values_pointer, double t) {
+    struct rp_sensor_values *values = values_pointer;
+    const struct rp_sensor_parameters *p = &values->parameters;
+    (void)t;
+    const bool has_started = values->ticks > 0.0;
+    const double last = values->ticks - 1.0;
+    for (int i = 0; i < 2; i++) {
+        // before the end of the initialization what the start will show
+        const int now = has_started ? shown(values, i, last) : sampled(values, i, 0.0);
+        const int before = has_started ? shown(values, i, last - 1.0) : now;
+        values->counts[i] = now;
+        values->q_measured[i] = now * p->resolution[i];
+        values->dq_measured[i] = ((double)now - before) * p->resolution[i] / p->sample_time;
+    }
+    return STATUS_OK;
+}
+
+static void rest(struct rp_sensor_values *derivatives) {
+    memset(derivatives->q_measured, 0, sizeof derivatives->q_measured);
+    memset(derivatives->dq_measured, 0, sizeof derivatives->dq_measured);
+}
+
+static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
+    // outputs rest between two ticks
+    (void)values;
+    (void)t;
+    (void)dt;
+    rest(first);
+    if (second != NULL) {
+        rest(second);
+    }
+    return STATUS_OK;
+}
+
+/* Outputs are finite whatever the counts are. */
+static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
+    const struct rp_sensor_parameters *p =
+        &((const struct rp_sensor_values *)values_pointer)->parameters;
+    for (int i = 0; i < 2; i++) {
+        const double largest = 2.0 * RP_SENSOR_COUNT_MAX * p->resolution[i] / p->sample_time;
+        if (!isfinite(largest)) {
+            (void)snprintf(text, size,
+                           "resolution%d = %g is refused: with sample_time = %g s the velocity of "
+                           "2^32 counts in one sample time is not finite",
+                           i + 1, p->resolution[i], p->sample_time);
+            return STATUS_INVALID_PARAMETERS;
+        }
+    }
+    return STATUS_OK;
+}
+
+const struct model rp_sensor_model = {
+    .values_size = sizeof(struct rp_sensor_values),
+    .parameters = {offsetof(struct rp_sensor_values, parameters),
+                   sizeof(struct rp_sensor_parameters)},
+    .inputs = {offsetof(struct rp_sensor_values, q), sizeof(double[2])},
+    .right_hand_side = right_hand_side,
+    .outputs = outputs,
+    .propagate = propagate,
+    .check_parameters = check_parameters,
+    .events = &events,
+};

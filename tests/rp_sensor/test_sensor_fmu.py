@@ -1,0 +1,125 @@
+"""RPSensor.fmu: what is refused, Model Exchange by time events, references."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from cosim.errors import UserError
+from cosim.fmu_file import Fmu
+from tests.rp_sensor.sensor_runs import COUNTS, MODEL, SCRIPT, independent, start_values, started
+from tests.support.cosim_project import declared, load, names_of
+from tests.support.instances import status_of
+
+SCENARIOS = names_of(MODEL.name)
+
+# ---- What is refused ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "limit"),
+    [
+        ("sample_time", 0.0, "1e-06"),
+        ("sample_time", 9.99e-7, "1e-06"),
+        ("sample_time", -0.001, "1e-06"),
+        ("latency", -1, "0"),
+        ("latency", 65, "64"),
+        ("resolution1", 0.0, "1e-12"),
+        ("resolution2", -1e-6, "1e-12"),
+        ("noise1", -1e-9, "0"),
+        ("noise2", -1.0, "0"),
+    ],
+)
+def test_values_out_of_range(sensor: Fmu, name: str, value: float, limit: str) -> None:
+    with sensor.instance("sensor") as instance:
+        with pytest.raises(UserError):
+            instance.set(name, value)
+        message = instance.messages[-1]
+        assert name in message and f"{value:g}" in message and limit in message, message
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+@pytest.mark.parametrize("name", ["sample_time", "resolution1", "noise2", "q1"])
+def test_values_that_are_not_finite(sensor: Fmu, name: str, value: float) -> None:
+    with sensor.instance("sensor") as instance:
+        with pytest.raises(UserError):
+            instance.set(name, value)
+        assert name in instance.messages[-1]
+
+
+@pytest.mark.parametrize("name", [n for n in start_values() if n != "time"])
+def test_parameters_are_fixed(sensor: Fmu, name: str) -> None:
+    with started(sensor) as instance, pytest.raises(UserError):
+        instance.set(name, declared(MODEL.name).variables[name].start)
+
+
+def test_a_start_that_swallows_the_sample_time(sensor: Fmu) -> None:
+    with started(sensor, start=1e9) as instance:
+        instance.do_step(1e9, 0.0021)
+    with pytest.raises(UserError), started(sensor, start=1e10):
+        pass
+    with pytest.raises(UserError), started(sensor, start=-1e300, sample_time=1.0):
+        pass
+
+
+def test_positions_that_overflow_within_a_step(sensor: Fmu) -> None:
+    """The step is refused, as everywhere."""
+    with started(sensor) as instance:
+        polynomials = instance.input_polynomials(["q1", "q2"], 1)
+        polynomials.view[:] = [[1e308, 0.0], [1.7e308, 0.0]]
+        polynomials.set()
+        assert status_of(instance.do_step, 0.0, 10.0) >= 2
+
+
+# ---- Model Exchange ----------------------------------------------------------------------------
+
+
+def test_fmpy_finds_no_problem(sensor: Fmu) -> None:
+    assert validate_fmu(str(sensor.path)) == []
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpy_simulates_it(sensor: Fmu, kind: str) -> None:
+    """In Model Exchange, ticks are time events at which the inputs are those of the time itself."""
+    values = {"sample_time": 0.00737, "noise1": 0.01, "seed": 4, "latency": 1}
+    encoder = independent.Encoder(start_values() | values)
+    result = fmpy.simulate_fmu(
+        str(sensor.path),
+        fmi_type=kind,
+        stop_time=0.5,
+        output_interval=0.01,
+        start_values=values | {"q1": 0.4, "q2": -0.01},
+        output=COUNTS,
+    )
+    expected = {}
+    for k in range(60):
+        encoder.sample([0.4, -0.01])
+        expected[k] = encoder.counts()
+    assert len(result) >= 51
+    for row in result:
+        t, *counts = row
+        after = t / 0.00737
+        if abs(after - round(after)) > 1e-6:  # at a tick both rows are right
+            assert counts == expected[int(after)], t
+
+
+# ---- References --------------------------------------------------------------------------------
+
+
+def test_references_made_again_are_the_same(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, SCRIPT, "--output", tmp_path], check=True, cwd=tmp_path)
+    kept = [folder.name for folder in (MODEL / "references").iterdir() if folder.is_dir()]
+    assert sorted(set(kept) - {"__pycache__"}) == sorted(SCENARIOS)
+    for name in SCENARIOS:
+        for file in ("RPSensor_ref.csv", "RPSensor_in.csv", "RPSensor_ref.opt"):
+            made = (tmp_path / name / file).read_bytes()
+            assert made == (MODEL / "references" / name / file).read_bytes(), (name, file)
+
+
+def test_scenarios_cover_the_parameters() -> None:
+    found = [load(name).start_values for name in SCENARIOS]
+    for name in start_values():
+        assert len({values[name] for values in found}) > 1, name

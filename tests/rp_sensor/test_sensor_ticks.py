@@ -1,0 +1,164 @@
+"""Counts, times of sampling and latency of the built FMU, tick by tick: closed forms, and an
+independent sensor in fractions."""
+
+import random
+from fractions import Fraction
+
+import pytest
+
+from cosim.fmi_instance import Instance
+from cosim.fmu_file import Fmu
+from tests.rp_sensor.sensor_runs import (
+    INPUTS,
+    Cubic,
+    Stepper,
+    independent,
+    shown,
+    start_values,
+    started,
+)
+
+STILL = (0.0,)
+# Further from the end of a step than what counts as rounding of a time, relative to the step.
+CLEAR = 0.02
+
+
+def random_cubic(chance: random.Random, resolution: float) -> Cubic:
+    """Hundreds of counts within a second."""
+    return [chance.uniform(-200.0, 200.0) * resolution for _ in range(4)]
+
+
+def random_parameters(chance: random.Random) -> dict[str, float]:
+    values = {
+        "sample_time": chance.uniform(1e-3, 0.03),
+        "latency": chance.choice([0, 1, 2, 5, 63, 64]),
+        "seed": chance.randrange(-(2**31), 2**31),
+    }
+    for i in (1, 2):
+        values[f"resolution{i}"] = 10 ** chance.uniform(-6.0, -3.0)
+        values[f"noise{i}"] = chance.choice([0.0, 0.3, 4.0]) * values[f"resolution{i}"]
+    return values
+
+
+def steps_clear_of_ticks(
+    chance: random.Random, start: float, sample_time: float, count: int
+) -> list[tuple[float, float]]:
+    """Begin and length (s) of random steps, short and long, that end at no tick."""
+    found: list[tuple[float, float]] = []
+    t = start
+    while len(found) < count:
+        h = chance.choice([0.1, 1.0, 5.0]) * chance.uniform(0.05, 1.0) * sample_time
+        ticks = (Fraction(t + h) - Fraction(start)) / Fraction(sample_time)
+        if abs(ticks - round(ticks)) * sample_time > CLEAR * h:
+            found.append((t, h))
+            t += h
+    return found
+
+
+def assert_shown(instance: Instance, encoder: object) -> None:
+    """Counts exactly, what is made of them up to its rounding."""
+    counts, outputs = shown(instance)
+    assert counts == tuple(encoder.counts())
+    for got, exact in zip(outputs, encoder.outputs(), strict=True):
+        assert abs(Fraction(got) - exact) <= abs(exact) * Fraction(1, 2**51)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_motions(sensor: Fmu, seed: int) -> None:
+    """Both joints along cubics, communication points anywhere, against the sensor in fractions."""
+    chance = random.Random(seed)
+    values = random_parameters(chance)
+    start = chance.choice([0.0, -3.7, 12.5])
+    cubics = [random_cubic(chance, values[f"resolution{i}"]) for i in (1, 2)]
+    cubics[0][0] += chance.uniform(-1.0, 1.0)
+    encoder = independent.Encoder(start_values() | values)
+    sample_time, begin = Fraction(values["sample_time"]), Fraction(start)
+
+    def sample_until(end: float) -> None:
+        while (t := begin + encoder.ticks * sample_time) <= Fraction(end):
+            encoder.sample([sum(Fraction(c) * t**k for k, c in enumerate(q)) for q in cubics])
+
+    with started(sensor, start, cubics, **values) as instance:
+        stepper = Stepper(instance, cubics)
+        sample_until(start)
+        assert_shown(instance, encoder)
+        for t, h in steps_clear_of_ticks(chance, start, values["sample_time"], 250):
+            stepper.step(t, h)
+            sample_until(t + h)
+            assert_shown(instance, encoder)
+    assert encoder.ticks > 200
+
+
+@pytest.mark.parametrize("latency", [0, 1, 7, 64])
+def test_times_of_sampling_are_exact(sensor: Fmu, latency: int) -> None:
+    """The position is the time since the start: what is shown is when it was sampled."""
+    start, sample_time, h = 2.0, 0.00137, 0.001
+    clock = (-start, 1.0)
+    values = {"sample_time": sample_time, "latency": latency, "resolution1": 1e-9}
+    with started(sensor, start, (clock, STILL), **values) as instance:
+        stepper = Stepper(instance, (clock, STILL))
+        for i in range(250):
+            stepper.step(start + i * h, h)
+            last = int((i + 1) * h / sample_time)
+            time = max(last - latency, 0) * sample_time
+            counts, outputs = shown(instance)
+            assert abs(counts[0] - time * 1e9) <= 0.5 + 1e-5
+            assert abs(outputs[0] - time) <= 0.5e-9 + 1e-14
+            rate = 1.0 if last > latency else 0.0
+            assert abs(outputs[2] - rate) <= 1e-9 / sample_time
+
+
+def test_a_tick_at_a_communication_point_belongs_to_the_step_before(sensor: Fmu) -> None:
+    """It samples the inputs of that step, and new ones a tick later."""
+    with started(sensor, resolution1=0.25, sample_time=0.125) as instance:
+        inputs = instance.reals(INPUTS)
+        seen = []
+        for i in range(1, 9):
+            inputs.view[:] = [0.25 * i * i, 0.0]
+            inputs.set()
+            assert shown(instance)[0][0] == (i - 1) ** 2
+            instance.do_step((i - 1) * 0.125, 0.125)
+            seen.append(shown(instance)[0][0])
+        assert seen == [i * i for i in range(1, 9)]
+
+
+def test_several_ticks_in_a_step_with_held_inputs(sensor: Fmu) -> None:
+    """All but the first one see the same count: the velocity is 0 at the end."""
+    with started(sensor, resolution1=0.25, sample_time=0.001) as instance:
+        instance.set("q1", 2.0)
+        instance.do_step(0.0, 0.0015)
+        assert shown(instance) == ((8, 0), (2.0, 0.0, 2.0 / 0.001, 0.0))
+        instance.do_step(0.0015, 0.001)
+        assert shown(instance) == ((8, 0), (2.0, 0.0, 0.0, 0.0))
+
+
+def test_outputs_are_held_between_ticks(sensor: Fmu) -> None:
+    with started(sensor, resolution1=0.25, sample_time=1.0) as instance:
+        for i in range(9):
+            instance.set("q1", 100.0)
+            assert shown(instance)[0] == (0, 0)
+            instance.do_step(i * 0.1, 0.1)
+            assert shown(instance)[0] == (0, 0)
+        instance.do_step(0.9, 0.2)
+        assert shown(instance)[0] == (400, 0)
+
+
+def test_outputs_during_initialization_follow_the_inputs(sensor: Fmu) -> None:
+    with sensor.instance("sensor") as instance:
+        instance.set_up(0.0, None)
+        instance.set("noise1", 0.01)
+        instance.set("latency", 3)
+        instance.enter_initialization()
+        before = shown(instance)
+        instance.set("q1", 0.5)
+        during = shown(instance)
+        instance.exit_initialization()
+        assert shown(instance) == during != before
+
+
+def test_the_counter_stops_at_its_ends(sensor: Fmu) -> None:
+    with started(sensor, resolution1=1e-12, sample_time=0.01) as instance:
+        for i, (q, counts) in enumerate([(1.0, 2**31 - 1), (-1e300, 1 - 2**31), (0.001, 10**9)]):
+            instance.set("q1", q)
+            instance.do_step(i * 0.01, 0.01)
+            assert shown(instance)[0][0] == counts
