@@ -12,7 +12,7 @@ SOURCES = sorted(path for path in (ROOT / "cosim").rglob("*") if path.suffix in 
 SOLVER = {"time", "solver_steps", "solver_rhs_evaluations"}  # of every model with states
 # words of English, letters and an argument of Ecos that are names of variables too
 WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
-WORDS |= {"start_time"}
+WORDS |= {"start_time", "position"}
 
 
 @pytest.fixture(scope="module")

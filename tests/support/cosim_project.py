@@ -26,6 +26,7 @@ FMUS = {
     "rp_actuator": BUILD / "RPActuator.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
     "rp_sensor": BUILD / "RPSensor.fmu",
+    "rp_environment": BUILD / "RPEnvironment.fmu",
 }
 FILES = project.scenario_files()
 NAMES = list(FILES)

@@ -1,0 +1,399 @@
+"""RPEnvironment.fmu: force and derivatives against sympy, scenarios, with the plant, refusals.
+
+The sympy model takes the tip as a point of the plane that moves with a rotation matrix, and the
+force from the depth below the surface and its rate of change.
+"""
+
+import functools
+import math
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+import sympy as sp
+from fmpy import fmi2
+from fmpy.validation import validate_fmu
+
+from cosim import reference
+from cosim.comparison import Runs
+from cosim.fmu_file import Fmu
+from tests.support.cosim_project import declared, load, names_of
+from tests.support.instances import DISCARD, OK, Instance, LoadedFmu, status_of
+from tests.support.paths import ROOT
+
+FOLDER = ROOT / "models" / "rp_environment"
+SCENARIOS = names_of(FOLDER.name)
+PARAMETERS = ("stiffness", "damping", "position", "angle", "tip_x", "tip_z")
+INPUTS = ("ee_x", "ee_y", "ee_vx", "ee_vy", "ee_angle", "ee_rate")
+KNOWNS = (*PARAMETERS, *INPUTS)
+OUTPUTS = ("ee_fx", "ee_fy", "ee_mz", "penetration", "wall_force")
+PRESSED, RELEASED, OUTSIDE = "pressed", "released", "outside"
+CASES = (PRESSED, RELEASED, OUTSIDE)
+
+Values = dict[str, float]
+
+
+# ---- The wall in sympy ---------------------------------------------------------------------------
+
+
+@functools.cache
+def wall(case: str) -> dict[str, sp.Expr]:
+    """Every output: pressed, in the wall but too fast outwards to be pushed, or outside."""
+    s = {name: sp.Symbol(name) for name in KNOWNS}
+    t = sp.Symbol("t")
+    moving = sp.Matrix([s["ee_x"] + s["ee_vx"] * t, s["ee_y"] + s["ee_vy"] * t])
+    turned = s["ee_angle"] + s["ee_rate"] * t
+    # columns: x2 and z2 in frame 0
+    frame2 = sp.Matrix([[-sp.sin(turned), sp.cos(turned)], [sp.cos(turned), sp.sin(turned)]])
+    lever = frame2 * sp.Matrix([s["tip_x"], s["tip_z"]])
+    normal = sp.Matrix([sp.cos(s["angle"]), sp.sin(s["angle"])])
+    depth = s["position"] - normal.dot(moving + lever)
+    now = {t: 0}
+    force = s["stiffness"] * depth + s["damping"] * depth.diff(t) if case == PRESSED else sp.S.Zero
+    x, y = lever
+    results = (
+        force * normal[0],
+        force * normal[1],
+        force * (x * normal[1] - y * normal[0]),
+        depth if case != OUTSIDE else sp.S.Zero,
+        force,
+    )
+    return {name: sp.sympify(r).subs(now) for name, r in zip(OUTPUTS, results, strict=True)}
+
+
+@functools.cache
+def compiled(case: str) -> Callable[..., tuple[list[float], list[list[float]]]]:
+    """Values of the outputs and their derivatives by each known."""
+    rows = list(wall(case).values())
+    slopes = [[row.diff(sp.Symbol(name)) for name in KNOWNS] for row in rows]
+    return sp.lambdify(sp.symbols(KNOWNS), (rows, slopes), "math", cse=True)
+
+
+def evaluated(case: str, point: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Outputs, (5,), and their derivatives, (5, 12)."""
+    rows, slopes = compiled(case)(*(point[name] for name in KNOWNS))
+    return np.array(rows, dtype=float), np.array(slopes, dtype=float)
+
+
+@functools.cache
+def raw() -> Callable[..., tuple[float, float]]:
+    """Depth, and the force without its lower limit."""
+    pressed = wall(PRESSED)
+    return sp.lambdify(sp.symbols(KNOWNS), (pressed["penetration"], pressed["wall_force"]), "math")
+
+
+def case_of(point: Values) -> str:
+    depth, force = raw()(*(point[name] for name in KNOWNS))
+    return OUTSIDE if depth <= 0 else RELEASED if force <= 0 else PRESSED
+
+
+def generic_point(case: str, seed: int) -> Values:
+    """Parameters and inputs, none of them zero, at which the wall does what `case` says."""
+    source = random.Random(f"{case} {seed}")
+    while True:
+        point = {name: source.choice((-1, 1)) * source.uniform(0.05, 1.0) for name in KNOWNS}
+        point["stiffness"] = 10 ** source.uniform(1.0, 4.0)
+        point["damping"] = 10 ** source.uniform(0.0, 3.0)
+        point["angle"] *= 4.0
+        point["ee_angle"] *= 4.0
+        if case_of(point) == case:
+            return point
+
+
+# ---- Instances -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def path() -> Path:
+    """The FMU, built beside that of the manipulator."""
+    build = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
+    return build / "RPEnvironment.fmu"
+
+
+@pytest.fixture(scope="module")
+def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(path, tmp_path_factory.mktemp("environment"))
+
+
+@contextmanager
+def running(loaded: LoadedFmu, point: Values, kind: type = fmi2.FMU2Slave) -> Iterator[Instance]:
+    with Instance(loaded, kind) as instance:
+        yield instance.initialize(**point)
+
+
+# ---- Force and derivatives -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_outputs_are_those_of_the_wall(loaded: LoadedFmu, case: str) -> None:
+    for seed in range(20):
+        point = generic_point(case, seed)
+        expected, _ = evaluated(case, point)
+        scale = point["stiffness"] + point["damping"]
+        with running(loaded, point) as instance:
+            actual = np.array(instance.get(*OUTPUTS))
+            assert (abs(actual - expected) <= 1e-14 * scale).all(), (seed, actual, expected)
+            assert (actual[3] > 0) == (case != OUTSIDE) and (actual[4] > 0) == (case == PRESSED)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_directional_derivatives(loaded: LoadedFmu, case: str) -> None:
+    references = [loaded.references[name] for name in OUTPUTS]
+    for seed in range(5):
+        point = generic_point(case, seed)
+        _, expected = evaluated(case, point)
+        scale = 10 * (point["stiffness"] + point["damping"])
+        with Instance(loaded) as instance:
+            instance.fmi.setupExperiment()
+            instance.set(**point)
+            instance.fmi.enterInitializationMode()  # only now derivatives by parameters exist
+            for k, known in enumerate(KNOWNS):
+                column = instance.fmi.getDirectionalDerivative(
+                    references, [loaded.references[known]], [1.0]
+                )
+                assert (abs(np.array(column) - expected[:, k]) <= 1e-14 * scale).all(), known
+
+
+def test_output_derivatives_follow_the_inputs(loaded: LoadedFmu) -> None:
+    """Inputs whose rates fit together: the force changes with depth and speed."""
+    point = generic_point(PRESSED, 3)
+    rates = {"ee_x": point["ee_vx"], "ee_y": point["ee_vy"], "ee_angle": point["ee_rate"]}
+    rates |= {"ee_vx": 0.7, "ee_vy": -0.4, "ee_rate": 1.3}
+    _, slopes = evaluated(PRESSED, point)
+    expected = sum(slopes[:, KNOWNS.index(name)] * rate for name, rate in rates.items())
+    with running(loaded, point) as instance:
+        instance.set_input_derivatives(**{name: [rate] for name, rate in rates.items()})
+        references = [loaded.references[name] for name in OUTPUTS]
+        actual = instance.fmi.getRealOutputDerivatives(references, [1] * len(OUTPUTS))
+    scale = 10 * (point["stiffness"] + point["damping"])
+    assert (abs(np.array(actual) - expected) <= 1e-13 * scale).all()
+
+
+def test_dependencies_are_those_of_the_formulas(loaded: LoadedFmu) -> None:
+    structure = loaded.description
+    depends = {
+        name: {str(x) for x in expression.free_symbols}
+        for name, expression in wall(PRESSED).items()
+    }
+    initial = {u.variable.name: u for u in structure.initialUnknowns}
+    assert {u.variable.name for u in structure.outputs} == set(OUTPUTS)
+    for unknown in structure.outputs:
+        name = unknown.variable.name
+        expected = depends[name]
+        assert {v.name for v in unknown.dependencies} == expected & set(INPUTS), name
+        assert {v.name for v in initial[name].dependencies} == expected, name
+
+
+def test_inputs_are_interpolated_within_a_step(loaded: LoadedFmu) -> None:
+    """A tip on a straight line into the wall: the force at the end of the step is that there."""
+    values = {"stiffness": 1000.0, "damping": 10.0, "position": 0.0, "ee_x": 0.1, "ee_vx": -0.5}
+    with running(loaded, values) as instance:
+        instance.set_input_derivatives(ee_x=[-0.5])
+        instance.step(0.0, 0.25)
+        assert instance.get("penetration", "wall_force") == pytest.approx([0.025, 30.0], abs=1e-12)
+
+
+# ---- With the plant ------------------------------------------------------------------------------
+
+
+def test_names_and_units_are_those_of_the_plant(loaded: LoadedFmu) -> None:
+    plant = declared("rp_plant").variables
+    own = declared("rp_environment").variables
+    for name in (*INPUTS, "ee_fx", "ee_fy", "ee_mz"):
+        assert (own[name].unit, own[name].reference) == (plant[name].unit, plant[name].reference)
+    causality = {name: plant[name].causality for name in own if name in plant and name != "time"}
+    assert causality == dict.fromkeys(INPUTS, "output") | dict.fromkeys(OUTPUTS[:3], "input")
+
+
+def test_the_default_wall_touches_nothing_in_reach(loaded: LoadedFmu, path: Path) -> None:
+    """At every pose with a slide of up to 2 m, at any velocity."""
+    plant = LoadedFmu(path.with_name("RPPlant.fmu"), loaded.folder / "plant")
+    source = random.Random(2)
+    with running(loaded, {}) as wall_instance, Instance(plant) as arm:
+        arm.fmi.setupExperiment()
+        arm.fmi.enterInitializationMode()
+        for _ in range(50):
+            names = ("q1", "q2", "dq1", "dq2")
+            limits = (math.pi, 2.0, 20.0, 20.0)
+            arm.set(**{n: source.uniform(-x, x) for n, x in zip(names, limits, strict=True)})
+            wall_instance.set(**dict(zip(INPUTS, arm.get(*INPUTS), strict=True)))
+            assert wall_instance.get(*OUTPUTS) == [0.0] * len(OUTPUTS)
+
+
+def test_the_tip_is_where_the_plant_has_its_payload(loaded: LoadedFmu, path: Path) -> None:
+    """A wall in every pose: the plant's potential energy gives the height of its payload."""
+    plant = LoadedFmu(path.with_name("RPPlant.fmu"), loaded.folder / "arm")
+    tip = {"payload_x": 0.07, "payload_z": -0.12}
+    references = [plant.references["payload_attached"]]
+    source = random.Random(5)
+    for _ in range(10):
+        pose = {"q1": source.uniform(-3, 3), "q2": source.uniform(-0.3, 0.3), "g": 1.0}
+        energies = []
+        for mass in (0.0, 1.0):
+            with Instance(plant) as arm:
+                arm.fmi.setBoolean(references, [True])
+                arm.initialize(payload_mass=mass, **tip, **pose)
+                energies.append(arm.get("potential_energy")[0])
+                motion = dict(zip(INPUTS, arm.get(*INPUTS), strict=True))
+        height = energies[1] - energies[0]
+        floor = {"angle": math.pi / 2, "position": 2.0, "tip_x": 0.07, "tip_z": -0.12}
+        with running(loaded, floor | motion) as instance:
+            assert instance.get("penetration")[0] == pytest.approx(2.0 - height, abs=1e-12)
+
+
+def test_power_of_the_wrench_is_what_the_plant_receives(loaded: LoadedFmu, path: Path) -> None:
+    """The rate of the arm's energy under the wrench is that of the force at the tip."""
+    plant = LoadedFmu(path.with_name("RPPlant.fmu"), loaded.folder / "driven")
+    rate = ["ddq1", "ddq2"]
+    for seed in range(5):
+        source = random.Random(seed)
+        state = {n: source.uniform(-1.0, 1.0) for n in ("q1", "q2", "dq1", "dq2")}
+        with Instance(plant) as arm:
+            arm.initialize(**state)
+            motion = dict(zip(INPUTS, arm.get(*INPUTS), strict=True))
+            tip = {"tip_x": source.uniform(-0.2, 0.2), "tip_z": source.uniform(-0.2, 0.2)}
+            wall_at = {"angle": source.uniform(-3.0, 3.0), "position": 3.0, "damping": 40.0}
+            with running(loaded, motion | tip | wall_at) as instance:
+                before = np.array(arm.get(*rate))
+                force = instance.get(*OUTPUTS)
+                arm.set(ee_fx=force[0], ee_fy=force[1], ee_mz=force[2])
+                added = np.array(arm.get(*rate)) - before
+                d11, d12, d22 = arm.get("D11", "D12", "D22")
+                # the depth after a short time in both directions
+                depths = []
+                for dt in (-1e-6, 1e-6):
+                    instance.set(
+                        ee_x=motion["ee_x"] + dt * motion["ee_vx"],
+                        ee_y=motion["ee_y"] + dt * motion["ee_vy"],
+                        ee_angle=motion["ee_angle"] + dt * motion["ee_rate"],
+                    )
+                    depths.append(instance.get("penetration")[0])
+        power = np.array([state["dq1"], state["dq2"]]) @ [[d11, d12], [d12, d22]] @ added
+        speed = -(depths[1] - depths[0]) / 2e-6
+        assert power == pytest.approx(force[4] * speed, abs=1e-8 * force[4])
+
+
+# ---- As a unit -----------------------------------------------------------------------------------
+
+
+def test_fmpy_finds_nothing_wrong(path: Path) -> None:
+    assert validate_fmu(str(path)) == []
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_fmpy_simulates_it(path: Path, kind: str) -> None:
+    times = np.linspace(0.0, 1.0, 11)
+    rows = [(t, 0.05 - 0.1 * t, -0.1) for t in times]
+    signals = np.array(rows, dtype=[("time", float), ("ee_x", float), ("ee_vx", float)])
+    result = fmpy.simulate_fmu(
+        str(path),
+        fmi_type=kind,
+        stop_time=1.0,
+        output_interval=0.1,
+        step_size=0.1,
+        start_values={"position": 0.0, "stiffness": 1000.0, "damping": 50.0},
+        input=signals,
+    )
+    assert result["wall_force"][0] == 0.0
+    assert result["wall_force"][-1] == pytest.approx(1000.0 * 0.05 + 5.0, abs=10.1)
+    assert (np.diff(result["penetration"]) >= 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("stiffness", -1.0), ("damping", -0.25), ("position", math.inf)]
+)
+def test_values_out_of_range_are_refused(loaded: LoadedFmu, name: str, value: float) -> None:
+    with Instance(loaded) as instance:
+        assert status_of(lambda: instance.set(**{name: value})) == DISCARD
+        text = instance.messages[-1].text
+        assert name in text and f"{value:g}" in text, text
+
+
+@pytest.mark.parametrize("name", [*PARAMETERS, *INPUTS])
+def test_what_is_no_number_is_refused(loaded: LoadedFmu, name: str) -> None:
+    with Instance(loaded) as instance:
+        assert status_of(lambda: instance.set(**{name: math.nan})) == DISCARD
+        assert name in instance.messages[-1].text and "nan" in instance.messages[-1].text
+
+
+def test_a_force_beyond_all_numbers_is_discarded(loaded: LoadedFmu) -> None:
+    with running(loaded, {"position": 0.0, "stiffness": 1e308, "ee_x": -1e3}) as instance:
+        assert status_of(lambda: instance.get("wall_force")) == DISCARD
+        assert "wall_force" in instance.messages[-1].text
+
+
+def test_parameters_change_between_steps(loaded: LoadedFmu) -> None:
+    with running(loaded, {"position": 0.0, "ee_x": -0.01, "damping": 0.0}) as instance:
+        for i, stiffness in enumerate((1e4, 2e4, 0.0)):
+            instance.set(stiffness=stiffness)
+            instance.step(0.1 * i, 0.1)
+            assert instance.get("wall_force") == [pytest.approx(0.01 * stiffness, abs=1e-10)]
+
+
+def test_states_are_saved_and_restored(loaded: LoadedFmu) -> None:
+    with running(loaded, generic_point(PRESSED, 1)) as instance:
+        instance.set_input_derivatives(ee_x=[0.01], ee_angle=[0.02])
+        instance.step(0.0, 0.1)
+        state = instance.fmi.getFMUstate()
+        once = instance.everything()
+        instance.set(ee_x=3.0)
+        instance.step(0.1, 0.1)
+        assert instance.everything() != once
+        instance.fmi.setFMUstate(state)
+        assert instance.everything() == once
+        assert status_of(instance.fmi.freeFMUstate, state) == OK
+
+
+# ---- References ----------------------------------------------------------------------------------
+
+
+def test_references_are_those_of_the_script(tmp_path: Path) -> None:
+    script = FOLDER / "references" / "make_references.py"
+    subprocess.run([sys.executable, script, "--output", tmp_path], check=True, cwd=tmp_path)
+    assert sorted(made.name for made in tmp_path.iterdir()) == sorted(SCENARIOS)
+    for name in SCENARIOS:
+        for made in (tmp_path / name).iterdir():
+            stored = FOLDER / "references" / name / made.name
+            assert stored.read_bytes() == made.read_bytes(), stored
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_scenarios_meet_their_references(path: Path, name: str) -> None:
+    with Fmu(path) as opened:
+        error = Runs({"rp_environment": opened}).run(load(name), 1e-8).error
+    assert error <= 1e-14
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_scenarios_touch_and_release(name: str) -> None:
+    expected = reference.load(load(name), declared(FOLDER.name))
+    penetration, force = expected.column("penetration"), expected.column("wall_force")
+    touches = np.flatnonzero((penetration[1:] > 0) & (penetration[:-1] == 0))
+    assert len(touches) >= 3 and (penetration == 0).sum() >= 20
+    assert force.min() == 0.0 and (force[penetration == 0] == 0.0).all()
+    if name == "wall_touch_and_release":
+        assert ((penetration > 0) & (force == 0.0)).sum() >= 5
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_velocities_of_the_scenarios_are_those_of_the_positions(name: str) -> None:
+    scenario = load(name)
+    times = scenario.times
+    middle = (times[1:] + times[:-1]) / 2
+    for position, velocity in zip(INPUTS[:2] + INPUTS[4:5], INPUTS[2:4] + INPUTS[5:], strict=True):
+        slope = np.diff(scenario.input(position)) / np.diff(times)
+        rate = np.interp(middle, times, scenario.input(velocity))
+        assert abs(slope - rate).max() <= 0.02 * max(abs(rate).max(), 1e-3), position
+
+
+def test_page_names_every_variable() -> None:
+    page = (FOLDER / "README.md").read_text(encoding="utf-8")
+    for name in (*KNOWNS, *OUTPUTS):
+        assert f"`{name}`" in page, name
