@@ -70,11 +70,6 @@ static enum status update(void *values_pointer, const struct event *event) {
     return STATUS_OK;
 }
 
-static bool are_possible(const void *values) {
-    (void)values;
-    return false; // no state ends a mode
-}
-
 /* Ticks are counted in whole numbers, no count is beyond the last, and where none has been written
  * there is none. */
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
@@ -98,7 +93,6 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
 static const struct model_events events = {
     .modes = {offsetof(struct rp_sensor_values, samples), sizeof(int[RP_SENSOR_SAMPLES][2])},
     .discrete_states = {offsetof(struct rp_sensor_values, start), 2 * sizeof(double)},
-    .are_possible = are_possible,
     .modes_are_possible = modes_are_possible,
     .update = update,
     .next_time = next_time,
