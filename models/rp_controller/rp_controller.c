@@ -3,10 +3,10 @@
 #include "arithmetic_double.h"
 #include "rp_controller_law.h"
 
-void rp_controller_unlimited(const struct rp_controller_parameters *p,
+void rp_controller_unlimited(const struct rp_controller_parameters *p, bool attached,
                              const struct rp_controller_inputs *inputs, const double w[2],
                              double unlimited[2]) {
-    law_unlimited(&p, &inputs, w, unlimited);
+    law_unlimited(&p, attached, &inputs, w, unlimited);
 }
 
 void rp_controller_limited(const struct rp_controller_parameters *p, const double unlimited[2],

@@ -24,6 +24,12 @@ struct rp_controller_parameters {
                                  anti-windup */
     double tracking_time;     /* s, > 0: time constant of the anti-windup */
     double limit[2];          /* N.m, N, >= 0: largest magnitude of the efforts */
+    double payload_mass;      /* kg, >= 0 */
+    double payload_inertia;   /* kg.m2, >= 0: about its center of mass, along z0 */
+    double payload_x;         /* m: its center of mass in frame 2, along x2 */
+    double payload_z;         /* m: the same, along z2 (the slide) */
+    double sample_time;       /* s; 0: the law acts continuously */
+    double delay;             /* s, 0 .. sample_time: from a sample to its efforts */
     int mode;                 /* enum rp_controller_mode */
 };
 
@@ -37,13 +43,13 @@ struct rp_controller_inputs {
 };
 
 /* Efforts (N.m, N) that the law asks for, with the integral parts w of the commanded accelerations
- * (rad/s2, m/s2). With the errors e = q_ref - q and de = dq_ref - dq and, for each joint,
- * v = Kp e + Kd de + w:
+ * (rad/s2, m/s2). attached: D, C and g are those of link 2 with the payload. With the errors
+ * e = q_ref - q and de = dq_ref - dq and, for each joint, v = Kp e + Kd de + w:
  *
  *   PD               M v                                       M: inertia
  *   PD with gravity  M v + g(q)
  *   computed torque  D(q) (ddq_ref + v) + C(q, dq) dq + g(q) */
-void rp_controller_unlimited(const struct rp_controller_parameters *p,
+void rp_controller_unlimited(const struct rp_controller_parameters *p, bool attached,
                              const struct rp_controller_inputs *inputs, const double w[2],
                              double unlimited[2]);
 
@@ -59,7 +65,7 @@ void rp_controller_integral_rates(const struct rp_controller_parameters *p,
 
 /* Derivatives of these rates, with the efforts that the law asks for, by the integral parts: row i,
  * column j is that of rate i by w[j] (1/s). One-sided where an effort just meets its limit. */
-void rp_controller_integral_jacobian(const struct rp_controller_parameters *p,
+void rp_controller_integral_jacobian(const struct rp_controller_parameters *p, bool attached,
                                      const struct rp_controller_inputs *inputs, const double w[2],
                                      double rates_by_w[2][2]);
 

@@ -4,7 +4,7 @@
 #define RP_CONTROLLER_LAW_H
 
 #include "rp_controller.h"
-#include "rp_equations.h"
+#include "rp_payload.h"
 
 /* e = q_ref - q and its rate. */
 EQUATION real law_error(const struct rp_controller_inputs *const inputs[SOURCES], int i) {
@@ -24,7 +24,27 @@ EQUATION real law_correction(const struct rp_controller_parameters *const p[SOUR
     return plus(plus(proportional, damping), w[i]);
 }
 
-EQUATION void law_unlimited(const struct rp_controller_parameters *const p[SOURCES],
+/* The arm that the controller assumes. */
+EQUATION struct arm law_arm(const struct rp_controller_parameters *const p[SOURCES], bool attached,
+                            const struct rp_controller_inputs *const inputs[SOURCES]) {
+    const struct rp_parameters *const parameters[SOURCES] = PARTS(p, arm);
+    const real q[2] = {READ(inputs, q[0]), READ(inputs, q[1])};
+    const real dq[2] = {READ(inputs, dq[0]), READ(inputs, dq[1])};
+    struct arm arm = arm_in_state(parameters, q, dq);
+    if (attached) {
+        const struct payload payload = {
+            .mass = READ(p, payload_mass),
+            .inertia = READ(p, payload_inertia),
+            .x = READ(p, payload_x),
+            .z = READ(p, payload_z),
+        };
+        real offset[2];
+        arm_attach(&arm, &payload, offset);
+    }
+    return arm;
+}
+
+EQUATION void law_unlimited(const struct rp_controller_parameters *const p[SOURCES], bool attached,
                             const struct rp_controller_inputs *const inputs[SOURCES],
                             const real w[2], real unlimited[2]) {
     const int mode = p[0]->mode;
@@ -32,10 +52,7 @@ EQUATION void law_unlimited(const struct rp_controller_parameters *const p[SOURC
     real gravity[2] = {constant(0.0), constant(0.0)};
 
     if (mode != RP_CONTROLLER_PD) {
-        const struct rp_parameters *const parameters[SOURCES] = PARTS(p, arm);
-        const real q[2] = {READ(inputs, q[0]), READ(inputs, q[1])};
-        const real dq[2] = {READ(inputs, dq[0]), READ(inputs, dq[1])};
-        const struct arm arm = arm_in_state(parameters, q, dq);
+        const struct arm arm = law_arm(p, attached, inputs);
         if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
             const real ddq[2] = {plus(READ(inputs, ddq_ref[0]), v[0]),
                                  plus(READ(inputs, ddq_ref[1]), v[1])};

@@ -2,6 +2,7 @@
 
 #include "arithmetic_double.h"
 #include "rp_controller_calculated.h"
+#include "rp_controller_events.h"
 #include "rp_controller_propagation.h"
 
 #include <stdio.h>
@@ -9,31 +10,38 @@
 
 _Static_assert(sizeof(struct rp_controller_inputs) == sizeof(double[10]),
                "the inputs are one array of doubles");
+_Static_assert(sizeof(struct rp_controller_samples) == sizeof(double[13]),
+               "what events keep is one array of doubles");
 
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
-    const struct rp_controller_parameters *p =
-        &((const struct rp_controller_values *)values_pointer)->parameters;
+    const struct rp_controller_values *values = values_pointer;
+    const struct rp_controller_parameters *p = &values->parameters;
     (void)t;
+    if (values->form == RP_CONTROLLER_SAMPLED) {
+        dx[0] = dx[1] = 0.0;
+        return STATUS_OK;
+    }
     struct rp_controller_inputs inputs;
     memcpy(&inputs, u, sizeof inputs);
 
     double unlimited[2];
-    rp_controller_unlimited(p, &inputs, x, unlimited);
+    rp_controller_unlimited(p, values->payload_attached != 0, &inputs, x, unlimited);
     rp_controller_integral_rates(p, &inputs, unlimited, dx);
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
-    const struct rp_controller_parameters *p =
-        &((const struct rp_controller_values *)values_pointer)->parameters;
+    const struct rp_controller_values *values = values_pointer;
     (void)t;
-    struct rp_controller_inputs inputs;
-    memcpy(&inputs, u, sizeof inputs);
-
-    double by_w[2][2];
-    rp_controller_integral_jacobian(p, &inputs, x, by_w);
+    double by_w[2][2] = {{0.0}};
+    if (values->form != RP_CONTROLLER_SAMPLED) {
+        struct rp_controller_inputs inputs;
+        memcpy(&inputs, u, sizeof inputs);
+        rp_controller_integral_jacobian(&values->parameters, values->payload_attached != 0, &inputs,
+                                        x, by_w);
+    }
     for (size_t i = 0; i < 2; i++) {
         J[i] = by_w[i][0];
         J[i + 2] = by_w[i][1];
@@ -58,16 +66,30 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 }
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
-    const struct rp_parameters *arm =
-        &((const struct rp_controller_values *)values_pointer)->parameters.arm;
-    if (rp_parameters_check(arm)) {
-        return STATUS_OK;
+    const struct rp_controller_parameters *p =
+        &((const struct rp_controller_values *)values_pointer)->parameters;
+    const struct rp_parameters *arm = &p->arm;
+    if (!rp_parameters_check(arm)) {
+        (void)snprintf(text, size,
+                       "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
+                       "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
+                       rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
+        return STATUS_INVALID_PARAMETERS;
     }
-    (void)snprintf(text, size,
-                   "the inertia m1 lc1^2 + I1z + I2z = %g is refused: it must be above 0 "
-                   "(m1 = %g, lc1 = %g, I1z = %g, I2z = %g)",
-                   rp_fixed_inertia(arm), arm->m1, arm->lc1, arm->I1z, arm->I2z);
-    return STATUS_INVALID_PARAMETERS;
+    if (p->sample_time > 0.0 && p->sample_time < rp_controller_shortest_sample_time) {
+        (void)snprintf(text, size,
+                       "sample_time = %g s is refused: it must be 0, for a continuous law, or at "
+                       "least %g s",
+                       p->sample_time, rp_controller_shortest_sample_time);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    if (p->delay > p->sample_time) {
+        (void)snprintf(text, size,
+                       "delay = %g s is refused: it must not be above sample_time = %g s", p->delay,
+                       p->sample_time);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    return STATUS_OK;
 }
 
 const struct model rp_controller_model = {
@@ -82,4 +104,5 @@ const struct model rp_controller_model = {
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,
+    .events = &rp_controller_events,
 };

@@ -4,7 +4,7 @@
 #ifndef RP_PLANT_EQUATIONS_H
 #define RP_PLANT_EQUATIONS_H
 
-#include "rp_equations.h"
+#include "rp_payload.h"
 #include "rp_plant.h"
 
 /* The plant in a state, with what many equations share. */
@@ -18,33 +18,18 @@ struct plant {
 
 /* ---- Bodies --------------------------------------------------------------------------------- */
 
-/* Link 2 and the payload are one rigid body. With M = m2 + mp its center of mass is at
- * mp (cx, cz) / M in frame 2, and its inertia about that follows from the parallel axes:
- *
- *   m2 -> M,  a -> a + mp cx / M,  l1 -> l1 + mp cz / M,
- *   I2z -> I2z + Ip + (m2 mp / M) (cx^2 + cz^2)
- *
- * in dynamics and energies. */
 EQUATION void plant_attach(struct plant *plant,
                            const struct rp_plant_parameters *const p[SOURCES]) {
-    struct arm *arm = &plant->arm;
-    const real cx = READ(p, payload_x);
-    const real cz = READ(p, payload_z);
-    const real mass = plus(arm->m2, READ(p, payload_mass));
-    const real share = over(READ(p, payload_mass), mass);
-    const real distance2 = plus(times(cx, cx), times(cz, cz));
-    plant->offset_x = times(share, cx);
-    plant->offset_z = times(share, cz);
-
-    const real parallel = times(times(arm->m2, share), distance2);
-    arm->I2z = plus(plus(arm->I2z, READ(p, payload_inertia)), parallel);
-    arm->m2 = mass;
-    arm->a = plus(arm->a, plant->offset_x);
-    arm->l1 = plus(arm->l1, plant->offset_z);
-    arm->L = plus(arm->l1, arm->q[1]);
-    const real link1 = times(times(arm->m1, arm->lc1), arm->lc1);
-    const real fixed = plus(plus(link1, arm->I1z), arm->I2z);
-    arm->J = plus(fixed, times(times(arm->m2, arm->L), arm->L));
+    const struct payload payload = {
+        .mass = READ(p, payload_mass),
+        .inertia = READ(p, payload_inertia),
+        .x = READ(p, payload_x),
+        .z = READ(p, payload_z),
+    };
+    real offset[2];
+    arm_attach(&plant->arm, &payload, offset);
+    plant->offset_x = offset[0];
+    plant->offset_z = offset[1];
 }
 
 /* The armature of joint 1 turns as I1z does, so that J takes it up; that of joint 2 is the only one

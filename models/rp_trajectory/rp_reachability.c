@@ -1,7 +1,5 @@
 #include "rp_trajectory.h"
 
-#include <stdbool.h>
-
 static const double two_pi = 6.28318530717958647693;
 
 static double length(const double v[2]) {
@@ -86,6 +84,9 @@ enum rp_trajectory_fault rp_trajectory_check(const struct rp_trajectory_paramete
         if (!(p->turns / fabs(p->frequency) >= p->ramp_time)) {
             return RP_TRAJECTORY_SHORT_TURNS;
         }
+    }
+    if (!(p->release_time >= p->grasp_time)) {
+        return RP_TRAJECTORY_EARLY_RELEASE;
     }
     double nearest[2];
     return rp_trajectory_distance(p, nearest) > fabs(p->a) ? RP_TRAJECTORY_VALID

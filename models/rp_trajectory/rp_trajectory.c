@@ -250,3 +250,7 @@ void rp_trajectory_evaluate(const struct rp_trajectory_curve *curve,
         break;
     }
 }
+
+bool rp_trajectory_is_attached(const struct rp_trajectory_parameters *p, double t) {
+    return p->grasp_time <= t && t < p->release_time;
+}

@@ -6,6 +6,8 @@
 
 #include "motion.h"
 
+#include <stdbool.h>
+
 enum rp_trajectory_motion {
     RP_TRAJECTORY_POINT_TO_POINT = 1,
     RP_TRAJECTORY_LINE,
@@ -36,6 +38,9 @@ struct rp_trajectory_parameters {
     double frequency;   /* Hz, not 0; its sign is the direction */
     double turns;       /* >= ramp_time |frequency| */
     double ramp_time;   /* s, > 0 */
+
+    double grasp_time;   /* s */
+    double release_time; /* s, >= grasp_time */
 };
 
 /* A point of a curve in the space of parameters and time, with the first and second derivatives of
@@ -60,12 +65,16 @@ void rp_trajectory_evaluate(const struct rp_trajectory_curve *curve,
 enum rp_trajectory_fault {
     RP_TRAJECTORY_VALID,
     RP_TRAJECTORY_NO_FREQUENCY,
-    RP_TRAJECTORY_SHORT_TURNS,  /* turns / |frequency| < ramp_time */
-    RP_TRAJECTORY_OUT_OF_REACH, /* the path comes as near as |a| to the axis of joint 1 */
+    RP_TRAJECTORY_SHORT_TURNS,   /* turns / |frequency| < ramp_time */
+    RP_TRAJECTORY_OUT_OF_REACH,  /* the path comes as near as |a| to the axis of joint 1 */
+    RP_TRAJECTORY_EARLY_RELEASE, /* release_time < grasp_time */
 };
 
 /* Whether the parameters are consistent. Each must be within its range. */
 enum rp_trajectory_fault rp_trajectory_check(const struct rp_trajectory_parameters *p);
+
+/* Whether the payload is attached at the time t (s): grasp_time <= t < release_time. */
+bool rp_trajectory_is_attached(const struct rp_trajectory_parameters *p, double t);
 
 /* Smallest distance (m) of the line or the swept arc from the axis of joint 1; the nearest point
  * goes to nearest. INFINITY for point_to_point, every point of which can be reached. */

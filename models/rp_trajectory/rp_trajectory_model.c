@@ -1,5 +1,6 @@
 #include "rp_trajectory_model.h"
 
+#include <math.h>
 #include <stdio.h>
 
 static const struct rp_trajectory_parameters at_rest;
@@ -27,6 +28,9 @@ static enum status outputs(void *values_pointer, double t) {
         v->ee_position[i] = point.ee[i].position.value;
         v->ee_velocity[i] = point.ee[i].velocity.value;
     }
+    v->payload_attached = v->payload == RP_TRAJECTORY_UNDECIDED
+                              ? rp_trajectory_is_attached(&v->parameters, t)
+                              : v->payload == RP_TRAJECTORY_ATTACHED;
     return STATUS_OK;
 }
 
@@ -73,6 +77,11 @@ static enum status check_parameters(const void *values_pointer, char *text, size
             "(turns = %g, frequency = %g Hz)",
             p->turns / fabs(p->frequency), p->ramp_time, p->turns, p->frequency);
         break;
+    case RP_TRAJECTORY_EARLY_RELEASE:
+        (void)snprintf(text, size,
+                       "release_time = %g s is refused: it must not be before grasp_time = %g s",
+                       p->release_time, p->grasp_time);
+        break;
     case RP_TRAJECTORY_OUT_OF_REACH:
         distance = rp_trajectory_distance(p, nearest);
         (void)snprintf(
@@ -85,6 +94,55 @@ static enum status check_parameters(const void *values_pointer, char *text, size
     return STATUS_INVALID_PARAMETERS;
 }
 
+/* ---- Events --------------------------------------------------------------------------------- */
+
+static int payload_at(const struct rp_trajectory_parameters *p, double t) {
+    if (rp_trajectory_is_attached(p, t)) {
+        return RP_TRAJECTORY_ATTACHED;
+    }
+    return t < p->grasp_time && p->grasp_time < p->release_time ? RP_TRAJECTORY_TO_GRASP
+                                                                : RP_TRAJECTORY_RELEASED;
+}
+
+static double next_time(const void *values_pointer) {
+    const struct rp_trajectory_values *values = values_pointer;
+    switch (values->payload) {
+    case RP_TRAJECTORY_TO_GRASP:
+        return values->parameters.grasp_time;
+    case RP_TRAJECTORY_ATTACHED:
+        return values->parameters.release_time;
+    default:
+        return INFINITY;
+    }
+}
+
+static enum status update(void *values_pointer, const struct event *event) {
+    struct rp_trajectory_values *values = values_pointer;
+    if (values->payload == RP_TRAJECTORY_UNDECIDED) {
+        values->payload = payload_at(&values->parameters, event->t);
+    } else if (event->is_timed) {
+        values->payload = values->payload == RP_TRAJECTORY_TO_GRASP ? RP_TRAJECTORY_ATTACHED
+                                                                    : RP_TRAJECTORY_RELEASED;
+    }
+    return STATUS_OK;
+}
+
+static bool modes_are_possible(const void *values_pointer, bool is_held) {
+    const struct rp_trajectory_values *values = values_pointer;
+    (void)is_held; // the parameters are fixed
+    const bool is_grasped = values->parameters.grasp_time < values->parameters.release_time;
+    return values->payload == RP_TRAJECTORY_RELEASED ||
+           (is_grasped && (values->payload == RP_TRAJECTORY_TO_GRASP ||
+                           values->payload == RP_TRAJECTORY_ATTACHED));
+}
+
+static const struct model_events events = {
+    .modes = {offsetof(struct rp_trajectory_values, payload), sizeof(int)},
+    .modes_are_possible = modes_are_possible,
+    .next_time = next_time,
+    .update = update,
+};
+
 const struct model rp_trajectory_model = {
     .values_size = sizeof(struct rp_trajectory_values),
     .parameters = {offsetof(struct rp_trajectory_values, parameters),
@@ -93,4 +151,5 @@ const struct model rp_trajectory_model = {
     .outputs = outputs,
     .propagate = propagate,
     .check_parameters = check_parameters,
+    .events = &events,
 };

@@ -4,135 +4,53 @@ Values must agree within 1e-12 and derivatives within 1e-10 of the exact ones, r
 of the absolute values of the terms that they are made of.
 """
 
-import functools
-import itertools
 import random
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
-import sympy as sp
 from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
 
 from cosim import reference
 from cosim.comparison import Runs
 from cosim.fmu_file import Fmu
+from tests.rp_controller.controller_symbolic import (
+    ARM,
+    CASES,
+    EFFORTS,
+    ERRORS,
+    FREE,
+    INPUTS,
+    KNOWNS,
+    LIMITS,
+    MODES,
+    PARAMETERS,
+    RATES,
+    STATES,
+    UNKNOWNS,
+    Case,
+    Values,
+    along_time,
+    assert_close,
+    generic_point,
+    jacobian,
+    law,
+    numbers,
+    terms_of_values,
+)
 from tests.support.cosim_project import declared, load, names_of
 from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
-from tests.support.rp_symbolic import PARAMETERS as ARM
-from tests.support.rp_symbolic import TERMS, Model
 
 FOLDER = ROOT / "models" / "rp_controller"
 SCENARIOS = names_of(FOLDER.name)
-
-MODES = {"pd": 1, "pd_gravity": 2, "computed_torque": 3}
-LAW = ("Kp1", "Kp2", "Kd1", "Kd2", "Ki1", "Ki2", "inertia1", "inertia2", "tracking_time")
-LIMITS = ("tau1_max", "f2_max")
-PARAMETERS = (*ARM, *LAW, *LIMITS)
-REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
-INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
-STATES = ("integral1", "integral2")
-KNOWNS = (*PARAMETERS, *INPUTS, *STATES)
-EFFORTS = ("tau1", "f2")
-ERRORS = ("q1_error", "q2_error", "dq1_error", "dq2_error")
-RATES = ("dintegral1", "dintegral2")
-UNLIMITED = ("tau1_unlimited", "f2_unlimited")
-UNKNOWNS = (*EFFORTS, *ERRORS, *RATES, *UNLIMITED)
-INPUT_RATES = tuple(tuple(f"{name}_{order}" for name in INPUTS) for order in ("rate", "bend"))
-FREE = (0, 0)
-SIDES = ((0, 0), (1, 0), (0, -1), (-1, 1))  # per joint: free, at the upper or lower limit
-CASES = list(itertools.product(MODES, SIDES))
-
-Values = dict[str, float]
-
-# ---- The laws in sympy ---------------------------------------------------------------------------
-
-
-@functools.cache
-def terms_of_the_arm() -> dict[str, sp.Expr]:
-    expressions = Model().expressions
-    return {name: expressions[name] for name in TERMS}
-
-
-@functools.cache
-def law(mode: str, sides: tuple[int, int]) -> dict[str, sp.Expr]:
-    """Every unknown, with each joint free or at the limit on the side that is given."""
-    s = {name: sp.Symbol(name) for name in KNOWNS}
-    arm = terms_of_the_arm()
-    e = [s[f"q{i}_ref"] - s[f"q{i}"] for i in (1, 2)]
-    de = [s[f"dq{i}_ref"] - s[f"dq{i}"] for i in (1, 2)]
-    v = [s[f"Kp{i}"] * e[i - 1] + s[f"Kd{i}"] * de[i - 1] + s[f"integral{i}"] for i in (1, 2)]
-    inertia = [s["inertia1"], s["inertia2"]]
-    gravity = sp.Matrix([arm["gravity1"], arm["gravity2"]])
-    if mode == "computed_torque":
-        mass = sp.Matrix([[arm["D11"], arm["D12"]], [arm["D12"], arm["D22"]]])
-        asked = sp.Matrix([s["ddq1_ref"] + v[0], s["ddq2_ref"] + v[1]])
-        unlimited = mass * asked + sp.Matrix([arm["coriolis1"], arm["coriolis2"]]) + gravity
-    else:
-        unlimited = sp.Matrix([inertia[0] * v[0], inertia[1] * v[1]])
-        if mode == "pd_gravity":
-            unlimited += gravity
-    limit = [s[name] for name in LIMITS]
-    effort = [sides[i] * limit[i] if sides[i] else unlimited[i] for i in (0, 1)]
-    rates = [
-        s[f"Ki{i + 1}"] * e[i] + (effort[i] - unlimited[i]) / (inertia[i] * s["tracking_time"])
-        for i in (0, 1)
-    ]
-    return dict(zip(UNKNOWNS, (*effort, *e, *de, *rates, *unlimited), strict=True))
-
-
-def compiled(names: tuple[str, ...], rows: list[list[sp.Expr]]) -> Callable[..., list]:
-    return sp.lambdify(sp.symbols(names), rows, "mpmath", cse=True)
-
-
-@functools.cache
-def terms_of_values(mode: str, sides: tuple[int, int]) -> Callable[..., list]:
-    return compiled(
-        KNOWNS, [list(sp.expand(x).as_ordered_terms()) for x in law(mode, sides).values()]
-    )
-
-
-@functools.cache
-def jacobian(mode: str, sides: tuple[int, int]) -> Callable[..., list]:
-    expressions = law(mode, sides).values()
-    return compiled(KNOWNS, [[x.diff(sp.Symbol(k)) for k in KNOWNS] for x in expressions])
-
-
-@functools.cache
-def along_time(mode: str, sides: tuple[int, int]) -> Callable[..., list]:
-    """Terms of the derivatives of orders 1 and 2 of each output, one per moving variable."""
-    expressions = law(mode, sides)
-    rates = {
-        **dict(zip(STATES, (expressions[name] for name in RATES), strict=True)),
-        **dict(zip(INPUTS, sp.symbols(INPUT_RATES[0]), strict=True)),
-        **dict(zip(INPUT_RATES[0], sp.symbols(INPUT_RATES[1]), strict=True)),
-    }
-    rows = []
-    for name in (*EFFORTS, *ERRORS):
-        once = [expressions[name].diff(sp.Symbol(x)) * rate for x, rate in rates.items()]
-        total = sp.Add(*once)
-        rows += [once, [total.diff(sp.Symbol(x)) * rate for x, rate in rates.items()]]
-    return compiled((*KNOWNS, *INPUT_RATES[0], *INPUT_RATES[1]), rows)
-
-
-def numbers(values: Values, names: tuple[str, ...]) -> list[mpmath.mpf]:
-    return [mpmath.mpf(values[name]) for name in names]
-
-
-def assert_close(actual: float, terms: list, bound: float, what: object) -> None:
-    exact = mpmath.fsum(terms)
-    scale = mpmath.fsum(abs(term) for term in terms)
-    assert abs(mpmath.mpf(actual) - exact) <= bound * scale, (what, actual, exact, scale)
-
-
-# ---- Instances at random points ------------------------------------------------------------------
+SAMPLED = ("sample_time", "delay", "payload_attached")
 
 
 @pytest.fixture(scope="module")
@@ -145,49 +63,13 @@ def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
     return LoadedFmu(path, tmp_path_factory.mktemp("controller"))
 
 
-def random_point(source: random.Random) -> Values:
-    """Parameters, inputs and states, none of them zero; the limits are still to be chosen."""
-
-    def either(low: float, high: float) -> float:
-        return source.choice((-1, 1)) * source.uniform(low, high)
-
-    return dict(
-        m1=10 ** source.uniform(-1.0, 1.5),
-        m2=10 ** source.uniform(-2.0, 1.5),
-        I1z=10 ** source.uniform(-3.0, 1.0),
-        I2z=10 ** source.uniform(-3.0, 1.0),
-        l1=source.uniform(0.1, 2.0),
-        lc1=source.uniform(0.05, 1.5),
-        a=either(0.05, 1.5),
-        g=source.uniform(1.0, 25.0),
-        **{name: 10 ** source.uniform(0.0, 3.0) for name in LAW[:6]},
-        **{name: 10 ** source.uniform(-1.0, 1.0) for name in LAW[6:8]},
-        tracking_time=10 ** source.uniform(-2.0, 1.0),
-        **dict.fromkeys(LIMITS, 1.0),
-        **{name: either(0.1, 3.0) for name in (*INPUTS, *STATES)},
-    )
-
-
-def generic_point(mode: str, sides: tuple[int, int], seed: int) -> Values:
-    """Draw a point at which each joint is free or at a limit as `sides` says."""
-    source = random.Random(f"{mode} {sides} {seed}")
-    while True:
-        point = random_point(source)
-        rows = terms_of_values(mode, FREE)(*numbers(point, KNOWNS))
-        asked = [float(mpmath.fsum(rows[UNKNOWNS.index(name)])) for name in UNLIMITED]
-        if all(side * u >= 0.0 for side, u in zip(sides, asked, strict=True)):
-            break
-    for name, side, u in zip(LIMITS, sides, asked, strict=True):
-        point[name] = abs(u) * (source.uniform(0.2, 0.9) if side else source.uniform(1.5, 5.0))
-    return point
-
-
 @contextmanager
-def in_initialization_mode(loaded: LoadedFmu, mode: str, point: Values) -> Iterator[Instance]:
+def in_initialization_mode(loaded: LoadedFmu, case: Case, point: Values) -> Iterator[Instance]:
     with Instance(loaded) as instance:
         instance.fmi.setupExperiment()
         instance.set(**point)
-        instance.fmi.setInteger([loaded.references["mode"]], [MODES[mode]])
+        instance.fmi.setInteger([loaded.references["mode"]], [MODES[case.mode]])
+        instance.fmi.setBoolean([loaded.references["payload_attached"]], [case.is_attached])
         instance.fmi.enterInitializationMode()
         yield instance
 
@@ -195,22 +77,22 @@ def in_initialization_mode(loaded: LoadedFmu, mode: str, point: Values) -> Itera
 # ---- Values and derivatives ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("mode", "sides"), CASES)
-def test_values_are_those_of_the_law(loaded: LoadedFmu, mode: str, sides: tuple[int, int]) -> None:
+@pytest.mark.parametrize("case", CASES)
+def test_values_are_those_of_the_law(loaded: LoadedFmu, case: Case) -> None:
     for seed in range(5):
-        point = generic_point(mode, sides, seed)
-        with in_initialization_mode(loaded, mode, point) as instance:
-            rows = terms_of_values(mode, sides)(*numbers(point, KNOWNS))
+        point = generic_point(case, seed)
+        with in_initialization_mode(loaded, case, point) as instance:
+            rows = terms_of_values(case)(*numbers(point, KNOWNS))
             for name, actual, row in zip(UNKNOWNS, instance.get(*UNKNOWNS), rows, strict=True):
                 assert_close(actual, row, 1e-12, (name, seed))
 
 
-@pytest.mark.parametrize(("mode", "sides"), CASES)
-def test_directional_derivatives(loaded: LoadedFmu, mode: str, sides: tuple[int, int]) -> None:
+@pytest.mark.parametrize("case", CASES)
+def test_directional_derivatives(loaded: LoadedFmu, case: Case) -> None:
     for seed in range(3):
-        point = generic_point(mode, sides, seed)
-        rows = jacobian(mode, sides)(*numbers(point, KNOWNS))
-        with in_initialization_mode(loaded, mode, point) as instance:
+        point = generic_point(case, seed)
+        rows = jacobian(case)(*numbers(point, KNOWNS))
+        with in_initialization_mode(loaded, case, point) as instance:
             unknowns = [loaded.references[name] for name in UNKNOWNS]
             for k, known in enumerate(KNOWNS):
                 column = instance.fmi.getDirectionalDerivative(
@@ -222,17 +104,17 @@ def test_directional_derivatives(loaded: LoadedFmu, mode: str, sides: tuple[int,
                     assert abs(actual - row[k]) <= bound, (name, known, actual, row[k])
 
 
-@pytest.mark.parametrize(("mode", "sides"), CASES)
-def test_output_derivatives(loaded: LoadedFmu, mode: str, sides: tuple[int, int]) -> None:
+@pytest.mark.parametrize("case", CASES)
+def test_output_derivatives(loaded: LoadedFmu, case: Case) -> None:
     outputs = (*EFFORTS, *ERRORS)
     references = [loaded.references[name] for name in outputs]
     for seed in range(3):
-        point = generic_point(mode, sides, seed)
+        point = generic_point(case, seed)
         source = random.Random(seed)
         rates = {name: (source.uniform(-3, 3), source.uniform(-9, 9)) for name in INPUTS}
         moving = [mpmath.mpf(rates[name][order]) for order in (0, 1) for name in INPUTS]
-        rows = iter(along_time(mode, sides)(*numbers(point, KNOWNS), *moving))
-        with in_initialization_mode(loaded, mode, point) as instance:
+        rows = iter(along_time(case)(*numbers(point, KNOWNS), *moving))
+        with in_initialization_mode(loaded, case, point) as instance:
             instance.fmi.exitInitializationMode()
             instance.set_input_derivatives(**rates)
             for name, reference in zip(outputs, references, strict=True):
@@ -243,14 +125,18 @@ def test_output_derivatives(loaded: LoadedFmu, mode: str, sides: tuple[int, int]
 
 def test_dependencies_are_those_of_the_laws(loaded: LoadedFmu) -> None:
     depends: dict[str, set[str]] = {name: set() for name in UNKNOWNS}
-    for mode, sides in CASES:
-        rows = jacobian(mode, sides)(*numbers(generic_point(mode, sides, 0), KNOWNS))
+    for case in CASES:
+        rows = jacobian(case)(*numbers(generic_point(case, 0), KNOWNS))
         for name, row in zip(UNKNOWNS, rows, strict=True):
             depends[name] |= {k for k, entry in zip(KNOWNS, row, strict=True) if entry != 0}
-    # of the mode depends what differs between two modes
+    # of mode and payload_attached depends what differs between two cases
     for name in UNKNOWNS:
-        if len({law(mode, FREE)[name] for mode in MODES}) > 1 or name in RATES:
+        if len({law(Case(mode))[name] for mode in MODES}) > 1 or name in RATES:
             depends[name].add("mode")
+        if any(law(Case(m))[name] != law(Case(m, FREE, True))[name] for m in MODES) or (
+            name in RATES
+        ):
+            depends[name].add("payload_attached")
 
     structure = loaded.description
     listed = {u.variable.name: u for u in (*structure.outputs, *structure.derivatives)}
@@ -335,12 +221,12 @@ def test_the_taylor_method_is_refused_where_the_fmu_integrates(loaded: LoadedFmu
 
 
 def test_mode_changes_between_steps(loaded: LoadedFmu) -> None:
-    point = generic_point("pd", FREE, 1) | dict.fromkeys(LIMITS, 1e9) | {"Ki1": 0.0, "Ki2": 0.0}
-    with in_initialization_mode(loaded, "pd", point) as instance:
+    point = generic_point(Case("pd"), 1) | dict.fromkeys(LIMITS, 1e9) | {"Ki1": 0.0, "Ki2": 0.0}
+    with in_initialization_mode(loaded, Case("pd"), point) as instance:
         instance.fmi.exitInitializationMode()
         for i, (mode, number) in enumerate(MODES.items()):
             instance.fmi.setInteger([loaded.references["mode"]], [number])
-            rows = terms_of_values(mode, FREE)(*numbers(point, KNOWNS))
+            rows = terms_of_values(Case(mode))(*numbers(point, KNOWNS))
             for name, actual in zip(EFFORTS, instance.get(*EFFORTS), strict=True):
                 assert_close(actual, rows[UNKNOWNS.index(name)], 1e-12, (mode, name))
             instance.step(0.1 * i, 0.1)
@@ -423,5 +309,5 @@ def test_scenarios_meet_their_references(path: Path, name: str) -> None:
 
 def test_page_tells_every_variable() -> None:
     page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    for name in (*PARAMETERS, *INPUTS, *STATES, *UNKNOWNS, "mode", *MODES):
+    for name in (*PARAMETERS, *INPUTS, *STATES, *UNKNOWNS, "mode", *MODES, *SAMPLED):
         assert f"`{name}`" in page, name

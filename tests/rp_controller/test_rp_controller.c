@@ -70,7 +70,7 @@ static void test_computed_torque_makes_the_error_dynamics_linear(void) {
                        v.parameters.Kp[i] * (in->q_ref[i] - in->q[i]) + v.integral[i];
             state.ddq[i] = asked[i];
         }
-        rp_controller_unlimited(&v.parameters, in, v.integral, efforts);
+        rp_controller_unlimited(&v.parameters, false, in, v.integral, efforts);
         rp_forward_dynamics(&v.parameters.arm, in->q, in->dq, efforts, ddq);
 
         double force[2];
@@ -97,7 +97,7 @@ static void test_gravity_compensation_holds_the_arm(void) {
         double efforts[2];
         double gravity[2];
         double ddq[2];
-        rp_controller_unlimited(&v.parameters, &v.inputs, v.integral, efforts);
+        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, efforts);
         rp_gravity_forces(&v.parameters.arm, v.inputs.q, gravity);
         TEST_ASSERT_TRUE(efforts[0] == gravity[0] && efforts[1] == gravity[1]);
 
@@ -124,9 +124,9 @@ static void test_pd_is_computed_torque_of_two_free_masses(void) {
         double pd[2];
         double computed[2];
         v.parameters.mode = RP_CONTROLLER_PD;
-        rp_controller_unlimited(&v.parameters, &v.inputs, v.integral, pd);
+        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, pd);
         v.parameters.mode = RP_CONTROLLER_COMPUTED_TORQUE;
-        rp_controller_unlimited(&v.parameters, &v.inputs, v.integral, computed);
+        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, computed);
         for (int i = 0; i < 2; i++) {
             ASSERT_CLOSE(computed[i], pd[i], 4 * DBL_EPSILON * fabs(computed[i]));
         }

@@ -8,11 +8,12 @@
 #include <string.h>
 #include <unity.h>
 
-/* All that a curve moves, from arm to limit and from the inputs to the integral part, then the
- * calculated fields. */
+/* All that a curve moves, from arm to payload_z and from the inputs to the integral part, then what
+ * is not continuous, then the calculated fields. */
 enum {
-    MOVED_PARAMETERS = offsetof(struct rp_controller_parameters, mode) / sizeof(double),
+    MOVED_PARAMETERS = offsetof(struct rp_controller_parameters, sample_time) / sizeof(double),
     INPUTS = offsetof(struct rp_controller_values, inputs) / sizeof(double),
+    MOVED_END = offsetof(struct rp_controller_values, payload_attached) / sizeof(double),
     CALCULATED = offsetof(struct rp_controller_values, dintegral) / sizeof(double),
     DOUBLES = sizeof(struct rp_controller_values) / sizeof(double),
 };
@@ -35,7 +36,7 @@ static void next_point(int mode, bool is_limited) {
     memset(&at, 0, sizeof at);
     memset(&first, 0, sizeof first);
     memset(&second, 0, sizeof second);
-    for (int i = 0; i < CALCULATED; i++) {
+    for (int i = 0; i < MOVED_END; i++) {
         if (i >= MOVED_PARAMETERS && i < INPUTS) {
             continue;
         }
@@ -43,6 +44,7 @@ static void next_point(int mode, bool is_limited) {
         first.all[i] = rp_test_uniform(&random_source, -0.5, 0.5);
         second.all[i] = rp_test_uniform(&random_source, -0.5, 0.5);
     }
+    at.v.payload_attached = (int)(rp_test_random_bits(&random_source) % 2);
     struct rp_controller_parameters *p = &at.v.parameters;
     p->mode = mode;
     p->Ki[0] = first.v.parameters.Ki[0] = second.v.parameters.Ki[0] = 0.0;
@@ -57,7 +59,7 @@ static void next_point(int mode, bool is_limited) {
 
 static void calculate(double t, union point *moved) {
     *moved = at;
-    for (int i = 0; i < CALCULATED; i++) {
+    for (int i = 0; i < MOVED_END; i++) {
         if (i < MOVED_PARAMETERS || i >= INPUTS) {
             moved->all[i] += t * first.all[i] + 0.5 * t * t * second.all[i];
         }
@@ -115,7 +117,7 @@ static void next_law(int mode, bool has_both, const int side[2]) {
     struct rp_controller_parameters *p = &at.v.parameters;
     p->Ki[0] = has_both ? 1.5 : 0.0;
     double unlimited[2];
-    rp_controller_unlimited(p, &at.v.inputs, at.v.integral, unlimited);
+    rp_controller_unlimited(p, at.v.payload_attached, &at.v.inputs, at.v.integral, unlimited);
     for (int i = 0; i < 2; i++) {
         static const double factors[SIDES] = {[BELOW] = 2.0, [AT] = 1.0, [BEYOND] = 0.5};
         p->limit[i] = factors[side[i]] * fabs(unlimited[i]);
@@ -127,6 +129,8 @@ static void jacobian(double J[2][2]) {
     struct rp_controller_values parameters;
     memset(&parameters, 0xff, sizeof parameters); // NaN
     parameters.parameters = at.v.parameters;
+    parameters.payload_attached = at.v.payload_attached;
+    parameters.form = RP_CONTROLLER_CONTINUOUS;
     memset(J, 0xff, sizeof(double[2][2]));
     TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.jacobian(&parameters, 3.0, at.v.integral,
                                                                   at.v.inputs.q_ref, J[0]));
@@ -137,6 +141,26 @@ static double rate_at(const double w[2], int i) {
     TEST_ASSERT_EQUAL_INT(
         STATUS_OK, rp_controller_model.right_hand_side(&at.v, 3.0, w, at.v.inputs.q_ref, dx));
     return dx[i];
+}
+
+/* The arm whose link 2 is link 2 with the payload: inertias by the parallel axes of both. */
+static struct rp_parameters assumed_arm(void) {
+    const struct rp_controller_parameters *p = &at.v.parameters;
+    struct rp_parameters arm = p->arm;
+    if (at.v.payload_attached) {
+        const double center[2] = {p->payload_mass * p->payload_x / (arm.m2 + p->payload_mass),
+                                  p->payload_mass * p->payload_z / (arm.m2 + p->payload_mass)};
+        const double from_payload[2] = {p->payload_x - center[0], p->payload_z - center[1]};
+        arm.I2z += p->payload_inertia;
+        for (int i = 0; i < 2; i++) {
+            arm.I2z += arm.m2 * center[i] * center[i] +
+                       p->payload_mass * from_payload[i] * from_payload[i];
+        }
+        arm.m2 += p->payload_mass;
+        arm.a += center[0];
+        arm.l1 += center[1];
+    }
+    return arm;
 }
 
 /* w' = Ki e - (u - limit) / (M Tt) beyond the limit, Ki e below it, 0 without Ki; u changes with w
@@ -153,16 +177,17 @@ static void test_jacobian_is_that_of_the_integral_rates(void) {
         const struct rp_controller_parameters *p = &at.v.parameters;
         double efforts[2];
         double D[2][2] = {{p->inertia[0], 0.0}, {0.0, p->inertia[1]}};
-        rp_controller_unlimited(p, &at.v.inputs, at.v.integral, efforts);
+        rp_controller_unlimited(p, at.v.payload_attached, &at.v.inputs, at.v.integral, efforts);
         if (mode == RP_CONTROLLER_COMPUTED_TORQUE) {
-            rp_mass_matrix(&p->arm, at.v.inputs.q, D);
+            const struct rp_parameters arm = assumed_arm();
+            rp_mass_matrix(&arm, at.v.inputs.q, D);
         }
         for (int i = 0; i < 2; i++) {
             const bool follows = p->Ki[i] > 0.0 && side[i] != BELOW;
             for (int j = 0; j < 2; j++) {
                 const double expected =
                     follows ? -D[i][j] / (p->inertia[i] * p->tracking_time) : 0.0;
-                ASSERT_CLOSE(expected, J[j][i], 4 * DBL_EPSILON * fabs(expected));
+                ASSERT_CLOSE(expected, J[j][i], 16 * DBL_EPSILON * fabs(expected));
 
                 // to the side on which the effort grows
                 double w[2] = {at.v.integral[0], at.v.integral[1]};
@@ -192,6 +217,27 @@ static void test_jacobian_is_what_propagation_gives(void) {
 }
 
 /* ---- What is refused ------------------------------------------------------------------------ */
+
+static void assert_refused(const char *expected) {
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
+                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
+    TEST_ASSERT_EQUAL_STRING(expected, text);
+}
+
+static void test_times_that_do_not_fit_are_refused(void) {
+    next_point(RP_CONTROLLER_PD, false);
+    struct rp_controller_parameters *p = &at.v.parameters;
+    p->delay = 0.0625;
+    assert_refused("delay = 0.0625 s is refused: it must not be above sample_time = 0 s");
+    p->sample_time = 0.03125;
+    assert_refused("delay = 0.0625 s is refused: it must not be above sample_time = 0.03125 s");
+    p->sample_time = 0.999e-6;
+    assert_refused("sample_time = 9.99e-07 s is refused: it must be 0, for a continuous law, or at "
+                   "least 1e-06 s");
+    p->sample_time = p->delay = 1e-6;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK,
+                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
+}
 
 static void test_an_arm_without_inertia_is_refused(void) {
     next_point(RP_CONTROLLER_PD, false);

@@ -216,7 +216,7 @@ static void test_derivatives_are_those_of_the_model(void) {
         read_curve(0, &values);
         read_curve(1, &first);
         read_curve(2, &second);
-        rp_controller_unlimited(&p, &values.inputs, values.integral, unlimited);
+        rp_controller_unlimited(&p, false, &values.inputs, values.integral, unlimited);
         rp_controller_propagate(&values, &first, &second);
         for (int i = 0; i < 2; i++) {
             const double bound = 8.0 * DBL_EPSILON * scale[i];

@@ -23,6 +23,8 @@ static const struct rp_trajectory_parameters rp_trajectory_example = {
     .frequency = 0.5,
     .turns = 2.0,
     .ramp_time = 1.0,
+    .grasp_time = 0.75,
+    .release_time = 1.5,
 };
 
 #endif

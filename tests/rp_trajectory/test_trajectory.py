@@ -26,7 +26,7 @@ MODEL = ROOT / "models" / "rp_trajectory"
 SCRIPT = MODEL / "references" / "make_references.py"
 DECLARED = declared(MODEL.name).variables
 START = {name: v.start for name, v in DECLARED.items() if v.causality == "parameter"}
-OUTPUTS = [name for name, v in DECLARED.items() if v.causality == "output"]
+OUTPUTS = [n for n, v in DECLARED.items() if v.causality == "output" and v.type == "Real"]
 SCENARIOS = names_of(MODEL.name)
 ENUMERATIONS = {name: list(v.items) for name, v in DECLARED.items() if v.type == "Enumeration"}
 
@@ -253,6 +253,10 @@ REFUSED = {
         {"motion": "line", "ee_x_from": 0.5, "ee_y_from": 0.125, "ee_x_to": -0.5}
         | {"ee_y_to": 0.125, "a": 0.125},
         "there it is 0.125 m",
+    ),
+    "release before grasp": (
+        {"grasp_time": 2.0, "release_time": 1.5},
+        "release_time = 1.5 s is refused: it must not be before grasp_time = 2 s",
     ),
     "at_the_axis": (
         {"motion": "line", "ee_x_from": 0.0, "ee_y_from": 0.0, "a": 0.0},

@@ -3,7 +3,8 @@
 sympy derives the arm's equations of motion from the positions of both centers of mass; the laws are
 those of the page. Between two communication points the inputs rest, and the integral parts obey
 linear equations that change where an effort meets a limit: their Taylor series, with 40 digits, is
-evaluated at the end of each piece, and the limit is located by bisection.
+evaluated at the end of each piece, and the limit is located by bisection. The sampled form is the
+same laws at the samples, with Euler's method from one to the next.
 """
 
 import sys
@@ -23,8 +24,10 @@ from models import reference_files
 
 MODEL = "RPController"
 ARM = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
+PAYLOAD = ("payload_mass", "payload_inertia", "payload_x", "payload_z")
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
+ATTACHED = "payload_attached"
 OUTPUTS = ("tau1", "f2", "q1_error", "q2_error", "dq1_error", "dq2_error")
 PD, PD_GRAVITY, COMPUTED_TORQUE = 1, 2, 3
 
@@ -37,17 +40,22 @@ mp.dps = 40
 
 
 def equations_of_the_arm() -> Callable[..., tuple]:
-    """Function of parameters, q and dq that gives D, C(q, dq) dq and g(q), by Euler-Lagrange."""
+    """Function of parameters, q and dq that gives D, C(q, dq) dq and g(q), by Euler-Lagrange.
+
+    The payload is a third body; it is attached where its mass and inertia are above 0.
+    """
     m1, m2, I1z, I2z, l1, lc1, a, g = sp.symbols(ARM)
+    mass3, Ip, cx, cz = sp.symbols(PAYLOAD)
     q = sp.Matrix(sp.symbols("q1 q2"))
     dq = sp.Matrix(sp.symbols("dq1 dq2"))
     along = sp.Matrix([sp.cos(q[0]), sp.sin(q[0])])  # long side of link 1
     across = sp.Matrix([-sp.sin(q[0]), sp.cos(q[0])])  # its short side
-    centers = (lc1 * along, (l1 + q[1]) * along + a * across)
+    end = (l1 + q[1]) * along + a * across
+    centers = (lc1 * along, end, end + cz * along + cx * across)
 
-    kinetic = (I1z + I2z) * dq[0] ** 2 / 2
+    kinetic = (I1z + I2z + Ip) * dq[0] ** 2 / 2
     potential = sp.Integer(0)
-    for mass, center in zip((m1, m2), centers, strict=True):
+    for mass, center in zip((m1, m2, mass3), centers, strict=True):
         velocity = center.jacobian(q) * dq
         kinetic += mass * velocity.dot(velocity) / 2
         potential += mass * g * center[1]
@@ -56,7 +64,8 @@ def equations_of_the_arm() -> Callable[..., tuple]:
     inertia = momenta.jacobian(dq)
     coriolis = momenta.jacobian(q) * dq - kinetic.jacobian(q).T
     gravity = sp.Matrix([potential]).jacobian(q).T
-    return sp.lambdify((*sp.symbols(ARM), *q, *dq), (inertia, coriolis, gravity), "mpmath")
+    names = sp.symbols((*ARM, *PAYLOAD))
+    return sp.lambdify((*names, *q, *dq), (inertia, coriolis, gravity), "mpmath")
 
 
 class Law:
@@ -72,8 +81,11 @@ class Law:
                 for i in (1, 2)
             ]
         )
+        payload = [value[name] if value[ATTACHED] else mpf(0) for name in PAYLOAD]
         inertia, coriolis, gravity = arm(
-            *(value[name] for name in (*ARM, "q1", "q2", "dq1", "dq2"))
+            *(value[name] for name in ARM),
+            *payload,
+            *(value[name] for name in ("q1", "q2", "dq1", "dq2")),
         )
         if value["mode"] == COMPUTED_TORQUE:
             self.gain = inertia
@@ -142,37 +154,78 @@ class Law:
             h -= high
         return w
 
-    def outputs(self, w: list[mpf]) -> list[mpf]:
+    def limited(self, w: list[mpf]) -> list[mpf]:
         efforts = self.unlimited(w)
-        limited = [max(-bound, min(bound, u)) for bound, u in zip(self.limit, efforts, strict=True)]
-        return [*limited, *self.error, *self.derror]
+        return [max(-bound, min(bound, u)) for bound, u in zip(self.limit, efforts, strict=True)]
+
+    def rates(self, w: list[mpf]) -> list[mpf]:
+        pairs = zip(self.unlimited(w), self.limited(w), strict=True)
+        excess = [u - effort for u, effort in pairs]
+        return [
+            self.push[i] - excess[i] / self.follow[i] if self.integrates[i] else mpf(0)
+            for i in (0, 1)
+        ]
+
+    def outputs(self, w: list[mpf]) -> list[mpf]:
+        return [*self.limited(w), *self.error, *self.derror]
 
 
-def input_table(scenario: Scenario) -> np.ndarray:
-    """Inputs at every communication point, (n + 1, inputs)."""
-    return np.stack([scenario.input(name) for name in INPUTS], 1)
+def input_table(scenario: Scenario) -> tuple[tuple[str, ...], np.ndarray]:
+    """Inputs at every communication point, (n + 1, inputs); that of the payload only if given."""
+    names = (*INPUTS, ATTACHED) if ATTACHED in scenario.inputs else INPUTS
+    return names, np.stack([scenario.input(name).astype(float) for name in names], 1)
 
 
-def simulate(scenario: Scenario, arm: Callable[..., tuple]) -> np.ndarray:
+class Laws:
+    """The law of a scenario with the inputs that are held after each communication point."""
+
+    def __init__(self, scenario: Scenario, arm: Callable[..., tuple]) -> None:
+        self.arm = arm
+        self.start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
+        self.names, self.inputs = input_table(scenario)
+        # times of the communication points are exact, their differences need not be
+        self.times = [mpf(float(t)) for t in scenario.times]
+
+    def after(self, i: int) -> Law:
+        held = (mpf(float(x)) for x in self.inputs[i])
+        return Law({ATTACHED: 0} | self.start | dict(zip(self.names, held, strict=True)), self.arm)
+
+
+def simulate(laws: Laws) -> np.ndarray:
     """Outputs at every communication point, (n + 1, outputs).
 
     The inputs of row i are those of the step that ends there; row 0 has those of the start.
     """
-    start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
-    inputs = input_table(scenario)
-    # times of the communication points are exact, their differences need not be
-    times = [mpf(float(t)) for t in scenario.times]
+    times = laws.times
     w = [mpf(0), mpf(0)]
     rows = []
     for i in range(len(times)):
-        held = inputs[max(i - 1, 0)]
-        law = Law(start | {n: mpf(float(x)) for n, x in zip(INPUTS, held, strict=True)}, arm)
+        law = laws.after(max(i - 1, 0))
         if i > 0:
             length = times[i] - times[i - 1]
-            pieces = int(mp.ceil(length / (LONGEST * start["tracking_time"])))
+            pieces = int(mp.ceil(length / (LONGEST * laws.start["tracking_time"])))
             for _ in range(pieces):
                 w = law.advance(w, length / pieces)
         rows.append([float(x) for x in law.outputs(w)])
+    return np.array(rows)
+
+
+def simulate_samples(laws: Laws) -> np.ndarray:
+    """The same in the sampled form; after the start no sample is at a communication point."""
+    times, period, delay = laws.times, laws.start["sample_time"], laws.start["delay"]
+    w = [mpf(0), mpf(0)]
+    rates = w
+    in_effect: list[tuple[mpf, list[mpf]]] = []  # from a time on, the efforts
+    rows, k = [], 0
+    for i in range(len(times)):
+        law = laws.after(max(i - 1, 0))
+        while times[0] + k * period <= times[i]:
+            w = [x + period * rate for x, rate in zip(w, rates, strict=True)]
+            rates = law.rates(w)
+            in_effect.append((times[0] + k * period + (delay if k > 0 else 0), law.limited(w)))
+            k += 1
+        efforts = next(u for t, u in reversed(in_effect) if t <= times[i])
+        rows.append([float(x) for x in (*efforts, *law.error, *law.derror)])
     return np.array(rows)
 
 
@@ -181,9 +234,11 @@ def prepare() -> Callable[[Scenario, Path], None]:
     arm = equations_of_the_arm()
 
     def write(scenario: Scenario, folder: Path) -> None:
-        outputs = simulate(scenario, arm)[scenario.reference_rows]
-        inputs = input_table(scenario)
-        reference_files.write(scenario, folder, MODEL, (OUTPUTS, outputs), (INPUTS, inputs))
+        laws = Laws(scenario, arm)
+        outputs = simulate_samples(laws) if laws.start["sample_time"] > 0 else simulate(laws)
+        rows = outputs[scenario.reference_rows]
+        inputs = laws.names, laws.inputs
+        reference_files.write(scenario, folder, MODEL, (OUTPUTS, rows), inputs)
 
     return write
 

@@ -1,0 +1,343 @@
+"""The sampled form of RPController: what a sample computes, and when its efforts take effect.
+
+The law of a sample is that of the continuous form, which test_controller.py checks; here it is that
+of PD at one joint, written out in the order of operations of the equations, so that all bits count.
+"""
+
+import random
+from bisect import bisect_right
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Model
+
+from cosim import reference
+from cosim.comparison import Runs
+from cosim.fmu_file import Fmu
+from tests.support.cosim_project import declared, fmi3_fmu, load
+from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
+
+PD = 1
+GAINS = {"Kp1": 50.0, "Kd1": 8.0, "Ki1": 240.0, "inertia1": 0.75, "tracking_time": 0.125}
+MOTION = {"q1_ref": 0.3125, "q1": 0.0625, "dq1_ref": 0.25, "dq1": 0.75}
+LIMIT = 30.0
+# on the grid of 1 ms or off it; efforts at once, late, or as late as the next sample
+TIMES = {
+    "off the grid": (0.0037, 0.0011),
+    "fast": (0.00031, 0.0003),
+    "slow": (0.0273, 0.0),
+    "on the grid": (0.002, 0.001),
+    "a whole period": (0.003, 0.003),
+    "a whole period, off the grid": (0.0017, 0.0017),
+}
+each_times = pytest.mark.parametrize(("period", "delay"), TIMES.values(), ids=TIMES.keys())
+
+
+@pytest.fixture(scope="module")
+def path(fmu: Path) -> Path:
+    return fmu.with_name("RPController.fmu")
+
+
+@pytest.fixture(scope="module")
+def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(path, tmp_path_factory.mktemp("controller"))
+
+
+@pytest.fixture
+def sampled(loaded: LoadedFmu) -> Iterator[Callable[..., Instance]]:
+    """Makes instances of PD at joint 1 in the sampled form."""
+    made: list[Instance] = []
+
+    def make(period: float, delay: float = 0.0, start: float = 0.0, **values: float) -> Instance:
+        instance = Instance(loaded)
+        made.append(instance)
+        instance.fmi.setInteger([loaded.references["mode"]], [PD])
+        times = {"sample_time": period, "delay": delay}
+        return instance.initialize(start, **(GAINS | MOTION | {"tau1_max": LIMIT} | times | values))
+
+    yield make
+    for instance in made:
+        instance.fmi.freeInstance()
+
+
+def samples(period: float, w: float, count: int, **changed: float) -> list[tuple[float, float]]:
+    """Effort and integral part of joint 1 at each sample, by Euler's method."""
+    v = GAINS | MOTION | changed
+    e, de = v["q1_ref"] - v["q1"], v["dq1_ref"] - v["dq1"]
+    rate, found = 0.0, []
+    for _ in range(count):
+        w += period * rate
+        u = v["inertia1"] * ((v["Kp1"] * e + v["Kd1"] * de) + w)
+        effort = max(-LIMIT, min(LIMIT, u))
+        rate = v["Ki1"] * e - (u - effort) / (v["inertia1"] * v["tracking_time"])
+        found.append((effort, w))
+    return found
+
+
+def last_of(times: list[Fraction], t: float) -> int:
+    """Number of the last of `times` that is not after t."""
+    return bisect_right(times, Fraction(t)) - 1
+
+
+# ---- What a sample computes, and when ------------------------------------------------------------
+
+
+@each_times
+@pytest.mark.parametrize("start", [0.0, -3.3])
+def test_efforts_are_those_of_the_last_sample_that_has_been_computed(
+    sampled: Callable[..., Instance], period: float, delay: float, start: float
+) -> None:
+    """At irregular points none of which is at a sample or an effort; the limit is met."""
+    instance = sampled(period, delay, start, integral1=2.0)
+    count = int(0.62 / period) + 3
+    expected = samples(period, 2.0, count)
+    T, d = Fraction(period), Fraction(delay)
+    starts = [Fraction(start) + k * T for k in range(count)]
+    shown = [starts[0], *(t + d for t in starts[1:])]
+    source = random.Random(3)
+    t, seen = start, set()
+    while t < start + 0.6:
+        t = instance.step(t, source.choice((0.0002, 0.003, 0.011)) * source.uniform(0.5, 1.5))
+        effort, w, rate = instance.get("tau1", "integral1", "dintegral1")
+        assert effort == expected[last_of(shown, t)][0], t
+        assert w == expected[last_of(starts, t)][1], t
+        assert rate == 0.0
+        seen.add(effort)
+    assert LIMIT in seen and min(seen) < LIMIT
+    assert instance.count("solver_steps") == instance.count("solver_rhs_evaluations") == 0
+
+
+def test_the_first_efforts_take_effect_at_once(sampled: Callable[..., Instance]) -> None:
+    instance = sampled(0.25, 0.25, integral1=2.0)
+    (first, _), (second, _) = samples(0.25, 2.0, 2)
+    assert instance.get("tau1", "integral1") == [first, 2.0]
+    instance.set(q1=5.0)
+    assert instance.get("tau1") == [first]
+    instance.set(q1=MOTION["q1"])
+    instance.step(0.0, 0.4375)
+    assert instance.get("tau1") == [first]
+    instance.step(0.4375, 0.125)
+    assert instance.get("tau1") == [second] != [first]
+
+
+def test_inputs_count_at_samples_only(sampled: Callable[..., Instance]) -> None:
+    """Samples at 0, 0.25 and 0.5 s, whose efforts take effect at 0, 0.3125 and 0.5625 s."""
+    instance = sampled(0.25, 0.0625, Ki1=0.0)
+    seen = []
+    for t, q1 in ((0.0, 0.1), (0.125, 0.2), (0.28125, 0.3), (0.4375, 0.0625)):
+        instance.set(q1=q1)
+        instance.step(t, 0.15625 if t else 0.125)
+        seen += instance.get("tau1", "q1_error")
+    (at_start, _), *_ = samples(0.25, 0.0, 1)
+    (at_sample, _), *_ = samples(0.25, 0.0, 1, q1=0.2)
+    errors = [MOTION["q1_ref"] - q1 for q1 in (0.1, 0.2, 0.3, 0.0625)]
+    efforts = [at_start, at_start, at_sample, at_start]  # the input is what it was
+    assert seen == [x for pair in zip(efforts, errors, strict=True) for x in pair]
+
+
+def test_the_payload_counts_at_samples_only(sampled: Callable[..., Instance]) -> None:
+    instance = sampled(0.25, 0.0625, payload_mass=2.0, payload_z=0.25)
+    loaded = instance.loaded
+    instance.fmi.setInteger([loaded.references["mode"]], [3])
+    attached = [loaded.references["payload_attached"]]
+
+    def unlimited_after(t: float, is_attached: bool) -> float:
+        instance.fmi.setBoolean(attached, [is_attached])
+        instance.step(t, 0.125)
+        return instance.get("tau1_unlimited")[0]
+
+    # samples at 0.25, 0.5, 0.75 s
+    without = [unlimited_after(t, t in (0.0, 0.25)) for t in (0.0, 0.125, 0.25, 0.375)]
+    assert without[0] == without[1]
+    light = unlimited_after(0.5, True)
+    assert unlimited_after(0.625, True) == light
+    assert unlimited_after(0.75, True) > light + 2.0 * 9.81 * 0.5
+
+
+def test_it_tends_to_the_continuous_form(sampled: Callable[..., Instance]) -> None:
+    """Euler's error falls with the period, in proportion to it."""
+    values = {"integral1": 150.0, "q1_ref": -0.1875}
+    at_end = {period: sampled(period, **values) for period in (0.0, 2e-4, 1e-4)}
+    for instance in at_end.values():
+        instance.step(0.0, 0.3)
+    exact, coarse, fine = (instance.get("integral1")[0] for instance in at_end.values())
+    assert abs(fine - exact) < 0.05
+    assert (coarse - exact) / (fine - exact) == pytest.approx(2.0, abs=0.1)
+
+
+def test_output_derivatives_are_those_of_held_efforts(sampled: Callable[..., Instance]) -> None:
+    instance = sampled(0.25)
+    instance.set_input_derivatives(q1=(0.5, 0.25))
+    names = ("tau1", "f2", "q1_error")
+    references = [instance.loaded.references[name] for name in names]
+    assert instance.fmi.getRealOutputDerivatives(references, [1] * 3) == [0.0, 0.0, -0.5]
+    assert instance.fmi.getRealOutputDerivatives(references, [2] * 3) == [0.0, 0.0, -0.25]
+    known = [instance.loaded.references["q1"]]
+    assert instance.fmi.getDirectionalDerivative(references, known, [1.0]) == [0.0, 0.0, -1.0]
+
+
+# ---- Independence of the master's step -----------------------------------------------------------
+
+
+@each_times
+def test_same_bits_for_all_communication_steps(
+    sampled: Callable[..., Instance], period: float, delay: float
+) -> None:
+    def seen(every: int) -> list[bytes]:
+        """All variables at each 10 ms."""
+        instance = sampled(period, delay, integral1=2.0)
+        found = []
+        for i in range(0, 300, every):
+            instance.step(i / 1000, (i + every) / 1000 - i / 1000)
+            if (i + every) % 10 == 0:
+                found.append(instance.everything())
+        return found
+
+    once = seen(10)
+    assert len(set(once)) == 30
+    assert seen(1) == seen(2) == once
+
+
+@each_times
+def test_same_bits_along_the_same_polynomial(
+    sampled: Callable[..., Instance], period: float, delay: float
+) -> None:
+    """Where no value of the line that the input follows is rounded."""
+
+    def seen(every: int) -> list[bytes]:
+        instance = sampled(period, delay, integral1=2.0)
+        found = []
+        for i in range(0, 256, every):
+            t = i / 1024
+            instance.set(q1=0.0625 - 0.5 * t)
+            instance.set_input_derivatives(q1=(-0.5,))
+            instance.step(t, every / 1024)
+            if (i + every) % 8 == 0:
+                found.append(instance.get("tau1", "integral1", "q1_error"))
+        return found
+
+    once = seen(8)
+    assert len({effort for effort, *_ in once}) > 8
+    assert seen(1) == seen(2) == once
+
+
+def test_rollback_across_samples_is_exact(sampled: Callable[..., Instance]) -> None:
+    instance, other = sampled(0.0037, 0.0019), sampled(0.0037, 0.0019)
+    source = random.Random(8)
+    t, states = 0.0, []
+    steps = [source.choice((0.0005, 0.004, 0.02)) for _ in range(60)]
+
+    def run(instance: Instance, first: int, t: float) -> list[bytes]:
+        found = []
+        for i in range(first, len(steps)):
+            instance.set(q1=0.0625 + 0.01 * (i % 5))
+            t = instance.step(t, steps[i])
+            found.append(instance.everything())
+        return found
+
+    once = run(sampled(0.0037, 0.0019), 0, 0.0)
+    for i in range(len(steps)):
+        states.append((i, t, instance.fmi.getFMUstate()))
+        instance.set(q1=0.0625 + 0.01 * (i % 5))
+        t = instance.step(t, steps[i])
+        assert instance.everything() == once[i]
+    for i, t, state in source.sample(states, 12):
+        instance.fmi.setFMUstate(state)
+        assert run(instance, i, t) == once[i:]
+        content = instance.fmi.serializeFMUstate(state)
+        other.fmi.setFMUstate(other.fmi.deSerializeFMUstate(content))
+        assert run(other, i, t) == once[i:]
+    for *_, state in states:
+        assert status_of(instance.fmi.freeFMUstate, state) == OK
+
+
+# ---- Other interfaces ----------------------------------------------------------------------------
+
+
+def test_model_exchange_has_the_samples_as_time_events(loaded: LoadedFmu) -> None:
+    period, delay = 0.0037, 0.0011
+    expected = samples(period, 2.0, 40)
+    with Instance(loaded, kind=FMU2Model) as instance:
+        instance.fmi.setInteger([loaded.references["mode"]], [PD])
+        times = {"sample_time": period, "delay": delay, "integral1": 2.0, "tau1_max": LIMIT}
+        instance.initialize(**(GAINS | MOTION | times))
+        _, _, _, has_jumped, is_defined, next_time = instance.fmi.newDiscreteStates()
+        for k in range(1, len(expected)):
+            for due, jumps in ((period * k, True), (period * k + delay, False)):
+                assert is_defined and next_time == pytest.approx(due, rel=1e-15)
+                instance.fmi.enterContinuousTimeMode()
+                instance.fmi.setTime(next_time)
+                assert instance.get("tau1")[0] == expected[k - 1][0]
+                instance.fmi.enterEventMode()
+                *_, has_jumped, is_defined, next_time = instance.fmi.newDiscreteStates()
+                assert bool(has_jumped) == jumps
+                assert instance.get("integral1")[0] == expected[k][1]
+            assert instance.get("tau1")[0] == expected[k][0]
+
+
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
+def test_the_scenario_meets_its_reference(path: Path, version: str) -> None:
+    scenario = load("controller_sampled")
+    with Fmu(path if version == "fmi2" else fmi3_fmu(path)) as opened:
+        assert Runs({"rp_controller": opened}).run(scenario, 1e-8).error < 1e-14
+    for name, limit in (("tau1", 14.0), ("f2", 9.0)):
+        column = reference.load(scenario, declared("rp_controller")).column(name)
+        assert abs(column).max() == limit and np.unique(column).size > 50
+
+
+# ---- What is refused -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["sample_time", "delay", "payload_mass", "payload_inertia"])
+def test_negative_values_are_refused(loaded: LoadedFmu, name: str) -> None:
+    with Instance(loaded) as instance:
+        assert status_of(lambda: instance.set(**{name: -1e-3})) == DISCARD
+        assert f"{name} = -0.001 is refused" in instance.messages[-1].text
+
+
+REFUSED = {
+    "too short": ({"sample_time": 5e-7}, "sample_time = 5e-07 s is refused: it must be 0, "),
+    "too late": (
+        {"sample_time": 0.001, "delay": 0.0011},
+        "delay = 0.0011 s is refused: it must not be above sample_time = 0.001 s",
+    ),
+    "delay of the continuous form": (
+        {"delay": 0.001},
+        "delay = 0.001 s is refused: it must not be above sample_time = 0 s",
+    ),
+}
+
+
+@pytest.mark.parametrize(("values", "text"), REFUSED.values(), ids=REFUSED.keys())
+def test_times_that_do_not_fit_are_refused(
+    loaded: LoadedFmu, values: dict[str, float], text: str
+) -> None:
+    with Instance(loaded) as instance:
+        instance.fmi.setupExperiment()
+        instance.set(**values)
+        instance.fmi.enterInitializationMode()
+        assert status_of(instance.fmi.exitInitializationMode) == ERROR
+        assert text in instance.messages[-1].text
+
+
+def test_a_start_at_which_samples_have_no_times_is_refused(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
+        assert status_of(lambda: instance.initialize(start=1e12, sample_time=0.01)) == ERROR
+        assert "t = 1000000000000" in instance.messages[-1].text
+
+
+def test_times_are_fixed(sampled: Callable[..., Instance]) -> None:
+    instance = sampled(0.01)
+    for name in ("sample_time", "delay"):
+        assert status_of(lambda name=name: instance.set(**{name: 0.01})) == ERROR
+
+
+def test_a_law_that_is_not_finite_is_discarded(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
+        assert (
+            status_of(lambda: instance.initialize(sample_time=0.01, q1_ref=1e308, Kp1=1e308))
+            == DISCARD
+        )

@@ -1,0 +1,134 @@
+"""The Boolean output of RPTrajectory: the payload is attached from grasp_time to release_time."""
+
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.fmi2 import FMU2Model
+from fmpy.fmi3 import FMU3Slave
+
+from tests.support.cosim_project import FMUS, fmi3_fmu
+from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
+
+GRASP, RELEASE = 0.3, 0.70001
+GRASPED = {"grasp_time": GRASP, "release_time": RELEASE}
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
+    return LoadedFmu(FMUS["rp_trajectory"], tmp_path_factory.mktemp("unit"))
+
+
+def is_attached(instance: Instance) -> bool:
+    (value,) = instance.fmi.getBoolean([instance.loaded.references["payload_attached"]])
+    return bool(value)
+
+
+@pytest.mark.parametrize("per_second", [10, 100, 1000, 7])
+def test_it_is_attached_from_grasp_to_release(loaded: LoadedFmu, per_second: int) -> None:
+    """Also where a communication point is the time of the grasp, but for rounding."""
+    with Instance(loaded) as instance:
+        instance.initialize(**GRASPED)
+        assert not is_attached(instance)
+        t = 0.0
+        for i in range(per_second):
+            t = instance.step(t, 1 / per_second)
+            point = (i + 1) / per_second
+            assert is_attached(instance) == (GRASP <= point < RELEASE), t
+
+
+@pytest.mark.parametrize(
+    ("start", "expected"), [(-1.0, False), (GRASP, True), (0.5, True), (RELEASE, False), (3, False)]
+)
+def test_initialization_knows_it(loaded: LoadedFmu, start: float, expected: bool) -> None:
+    """Before initialization ends a payload becomes a part of the plant without a jump."""
+    with Instance(loaded) as instance:
+        instance.fmi.setupExperiment(startTime=start)
+        instance.set(**GRASPED)
+        instance.fmi.enterInitializationMode()
+        assert is_attached(instance) == expected
+        instance.fmi.exitInitializationMode()
+        assert is_attached(instance) == expected
+
+
+def test_it_is_never_attached_by_default(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
+        instance.initialize(start=-0.5)
+        for i in range(10):
+            instance.step(-0.5 + 0.1 * i, 0.1)
+            assert not is_attached(instance)
+
+
+def test_rollback_over_grasp_and_release(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance, Instance(loaded) as other:
+        instance.initialize(**GRASPED)
+        other.initialize()
+        states = []
+        for t, expected in ((0.0, False), (0.25, True), (0.5, False)):
+            states.append((t, instance.fmi.getFMUstate(), expected))
+            instance.step(t, 0.25)
+            assert is_attached(instance) == expected
+        for t, state, expected in reversed(states):
+            instance.fmi.setFMUstate(state)
+            content = instance.fmi.serializeFMUstate(state)
+            other.fmi.setFMUstate(other.fmi.deSerializeFMUstate(content))
+            for one in (instance, other):
+                one.step(t, 0.25)
+                assert is_attached(one) == expected
+        for _, state, _ in states:
+            instance.fmi.freeFMUstate(state)
+
+
+def test_grasp_and_release_are_time_events_in_model_exchange(loaded: LoadedFmu) -> None:
+    with Instance(loaded, kind=FMU2Model) as instance:
+        instance.initialize(**GRASPED)
+        for due, before in ((GRASP, False), (RELEASE, True)):
+            *_, is_defined, next_time = instance.fmi.newDiscreteStates()
+            assert is_defined and next_time == due
+            instance.fmi.enterContinuousTimeMode()
+            instance.fmi.setTime(due)
+            assert is_attached(instance) == before
+            instance.fmi.enterEventMode()
+        *_, is_defined, _ = instance.fmi.newDiscreteStates()
+        assert not is_defined and not is_attached(instance)
+
+
+def test_steps_end_at_grasp_and_release_in_event_mode(tmp_path: Path) -> None:
+    path = fmi3_fmu(FMUS["rp_trajectory"])
+    description = fmpy.read_model_description(path)
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    fmpy.extract(path, tmp_path)
+    unit = FMU3Slave(
+        guid=description.instantiationToken,
+        modelIdentifier="RPTrajectory",
+        unzipDirectory=str(tmp_path),
+        instanceName="grasp",
+    )
+
+    def attached() -> list[bool]:
+        return [bool(x) for x in unit.getBoolean([references["payload_attached"]])]
+
+    unit.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
+    unit.setFloat64([references[name] for name in GRASPED], list(GRASPED.values()))
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+    t = 0.0
+    for due, after in ((GRASP, True), (RELEASE, False)):
+        *_, is_defined, next_time = unit.updateDiscreteStates()
+        assert is_defined and next_time == due
+        unit.enterStepMode()
+        event, _, early, t = unit.doStep(t, 1.0)
+        assert event and early and t == due
+        assert attached() == [not after]
+        unit.enterEventMode()
+        *_, is_defined, _ = unit.updateDiscreteStates()
+        assert attached() == [after]
+    assert not is_defined
+    unit.terminate()
+    unit.freeInstance()
+
+
+def test_times_are_fixed(loaded: LoadedFmu) -> None:
+    with Instance(loaded) as instance:
+        instance.initialize(**GRASPED)
+        assert status_of(lambda: instance.set(grasp_time=0.1)) == ERROR
