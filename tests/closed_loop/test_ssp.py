@@ -57,7 +57,8 @@ def test_structure() -> None:
         assert [(c.name, c.source) for c in system.components] == [
             (name, f"resources/{fmu}.fmu") for name, fmu in FMUS.items()
         ]
-        wanted = [("trajectory", name, "controller", name) for name in REFERENCES]
+        given = [*REFERENCES, "payload_attached"]
+        wanted = [("trajectory", name, "controller", name) for name in given]
         wanted += [("arm", name, "controller", name) for name in MEASURED]
         wanted += [("controller", name, "arm", name) for name in EFFORTS]
         found = [
