@@ -4,7 +4,8 @@
 #   ./run.sh                       all scenarios
 #   ./run.sh NAME ...              these scenarios
 #   ./run.sh --list                names of the scenarios, without building
-#   ./run.sh system [VARIANT ...]  the closed loop in Ecos; --list: names of its variants
+#   ./run.sh system                all variants of all systems in Ecos
+#   ./run.sh system NAME ...       these variants, or all of these systems; --list names both
 #   ./run.sh coupling              what the coupling of the closed loop costs
 #   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling

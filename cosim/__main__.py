@@ -138,26 +138,29 @@ def _parser() -> argparse.ArgumentParser:
     system_options = _Parser(add_help=False)
     choice = system_options.add_mutually_exclusive_group()
     choice.add_argument(
-        "--ssp", type=Path, metavar="PATH", help="the system (default: the one in build/)"
+        "--ssp", type=Path, metavar="PATH", help="the system (default: all in build/)"
     )
-    _add_fmi(
-        choice, VERSIONS[0], "the system in build/ with FMUs of this version of FMI (default: 2)"
-    )
+    _add_fmi(choice, VERSIONS[0], "systems in build/ with FMUs of this version of FMI (default: 2)")
     _add_report(system_options, project.report_folder("system"))
     system = commands.add_parser(
         "system",
         parents=[system_options],
-        help="run the system in Ecos, check against the references, write a report",
-        description="Runs the variants of the system in Ecos and compares every variable with the "
+        help="run systems in Ecos, check against the references, write a report",
+        description="Runs the variants of the systems in Ecos and compares every variable with the "
         "reference. Exit code: 0 all within the bound, 1 not, 2 wrong use, a wrong system or a "
         "component that fails.",
     )
-    system.add_argument("names", nargs="*", metavar="VARIANT", help="variants (default: all)")
-    system.add_argument("--list", action="store_true", help="name the variants")
+    system.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="variants, or systems with all theirs (default: all)",
+    )
+    system.add_argument("--list", action="store_true", help="name the systems and their variants")
     commands.add_parser(
         "coupling",
         parents=[system_options],
-        help="study how far co-simulation of the system is from its exact solution",
+        help="study how far co-simulation of a system is from its exact solution",
         description="Steps the system in several orders, with inputs held and extrapolated and "
         "with step-size control, and compares it with the solution in continuous time. Exit code: "
         "0 as expected, 1 not, 2 wrong use.",

@@ -7,6 +7,7 @@ models/MODEL/references/scales.toml     sums that errors are divided by, instead
 models/SYSTEM/SystemStructure.ssd       connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
+models/SYSTEM/system.svg                its components and the signals between them
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
@@ -21,6 +22,7 @@ from cosim.model import VERSIONS
 ROOT = Path(__file__).resolve().parents[1]
 
 STRUCTURE = "SystemStructure.ssd"
+DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that cosim.system.study describes
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
@@ -107,19 +109,12 @@ def making_references(folder: Path, name: str) -> str:
     return f"to make it again: build/venv/bin/python {script}"
 
 
-def system_folder() -> Path:
-    """Folder of the system.
-
-    Raises
-    ------
-    UserError
-        If there is not exactly one.
-    """
+def systems() -> dict[str, Path]:
+    """Folders of all systems by name."""
     found = sorted(path.parent for path in ROOT.glob(f"models/*/{STRUCTURE}"))
-    if len(found) != 1:
-        names = ", ".join(folder.name for folder in found) or "none"
-        raise UserError(f"{ROOT / 'models'}: expected one folder with {STRUCTURE}, found {names}")
-    return found[0]
+    if not found:
+        raise UserError(f"{ROOT / 'models'}: has no folder with {STRUCTURE}")
+    return {folder.name: folder for folder in found}
 
 
 def is_built_from(name: str, folder: Path) -> bool:

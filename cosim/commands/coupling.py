@@ -8,6 +8,6 @@ from cosim.system import study
 
 def run(options: argparse.Namespace) -> int:
     """Make the study; 0 if everything is as expected."""
-    folder = project.system_folder()
+    folder, known = study.of_coupling()
     path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
-    return 0 if study.load(folder).study_coupling(path, options.report) else 1
+    return 0 if known.study_coupling(path, options.report) else 1

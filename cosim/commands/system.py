@@ -1,59 +1,148 @@
-"""`system`: run the variants of a system in Ecos, compare them with references, write a report."""
+"""`system`: run variants of the systems in Ecos, compare them with references, write a report."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 
 from cosim import console, project
-from cosim.errors import UserError
+from cosim.errors import UserError, did_you_mean
 from cosim.output_files import from_here, written
 from cosim.system import comparison, report, ssp, study
-from cosim.system.comparison import Reference
+from cosim.system.comparison import Outcome, Reference
+from cosim.system.report import Section
 from cosim.system.ssp import Ssp
 from cosim.system.study import Study
 
 
+@dataclass(frozen=True)
+class _System:
+    """A system that is unpacked."""
+
+    folder: Path
+    ssp: Ssp
+
+    @property
+    def variants(self) -> list[str]:
+        return list(self.ssp.system.parameters)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What to run of a system."""
+
+    system: _System
+    study: Study
+    references: Mapping[str, Reference]  # by variant
+
+
 def run(options: argparse.Namespace) -> int:
     """Run the variants that the options name, or all; or name them."""
-    folder = project.system_folder()
-    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     with ExitStack() as stack:
         try:
-            unpacked = stack.enter_context(ssp.unpacked(path))
+            systems = [_opened(path, stack) for path in _paths(options)]
         except UserError:
             if not options.list:
-                # if the system cannot be run, older results must not pass for new ones
+                # if a system cannot be run, older results must not pass for new ones
                 with written(options.report):
-                    report.remove(options.report, comparison.reference_names(folder))
+                    for name, folder in project.systems().items():
+                        known = comparison.reference_names(folder)
+                        report.remove(options.report, name, known)
             raise
-        chosen = comparison.choose(unpacked, options.names)
+        chosen = _choose(systems, options.names)
         if options.list:
-            print(*chosen, sep="\n")
+            for system, names in chosen:
+                print(system.folder.name, *(f"  {name}" for name in names), sep="\n")
             return 0
-        known = study.load(folder)
         with written(options.report):
-            report.remove(options.report, chosen)
-        references = {
-            name: comparison.load_reference(unpacked, name, folder, known.EXPERIMENT)
-            for name in chosen
-        }
-        return _run(unpacked, known, references, options.report)
+            for system, names in chosen:
+                report.remove(options.report, system.folder.name, names)
+        plans = [_planned(system, names) for system, names in chosen]
+        return _run(plans, options.report)
 
 
-def _run(opened: Ssp, known: Study, references: Mapping[str, Reference], folder: Path) -> int:
-    """Run variants; a row appears as one ends, and its files are written then."""
-    table = console.VariantTable(references, known.MEASURES)
-    outcomes = []
-    for name, reference in references.items():
-        outcome = comparison.simulate(opened, name, reference)
-        table.row(outcome)
-        console.messages(name, outcome.run.messages)
-        with written(folder):
-            report.write_variant(folder, known.figure(opened, outcome), outcome)
-        outcomes.append(outcome)
+def _paths(options: argparse.Namespace) -> list[Path]:
+    """The SSPs to open: the one that is given, or those that the names may be of."""
+    if options.ssp:
+        return [options.ssp]
+    folders = project.systems()
+    if options.names and set(options.names) <= set(folders):
+        folders = {name: folders[name] for name in dict.fromkeys(options.names)}
+    return [project.built(folder, ".ssp", "--ssp", options.fmi) for folder in folders.values()]
+
+
+def _opened(path: Path, stack: ExitStack) -> _System:
+    """The system in an SSP, with the folder that it is from."""
+    unpacked = stack.enter_context(ssp.unpacked(path))
+    name, folders = unpacked.system.name, project.systems()
+    if name not in folders:
+        known = f"{did_you_mean(name, folders)} (known: {', '.join(folders)})"
+        raise UserError(f"{path}: no system {name!r} has references{known}")
+    return _System(folders[name], unpacked)
+
+
+def _choose(systems: Sequence[_System], names: Sequence[str]) -> list[tuple[_System, list[str]]]:
+    """Variants to run of each system: those named, all of a system that is named, or all.
+
+    Raises
+    ------
+    UserError
+        If a name is unknown, or stands for two things.
+    """
+    owners: dict[str, str] = {system.folder.name: "a system" for system in systems}
+    for system in systems:
+        for variant in system.variants:
+            if variant in owners:
+                where = f"{system.ssp.path}: the name of variant {variant!r}"
+                raise UserError(f"{where} is taken by {owners[variant]}")
+            owners[variant] = f"a variant of {system.folder.name}"
+    for name in names:
+        if name not in owners:
+            known = "; ".join(f"{s.folder.name}: {', '.join(s.variants)}" for s in systems)
+            raise UserError(f"no variant {name!r}{did_you_mean(name, owners)} (there are: {known})")
+    chosen = []
+    for system in systems:
+        own = [name for name in dict.fromkeys(names) if name in system.variants]
+        if not names or system.folder.name in names:
+            own = system.variants
+        if own:
+            chosen.append((system, own))
+    return chosen
+
+
+def _planned(system: _System, names: Sequence[str]) -> _Plan:
+    known = study.load(system.folder)
+    return _Plan(
+        system,
+        known,
+        {
+            name: comparison.load_reference(system.ssp, name, system.folder, known.EXPERIMENT)
+            for name in names
+        },
+    )
+
+
+def _run(plans: Sequence[_Plan], folder: Path) -> int:
+    """Run the plans; a row appears as a variant ends, and its files are written then."""
+    outcomes: list[Outcome] = []
+    sections = []
+    for plan in plans:
+        opened, known = plan.system.ssp, plan.study
+        table = console.VariantTable(plan.references, known.MEASURES)
+        own = []
+        for name, reference in plan.references.items():
+            outcome = comparison.simulate(opened, name, reference)
+            table.row(outcome)
+            console.messages(name, outcome.run.messages)
+            with written(folder):
+                report.write_variant(folder, known.figure(opened, outcome), outcome)
+            own.append(outcome)
+        sections.append(Section(plan.system.folder, opened, known, own))
+        outcomes += own
+        print()
     with written(folder):
-        index = report.write_page(folder, opened, known, outcomes)
-    print(f"\nreport: {from_here(index)}")
+        index = report.write_page(folder, sections)
+    print(f"report: {from_here(index)}")
     failed = (outcome.variant for outcome in outcomes if not outcome.passed)
     return console.summary(failed, outcomes, "variant")

@@ -1,13 +1,12 @@
 """Runs of a system's variants in Ecos, compared with their references."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from cosim import project, reference, trajectory_csv
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError
 from cosim.reference import Summed
 from cosim.system import ecos
 from cosim.system.ssp import Ssp
@@ -58,16 +57,6 @@ class Outcome:
         return self.run.values[:, self.run.names.index(name)]
 
 
-def choose(ssp: Ssp, names: Sequence[str]) -> list[str]:
-    """Variants called `names`, or all of them; UserError for an unknown one."""
-    known = list(ssp.system.parameters)
-    for name in names:
-        if name not in known:
-            hint = did_you_mean(name, known)
-            raise UserError(f"no variant {name!r}{hint} (there are: {', '.join(known)})")
-    return list(dict.fromkeys(names)) or known
-
-
 def recorded(ssp: Ssp) -> list[str]:
     """All Real outputs of all components, then the continuous states that are no outputs."""
     outputs, states = [], []
@@ -77,9 +66,19 @@ def recorded(ssp: Ssp) -> list[str]:
     return list(dict.fromkeys((*outputs, *states)))
 
 
+def discrete(ssp: Ssp) -> list[str]:
+    """All Integer and Boolean outputs of all components; references may have them or not."""
+    return [
+        f"{component}.{variable.name}"
+        for component, model in ssp.models.items()
+        for variable in model.variables.values()
+        if variable.causality == "output" and variable.type in ("Integer", "Boolean")
+    ]
+
+
 def simulate(ssp: Ssp, variant: str, expected: Reference) -> Outcome:
     """Run a variant and compare it; UserError if a component or Ecos fails."""
-    run = ecos.run(ssp, variant, recorded(ssp))
+    run = ecos.run(ssp, variant, [*recorded(ssp), *discrete(ssp)])
     errors = {}
     for name, values in expected.columns.items():
         actual = run.values[expected.steps, run.names.index(name)]
@@ -123,8 +122,9 @@ def load_reference(
     columns, table = trajectory_csv.read(path, wrong)
     names = columns[1:]
     known = recorded(ssp)
+    possible = {*known, *discrete(ssp)}
     for name in names:
-        if name not in known or names.count(name) > 1:
+        if name not in possible or names.count(name) > 1:
             raise wrong(f"column {name!r} is unknown or there twice", 1)
     for name in known:
         if name not in names:

@@ -35,6 +35,7 @@ MESSAGE = re.compile(
     r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
 )
 BAD = ("Discard", "Error", "Fatal")
+READERS = {"Real": "get_real", "Integer": "get_integer", "Boolean": "get_bool"}  # of Ecos, by type
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ class Run:
 
     names: tuple[str, ...]  # component.variable
     times: np.ndarray  # (rows,) s
-    values: np.ndarray  # (rows, len(names)) in the variables' units
+    values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
     wall_time: float  # s, of the steps with the reading
     messages: tuple[str, ...]  # warnings of the components
 
@@ -57,7 +58,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     variant : str
         Name of a parameter set; must exist: for an unknown name Ecos sets nothing.
     names : sequence of str
-        Real variables to read, ``component.variable``.
+        Variables to read, ``component.variable``: Real, Integer or Boolean.
 
     Raises
     ------
@@ -76,6 +77,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
             "ssp": str(ssp.path.resolve()),
             "variant": variant,
             "names": [f"{c}::{v}" for c, _, v in (name.partition(".") for name in names)],
+            "readers": [READERS[ssp.variable(name).type] for name in names],
             "start": system.start,
             "step": system.step,
             "steps": system.steps,
@@ -204,7 +206,7 @@ def _child(folder: Path) -> None:
 
     def go_on(row: int) -> bool:
         nonlocal seen
-        rows[row] = [simulation.get_real(name) for name in names]
+        rows[row] = [read(name) for read, name in readers]
         flush(None)
         if os.fstat(1).st_size != seen:  # the log has grown, which is rare
             log = (folder / LOG).read_text(encoding="utf-8", errors="replace")
@@ -216,6 +218,10 @@ def _child(folder: Path) -> None:
     with EcosSimulation(step_size=plan["step"], ssp_path=plan["ssp"]) as simulation:
         if not simulation.init(start_time=plan["start"], parameter_set=plan["variant"]):
             raise RuntimeError(EcosLib.get_last_error())
+        readers = [
+            (getattr(simulation, reader), name)
+            for reader, name in zip(plan["readers"], names, strict=True)
+        ]
         row, begin = 0, time.perf_counter()
         while go_on(row) and row < steps:
             simulation.step()

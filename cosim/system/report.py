@@ -1,11 +1,13 @@
-"""Results of a system's runs as files: a picture and the values of each variant, and a page."""
+"""Results of systems' runs as files: a picture and the values of each variant, and a page."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from cosim import trajectory_csv
+from cosim import project, trajectory_csv
+from cosim.output_files import whole
 from cosim.report import pages
 from cosim.report.style import save
 from cosim.system.comparison import BOUND, Outcome
@@ -13,9 +15,25 @@ from cosim.system.ssp import Ssp
 from cosim.system.study import Study
 
 
-def remove(folder: Path, variants: Sequence[str]) -> None:
+@dataclass(frozen=True)
+class Section:
+    """Runs of one system, for the page."""
+
+    folder: Path
+    ssp: Ssp
+    study: Study
+    outcomes: Sequence[Outcome]
+
+    @property
+    def name(self) -> str:
+        """Name of the system."""
+        return self.folder.name
+
+
+def remove(folder: Path, system: str, variants: Sequence[str]) -> None:
     """Remove what an earlier run left of these variants, and the page that shows it."""
     (folder / pages.INDEX).unlink(missing_ok=True)
+    (folder / f"{system}.svg").unlink(missing_ok=True)
     for variant in variants:
         for suffix in (".csv", ".png"):
             (folder / f"{variant}{suffix}").unlink(missing_ok=True)
@@ -29,16 +47,17 @@ def write_variant(folder: Path, figure: Figure, outcome: Outcome) -> None:
     trajectory_csv.write(folder / f"{outcome.variant}.csv", run.times, run.names, run.values)
 
 
-def write_page(folder: Path, ssp: Ssp, study: Study, outcomes: Sequence[Outcome]) -> Path:
-    """Write index.html over the runs of `write_variant`; return its path."""
-    versions = " and ".join(sorted({model.fmi_version for model in ssp.models.values()}))
+def write_page(folder: Path, sections: Sequence[Section]) -> Path:
+    """Write index.html over the runs of `write_variant`, and the diagrams; return its path."""
+    for section in sections:
+        with whole(folder / f"{section.name}.svg") as path:
+            path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
+    versions = {model.fmi_version for section in sections for model in section.ssp.models.values()}
+    names = ", ".join(section.ssp.path.stem for section in sections)
     return pages.write_page(
         folder,
         "system.html",
-        title=f"{ssp.path.stem} (FMI {versions}): runs against their references",
-        step=ssp.system.step,
+        title=f"{names} (FMI {' and '.join(sorted(versions))}): runs against their references",
         bound=BOUND,
-        measures=study.MEASURES,
-        picture_text=study.PICTURE,
-        outcomes=outcomes,
+        sections=sections,
     )

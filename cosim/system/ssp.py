@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 from cosim.archives import check_archive
 from cosim.errors import UserError, reason
 from cosim.input_files import UnreadableError
-from cosim.model import Model
+from cosim.model import Model, Variable
 from cosim.system import ssp_checks
 from cosim.system.ssp_reader import SspReader
 from cosim.system.structure import System
@@ -28,6 +28,11 @@ class Ssp:
     def fmu(self, component: str) -> Path:
         """FMU of a component, as a file."""
         return self.folder / self.system.component(component).source
+
+    def variable(self, name: str) -> Variable:
+        """What the FMU declares of ``component.variable``."""
+        component, _, variable = name.partition(".")
+        return self.models[component].variables[variable]
 
 
 @contextmanager

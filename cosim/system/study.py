@@ -39,6 +39,10 @@ class Study(Protocol):
         """Picture of a run of one variant."""
         ...
 
+
+class CouplingStudy(Study, Protocol):
+    """The module of a system that has a study of what the coupling costs."""
+
     def study_coupling(self, ssp: Path, report: Path) -> bool:
         """Study what the coupling costs, print tables, write pictures; whether all is well."""
         ...
@@ -50,3 +54,20 @@ def load(folder: Path) -> Study:
     if not is_file(file):
         raise UserError(f"{file}: no such file, cosim/system/study.py says what belongs in it")
     return cast(Study, import_module(f"models.{folder.name}.{project.STUDY}"))
+
+
+def of_coupling() -> tuple[Path, CouplingStudy]:
+    """Folder and module of the system that has a study of its coupling.
+
+    Raises
+    ------
+    UserError
+        If there is not exactly one.
+    """
+    loaded = {folder: load(folder) for folder in project.systems().values()}
+    found = {folder: known for folder, known in loaded.items() if hasattr(known, "study_coupling")}
+    if len(found) != 1:
+        names = ", ".join(folder.name for folder in found) or "none"
+        raise UserError(f"expected one system with a study of its coupling, found {names}")
+    (folder, known), *_ = found.items()
+    return folder, cast(CouplingStudy, known)

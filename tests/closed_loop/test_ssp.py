@@ -1,25 +1,19 @@
-"""ClosedLoop.ssp is valid and complete; an SSP with a mistake is refused, and the mistake named."""
+"""What ClosedLoop.ssp consists of; an SSP with a mistake is refused, and the mistake named.
 
-import sys
-import zipfile
+What holds for every SSP: test_ssp_archives.py.
+"""
+
 from pathlib import Path
 
 import fmpy
 import pytest
-from lxml import etree
 
 from cosim.__main__ import main
 from cosim.errors import UserError
 from cosim.system import ssp
-from cosim.system.ssp_reader import NAMESPACES
 from cosim.system.structure import Connector
-from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
 
-sys.path.insert(0, str(ROOT / "fmu"))
-import package  # noqa: E402
-
-SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"
 STRUCTURE = "SystemStructure.ssd"
 FMUS = {"trajectory": "RPTrajectory", "controller": "RPController", "arm": "RPManipulator"}
 REFERENCES = ["q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref"]
@@ -57,65 +51,14 @@ def refused(path: Path) -> str:
 # ---- what is in it -------------------------------------------------------------------------------
 
 
-def test_files_are_valid_against_the_schemas() -> None:
-    kinds = {
-        ".ssd": "SystemStructureDescription.xsd",
-        ".ssv": "SystemStructureParameterValues.xsd",
-    }
-    found = []
-    with zipfile.ZipFile(SSP) as archive:
-        for name in archive.namelist():
-            if Path(name).suffix in kinds:
-                schema = etree.XMLSchema(etree.parse(SCHEMAS / kinds[Path(name).suffix]))
-                schema.assertValid(etree.fromstring(archive.read(name)).getroottree())
-                found.append(name)
-    assert len(found) == 1 + len(FMUS) * len(VARIANTS)
-
-
-def test_the_archive_depends_on_its_contents_alone(tmp_path: Path) -> None:
-    with zipfile.ZipFile(SSP) as archive:
-        archive.extractall(tmp_path / "files")
-        names = archive.namelist()
-    again = tmp_path / "again.ssp"
-    package.pack(again, {name: tmp_path / "files" / name for name in reversed(names)})
-    assert again.read_bytes() == SSP.read_bytes()
-
-
-def test_units_that_are_used_are_defined() -> None:
-    with zipfile.ZipFile(SSP) as archive:
-        for name in archive.namelist():
-            if name.endswith((".ssd", ".ssv")):
-                root = etree.fromstring(archive.read(name))
-                used = set(root.xpath("//@unit"))
-                defined = root.xpath("//ssc:Unit/@name", namespaces=NAMESPACES)
-                assert set(defined) == used, name
-                assert len(defined) == len(used)
-
-
-def test_units_are_those_of_the_fmus() -> None:
-    """Exponents of the SI base units, as the model descriptions define them."""
-    bases = ("kg", "m", "s", "rad")
-    with ssp.unpacked(SSP) as opened:
-        for component in FMUS:
-            description = fmpy.read_model_description(opened.fmu(component))
-            units = {u.name: u.baseUnit for u in description.unitDefinitions}
-            files = [opened.folder / STRUCTURE]
-            files += sorted((opened.folder / "resources").glob(f"{component}_*.ssv"))
-            for path in files:
-                for unit in etree.parse(path).iterfind(".//ssc:Unit", NAMESPACES):
-                    if unit.get("name") in units:
-                        wanted = [getattr(units[unit.get("name")], b) or 0 for b in bases]
-                        given = [int(unit[0].get(b, 0)) for b in bases]
-                        assert given == [int(x) for x in wanted], (path.name, unit.get("name"))
-
-
 def test_structure() -> None:
     with ssp.unpacked(SSP) as opened:
         system = opened.system
         assert [(c.name, c.source) for c in system.components] == [
             (name, f"resources/{fmu}.fmu") for name, fmu in FMUS.items()
         ]
-        wanted = [("trajectory", name, "controller", name) for name in REFERENCES]
+        given = [*REFERENCES, "payload_attached"]
+        wanted = [("trajectory", name, "controller", name) for name in given]
         wanted += [("arm", name, "controller", name) for name in MEASURED]
         wanted += [("controller", name, "arm", name) for name in EFFORTS]
         found = [
@@ -127,26 +70,6 @@ def test_structure() -> None:
         assert system.component("arm").connectors["tau1"] == Connector(
             "tau1", "input", "Real", "N.m"
         )
-        for component, fmu in FMUS.items():
-            built = ROOT / "build" / f"{fmu}.fmu"
-            assert opened.fmu(component).read_bytes() == built.read_bytes()
-
-
-def test_omsimulator_finds_what_it_needs() -> None:
-    """The type of each component, and its own annotation with the step that the others take too."""
-    with ssp.unpacked(SSP) as opened:
-        step = opened.system.step
-        root = etree.parse(opened.folder / STRUCTURE).getroot()
-    types = [node.get("type") for node in root.iterfind(".//ssd:Component", NAMESPACES)]
-    assert types == ["application/x-fmu-sharedlibrary"] * len(FMUS)
-    system = root.find("ssd:System", NAMESPACES)
-    assert system is not None
-    assert system[-1].tag.endswith("}Annotations")
-    masters = root.xpath(
-        "//ssc:Annotation[@type='org.openmodelica']//*[local-name()='FixedStepMaster']",
-        namespaces=NAMESPACES,
-    )
-    assert [float(master.get("stepSize")) for master in masters] == [step]
 
 
 def test_variants() -> None:
@@ -167,24 +90,6 @@ def test_variants() -> None:
                 assert given.pop("relative_tolerance") == 1e-11
             changed = {k: v for k, v in given.items() if v != float(starts[component][k])}
             assert changed == changes.get(component, {}), (variant, component)
-
-
-def test_every_importer_gets_a_whole_variant() -> None:
-    """The first set, as libcosim reads it, is nominal; so is what is left where all sets apply in
-    turn, as the standard has it; and in any order the last one gives all values."""
-    with zipfile.ZipFile(SSP) as archive:
-        root = etree.fromstring(archive.read(STRUCTURE))
-        for component in FMUS:
-            path = f".//ssd:Component[@name='{component}']//ssd:ParameterBinding"
-            sources = [node.get("source") for node in root.iterfind(path, NAMESPACES)]
-            assert sources[0] == sources[-1] == f"resources/{component}_nominal.ssv"
-            names = [
-                etree.fromstring(archive.read(source)).xpath(
-                    "//ssv:Parameter/@name", namespaces=NAMESPACES
-                )
-                for source in sources
-            ]
-            assert all(x == names[0] for x in names)
 
 
 def test_nothing_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,9 +1,7 @@
 """The closed loop in Ecos and in libcosim is what the references say; failures leave nothing."""
 
 import functools
-import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -17,7 +15,7 @@ from cosim.__main__ import main
 from cosim.errors import UserError
 from cosim.system import comparison, ecos, ssp
 from models.closed_loop.study import EXPERIMENT
-from tests.importers.test_importers import folder_of
+from tests.support.libcosim import libcosim, only_variant
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, replace
 
@@ -139,45 +137,12 @@ def test_variants_differ_as_they_should() -> None:
 # ---- libcosim ------------------------------------------------------------------------------------
 
 
-def first_variant(variant: str) -> Edit:
-    """Edit that leaves only the bindings of one variant: libcosim takes the first."""
-    others = "|".join(name for name in VARIANTS if name != variant)
-    binding = re.compile(rf'\s*<ssd:ParameterBinding source="resources/[a-z]+_({others})\.ssv"/>')
-
-    def edit(content: bytes) -> bytes:
-        text, count = binding.subn("", content.decode())
-        assert count == 3 * len(VARIANTS)  # nominal is bound twice
-        return text.encode()
-
-    return edit
-
-
-def libcosim(path: Path, names: list[str], steps: int, folder: Path) -> dict[str, np.ndarray]:
-    """Values by name, read after each step; no row of the start."""
-    python = folder_of("libcosimpy") / "bin" / "python"
-    driver = ROOT / "tests" / "importers" / "run_libcosimpy_system.py"
-    plan, result = folder / "names.json", folder / "rows.json"
-    plan.write_text(json.dumps(names), encoding="utf-8")
-    process = subprocess.run(
-        [python, driver, path, plan, str(steps), result],
-        check=False,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=120,
-        env=os.environ | {"TMPDIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
-    )
-    assert process.returncode == 0, process.stdout
-    rows = np.array(json.loads(result.read_text(encoding="utf-8")))
-    return dict(zip(names, rows.T, strict=True))
-
-
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_libcosim_is_at_the_reference_of_its_order(variant: str, tmp_path: Path) -> None:
     """libcosim reads before it sets inputs: all variables are those of the sampled system."""
     path = SSP
     if variant != "nominal":
-        path = edited(SSP, tmp_path / "one.ssp", {STRUCTURE: first_variant(variant)})
+        path = edited(SSP, tmp_path / "one.ssp", {STRUCTURE: only_variant(variant)})
     expected = reference(variant, "sampled.csv")
     rows = rows_of(expected)
     names = [name for name in expected if name != "time"]
@@ -225,15 +190,14 @@ def test_the_command_checks_and_reports(tmp_path: Path, capsys: pytest.CaptureFi
             assert (tmp_path / file.format(name)).stat().st_size > 10_000
         assert f'src="{name}.png"' in page
     written, result = read_csv(tmp_path / "nominal.csv"), run("nominal")
-    assert list(written) == list(result)
+    with ssp.unpacked(SSP) as opened:
+        assert list(written) == [*result, *comparison.discrete(opened)]
     for name in result:
         np.testing.assert_array_equal(written[name], result[name])
-    assert len(list(tmp_path.iterdir())) == 5
-
-
-def test_the_variants_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["system", "--list"]) == 0
-    assert capsys.readouterr().out.split() == list(VARIANTS)
+    diagram = ROOT / "models" / "closed_loop" / "system.svg"
+    assert (tmp_path / "closed_loop.svg").read_bytes() == diagram.read_bytes()
+    assert 'src="closed_loop.svg"' in page
+    assert len(list(tmp_path.iterdir())) == 6
 
 
 def test_an_unknown_variant_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

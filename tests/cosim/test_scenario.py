@@ -216,15 +216,12 @@ def test_what_is_built_has_the_name_of_its_folder(root: Path) -> None:
         project.built(root / "models" / "toy", ".fmu")
 
 
-def test_there_is_one_system(root: Path) -> None:
-    with pytest.raises(
-        UserError, match=r"expected one folder with SystemStructure\.ssd, found none"
-    ):
-        project.system_folder()
-    for name in ("loop", "other"):
+def test_systems_are_found_by_their_names(root: Path) -> None:
+    with pytest.raises(UserError, match=r"models: has no folder with SystemStructure\.ssd"):
+        project.systems()
+    for name in ("loop", "machine", "other"):
         (root / "models" / name).mkdir(parents=True)
-    (root / "models" / "loop" / "SystemStructure.ssd").touch()
-    assert project.system_folder() == root / "models" / "loop"
-    (root / "models" / "other" / "SystemStructure.ssd").touch()
-    with pytest.raises(UserError, match="found loop, other"):
-        project.system_folder()
+    for name in ("machine", "loop"):
+        (root / "models" / name / "SystemStructure.ssd").touch()
+    assert list(project.systems()) == ["loop", "machine"]
+    assert project.systems()["loop"] == root / "models" / "loop"

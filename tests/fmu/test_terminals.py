@@ -27,6 +27,8 @@ MOTION = {1: ["q1", "dq1"], 2: ["q2", "dq2"]}
 EFFORT = {1: "tau1", 2: "f2"}
 REFERENCE = {1: ["q1", "dq1", "ddq1"], 2: ["q2", "dq2", "ddq2"]}
 END_EFFECTOR = ["ee_x", "ee_y", "ee_vx", "ee_vy"]
+# a connection without terminals: of the payload, and of no joint
+PAYLOAD = ("trajectory", "payload_attached", "controller", "payload_attached")
 
 
 def joints(name: str, members: dict[int, dict[str, tuple[str, str]]]) -> dict:
@@ -158,6 +160,7 @@ def test_terminals_of_the_same_name_connect_the_closed_loop(fmu: Path, version: 
         assert (first, second) == ("output", "input")
         connections.add((*source, *target))
     keys = ("startElement", "startConnector", "endElement", "endConnector")
+    connections.add(PAYLOAD)
     in_ssp = ET.parse(SSD).getroot().iter(f"{SSD_NAMESPACE}Connection")
     assert connections == {tuple(c.get(key) for key in keys) for c in in_ssp}
 

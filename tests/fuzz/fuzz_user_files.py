@@ -246,7 +246,7 @@ class Fuzz:
 
     def read_system(self, path: Path) -> None:
         with ssp.unpacked(path) as unpacked:
-            for name in comparison.choose(unpacked, []):
+            for name in unpacked.system.parameters:
                 comparison.load_reference(unpacked, name, CLOSED_LOOP, EXPERIMENT)
 
     def with_file(self, file: Path, content: bytes, check: Check) -> None:

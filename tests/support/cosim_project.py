@@ -25,8 +25,8 @@ FMUS = {
     "rp_controller": BUILD / "RPController.fmu",
     "rp_actuator": BUILD / "RPActuator.fmu",
     "rp_trajectory": BUILD / "RPTrajectory.fmu",
-    "rp_environment": BUILD / "RPEnvironment.fmu",
     "rp_sensor": BUILD / "RPSensor.fmu",
+    "rp_environment": BUILD / "RPEnvironment.fmu",
 }
 FILES = project.scenario_files()
 NAMES = list(FILES)

@@ -131,7 +131,13 @@ def opened(path: Path) -> Iterator[ClosedLoop]:
         fmus = {c.name: stack.enter_context(Fmu(unpacked.fmu(c.name))) for c in system.components}
         for component in system.components:
             fmus[component.name].path = path / component.source  # for messages
-        loop = ClosedLoop(fmus, system.connections, system.parameter_sets, system.stop)
+        # the master connects Reals; that the payload is attached never changes
+        real = [
+            c
+            for c in system.connections
+            if system.component(c.start_component).connectors[c.start_connector].type == "Real"
+        ]
+        loop = ClosedLoop(fmus, real, system.parameter_sets, system.stop)
         _check(path, loop)
         yield loop
 

@@ -154,6 +154,18 @@ def sampled(
     return _columns(loop, references, signals, commands, states, efforts)
 
 
+def reference_motion(
+    parameters: Parameters, times: Sequence[float], real: type = np.longdouble
+) -> Columns:
+    """Outputs of the trajectory by name, (times,), with parameters by the names of its FMU."""
+    known = _declared()
+    own = {f"trajectory.{name}": value for name, value in parameters.items()}
+    loop, segments, _ = prepare({n: v for n, v in own.items() if n in known}, real)
+    times = _ascending(times, real)
+    names = (*equations.REFERENCES, *equations.PATH)
+    return dict(zip(names, loop.references(times, _at(times, segments)), strict=True))
+
+
 def prepare(parameters: Parameters, real: type) -> tuple[Loop, np.ndarray, np.ndarray]:
     """The equations with the parameters in them, the trajectory's segments and the start.
 

@@ -1,0 +1,129 @@
+"""Several systems in one project: which variants the names of `system` stand for."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from cosim import project
+from cosim.__main__ import main
+from cosim.errors import UserError
+from cosim.system import study
+from tests.support.ssp_files import SSP, Edit, edited, replace
+
+STRUCTURE = "SystemStructure.ssd"
+VARIANTS = (
+    *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
+    "limited_effort",
+)
+SECOND = tuple(f"{name}_2" for name in VARIANTS)
+Add = Callable[[str, str, str], Path]
+
+
+@pytest.fixture
+def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Add:
+    """Puts a copy of the closed loop, with other names, into a project without systems."""
+    monkeypatch.setattr(project, "ROOT", tmp_path)
+    (tmp_path / "build").mkdir()
+
+    def one(name: str, archive: str, suffix: str) -> Path:
+        (tmp_path / "models" / name).mkdir(parents=True)
+        (tmp_path / "models" / name / STRUCTURE).touch()
+        edits: dict[str, Edit] = {
+            STRUCTURE: replace('System name="closed_loop"', f'System name="{name}"')
+        }
+        for component in ("trajectory", "controller", "arm"):
+            for variant in VARIANTS:
+                file = f"resources/{component}_{variant}.ssv"
+                edits[file] = replace(f'name="{variant}"', f'name="{variant}{suffix}"')
+        return edited(SSP, tmp_path / "build" / archive, edits)
+
+    return one
+
+
+def listed(
+    capsys: pytest.CaptureFixture[str], *names: str, ssp: Path | None = None
+) -> dict[str, list[str]]:
+    """What --list prints: variants by system."""
+    option = ["--ssp", str(ssp)] if ssp else []
+    assert main(["system", "--list", *option, *names]) == 0
+    found: dict[str, list[str]] = {}
+    for line in capsys.readouterr().out.splitlines():
+        if line.startswith("  "):
+            found[list(found)[-1]].append(line.strip())
+        else:
+            found[line] = []
+    return found
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(["system", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("error: ") and err.count("\n") == 1
+    return err
+
+
+def test_names_are_those_of_variants_and_systems(
+    add: Add, capsys: pytest.CaptureFixture[str]
+) -> None:
+    add("loop", "Loop.ssp", "")
+    second = add("loop_two", "LoopTwo.ssp", "_2")
+    both = {"loop": list(VARIANTS), "loop_two": list(SECOND)}
+    assert listed(capsys) == both
+    assert listed(capsys, "loop_two") == {"loop_two": list(SECOND)}
+    assert listed(capsys, "loop_two", "loop") == both
+    assert listed(capsys, "nominal_2") == {"loop_two": ["nominal_2"]}
+    mixed = listed(capsys, "nominal", "loop_two", "nominal_2", "nominal")
+    assert mixed == {"loop": ["nominal"], "loop_two": list(SECOND)}
+    assert listed(capsys, ssp=second) == {"loop_two": list(SECOND)}
+
+
+def test_an_unknown_name_is_refused(add: Add, capsys: pytest.CaptureFixture[str]) -> None:
+    add("loop", "Loop.ssp", "")
+    add("loop_two", "LoopTwo.ssp", "_2")
+    err = refused(capsys, "nominal", "lop_two")
+    assert "no variant 'lop_two', did you mean 'loop_two'? (there are: loop: nominal, " in err
+    assert all(name in err for name in (*VARIANTS, *SECOND))
+
+
+def test_a_name_stands_for_one_thing(add: Add, capsys: pytest.CaptureFixture[str]) -> None:
+    add("loop", "Loop.ssp", "")
+    path = add("loop_two", "LoopTwo.ssp", "")
+    wanted = f"{path}: the name of variant 'nominal' is taken by a variant of loop\n"
+    assert refused(capsys, "--list") == f"error: {wanted}"
+
+
+def test_a_variant_has_not_the_name_of_a_system(
+    add: Add, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = add("nominal", "Nominal.ssp", "")
+    wanted = f"{path}: the name of variant 'nominal' is taken by a system\n"
+    assert refused(capsys, "--list") == f"error: {wanted}"
+
+
+def test_a_system_that_is_not_built_is_named(add: Add, capsys: pytest.CaptureFixture[str]) -> None:
+    add("loop", "Loop.ssp", "")
+    add("loop_two", "LoopTwo.ssp", "_2").unlink()
+    assert "has no SSP of loop_two: ./run.sh builds it" in refused(capsys, "--list")
+    assert listed(capsys, "loop") == {"loop": list(VARIANTS)}
+
+
+def test_a_system_without_a_folder_is_refused(
+    add: Add, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = add("loop", "Loop.ssp", "")
+    other = edited(path, tmp_path / "x.ssp", {STRUCTURE: replace('name="loop"', 'name="lop"')})
+    wanted = f"{other}: no system 'lop' has references, did you mean 'loop'? (known: loop)\n"
+    assert refused(capsys, "--ssp", str(other)) == f"error: {wanted}"
+
+
+def test_one_system_has_a_study_of_its_coupling(monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, known = study.of_coupling()
+    assert folder.name == "closed_loop" and callable(known.study_coupling)
+    for folders, found in (({}, "none"), ({"a": folder, "b": folder}, "closed_loop, closed_loop")):
+        paths = {name: Path(name) / path.name for name, path in folders.items()}
+        monkeypatch.setattr(project, "systems", lambda paths=paths: paths)
+        monkeypatch.setattr(study, "load", lambda _: known)
+        with pytest.raises(UserError, match=f"study of its coupling, found {found}"):
+            study.of_coupling()

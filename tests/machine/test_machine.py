@@ -1,0 +1,183 @@
+"""The machine in Ecos is what the references say, and does what its page says."""
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.__main__ import main
+from cosim.system import comparison, ecos, ssp
+from models.machine.experiment import STEPS_PER_SECOND, STOP
+from tests.support.paths import ROOT
+
+SSP = ROOT / "build" / "Machine.ssp"
+VARIANTS = ("pick_and_place", "pick_and_place_untold", "stick_slip", "wall_contact")
+BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
+SCALE = 1e-3
+STEPS = round(STOP * STEPS_PER_SECOND)
+DISCRETE = ("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2")
+DISCRETE = (*DISCRETE, "trajectory.payload_attached")
+
+Columns = dict[str, np.ndarray]
+
+
+def read_csv(path: Path) -> Columns:
+    """Columns of a CSV file by name."""
+    with path.open(encoding="utf-8") as file:
+        names = [name.strip('"') for name in file.readline().strip().split(",")]
+        return dict(zip(names, np.loadtxt(file, delimiter=",").T, strict=True))
+
+
+def reference(variant: str, name: str = "ecos.csv") -> Columns:
+    return read_csv(ROOT / "models" / "machine" / "references" / variant / name)
+
+
+@functools.cache
+def run(variant: str, folder: str = "") -> Columns:
+    """The variant in Ecos: all recorded values by name."""
+    with ssp.unpacked(SSP.parent / folder / SSP.name) as opened:
+        names = [*comparison.recorded(opened), *comparison.discrete(opened)]
+        result = ecos.run(opened, variant, names)
+    assert len(result.times) == STEPS + 1
+    return {"time": result.times} | dict(zip(result.names, result.values.T, strict=True))
+
+
+def distance(columns: Columns) -> np.ndarray:
+    """Of the end effector from its reference, (rows,) m."""
+    return np.hypot(*(columns[f"plant.ee_{x}"] - columns[f"trajectory.ee_{x}_ref"] for x in "xy"))
+
+
+def changes(mode: np.ndarray) -> np.ndarray:
+    """Rows after which a mode is another one."""
+    return np.flatnonzero(np.diff(mode))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_ecos_is_at_the_reference_of_its_order(variant: str) -> None:
+    """All Real outputs, and to the last bit counts, modes and whether the payload is attached."""
+    expected, result = reference(variant), run(variant)
+    rows = np.rint(expected["time"] * STEPS_PER_SECOND).astype(int)
+    assert np.allclose(expected["time"], rows / STEPS_PER_SECOND, rtol=0, atol=1e-12)
+    assert (rows[0], rows[-1]) == (0, STEPS) and len(rows) > 100
+    assert {"plant.mode1", "sensor.counts1", "environment.wall_force"} <= set(expected)
+    assert set(expected) <= set(result)
+    for name in DISCRETE:
+        np.testing.assert_array_equal(result[name][rows], expected[name])
+    worst = {
+        name: np.abs(result[name][rows] - x).max() / max(np.abs(x).max(), SCALE)
+        for name, x in expected.items()
+    }
+    assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
+
+
+def test_a_controller_that_is_told_tracks_ten_times_better() -> None:
+    told, untold = (run(name) for name in VARIANTS[:2])
+    assert distance(told).max() < 0.1 * distance(untold).max()
+    attached = untold["trajectory.payload_attached"] == 1
+    np.testing.assert_array_equal(attached, told["trajectory.payload_attached"] == 1)
+    time = told["time"][attached]
+    assert (time[0], time[-1]) == pytest.approx((0.201, 3.6), abs=1e-9)
+    # the object keeps its velocity, so that the arm feels no jump
+    assert np.abs(np.diff(told["plant.dq1"])).max() < 0.03
+    np.testing.assert_array_equal(told["plant.grasp_loss"], 0.0)
+    # until the payload comes, both are the same
+    first = int(np.argmax(attached))
+    for name in ("plant.q1", "plant.q2", "controller.tau1", "controller.f2"):
+        np.testing.assert_array_equal(told[name][:first], untold[name][:first])
+    # the slide sinks as a mass of m2 + mp on a spring m2 Kp with a damper m2 Kd: 2 kg, 400, 40
+    sag = untold["plant.q2"] - untold["trajectory.q2_ref"]
+    since = 0.395 - 0.201
+    swing = np.exp(-10 * since) * (np.cos(10 * since) + np.sin(10 * since))
+    row = round(0.395 * STEPS_PER_SECOND)
+    assert sag[row] == pytest.approx(9.81 / 400 * (1 - swing), rel=0.05)
+
+
+def test_integral_action_against_friction_hunts() -> None:
+    """Sticking and slipping in turn, in motion and on after the reference has come to rest."""
+    columns = run("stick_slip")
+    for joint in (1, 2):
+        mode, rate = columns[f"plant.mode{joint}"], columns[f"plant.dq{joint}"]
+        assert set(mode) == {-1.0, 0.0, 1.0}
+        assert (rate[mode == 0] == 0.0).all()
+        moves = np.abs(mode) == 1
+        assert 0.2 < np.mean(moves) < 0.8
+        assert (np.sign(rate[moves]) * mode[moves] >= 0).all()
+        still = columns["time"] > 2.2
+        assert np.ptp(columns[f"trajectory.q{joint}_ref"][still]) < 1e-12
+        assert len(changes(mode[still])) >= 3
+        # slips are far faster than the motion that is wanted
+        wanted = np.abs(columns[f"trajectory.dq{joint}_ref"]).max()
+        assert np.abs(rate).max() > 3 * wanted
+        # read after inputs are set, a joint that is about to break away shows more
+        friction = np.abs(columns[f"plant.friction{joint}"])
+        assert (friction[moves] <= 1.2).all()
+        assert friction.max() == pytest.approx(1.2, rel=0.01)
+
+
+def test_the_wall_pushes_and_never_pulls() -> None:
+    columns = run("wall_contact")
+    force, depth = columns["environment.wall_force"], columns["environment.penetration"]
+    assert (force >= 0).all() and (force[depth == 0] == 0).all()
+    wanted = -0.08 - columns["trajectory.ee_x_ref"]
+    assert wanted.max() == pytest.approx(0.02, rel=1e-3)
+    assert 0 < depth.max() < 0.15 * wanted.max()
+    speed = -columns["plant.ee_vx"]
+    law = np.where(depth > 0, np.maximum(2e4 * depth + 60.0 * speed, 0.0), 0.0)
+    np.testing.assert_allclose(force, law, rtol=1e-12, atol=1e-9)
+    # one contact, after which the tip is back on its path
+    touches = force > 0
+    assert 0.2 < np.mean(touches) * STOP < 0.6
+    assert distance(columns)[-1] < 1e-3
+    # the reading is that after inputs are set: the wrench follows the motion of the same point
+    np.testing.assert_array_equal(columns["environment.ee_fx"], force)
+
+
+def test_drives_and_encoders_are_what_their_pages_say() -> None:
+    columns = run("wall_contact")
+    for joint, effort, gear in ((1, "tau1", 100.0), (2, "f2", 200.0 * np.pi)):
+        current = columns[f"actuator.current{joint}"]
+        np.testing.assert_allclose(columns[f"actuator.{effort}"], 0.05 * gear * current, rtol=1e-13)
+        resolution = (5.992112452678286e-06, 1e-6)[joint - 1]
+        counted = columns[f"sensor.counts{joint}"] * resolution
+        np.testing.assert_allclose(columns[f"sensor.q{joint}_measured"], counted, rtol=1e-15)
+        # a sample is that of the point before its step: less than two steps old
+        late = np.abs(counted - columns[f"plant.q{joint}"])
+        fastest = np.abs(columns[f"plant.dq{joint}"]).max()
+        assert late.max() <= 2e-3 * fastest + resolution
+
+
+@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip"])
+def test_fmus_of_fmi_3_give_the_same_bits(variant: str) -> None:
+    first, second = run(variant), run(variant, "fmi3")
+    assert list(first) == list(second)
+    for name, values in first.items():
+        assert values.tobytes() == second[name].tobytes(), name
+
+
+def test_the_command_runs_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "stick_slip", "--report", str(tmp_path)]) == 0
+    assert "passed: 1 variant\n" in capsys.readouterr().out
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    for file in ("machine.svg", "stick_slip.png"):
+        assert f'src="{file}"' in page
+        assert (tmp_path / file).stat().st_size > 1000
+    written = read_csv(tmp_path / "stick_slip.csv")
+    for name, values in run("stick_slip").items():
+        np.testing.assert_array_equal(written[name], values)
+
+
+def test_systems_are_listed_with_their_variants(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    at = lines.index("machine")
+    assert lines[0] == "closed_loop"
+    assert lines[at + 1 : at + 1 + len(VARIANTS)] == [f"  {name}" for name in VARIANTS]
+
+
+def test_an_unknown_variant_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "stick_slop"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1
+    assert "no variant 'stick_slop', did you mean 'stick_slip'?" in err
+    assert all(name in err for name in VARIANTS)
