@@ -15,6 +15,7 @@ from cosim.fmu_file import Fmu
 from cosim.reference import Reference
 from cosim.report import pages
 from cosim.tolerance_sweep import Sweep
+from tests.support.all_fmus import FOLDERS
 from tests.support.cosim_project import (
     LONG,
     NAMES,
@@ -26,20 +27,13 @@ from tests.support.cosim_project import (
 @pytest.fixture(scope="module")
 def runs(opened: Fmu) -> Iterator[Runs]:
     """Of all models, whose FMUs lie in one folder."""
-    others = {
-        "rp_actuator": "RPActuator.fmu",
-        "rp_controller": "RPController.fmu",
-        "rp_environment": "RPEnvironment.fmu",
-        "rp_plant": "RPPlant.fmu",
-        "rp_trajectory": "RPTrajectory.fmu",
-        "rp_sensor": "RPSensor.fmu",
-    }
     with ExitStack() as stack:
         fmus = {
-            model: stack.enter_context(Fmu(opened.path.parent / name))
-            for model, name in others.items()
+            folder: stack.enter_context(Fmu(opened.path.with_name(f"{name}.fmu")))
+            for name, folder in FOLDERS.items()
+            if name != opened.path.stem
         }
-        yield Runs({"rp_manipulator": opened, **fmus})
+        yield Runs({FOLDERS[opened.path.stem]: opened, **fmus})
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.all_fmus import NAMES, SYSTEMS
 from tests.support.paths import ROOT
 from tests.support.source_copy import copy_sources, run, settings_of
 
-NAMES = ("RPManipulator", "RPPlant", "RPTrajectory", "RPController", "RPActuator")
 FMUS = (*NAMES, *(f"fmi3/{name}" for name in NAMES))
 
 
@@ -122,5 +122,5 @@ def test_two_builds_in_two_folders_give_the_same_bytes(fmu: Path, tmp_path: Path
     finally:
         os.umask(before)
     expected = build(first, first / "build", settings)
-    for name in [f"{name}.fmu" for name in FMUS] + ["ClosedLoop.ssp"]:
+    for name in (*(f"{name}.fmu" for name in FMUS), *(f"{name}.ssp" for name in SYSTEMS)):
         assert (built / name).read_bytes() == (expected / name).read_bytes(), name

@@ -14,6 +14,7 @@ import pytest
 from lxml import etree
 
 from tests.importers.by_fmpy import instance
+from tests.support.all_fmus import CARRIED, FOLDERS
 from tests.support.generator import change, copied
 from tests.support.instances import STATES, LoadedFmu
 from tests.support.paths import ROOT
@@ -21,12 +22,7 @@ from tests.support.paths import ROOT
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST = "fmi-ls-manifest.xml"
 SCHEMAS = Path(fmpy.__file__).parent
-MODELS = {
-    "RPManipulator": ("rp_manipulator", ["irregular_steps", "sixtieth"]),
-    "RPController": ("rp_controller", ["controller_computed_torque", "controller_pd_gravity"]),
-    "RPActuator": ("rp_actuator", ["actuator_torque_speed", "actuator_limits_irregular"]),
-    "RPTrajectory": ("rp_trajectory", ["line_backward_branch", "point_to_point_joint"]),
-}
+MODELS = {name: (FOLDERS[name], scenarios) for name, scenarios in CARRIED.items()}
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"
 SSV = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"

@@ -15,9 +15,9 @@ import fmpy.validation
 import lief
 import pytest
 
+from tests.support.all_fmus import NAMES, SYSTEMS
 from tests.support.paths import ROOT
 
-NAMES = ("RPManipulator", "RPPlant", "RPTrajectory", "RPController", "RPActuator")
 BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
 LARGEST = {"fmi2": 2_500_000, "fmi3": 3_500_000}  # bytes of an FMU
 FUNCTIONS = {"fmi2": 44, "fmi3": 75}  # of the standard
@@ -87,7 +87,7 @@ def test_a_release_has_checksums_of_all_its_files(release: Path) -> None:
     files = [path for pattern in ("*.fmu", "*.ssp") for path in release.rglob(pattern)]
     found = {path.relative_to(release).as_posix() for path in files}
     assert {name for _, name in lines} == found
-    names = {"ClosedLoop.ssp", *(f"{name}.fmu" for name in NAMES)}
+    names = {*(f"{name}.ssp" for name in SYSTEMS), *(f"{name}.fmu" for name in NAMES)}
     assert found == {f"{below}{name}" for below in BELOW.values() for name in names}
     for checksum, name in lines:
         assert hashlib.sha256((release / name).read_bytes()).hexdigest() == checksum, name

@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 
 from tests.importers.by_fmpy import co_simulation, euler
+from tests.support.all_fmus import NAMES
 from tests.support.instances import LoadedFmu
 from tests.support.paths import ROOT
 
@@ -218,7 +219,7 @@ def fmutool_check(fmu: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     return start([folder_of(CHECKER) / "bin" / "fmutool", "-check", "-input", fmu], folder)
 
 
-@pytest.mark.parametrize("name", ["RPManipulator", "RPPlant", "RPController", "RPTrajectory", "RPActuator"])
+@pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("version", VERSIONS)
 def test_fmutool_finds_nothing(version: str, name: str, fmu: Path, tmp_path: Path) -> None:
     below = fmu.parent if version == "fmi2" else fmu.parent / version

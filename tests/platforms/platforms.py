@@ -18,7 +18,6 @@ import pytest
 from tests.platforms.scripts import Model, Script, read_model
 from tests.support.paths import ROOT
 
-FMUS = ("RPManipulator", "RPTrajectory", "RPController", "RPPlant", "RPActuator")
 BUILD = ROOT / "build"
 # of builds for one platform, of the hosts, and of wine
 SCRATCH = BUILD / "platforms"

@@ -135,11 +135,12 @@ def accesses(script: Refusals) -> None:
     calculated = first(model, kind="Real", causality="output", initial="calculated")
     number = first(model, kind="Enumeration")
     fixed = first(model, kind="Real", causality="parameter", variability="fixed")
-    assert parameter and calculated and number and fixed
+    assert parameter and calculated
     for reference in (9, 4711, 2_000_000_000):
         script.refuse("SetReal", reference, bits(1.0))
         script.in_initialization("GetReal", reference)
-    script.in_initialization("GetReal", number.reference)
+    if number:
+        script.in_initialization("GetReal", number.reference)
     script.in_initialization("GetInteger", parameter.reference)
     for name in ("GetBoolean", "GetString"):
         script.in_initialization(name, parameter.reference)
@@ -148,18 +149,20 @@ def accesses(script: Refusals) -> None:
     script.refuse("SetString", parameter.reference, "text")
     script.refuse("SetReal", calculated.reference, bits(1.0))
     script.refuse("SetReal", model["time"].reference, bits(1.0))
-    script.at_step("SetReal", fixed.reference, bits(1.0))
-    for wrong in (-1, 0, METHODS[-1] + 1, 2147483647, -2147483648):
+    if fixed:
+        script.at_step("SetReal", fixed.reference, bits(1.0))
+    for wrong in (-1, 0, METHODS[-1] + 1, 2147483647, -2147483648) if number else ():
         script.refuse("SetInteger", number.reference, wrong, expect="Discard")
     for digits in NOT_FINITE:
         script.refuse("SetReal", parameter.reference, digits, expect="Discard")
         for reference in model.inputs[:1]:
             script.at_step("SetReal", reference, digits, expect="Discard")
-    for name, value in INCONSISTENT[model.name].items():
+    for name, value in INCONSISTENT.get(model.name, {}).items():
         script.call("SetReal", PLACE, model[name].reference, bits(value))
     script.call("SetupExperiment", PLACE, "-", bits(0.0), "-")
     script.call("EnterInitializationMode", PLACE)
-    script.refuse("ExitInitializationMode")
+    if model.name in INCONSISTENT:
+        script.refuse("ExitInitializationMode")
 
 
 def experiments(script: Refusals) -> None:

@@ -157,6 +157,7 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "current2": 12.0, "solver_method": [1, 2, 3, 1],
     },
     "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3, 1]},
+    "RPEnvironment": {"position": 0.5, "tip_x": 0.1, "stiffness": 2000.0},
     # falls onto its stops, slides and is held
     "RPPlant": {
         "m2": 1.25, "a": 0.15, "q1": 0.3, "q2": 0.1, "dq1": -0.4, "dq2": 0.2, "g": 2.5,

@@ -11,15 +11,16 @@ from pathlib import Path
 import pytest
 
 from tests.platforms import refusals, scripts
-from tests.platforms.platforms import FMUS, PLATFORMS, Platform, Runner, runner
+from tests.platforms.platforms import PLATFORMS, Platform, Runner, runner
 from tests.platforms.scripts import Model, Script, joined
 from tests.platforms.transcript import first_difference, read
+from tests.support.all_fmus import NAMES
 
 VARIANTS = (1, 2, 3)
 THREADS = 8
 STEPS = 40  # before a state is saved, and after
 
-each_fmu = pytest.mark.parametrize("name", FMUS)
+each_fmu = pytest.mark.parametrize("name", NAMES)
 each_platform = pytest.mark.parametrize("row", PLATFORMS, ids=lambda row: row.name)
 # and this one, whose library comes from the FMU in build/
 everywhere = pytest.mark.parametrize(

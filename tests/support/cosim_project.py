@@ -16,18 +16,11 @@ from cosim import scenario as scenarios
 from cosim.fmu_file import read_model
 from cosim.model import Model
 from cosim.scenario import Scenario
+from tests.support.all_fmus import FOLDERS
 from tests.support.paths import ROOT
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
-FMUS = {
-    "rp_manipulator": BUILD / "RPManipulator.fmu",
-    "rp_plant": BUILD / "RPPlant.fmu",
-    "rp_controller": BUILD / "RPController.fmu",
-    "rp_actuator": BUILD / "RPActuator.fmu",
-    "rp_trajectory": BUILD / "RPTrajectory.fmu",
-    "rp_sensor": BUILD / "RPSensor.fmu",
-    "rp_environment": BUILD / "RPEnvironment.fmu",
-}
+FMUS = {folder: BUILD / f"{name}.fmu" for name, folder in FOLDERS.items()}
 FILES = project.scenario_files()
 NAMES = list(FILES)
 SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion
