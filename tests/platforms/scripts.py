@@ -62,8 +62,13 @@ class Model:
 
     @property
     def booleans(self) -> list[int]:
-        """References of Boolean inputs."""
         return [v.reference for v in self.variables if v.kind == "Boolean"]
+
+    @property
+    def boolean_inputs(self) -> list[int]:
+        return [
+            v.reference for v in self.variables if (v.kind, v.causality) == ("Boolean", "input")
+        ]
 
     @property
     def methods(self) -> tuple[int, ...]:
@@ -157,6 +162,10 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "current2": 12.0, "solver_method": [1, 2, 3, 1],
     },
     "RPTrajectory": {"start_time": 0.6, "radius": 0.09, "motion": [1, 2, 3, 1]},
+    "RPSensor": {
+        "noise1": 0.01, "sample_time": 0.003, "resolution1": 1e-4, "latency": [0, 1, 2, 3],
+        "seed": [7, -8, 9, 10],
+    },
     "RPEnvironment": {"position": 0.5, "tip_x": 0.1, "stiffness": 2000.0},
     # falls onto its stops, slides and is held
     "RPPlant": {
@@ -177,6 +186,7 @@ INCONSISTENT: dict[str, dict[str, float]] = {
     "RPController": {"I1z": 0.0, "I2z": 0.0, "lc1": 0.0},
     "RPActuator": {"gear_ratio1": 0.0},
     "RPTrajectory": {"turns": 1.0, "frequency": 3.0},
+    "RPSensor": {"resolution1": 1e300, "sample_time": 1e-6},
     "RPPlant": {"coulomb_friction2": 2.0, "breakaway_friction2": 1.0},
 }
 
@@ -236,7 +246,7 @@ def step(script: Script, model: Model, place: int, i: int, time: float, shift: i
             for word in (r, 1 + (i // 5 + j) % 3, bits((i % 13 - 6) / 4))
         ]
         script.call("SetRealInputDerivatives", place, *slopes)
-    for boolean in model.booleans:
+    for boolean in model.boolean_inputs:
         if i % 9 == 4:
             script.call("SetBoolean", place, boolean, 1 - i // 9 % 2)
     length = LENGTHS[i // 7 % len(LENGTHS)]
@@ -321,7 +331,7 @@ def model_exchange(model: Model) -> Script:
     for i in range(STEPS):
         if i % 50 == 49:
             script.call("EnterEventMode", place)
-            for boolean in model.booleans:
+            for boolean in model.boolean_inputs:
                 script.call("SetBoolean", place, boolean, 1 - i // 50 % 2)
             script.call("NewDiscreteStates", place)
             script.call("EnterContinuousTimeMode", place)

@@ -153,11 +153,14 @@ def test_how_much_is_compared(native: Runner, name: str) -> None:
     answers = answers_of(native, whole(native.model))
     reals = [word for a in answers for word in a.words if len(word) == 16]
     expected = min(25_000, 500 * len(native.model.reals()))
-    assert len(reals) > expected and len(set(reals)) > expected / 7
+    # inputs repeat after 23 steps, and some models are functions of them
+    different = 500 if name in ("RPEnvironment", "RPSensor") else 4_000
+    assert len(reals) > expected and len(set(reals)) > different
     states = [a.words[0] for a in answers if a.call.startswith("SerializeFMUstate") and a.words]
     saved = [state for state in states if state.startswith(b"COSIMSTA".hex())]
     assert native.model.guid.encode().hex() in saved[0]
-    assert len(set(saved)) >= 3 * 3 + 1 and min(map(len, saved)) > 2 * 300
+    has_variants = any(isinstance(value, list) for value in scripts.CHANGED[name].values())
+    assert len(set(saved)) >= (3 * 3 + 1 if has_variants else 6) and min(map(len, saved)) > 2 * 300
 
 
 def test_methods_agree_and_have_other_bits(arm: Runner) -> None:
