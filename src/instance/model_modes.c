@@ -44,13 +44,13 @@ static bool is_timed(const struct instance *instance, const bool *fired) {
 }
 
 /* Time must get on from one time event to the next. */
-static enum status check_next_time(const struct instance *instance, double t) {
+static enum status check_next_time(const struct instance *instance, double passed) {
     const double next = instance_next_time(instance);
-    if (next > t) {
+    if (next > passed) {
         return STATUS_OK;
     }
     message_write(&instance->sink, STATUS_INTERNAL,
-                  "a time event at t = %.17g is followed by one at t = %.17g", t, next);
+                  "a time event at t = %.17g is followed by one at t = %.17g", passed, next);
     return STATUS_INTERNAL;
 }
 
@@ -67,9 +67,10 @@ static enum status update(struct instance *instance, const bool *fired) {
         .du = instance->du,
         .tolerance = instance->tolerances,
     };
+    const double next_time = instance_next_time(instance);
     enum status status = events->update(instance->memory.values, &event);
     if (status == STATUS_OK && event.is_timed) {
-        status = check_next_time(instance, event.t);
+        status = check_next_time(instance, next_time);
     }
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,

@@ -265,6 +265,24 @@ static void test_integrated_from_outside(void) {
     }
 }
 
+/* One that passes several strokes gets one with each update. */
+static void test_strokes_passed_from_outside_follow_one_by_one(void) {
+    struct discrete_update update;
+    prepare(&hammer_description, 1, 1e-8);
+    set(TOY_PARAMETER2, first);
+    instance_integrate_outside(toy);
+    initialize();
+    ASSERT_OK(instance_enter_continuous_time(toy));
+    ASSERT_OK(instance_set_time(toy, first + 2.5));
+    instance_enter_event_mode(toy);
+    for (int n = 1; n <= 4; n++) {
+        ASSERT_OK(instance_update_discrete_states(toy, &update));
+        TEST_ASSERT_EQUAL_INT(n < 4, update.states_changed);
+        TEST_ASSERT_EQUAL_DOUBLE(first + (n < 3 ? n : 3), update.next_time);
+    }
+    TEST_ASSERT_EQUAL_INT(3, hammer()->strokes);
+}
+
 static void test_a_declaration_that_does_not_fit_the_model_is_refused(void) {
     struct model_description wrong = hammer_description;
     struct instance *none = NULL;
