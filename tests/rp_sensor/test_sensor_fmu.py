@@ -7,6 +7,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from fmpy.simulation import instantiate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.errors import UserError
@@ -168,6 +169,34 @@ def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: b
     within = [k * 0.00737 for k in range(1, 41)]
     found = [np.abs(result["time"] - t).min() < 1e-12 for t in within]
     assert all(found) if early_return else not any(found)
+
+
+def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Path) -> None:
+    path = fmi3_fmu(fmu.with_name("RPSensor.fmu"))
+    fmpy.extract(path, tmp_path)
+    description = fmpy.read_model_description(path)
+    reference = {v.name: v.valueReference for v in description.modelVariables}
+    sensor = instantiate_fmu(
+        tmp_path, description, "CoSimulation", early_return_allowed=True, event_mode_used=True
+    )
+    try:
+        sensor.enterInitializationMode(startTime=0.0)
+        sensor.setFloat64([reference["resolution1"], reference["sample_time"]], [0.25, 0.125])
+        sensor.exitInitializationMode()
+        assert sensor.updateDiscreteStates()[-2:] == (True, 0.125)
+        sensor.enterStepMode()
+        t = 0.0
+        for k in range(1, 9):
+            has_event, _, early, t = sensor.doStep(t, 2.0 - t)
+            assert (bool(has_event), bool(early), t) == (True, True, k * 0.125)
+            sensor.enterEventMode()
+            sensor.setFloat64([reference["q1"]], [0.25 * k * k])
+            assert sensor.getInt32([reference["counts1"]]) == [(k - 1) ** 2]
+            assert sensor.updateDiscreteStates()[-2:] == (True, (k + 1) * 0.125)
+            assert sensor.getInt32([reference["counts1"]]) == [k * k]
+            sensor.enterStepMode()
+    finally:
+        sensor.freeInstance()
 
 
 # ---- References --------------------------------------------------------------------------------
