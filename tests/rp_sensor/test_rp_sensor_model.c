@@ -183,6 +183,19 @@ static void test_derivatives_are_zero(void) {
     }
 }
 
+static void test_first_derivatives_without_second_ones(void) {
+    struct rp_sensor_values first = {.q_measured = {3.0, 4.0}, .dq_measured = {5.0, 6.0}};
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.propagate(&v, 0.0, 1.0, &first, NULL));
+    for (int i = 0; i < 2; i++) {
+        TEST_ASSERT_TRUE(first.q_measured[i] == 0.0 && first.dq_measured[i] == 0.0);
+    }
+}
+
+static void test_there_is_no_continuous_state(void) {
+    TEST_ASSERT_EQUAL_UINT64(0, rp_sensor_model.states.size);
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
+}
+
 /* ---- Modes of saved states ------------------------------------------------------------------ */
 
 static void assert_possible(bool expected) {

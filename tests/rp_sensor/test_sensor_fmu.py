@@ -1,17 +1,19 @@
-"""RPSensor.fmu: what is refused, Model Exchange by time events, references."""
+"""RPSensor.fmu: what is refused, Model Exchange by time events, event mode, references."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 import fmpy
+import numpy as np
 import pytest
+from fmpy.simulation import instantiate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.errors import UserError
 from cosim.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import COUNTS, MODEL, SCRIPT, independent, start_values, started
-from tests.support.cosim_project import declared, load, names_of
+from tests.support.cosim_project import declared, fmi3_fmu, load, names_of
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 
 SCENARIOS = names_of(MODEL.name)
@@ -112,6 +114,89 @@ def test_fmpy_simulates_it(sensor: Fmu, kind: str) -> None:
         after = t / 0.00737
         if abs(after - round(after)) > 1e-6:  # at a tick both rows are right
             assert counts == expected[int(after)], t
+
+
+def test_in_model_exchange_ticks_sample_the_inputs_of_their_time(sensor: Fmu) -> None:
+    """The position is the time: what is measured is the time of the tick."""
+    ramp = np.array([(0.0, 0.0), (1.0, 1.0)], dtype=[("time", float), ("q1", float)])
+    for latency in (0, 1):
+        result = fmpy.simulate_fmu(
+            str(sensor.path),
+            fmi_type="ModelExchange",
+            stop_time=0.3,
+            output_interval=0.01,
+            start_values={"sample_time": 0.00737, "resolution1": 1e-9, "latency": latency},
+            input=ramp,
+            output=["q1_measured"],
+        )
+        checked = 0
+        for t, measured in result:
+            ticks = t / 0.00737
+            if abs(ticks - round(ticks)) > 1e-6:  # at a tick both rows are right
+                sampled = max(int(ticks) - latency, 0) * 0.00737
+                assert abs(measured - sampled) <= 1e-9
+                checked += 1
+        assert checked >= 30
+
+
+# ---- FMI 3.0's event mode ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("event_mode", [False, True])
+@pytest.mark.parametrize("early_return", [False, True])
+def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: bool) -> None:
+    """The counts are the same; a step that may return early does so at each tick within it."""
+    values = {"sample_time": 0.00737, "noise1": 0.01, "noise2": 1e-4, "seed": 9, "latency": 1}
+    encoder = independent.Encoder(start_values() | values)
+    result = fmpy.simulate_fmu(
+        str(fmi3_fmu(fmu.with_name("RPSensor.fmu"))),
+        fmi_type="CoSimulation",
+        use_event_mode=event_mode,
+        early_return_allowed=early_return,
+        stop_time=0.3,
+        output_interval=0.01,
+        start_values=values | {"q1": 0.4, "q2": -0.01},
+        output=COUNTS,
+    )
+    expected = []
+    for _ in range(41):
+        encoder.sample([0.4, -0.01])
+        expected.append(encoder.counts())
+    for t, *counts in result:
+        ticks = t / 0.00737
+        if abs(ticks - round(ticks)) > 1e-6:  # at a tick both rows are right
+            assert counts == expected[int(ticks)], t
+    within = [k * 0.00737 for k in range(1, 41)]
+    found = [np.abs(result["time"] - t).min() < 1e-12 for t in within]
+    assert all(found) if early_return else not any(found)
+
+
+def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Path) -> None:
+    path = fmi3_fmu(fmu.with_name("RPSensor.fmu"))
+    fmpy.extract(path, tmp_path)
+    description = fmpy.read_model_description(path)
+    reference = {v.name: v.valueReference for v in description.modelVariables}
+    sensor = instantiate_fmu(
+        tmp_path, description, "CoSimulation", early_return_allowed=True, event_mode_used=True
+    )
+    try:
+        sensor.enterInitializationMode(startTime=0.0)
+        sensor.setFloat64([reference["resolution1"], reference["sample_time"]], [0.25, 0.125])
+        sensor.exitInitializationMode()
+        assert sensor.updateDiscreteStates()[-2:] == (True, 0.125)
+        sensor.enterStepMode()
+        t = 0.0
+        for k in range(1, 9):
+            has_event, _, early, t = sensor.doStep(t, 2.0 - t)
+            assert (bool(has_event), bool(early), t) == (True, True, k * 0.125)
+            sensor.enterEventMode()
+            sensor.setFloat64([reference["q1"]], [0.25 * k * k])
+            assert sensor.getInt32([reference["counts1"]]) == [(k - 1) ** 2]
+            assert sensor.updateDiscreteStates()[-2:] == (True, (k + 1) * 0.125)
+            assert sensor.getInt32([reference["counts1"]]) == [k * k]
+            sensor.enterStepMode()
+    finally:
+        sensor.freeInstance()
 
 
 # ---- References --------------------------------------------------------------------------------
