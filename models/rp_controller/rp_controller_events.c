@@ -81,7 +81,7 @@ static enum status start(struct rp_controller_values *values, double t) {
         return STATUS_OK;
     }
     if (!(t + rp_controller_shortest_sample_time > t)) {
-        return STATUS_INVALID_TIME; // samples would have no times of their own
+        return STATUS_INVALID_TIME; // samples would have the same time
     }
     const enum status status = take_sample(values);
     if (status == STATUS_OK) {
