@@ -11,16 +11,18 @@ static double sample_time_of(const struct rp_controller_values *values, double k
     return values->samples.start + k * values->parameters.sample_time;
 }
 
-/* s: when the efforts of the last sample come into effect. Rounding must not bring them behind the
- * next sample, which would take their place. */
+/* s: when the efforts of the last sample come into effect: with the next sample at the latest,
+ * which would take their place. Rounding must change neither this nor that both have the same time.
+ */
 static double show_time(const struct rp_controller_values *values) {
     const struct rp_controller_samples *samples = &values->samples;
+    const struct rp_controller_parameters *p = &values->parameters;
     if (!(samples->shown < samples->taken)) {
         return INFINITY;
     }
     const double next_sample = sample_time_of(values, samples->taken);
-    const double due = sample_time_of(values, samples->taken - 1.0) + values->parameters.delay;
-    return due < next_sample ? due : next_sample;
+    const double due = sample_time_of(values, samples->taken - 1.0) + p->delay;
+    return p->delay < p->sample_time && due < next_sample ? due : next_sample;
 }
 
 static double next_time(const void *values_pointer) {
@@ -79,7 +81,7 @@ static enum status start(struct rp_controller_values *values, double t) {
         return STATUS_OK;
     }
     if (!(t + rp_controller_shortest_sample_time > t)) {
-        return STATUS_INVALID_TIME; // samples would have no times of their own
+        return STATUS_INVALID_TIME; // samples would have the same time
     }
     const enum status status = take_sample(values);
     if (status == STATUS_OK) {
