@@ -54,7 +54,7 @@ def test_states_may_jump_and_indicators_are_counted(plant: Fmu) -> None:
         root = ET.fromstring(archive.read("modelDescription.xml"))
     variables = {v.get("name"): v for v in root.find("ModelVariables")}
     if plant.model.fmi_version == "2.0":
-        assert root.get("numberOfEventIndicators") == "8"
+        assert root.get("numberOfEventIndicators") == "10"
         jump = [name for name, v in variables.items() if v[0].get("reinit") == "true"]
     else:
         found = root.iterfind("ModelStructure/EventIndicator")
