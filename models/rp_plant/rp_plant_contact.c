@@ -26,12 +26,20 @@ static int sign_of(double x) {
 /* Of 1 + c d': an event is located far better. */
 static const double near_change = 1e-9;
 
+static double push_at(const struct rp_plant_parameters *p, int joint, int side, double dq) {
+    return 1.0 - side * (p->stop_damping[joint] * dq);
+}
+
+static bool is_near_change(const struct rp_plant_parameters *p, int joint, int side, double dq) {
+    return fabs(push_at(p, joint, side, dq)) <= near_change;
+}
+
 static int contact_at(const struct rp_plant_parameters *p, int joint, int side, double dq,
                       int before) {
-    const double push = 1.0 - side * (p->stop_damping[joint] * dq);
-    if (fabs(push) <= near_change && side * before > 0) {
+    if (side * before > 0 && is_near_change(p, joint, side, dq)) {
         return before;
     }
+    const double push = push_at(p, joint, side, dq);
     return side * (push > 0.0 ? RP_PLANT_PUSHED : RP_PLANT_LET_GO);
 }
 
@@ -87,7 +95,11 @@ bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, doubl
            contact == contact_at(p, joint, side, dq, contact);
 }
 
-int rp_plant_other_contact(int contact) {
-    const int side = sign_of(contact);
-    return abs(contact) == RP_PLANT_PUSHED ? side * RP_PLANT_LET_GO : side * RP_PLANT_PUSHED;
+void rp_plant_turn_contact(const struct rp_plant_parameters *p, int joint, double *dq,
+                           int *contact) {
+    const int side = sign_of(*contact);
+    if (is_near_change(p, joint, side, *dq)) {
+        *dq = side / p->stop_damping[joint];
+    }
+    *contact = side * (abs(*contact) == RP_PLANT_PUSHED ? RP_PLANT_LET_GO : RP_PLANT_PUSHED);
 }

@@ -23,7 +23,9 @@ void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q
 bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, double q, double dq,
                            int contact);
 
-/* What the contact becomes where the stop begins or ends to push. */
-int rp_plant_other_contact(int contact);
+/* The stop that a joint is in begins or ends to push: writes the contact that follows, and the
+ * velocity at which this happens. */
+void rp_plant_turn_contact(const struct rp_plant_parameters *p, int joint, double *dq,
+                           int *contact);
 
 #endif

@@ -214,7 +214,8 @@ static enum status update(void *values_pointer, const struct event *event) {
             jumps = true;
         }
         if (fired.turned[i]) {
-            values->modes.contact[i] = rp_plant_other_contact(values->modes.contact[i]);
+            rp_plant_turn_contact(&values->parameters, i, &values->dq[i],
+                                  &values->modes.contact[i]);
         }
     }
     if (take_payload(values)) {
