@@ -34,7 +34,8 @@ enum rp_plant_joint_mode {
     RP_PLANT_FREE = 2,      /* moves without friction */
 };
 
-/* Contact of a joint with a compliant stop, times the side: 1 at the lower stop, -1 at the upper. */
+/* Contact of a joint with a compliant stop, times the side: 1 at the lower stop, -1 at the upper.
+ */
 enum rp_plant_contact {
     RP_PLANT_APART = 0,
     RP_PLANT_PUSHED = 1, /* the stop pushes the joint back */
@@ -76,8 +77,8 @@ struct rp_plant_inputs {
 };
 
 struct rp_plant_modes {
-    int joint[2]; /* enum rp_plant_joint_mode */
-    int payload;  /* enum rp_plant_payload_mode */
+    int joint[2];   /* enum rp_plant_joint_mode */
+    int payload;    /* enum rp_plant_payload_mode */
     int contact[2]; /* enum rp_plant_contact, times the side */
 };
 

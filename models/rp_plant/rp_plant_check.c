@@ -114,11 +114,10 @@ static enum status check_stops(const struct rp_plant_parameters *p, int i, char 
     }
     if (p->stops[i] != RP_PLANT_STOPS_NONE &&
         !(isfinite(p->lower[i]) && isfinite(p->upper[i]) && p->lower[i] < p->upper[i])) {
-        (void)snprintf(
-            text, size,
-            "lower%d = %.17g and upper%d = %.17g are refused: with stops they must be "
-            "finite and lower%d below upper%d",
-            joint, p->lower[i], joint, p->upper[i], joint, joint);
+        (void)snprintf(text, size,
+                       "lower%d = %.17g and upper%d = %.17g are refused: with stops they must be "
+                       "finite and lower%d below upper%d",
+                       joint, p->lower[i], joint, p->upper[i], joint, joint);
         return STATUS_INVALID_PARAMETERS;
     }
     return STATUS_OK;

@@ -1,8 +1,8 @@
 /* Contacts with compliant stops, which follow from positions and velocities.
  *
  * The force is 0 where a contact begins or ends, but its slope jumps; the same holds where the
- * velocity out of a damped stop passes 1 / c, from where on the stop does not push. Both are events,
- * so that no internal step goes over a kink. */
+ * velocity out of a damped stop passes 1 / c, from where on the stop does not push. Both are
+ * events, so that no internal step goes over a kink. */
 #ifndef RP_PLANT_CONTACT_H
 #define RP_PLANT_CONTACT_H
 

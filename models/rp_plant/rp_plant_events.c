@@ -279,9 +279,8 @@ static void describe_stops(const struct rp_plant_values *values, int contact, in
 }
 
 /* As plant_indicators. */
-static void describe_joint(const struct rp_plant_values *values,
-                           const struct rp_plant_modes *modes, int joint,
-                           struct indicator indicators[PLANT_INDICATORS]) {
+static void describe_joint(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
+                           int joint, struct indicator indicators[PLANT_INDICATORS]) {
     const struct rp_plant_parameters *p = &values->parameters;
     const int mode = modes->joint[joint];
     const size_t q = (size_t)joint;
@@ -343,9 +342,8 @@ static enum status indicators(const void *values_pointer, double t, const double
 }
 
 static const char *const indicator_names[RP_PLANT_INDICATORS] = {
-    "slip1_forward", "slip1_backward", "stop1_lower", "stop1_upper",
-    "slip2_forward", "slip2_backward", "stop2_lower", "stop2_upper",
-    "stop1_push",    "stop2_push",
+    "slip1_forward",  "slip1_backward", "stop1_lower", "stop1_upper", "slip2_forward",
+    "slip2_backward", "stop2_lower",    "stop2_upper", "stop1_push",  "stop2_push",
 };
 
 const struct model_events rp_plant_events = {

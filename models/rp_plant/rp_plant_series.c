@@ -1,7 +1,7 @@
 /* Recurrences for the coefficients of a motion in given modes. Symbols are those of rp_series.c,
  * with link 2 and its payload as one body and the armature b1 in J. With the armature b2 and the
- * efforts E_i = tau_i + Q_i - d_i q_i' - f_i + p_i, row 1 plus a times row 2 of the equations of motion,
- * and row 2 over m2, are
+ * efforts E_i = tau_i + Q_i - d_i q_i' - f_i + p_i, row 1 plus a times row 2 of the equations of
+ * motion, and row 2 over m2, are
  *
  *   (N + a b2 v)' = E1 + a E2 + a m2 P w - g c1 (m1 lc1 + m2 L)
  *   (v - a w + (b2 / m2) v)' = E2 / m2 + P w - g s1

@@ -67,6 +67,12 @@ static void next_sample(void) {
         v.parameters.lower[i] = bits % 3 == 0 ? v.q[i] : v.q[i] - 0.5;
         v.parameters.upper[i] = bits % 3 == 1 ? v.q[i] : v.q[i] + 0.5;
         v.parameters.stops[i] = bits % 5 == 0 ? RP_PLANT_STOPS_NONE : RP_PLANT_STOPS_RIGID;
+        if (bits % 5 > 2) {
+            v.parameters.stops[i] = RP_PLANT_STOPS_COMPLIANT;
+            v.parameters.stop_stiffness[i] = 300.0;
+            v.parameters.stop_damping[i] = 0.25 * (double)(bits % 4);
+            v.q[i] += bits % 7 < 3 ? 0.0 : bits % 7 < 5 ? 0.75 : -0.75;
+        }
     }
 }
 
@@ -352,7 +358,8 @@ static void test_modes_that_fit_parameters_and_states(void) {
 static void test_a_joint_is_held_at_rest_by_friction_or_on_a_stop(void) {
     for (int joint = 0; joint < 2; joint++) {
         plant_test_start(&v);
-        v.modes = (struct rp_plant_modes){{RP_PLANT_FREE, RP_PLANT_FREE}, RP_PLANT_RELEASED, {0, 0}};
+        v.modes =
+            (struct rp_plant_modes){{RP_PLANT_FREE, RP_PLANT_FREE}, RP_PLANT_RELEASED, {0, 0}};
         v.modes.joint[joint] = RP_PLANT_STUCK;
         v.parameters.lower[joint] = -1.0;
         v.parameters.upper[joint] = 0.5;
