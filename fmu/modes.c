@@ -1,7 +1,5 @@
 #include "modes.h"
 
-#include "continuous_states.h"
-
 /* The component is in this state where the instance has succeeded. */
 static enum component_status go_to(struct component *component, enum fmi_state state,
                                    enum status status) {
@@ -68,9 +66,9 @@ enum component_status mode_enter_continuous_time(struct component *component, un
 }
 
 enum component_status mode_update_discrete_states(struct component *component,
-                                                  bool *states_changed) {
+                                                  struct discrete_update *update) {
     return component_result(component,
-                            instance_update_discrete_states(component->instance, states_changed));
+                            instance_update_discrete_states(component->instance, update));
 }
 
 enum component_status mode_enter_step(struct component *component, unsigned call) {

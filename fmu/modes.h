@@ -4,6 +4,7 @@
 #define MODES_H
 
 #include "component.h"
+#include "continuous_states.h"
 
 enum component_status mode_setup_experiment(struct component *component, unsigned call,
                                             const struct instance_experiment *experiment);
@@ -17,9 +18,8 @@ enum component_status mode_exit_initialization(struct component *component, unsi
 
 enum component_status mode_enter_event(struct component *component, unsigned call);
 enum component_status mode_enter_continuous_time(struct component *component, unsigned call);
-/* *states_changed: whether continuous states have jumped. */
 enum component_status mode_update_discrete_states(struct component *component,
-                                                  bool *states_changed);
+                                                  struct discrete_update *update);
 enum component_status mode_enter_step(struct component *component, unsigned call);
 enum component_status mode_terminate(struct component *component, unsigned call);
 

@@ -79,6 +79,7 @@ def variable_table(declaration: Declaration) -> str:
         "    .row_of_reference = row_of_reference,",
         "    .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],",
         *(INDICATORS if model.event_indicators else []),
+        *(["    .has_time_events = true,"] if model.time_events else []),
         "};",
         "",
         f'const char model_token_fmi3[] = "{declaration.token("fmi3")}";',

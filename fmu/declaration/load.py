@@ -55,6 +55,8 @@ class Declaration:
         }
         if self.model.event_indicators:
             interface["event_indicators"] = self.model.event_indicators
+        if self.model.time_events:
+            interface["time_events"] = True
         text = json.dumps(interface, sort_keys=True) + "".join(versions)
         digest = hashlib.sha256(text.encode()).hexdigest()
         parts = (digest[0:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])

@@ -3,7 +3,8 @@
 include       further files, relative to this one, whose [variables] and [units] count too
 [model]       name (also the identifier), description, header, values (C type of the value
               structure), symbol (the C object of type struct model), event_indicators (names of
-              local continuous variables, in the order of the model's indicators; default: none)
+              local continuous variables, in the order of the model's indicators; default: none),
+              time_events (true: the model has time events)
 [experiment]  start, stop, tolerance, step: the default experiment
 [units]       "name" = { exponents of the SI base units, display.NAME = factor }
 [variables.NAME]
@@ -108,6 +109,12 @@ class Model(Table):
     values: str
     symbol: Identifier
     event_indicators: list[str] = []
+    time_events: bool = False
+
+    @property
+    def has_events(self) -> bool:
+        """Whether steps can meet events."""
+        return bool(self.event_indicators) or self.time_events
 
 
 class Experiment(Table):

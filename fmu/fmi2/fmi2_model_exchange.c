@@ -3,6 +3,8 @@
 #include "fmi2_component.h"
 #include "modes.h"
 
+#include <math.h>
+
 /* ---- Modes ---------------------------------------------------------------------------------- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
@@ -16,14 +18,16 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
         !component_has_arrays(component, call, 1, fmi2eventInfo, fmi2eventInfo)) {
         return fmi2Error;
     }
-    bool states_changed = false;
-    const enum component_status status = mode_update_discrete_states(component, &states_changed);
+    struct discrete_update update;
+    const enum component_status status = mode_update_discrete_states(component, &update);
+    const bool has_next_time = isfinite(update.next_time);
     *fmi2eventInfo = (fmi2EventInfo){
         .newDiscreteStatesNeeded = fmi2False,
         .terminateSimulation = fmi2False,
         .nominalsOfContinuousStatesChanged = fmi2False,
-        .valuesOfContinuousStatesChanged = states_changed ? fmi2True : fmi2False,
-        .nextEventTimeDefined = fmi2False,
+        .valuesOfContinuousStatesChanged = update.states_changed ? fmi2True : fmi2False,
+        .nextEventTimeDefined = has_next_time ? fmi2True : fmi2False,
+        .nextEventTime = has_next_time ? update.next_time : 0.0,
     };
     return fmi2_status(status);
 }

@@ -6,6 +6,7 @@
 #include "modes.h"
 #include "variable_access.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -254,12 +255,16 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
         !component_has_arrays(component, call, 1, nextEventTimeDefined, nextEventTime)) {
         return fmi3Error;
     }
+    struct discrete_update update;
+    const enum component_status status = mode_update_discrete_states(component, &update);
+    const bool has_next_time = isfinite(update.next_time);
     *discreteStatesNeedUpdate = fmi3False;
     *terminateSimulation = fmi3False;
     *nominalsOfContinuousStatesChanged = fmi3False;
-    *nextEventTimeDefined = fmi3False;
-    *nextEventTime = 0.0;
-    return fmi3_status(mode_update_discrete_states(component, valuesOfContinuousStatesChanged));
+    *valuesOfContinuousStatesChanged = update.states_changed;
+    *nextEventTimeDefined = has_next_time;
+    *nextEventTime = has_next_time ? update.next_time : 0.0;
+    return fmi3_status(status);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance) {

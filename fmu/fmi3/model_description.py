@@ -36,7 +36,7 @@ def model_description(declaration: Declaration, provenance: Provenance) -> str:
         **texts_of(declaration, provenance),
         variableNamingConvention="flat",
     )
-    add_interfaces(root, model.name, has_events=bool(model.event_indicators))
+    add_interfaces(root, model.name, has_events=model.has_events)
     add_units(root, declaration.units)
     add_types(root, declaration)
     add_log_categories(root, "fmi3")

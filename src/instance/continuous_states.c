@@ -20,7 +20,7 @@ void instance_enter_event_mode(struct instance *instance) {
     instance->state.phase = PHASE_STEPPING;
 }
 
-enum status instance_update_discrete_states(struct instance *instance, bool *states_changed) {
+static enum status update_discrete_states(struct instance *instance, bool *states_changed) {
     if (instance->is_integrated_outside) {
         return instance_update_at_point(instance, states_changed);
     }
@@ -30,6 +30,13 @@ enum status instance_update_discrete_states(struct instance *instance, bool *sta
         return instance_pass_due_event(instance, &none);
     }
     return instance_is_unchanged(instance) ? STATUS_OK : instance_update_modes(instance, NULL);
+}
+
+enum status instance_update_discrete_states(struct instance *instance,
+                                            struct discrete_update *update) {
+    const enum status status = update_discrete_states(instance, &update->states_changed);
+    update->next_time = instance_next_time(instance);
+    return status;
 }
 
 enum status instance_set_time(struct instance *instance, double time) {

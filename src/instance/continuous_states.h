@@ -8,11 +8,16 @@
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);
 NONNULL void instance_enter_event_mode(struct instance *instance);
 
+struct discrete_update {
+    bool states_changed; /* states integrated outside have jumped */
+    double next_time;    /* s: of the next time event; INFINITY: there is none */
+};
+
 /* In event mode: brings modes to what follows the values set and the event at the present time.
- * That is the one that a step has left; with integration from outside, one where an event indicator
- * is near 0 and falls. *states_changed: whether states integrated outside have jumped. */
+ * That is the one that a step has left; with integration from outside, a time event, or one where
+ * an event indicator is near 0 and falls. */
 MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *instance,
-                                                               bool *states_changed);
+                                                               struct discrete_update *update);
 
 MUST_CHECK NONNULL enum status instance_set_time(struct instance *instance, double time);
 

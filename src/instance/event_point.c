@@ -6,12 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-static size_t count_of_indicators(const struct instance *instance) {
-    return events_of(instance->model).indicator_count;
-}
-
 void instance_leave_event(struct instance *instance, const bool fired[], struct clock_time end) {
-    memcpy(instance->memory.due, fired, count_of_indicators(instance) * sizeof *fired);
+    memcpy(instance->memory.due, fired, instance_event_size(instance->model));
     instance->state.event_point = EVENT_DUE;
     instance->state.cut_end = end;
 }
@@ -23,8 +19,11 @@ void instance_note_event(struct instance *instance, struct clock_time end) {
 
 /* Forces that have changed at the event decide anew; what a state has reached, it has reached. */
 static void forget_due_forces(struct instance *instance) {
-    instance->model->events->describe(instance->memory.values, instance->indicators);
-    for (size_t i = 0; i < count_of_indicators(instance); i++) {
+    const struct model_events *events = instance->model->events;
+    if (events->describe != NULL) {
+        events->describe(instance->memory.values, instance->indicators);
+    }
+    for (size_t i = 0; i < events->indicator_count; i++) {
         if (instance->indicators[i].kind == INDICATOR_OF_MODEL) {
             instance->memory.due[i] = false;
         }
@@ -46,7 +45,7 @@ enum status instance_pass_due_event(struct instance *instance, int *count_in_ste
     }
     if (status == STATUS_OK) {
         state->event_point = is_unchanged ? EVENT_PASSED : NO_EVENT;
-        memset(instance->memory.due, 0, count_of_indicators(instance) * sizeof(bool));
+        memset(instance->memory.due, 0, instance_event_size(instance->model));
     }
     return status;
 }

@@ -13,8 +13,8 @@ NONNULL void instance_leave_event(struct instance *instance, const bool fired[],
 /* The same where the event has been passed already. */
 NONNULL void instance_note_event(struct instance *instance, struct clock_time end);
 
-/* Brings modes, states and sums to what follows the event that is due, if one is. It counts as one
- * of a communication step. */
+/* Brings modes, states and discrete states to what follows the event that is due, if one is. It
+ * counts as one of a communication step. */
 MUST_CHECK NONNULL enum status instance_pass_due_event(struct instance *instance,
                                                        int *count_in_step);
 

@@ -22,14 +22,14 @@ static bool lies_in(struct span span, const struct variable *variable) {
     return variable->offset >= span.offset && variable->offset - span.offset < span.size;
 }
 
-/* Only events write its value: a mode or a sum. */
+/* Only events write its value: a mode or a discrete state. */
 static bool is_kept_by_events(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     return variable->owner == VARIABLE_OF_MODEL &&
-           (lies_in(events.modes, variable) || lies_in(events.sums, variable));
+           (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable));
 }
 
-/* What events keep is calculated and discrete: ints as modes, doubles as sums. */
+/* What events keep is calculated and discrete: ints as modes, doubles as discrete states. */
 static bool is_bound_well(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     const bool is_real = variable->type == VARIABLE_FLOAT64;
@@ -43,7 +43,7 @@ static bool is_bound_well(const struct model *model, const struct variable *vari
            (is_input && !is_real) == lies_in(events.discrete_inputs, variable) &&
            is_state == lies_in(model->states, variable) &&
            (!lies_in(events.modes, variable) || (can_be_kept && !is_real)) &&
-           (!lies_in(events.sums, variable) || (can_be_kept && is_real));
+           (!lies_in(events.discrete_states, variable) || (can_be_kept && is_real));
 }
 
 /* Each variable is bound to a field of its own kind: a wrong binding compiles, but the value would
@@ -55,6 +55,12 @@ static enum status check_bindings(const struct model_description *description,
         message_write(sink, STATUS_INTERNAL,
                       "%zu event indicators of %s are declared: its model has %zu",
                       description->indicator_count, description->name, indicator_count);
+        return STATUS_INTERNAL;
+    }
+    if (description->has_time_events != (events_of(description->model).next_time != NULL)) {
+        message_write(sink, STATUS_INTERNAL, "time events of %s are %sdeclared: its model has %s",
+                      description->name, description->has_time_events ? "" : "not ",
+                      description->has_time_events ? "none" : "some");
         return STATUS_INTERNAL;
     }
     for (size_t i = 0; i < description->variable_count; i++) {
@@ -92,9 +98,9 @@ static bool setup_events(struct instance *instance) {
     const size_t state_count = count_of(model->states);
     const size_t count = model->events->indicator_count;
     instance->absolute_tolerances =
-        calloc(2 * state_count + count_of(model->inputs) + 2 * count, sizeof(double));
-    instance->indicators = calloc(count, sizeof *instance->indicators);
-    instance->fired = calloc(count, sizeof *instance->fired);
+        calloc(2 * state_count + count_of(model->inputs) + 2 * count + 1, sizeof(double));
+    instance->indicators = calloc(count + 1, sizeof *instance->indicators);
+    instance->fired = calloc(count + 1, sizeof *instance->fired);
     if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
         instance->fired == NULL) {
         return false;
@@ -114,8 +120,8 @@ static enum status setup(struct instance *instance) {
     const size_t input_count = count_of(model->inputs);
     struct instance_memory *memory = &instance->memory;
 
-    memory->size = 2 * values_size + 3 * input_count * sizeof(struct polynomial) +
-                   events_of(model).indicator_count * sizeof(bool);
+    memory->size =
+        2 * values_size + 3 * input_count * sizeof(struct polynomial) + instance_event_size(model);
     memory->block = calloc(1, memory->size);
     instance->first_derivatives = calloc(2, values_size);
     instance->u =

@@ -61,7 +61,7 @@ struct instance_memory {
     struct polynomial *pending; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current; /* inputs at the current time */
     struct polynomial *running; /* inputs since the last restart */
-    bool *due;                  /* one per indicator: it falls to 0 in the event that is due */
+    bool *due;                  /* as fired of struct instance: the event that is due */
 };
 
 /* Where the value of a Real lies, and when the value of any variable is up to date. */
@@ -95,7 +95,8 @@ struct instance {
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* two per indicator */
-    bool *fired;                  /* one per indicator */
+    bool *fired;                  /* one per indicator: it falls to 0; then whether a time event
+                                     has come */
     bool inputs_move;             /* since the last restart; otherwise u holds their values */
     double *u;                    /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
@@ -128,6 +129,11 @@ static inline int *ints_of(char *values, struct span span) {
 /* Places in the value structure for what events keep; empty for models without events. */
 static inline struct model_events events_of(const struct model *model) {
     return model->events != NULL ? *model->events : (struct model_events){0};
+}
+
+/* Bytes of what says which event it is: fired of struct instance. */
+static inline size_t instance_event_size(const struct model *model) {
+    return model->events != NULL ? (model->events->indicator_count + 1) * sizeof(bool) : 0;
 }
 
 #endif

@@ -7,9 +7,16 @@
 #include <math.h>
 #include <string.h>
 
+double instance_next_time(const struct instance *instance) {
+    const struct model_events *events = instance->model->events;
+    return events != NULL && events->next_time != NULL ? events->next_time(instance->memory.values)
+                                                       : INFINITY;
+}
+
 bool instance_is_at_rest(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
-    return events != NULL && events->is_at_rest(instance->memory.values);
+    return events != NULL && events->is_at_rest != NULL &&
+           events->is_at_rest(instance->memory.values);
 }
 
 const struct indicator *instance_describe_indicators(struct instance *instance) {
@@ -31,6 +38,22 @@ static void write_tolerances(struct instance *instance) {
     }
 }
 
+/* fired, of struct instance, says that a time event has come. */
+static bool is_timed(const struct instance *instance, const bool *fired) {
+    return fired != NULL && fired[instance->model->events->indicator_count];
+}
+
+/* Time must get on from one time event to the next. */
+static enum status check_next_time(const struct instance *instance, double t) {
+    const double next = instance_next_time(instance);
+    if (next > t) {
+        return STATUS_OK;
+    }
+    message_write(&instance->sink, STATUS_INTERNAL,
+                  "a time event at t = %.17g is followed by one at t = %.17g", t, next);
+    return STATUS_INTERNAL;
+}
+
 static enum status update(struct instance *instance, const bool *fired) {
     const struct model_events *events = instance->model->events;
     write_tolerances(instance);
@@ -40,10 +63,14 @@ static enum status update(struct instance *instance, const bool *fired) {
     const struct event event = {
         .t = instance->state.time.s,
         .fired = fired,
+        .is_timed = is_timed(instance, fired),
         .du = instance->du,
         .tolerance = instance->tolerances,
     };
-    const enum status status = events->update(instance->memory.values, &event);
+    enum status status = events->update(instance->memory.values, &event);
+    if (status == STATUS_OK && event.is_timed) {
+        status = check_next_time(instance, event.t);
+    }
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,
                       status_text(status));
@@ -77,6 +104,9 @@ static double band_of(const struct instance *instance, const struct indicator *i
 
 void instance_add_bands(struct instance *instance) {
     const struct model_description *description = instance->description;
+    if (description->indicator_count == 0) {
+        return;
+    }
     instance->model->events->describe(instance->memory.values, instance->indicators);
     for (size_t i = 0; i < description->indicator_count; i++) {
         double *z = instance_field(instance, variable_of(description, description->indicators[i]));
@@ -115,7 +145,6 @@ static enum status find_fired(struct instance *instance, bool *is_any) {
     if (status == STATUS_OK) {
         status = model->events->indicators(values, t, ahead, u, z_ahead);
     }
-    *is_any = false;
     model->events->describe(values, instance->indicators);
     for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
         instance->fired[i] = has_fired(instance, i, z[i], z_ahead[i]);
@@ -131,13 +160,19 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     if (events == NULL) {
         return STATUS_OK;
     }
+    memset(instance->fired, 0, instance_event_size(instance->model));
     bool is_any = false;
     enum status status = STATUS_OK;
-    if (events->are_possible(instance->memory.values)) {
+    if (events->are_possible != NULL && events->are_possible(instance->memory.values)) {
         status = find_fired(instance, &is_any);
     }
     if (status != STATUS_OK) {
         return instance_not_finite(instance, "an event indicator");
+    }
+    const double now = instance->state.time.s;
+    if (instance_next_time(instance) - now <= clock_spacing(now)) {
+        instance->fired[events->indicator_count] = true;
+        is_any = true;
     }
     if (is_any) {
         int none = 0;
@@ -156,7 +191,8 @@ enum status instance_count_event(struct instance *instance, const bool fired[],
                                  int *count_in_step) {
     const struct model_events *events = instance->model->events;
     struct instance_values *own = &instance->state.own;
-    if (*count_in_step >= own->max_events) {
+    const bool is_state_event = !is_timed(instance, fired);
+    if (is_state_event && *count_in_step >= own->max_events) {
         size_t first = 0;
         while (!fired[first]) {
             first++;
@@ -167,7 +203,7 @@ enum status instance_count_event(struct instance *instance, const bool fired[],
                       own->time, events->indicator_names[first], own->max_events);
         return STATUS_TOO_MANY_EVENTS;
     }
-    ++*count_in_step;
+    *count_in_step += is_state_event;
     own->event_count += own->event_count < INT_MAX ? 1 : 0;
     own->last_event_time = own->time;
     return STATUS_OK;

@@ -4,18 +4,22 @@
 
 #include "internals.h"
 
-/* There can be events with the parameters that the integrator runs with. Inline, as it is part of
- * each step of models without events too. */
+/* There can be state events with the parameters that the integrator runs with. Inline, as it is
+ * part of each step of models without events too. */
 static inline bool instance_is_searched(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
-    return events != NULL && events->are_possible(instance->memory.held);
+    return events != NULL && events->are_possible != NULL &&
+           events->are_possible(instance->memory.held);
 }
+
+/* Time of the next time event, s; INFINITY: there is none. */
+NONNULL double instance_next_time(const struct instance *instance);
 
 /* No state moves in the present modes. */
 NONNULL bool instance_is_at_rest(const struct instance *instance);
 
-/* Brings modes, states and sums to what follows the inputs and parameters set now and, where
- * `fired` is not NULL, the event at the current time. */
+/* Brings modes, states and discrete states to what follows the inputs and parameters set now and,
+ * where `fired` is not NULL, the event at the current time. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *fired);
 
@@ -31,8 +35,9 @@ MUST_CHECK NONNULL enum status instance_update_at_point(struct instance *instanc
 /* The indicators of the present modes, for the integrator; NULL: no events can be. */
 MUST_CHECK NONNULL const struct indicator *instance_describe_indicators(struct instance *instance);
 
-/* Counts an event with these indicators at the current time; fails at the first one above the
- * limit of a communication step, whose count is in the step. */
+/* Counts an event at the current time. Fails at the first state event above the limit of a
+ * communication step, whose count is in the step; time events have no limit, as each is later than
+ * the one before. */
 MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance, const bool fired[],
                                                     int *count_in_step);
 

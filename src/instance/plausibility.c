@@ -121,8 +121,8 @@ static bool are_finite_inputs(const struct instance *instance, const char *name,
     return true;
 }
 
-/* Parameters, inputs and states that could have been set, and modes and sums within their limits.
- */
+/* Parameters, inputs and states that could have been set, and modes and discrete states within
+ * their limits. */
 static bool are_within_limits(const struct instance *instance, const char *values) {
     const struct message_sink quiet = {0};
     for (size_t i = 0; i < instance->description->variable_count; i++) {
@@ -143,12 +143,12 @@ static bool are_within_limits(const struct instance *instance, const char *value
     return true;
 }
 
-/* Sums that are no variables. */
-static bool are_finite_sums(const struct instance *instance, const char *values) {
-    const struct span sums = events_of(instance->model).sums;
-    for (size_t i = 0; i < count_of(sums); i++) {
-        const double sum = ((const double *)(const void *)(values + sums.offset))[i];
-        const struct named_value value = {"a sum over events", sum, isfinite(sum)};
+/* Discrete states that are no variables. */
+static bool are_finite_kept(const struct instance *instance, const char *values) {
+    const struct span kept = events_of(instance->model).discrete_states;
+    for (size_t i = 0; i < count_of(kept); i++) {
+        const double state = ((const double *)(const void *)(values + kept.offset))[i];
+        const struct named_value value = {"a discrete state", state, isfinite(state)};
         if (!are_possible(instance, &value, 1)) {
             return false;
         }
@@ -194,24 +194,25 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
 
 /* A value structure that the instance can have. */
 static bool is_possible_structure(const struct instance *instance, const char *values) {
-    return are_within_limits(instance, values) && are_finite_sums(instance, values);
+    return are_within_limits(instance, values) && are_finite_kept(instance, values);
 }
 
-/* Some indicator falls to 0 in an event that is due, none does in no such event. */
+/* An event that is due is one of an indicator or of the time. */
 static bool is_possible_event_point(const struct instance *instance,
                                     const struct instance_state *state, const bool due[]) {
     int count = 0;
-    for (size_t i = 0; i < events_of(instance->model).indicator_count; i++) {
+    for (size_t i = 0; i < instance_event_size(instance->model) / sizeof *due; i++) {
         count += due[i];
     }
     const bool is_due = state->event_point == EVENT_DUE;
-    const bool is_stepping = state->phase == PHASE_STEPPING && instance_has_integrator(instance);
+    const bool is_stepping = state->phase == PHASE_STEPPING && !instance->is_integrated_outside &&
+                             instance->model->events != NULL;
     const struct clock_time end = state->cut_end;
     const struct named_value values[] = {
         {"event_point", state->event_point,
          state->event_point == NO_EVENT ||
              (is_stepping && (is_due || state->event_point == EVENT_PASSED))},
-        {"the number of indicators of the event that is due", count, is_due == (count > 0)},
+        {"the number of causes of the event that is due", count, is_due == (count > 0)},
         {"the end of the step cut short", end.s, isfinite(end.s)},
         {"the rest of the end of the step cut short", end.rest, isfinite(end.rest)},
     };

@@ -56,16 +56,16 @@ static void transfer_values(struct codec *codec, const struct model_description 
     }
 }
 
-/* What events keep: modes and sums, declared as variables or not. */
+/* What events keep: modes and discrete states, declared as variables or not. */
 static void transfer_kept(struct codec *codec, const struct model *model, char *values) {
     const struct model_events events = events_of(model);
     int *modes = ints_of(values, events.modes);
-    double *sums = doubles_of(values, events.sums);
+    double *kept = doubles_of(values, events.discrete_states);
     for (size_t i = 0; i < events.modes.size / sizeof *modes; i++) {
         codec_int(codec, "a mode", &modes[i]);
     }
-    for (size_t i = 0; i < count_of(events.sums); i++) {
-        codec_real(codec, &sums[i]);
+    for (size_t i = 0; i < count_of(events.discrete_states); i++) {
+        codec_real(codec, &kept[i]);
     }
 }
 
@@ -77,8 +77,8 @@ static void transfer_event_point(struct codec *codec, const struct model *model,
     state->event_point = (enum event_point)event_point;
     codec_real(codec, &state->cut_end.s);
     codec_real(codec, &state->cut_end.rest);
-    for (size_t i = 0; i < model->events->indicator_count; i++) {
-        codec_bool(codec, "an indicator of the event that is due", &due[i]);
+    for (size_t i = 0; i <= model->events->indicator_count; i++) {
+        codec_bool(codec, "a cause of the event that is due", &due[i]);
     }
 }
 

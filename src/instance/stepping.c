@@ -2,11 +2,10 @@
 
 #include "event_point.h"
 #include "fields.h"
-#include "history.h"
-#include "model_modes.h"
 #include "right_hand_side.h"
 #include "settings.h"
 #include "snapshot_contents.h"
+#include "step.h"
 
 #include <limits.h>
 #include <math.h>
@@ -60,31 +59,7 @@ static void update_statistics(struct instance *instance) {
     own->solver_last_order = statistics->last_order;
 }
 
-/* A step that is being done. */
-struct step {
-    struct instance *instance;
-    const struct step_options *options;
-    struct clock_time begin;
-    struct clock_time end;          /* where it is to end; it may come forward */
-    bool is_early;                  /* it has come forward */
-    bool is_over;                   /* the step is to end where it is */
-    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
-    enum status answer;             /* of options->accept */
-    int events;                     /* so far */
-    int64_t steps_before;           /* internal ones, since initialization */
-};
-
 /* ---- Inputs --------------------------------------------------------------------------------- */
-
-/* Those at the time of the instance, elapsed s after the beginning of the step. */
-static void place_inputs(struct instance *instance, double elapsed) {
-    struct instance_memory *memory = &instance->memory;
-    double *u = doubles_of(memory->values, instance->model->inputs);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
-        u[i] = memory->current[i].d[0];
-    }
-}
 
 /* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
 static void end_inputs(struct instance *instance, double elapsed) {
@@ -100,53 +75,6 @@ static void end_inputs(struct instance *instance, double elapsed) {
         }
         u[i] = memory->current[i].d[0];
     }
-}
-
-/* From now on the last value of an input is the one that was set for the end of the step; where the
- * step ended earlier, the value that the input has there. */
-static void hold_last_nodes(const struct step *step) {
-    const struct instance *instance = step->instance;
-    const struct instance_memory *memory = &instance->memory;
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
-        memory->pending[i].d[0] =
-            step->is_early ? memory->current[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
-    }
-}
-
-static enum status set_polynomials(struct instance *instance, double h) {
-    struct instance_memory *memory = &instance->memory;
-    double *u = doubles_of(memory->values, instance->model->inputs);
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const struct polynomial input =
-            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
-        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
-            if (!isfinite(input.d[k])) {
-                return instance_not_finite(instance, "a derivative of an input");
-            }
-        }
-        memory->pending[i] = input;
-        memory->current[i] = input;
-        u[i] = input.d[0];
-    }
-    instance->outputs_are_valid = false;
-    return STATUS_OK;
-}
-
-static enum status ask_inputs(const struct step *step, double t, double h) {
-    struct instance *instance = step->instance;
-    for (int k = 0; k < POLYNOMIAL_NODES; k++) {
-        const double time =
-            k == POLYNOMIAL_NODES - 1 ? step->end.s : t + k * (h / (POLYNOMIAL_NODES - 1));
-        const enum status status = step->options->ask_inputs(step->options->context, time);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] = instance->memory.pending[i].d[0];
-        }
-    }
-    return set_polynomials(instance, clock_difference(step->end, step->begin));
 }
 
 /* ---- Integration ---------------------------------------------------------------------------- */
@@ -167,6 +95,10 @@ static bool report(struct step *step) {
         step->is_over = step->answer != STATUS_OK || !(end - now > clock_slack(now, end - now));
         step->end = step->is_over ? step->instance->state.time : (struct clock_time){.s = end};
         step->is_early = true;
+        if (clock_difference(step->until, step->end) > 0.0) {
+            step->until = step->end;
+            step->meets_time_event = false;
+        }
         return true;
     }
     return false;
@@ -179,7 +111,7 @@ static bool observe(void *step_pointer, double t, const double x[]) {
     memcpy(doubles_of(instance->memory.values, instance->model->states), x,
            instance->model->states.size);
     instance_set_clock(instance, clock_add(instance->state.restart_time, t));
-    place_inputs(instance, clock_difference(instance->state.time, step->begin));
+    instance_place_inputs(instance, clock_difference(instance->state.time, step->begin));
     return report(step);
 }
 
@@ -187,13 +119,7 @@ static bool is_at_event(const struct instance *instance) {
     return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
 }
 
-/* Internal steps that the step may still take. */
-static int64_t steps_left(const struct step *step) {
-    const struct instance_state *state = &step->instance->state;
-    return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
-}
-
-/* To step->end, which may come forward on the way. */
+/* To step->until, which may come forward on the way. */
 ALWAYS_INLINE enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -203,12 +129,12 @@ ALWAYS_INLINE enum status advance(struct step *step) {
     }
     enum status status;
     for (;;) {
-        const int64_t left = steps_left(step);
+        const int64_t left = instance_steps_left(step);
         status = integrator_advance(instance->integrator,
-                                    clock_difference(step->end, state->restart_time),
+                                    clock_difference(step->until, state->restart_time),
                                     left > 1 ? left : 1, &state->latest_time, x);
         if (status != STATUS_OK || step->is_over || is_at_event(instance) ||
-            !(state->latest_time < clock_difference(step->end, state->restart_time))) {
+            !(state->latest_time < clock_difference(step->until, state->restart_time))) {
             break;
         }
         // to the new end; the step that the observer cut short counts
@@ -239,7 +165,7 @@ static bool interpolate(const struct step *step, double target) {
     return true;
 }
 
-/* To step->end, or to an event before it. */
+/* To step->until, or to an event before it. */
 ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -250,7 +176,7 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
     status = advance(step);
 
     // a step that ended early cannot be replayed: its end was not known when it began
-    const bool is_whole = !step->is_early && !is_at_event(instance);
+    const bool is_whole = !step->is_early && !step->meets_time_event && !is_at_event(instance);
     state->has_history = status == STATUS_OK && is_whole && instance_longest_history(instance) > 0;
     state->passed_time = integrator_passed_time(instance->integrator);
     if (!state->has_history) {
@@ -260,89 +186,8 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
     return status;
 }
 
-/* The same where no state moves: time passes until an input sets them free. */
-static enum status rest(struct step *step) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    const bool is_after_event = step->events > 0;
-    instance_hold(instance, step->end,
-                  is_after_event ? instance->memory.current : instance->memory.pending);
-    const struct integrator_start start = {
-        .span = state->span,
-        // inputs that are held leave the modes as they are
-        .indicators = instance->inputs_move ? instance_describe_indicators(instance) : NULL,
-    };
-    state->next_step = 0.0;
-    return integrator_rest(instance->integrator,
-                           doubles_of(instance->memory.held, instance->model->states), &start,
-                           state->first_time, &state->latest_time);
-}
-
-/* The instance goes to the time of an event, and its modes change, unless the event is left. */
-static enum status meet_event(struct step *step, const bool fired[]) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    const struct clock_time end = step->end;
-    instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
-    place_inputs(instance, clock_difference(state->time, step->begin));
-    instance->step_met_event = true;
-    if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
-        step->is_early = clock_difference(end, state->time) > 0.0;
-        step->end = state->time;
-        if (step->options->at_event == EVENTS_LEFT) {
-            instance_leave_event(instance, fired, end);
-            return STATUS_OK;
-        }
-    }
-    enum status status = instance_count_event(instance, fired, &step->events);
-    if (status == STATUS_OK) {
-        status = instance_update_modes(instance, fired);
-    }
-    if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
-        instance_note_event(instance, end);
-    }
-    return status;
-}
-
-/* The modes at the beginning of a step, and how the integrator goes on from there. */
-static enum status begin_modes(struct step *step, enum continuation *continuation) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    if (state->event_point == EVENT_DUE) {
-        const enum status status = instance_pass_due_event(instance, &step->events);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        *continuation =
-            instance_continuation(instance, clock_difference(step->end, state->restart_time));
-    }
-    state->event_point = NO_EVENT;
-    return *continuation == CONTINUE_AFTER_CHANGE ? instance_update_modes(instance, NULL)
-                                                  : STATUS_OK;
-}
-
-/* To step->end over all events on the way. */
-static enum status move_over_events(struct step *step, enum continuation continuation) {
-    struct instance *instance = step->instance;
-    enum status status = begin_modes(step, &continuation);
-    while (status == STATUS_OK) {
-        if (instance_is_at_rest(instance)) {
-            status = rest(step);
-        } else if (step->events > 0 && steps_left(step) <= 0) {
-            status = STATUS_TOO_MANY_STEPS;
-        } else {
-            status = move(step, continuation);
-        }
-        if (status != STATUS_OK || integrator_event(instance->integrator) == NULL) {
-            break;
-        }
-        status = meet_event(step, integrator_event(instance->integrator));
-        if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
-            break;
-        }
-        continuation = CONTINUE_AFTER_EVENT;
-    }
-    return status;
+enum status instance_move(struct step *step, enum continuation continuation) {
+    return move(step, continuation);
 }
 
 static enum status integrate(struct step *step) {
@@ -350,15 +195,27 @@ static enum status integrate(struct step *step) {
     struct instance_state *state = &instance->state;
     const double target = clock_difference(step->end, state->restart_time);
     const enum continuation continuation = instance_continuation(instance, target);
-    if (continuation == CONTINUE_NOW && interpolate(step, target)) {
+    instance_set_part(step);
+    if (continuation == CONTINUE_NOW && !step->meets_time_event && interpolate(step, target)) {
         return STATUS_OK;
     }
     keep(step);
     const enum status status = instance->model->events == NULL
                                    ? move(step, continuation)
-                                   : move_over_events(step, continuation);
+                                   : instance_move_over_events(step, continuation);
     arrive(step,
            status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
+    return status;
+}
+
+/* The same for a model without states. */
+static enum status pass_time(struct step *step) {
+    enum status status = STATUS_OK;
+    if (step->instance->model->events != NULL) {
+        keep(step);
+        status = instance_move_over_events(step, CONTINUE_AFTER_CHANGE);
+    }
+    arrive(step, status == STATUS_OK ? step->end : step->instance->state.time);
     return status;
 }
 
@@ -369,16 +226,12 @@ static enum status do_step(struct step *step, double communication_point, double
     enum status status = STATUS_OK;
     if (step->options->ask_inputs != NULL) {
         keep(step);
-        status = ask_inputs(step, communication_point, h);
+        status = instance_ask_inputs(step, communication_point, h);
         if (status != STATUS_OK) {
             return status;
         }
     }
-    if (instance->integrator == NULL) {
-        arrive(step, step->end);
-    } else {
-        status = integrate(step);
-    }
+    status = instance->integrator == NULL ? pass_time(step) : integrate(step);
     if (status == STATUS_TOO_MANY_EVENTS) {
         return status; // the message has been sent
     }
@@ -389,7 +242,7 @@ static enum status do_step(struct step *step, double communication_point, double
         return status;
     }
     if (step->options->ask_inputs != NULL) {
-        hold_last_nodes(step);
+        instance_hold_last_nodes(step);
     }
     const bool ends_at_event = instance->state.event_point != NO_EVENT;
     if (step->options->accept != NULL && (!step->is_early || ends_at_event)) {

@@ -61,6 +61,7 @@ struct model_description {
     unsigned reference_count;      /* entries of row_of_reference */
     const unsigned *indicators;    /* references, in the order of the model; NULL: none */
     size_t indicator_count;
+    bool has_time_events;
 };
 
 /* Phase in the life of an instance; it decides what may be set. */

@@ -1,7 +1,8 @@
 /* Modes of a model, and the events at which they change. A model without modes has none of this.
  *
  * Between two events the modes stay as they are, and the right-hand side is smooth. An indicator is
- * above 0 while the modes are valid; an event is where one falls to 0. */
+ * above 0 while the modes are valid; a state event is where one falls to 0. A time event comes at a
+ * time that is known before. */
 #ifndef EVENTS_H
 #define EVENTS_H
 
@@ -34,22 +35,28 @@ struct indicator {
 
 struct event {
     double t;                /* s */
-    const bool *fired;       /* one per indicator: it falls to 0 here. NULL: none does; inputs or
-                                parameters have changed, or the initialization ends */
+    const bool *fired;       /* one per indicator: it falls to 0 here. NULL: there is no event;
+                                inputs or parameters have changed, or the initialization ends */
+    bool is_timed;           /* the time that next_time gave has come */
     const double *du;        /* derivative of each input by the time after the event */
     const double *tolerance; /* of each state, in its unit: relative part and absolute one */
 };
 
+/* A model without indicators has NULL for all that belongs to them. */
 struct model_events {
     size_t indicator_count;
     const char *const *indicator_names;
-    struct span modes; /* int[]: the right-hand side reads them, only update writes them. Zeros
-                          until the initialization ends */
-    struct span sums;  /* double[]: sums over events, such as losses; as modes */
+    struct span modes;           /* int[]: the right-hand side reads them, only update writes them.
+                                    Zeros until the initialization ends */
+    struct span discrete_states; /* double[]: sums over events, samples; as modes */
     struct span discrete_inputs; /* int[]: Boolean inputs */
 
-    /* Whether there can be events with these parameters. If not, update writes the modes in which
-     * the right-hand side is smooth everywhere. */
+    /* Time of the next time event, s; INFINITY: there is none. It follows from parameters, modes
+     * and discrete states, and moves on with update. NULL: the model has no time events. */
+    double (*next_time)(const void *values);
+
+    /* Whether there can be state events with these parameters. If not, update writes the modes in
+     * which the right-hand side is smooth everywhere. */
     bool (*are_possible)(const void *values);
 
     /* Whether update can have left these modes: those of a saved state may be anything. is_held:
@@ -57,7 +64,7 @@ struct model_events {
      * set since. */
     bool (*modes_are_possible)(const void *values, bool is_held);
 
-    /* In these modes no state moves, whatever the inputs are. */
+    /* In these modes no state moves, whatever the inputs are. NULL: of a model without states. */
     bool (*is_at_rest)(const void *values);
 
     /* Writes the kind of each indicator in these modes. */
@@ -73,8 +80,8 @@ struct model_events {
      * is evaluated. NULL: any way. */
     void (*reach)(const void *values, const double x[], double reach[]);
 
-    /* Writes the modes, states and sums that follow an event, from all that is set: parameters,
-     * inputs, states, modes. Where nothing has fired, a second call changes nothing. */
+    /* Writes the modes, states and discrete states that follow an event, from all that is set:
+     * parameters, inputs, states, modes. Where there is no event, a second call changes nothing. */
     enum status (*update)(void *values, const struct event *event);
 };
 

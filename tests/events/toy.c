@@ -1,5 +1,6 @@
 #include "toy.h"
 
+#include <math.h>
 #include <string.h>
 
 /* ---- Ball ----------------------------------------------------------------------------------- */
@@ -130,7 +131,7 @@ static const struct model_events ball_events = {
     .indicator_count = 2,
     .indicator_names = ball_names,
     .modes = {offsetof(struct ball_values, is_resting), sizeof(int)},
-    .sums = {offsetof(struct ball_values, impulse), sizeof(double)},
+    .discrete_states = {offsetof(struct ball_values, impulse), sizeof(double)},
     .are_possible = ball_has_floor,
     .modes_are_possible = ball_mode_is_possible,
     .is_at_rest = ball_is_resting,
@@ -275,6 +276,118 @@ static const struct model block_model = {
     .events = &block_events,
 };
 
+/* ---- Hammer --------------------------------------------------------------------------------- */
+
+static enum status hammer_rhs(const void *values, double t, const double x[], const double u[],
+                              double dx[]) {
+    (void)values;
+    (void)t;
+    dx[0] = x[1];
+    dx[1] = u[0];
+    return STATUS_OK;
+}
+
+static enum status hammer_extend(const struct series_origin *origin, int first, int last,
+                                 double rows[][SERIES_LENGTH]) {
+    for (int k = first > 0 ? first : 1; k <= last; k++) {
+        extend_motion(origin, k, input_order(origin, k - 1), rows);
+    }
+    return STATUS_OK;
+}
+
+static const struct series hammer_series = {.row_count = 2, .extend = hammer_extend};
+
+static enum status hammer_outputs(void *values, double t) {
+    struct hammer_values *hammer = values;
+    (void)t;
+    hammer->a = hammer->f;
+    return STATUS_OK;
+}
+
+static double hammer_next_time(const void *values) {
+    const struct hammer_values *hammer = values;
+    return hammer->is_started ? hammer->start + hammer->first + hammer->strokes * hammer->period
+                              : INFINITY;
+}
+
+static bool hammer_is_never_at_rest(const void *values) {
+    (void)values;
+    return false;
+}
+
+static bool hammer_modes_are_possible(const void *values, bool is_held) {
+    const struct hammer_values *hammer = values;
+    (void)is_held;
+    return hammer->is_started == 1 && hammer->strokes >= 0 && hammer->hits >= 0;
+}
+
+static void hammer_describe(const void *values, struct indicator indicators[]) {
+    indicators[0] = (struct indicator){
+        .kind = INDICATOR_OF_STATE,
+        .state = 0,
+        .factor = 1.0,
+        .rises = ((const struct hammer_values *)values)->v > 0.0,
+    };
+}
+
+static enum status hammer_indicators(const void *values, double t, const double x[],
+                                     const double u[], double z[]) {
+    (void)values;
+    (void)t;
+    (void)u;
+    z[0] = x[0];
+    return STATUS_OK;
+}
+
+static enum status hammer_update(void *values, const struct event *event) {
+    struct hammer_values *hammer = values;
+    if (!hammer->is_started) {
+        hammer->is_started = 1;
+        hammer->start = event->t;
+    }
+    if (event->fired != NULL && event->fired[0]) {
+        hammer->x = 0.0;
+        hammer->v = fabs(hammer->v);
+        hammer->hits++;
+    }
+    if (event->is_timed) {
+        hammer->strokes++;
+        hammer->v += hammer->kick;
+        hammer->last = hammer->f;
+    }
+    return STATUS_OK;
+}
+
+static const char *const hammer_names[] = {"the distance"};
+
+static const struct model_events hammer_events = {
+    .indicator_count = 1,
+    .indicator_names = hammer_names,
+    .modes = {offsetof(struct hammer_values, is_started), 3 * sizeof(int)},
+    .discrete_states = {offsetof(struct hammer_values, start), 2 * sizeof(double)},
+    .next_time = hammer_next_time,
+    .are_possible = block_always,
+    .modes_are_possible = hammer_modes_are_possible,
+    .is_at_rest = hammer_is_never_at_rest,
+    .describe = hammer_describe,
+    .indicators = hammer_indicators,
+    .update = hammer_update,
+};
+
+static const struct model hammer_model = {
+    .values_size = sizeof(struct hammer_values),
+    .parameters = {offsetof(struct hammer_values, period), sizeof(double[3])},
+    .inputs = {offsetof(struct hammer_values, f), sizeof(double)},
+    .states = {offsetof(struct hammer_values, x), sizeof(double[2])},
+    .derivatives = {offsetof(struct hammer_values, v), sizeof(double[2])},
+    .right_hand_side = hammer_rhs,
+    .jacobian = jacobian,
+    .series = &hammer_series,
+    .outputs = hammer_outputs,
+    .check_parameters = no_check,
+    .events = &hammer_events,
+};
+
 /* ---- Variables ------------------------------------------------------------------------------ */
 
 #define OF_INSTANCE(type, field)   type, VARIABLE_OF_INSTANCE, offsetof(struct instance_values, field)
@@ -358,17 +471,32 @@ static const struct variable block_variables[] = {
     OWN,
 };
 
+static const struct variable hammer_variables[] = {
+    {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},
+    {TOY_PARAMETER1, "period", OF_MODEL(struct hammer_values, period), TUNABLE, 1.0, ANY},
+    {TOY_PARAMETER2, "first", OF_MODEL(struct hammer_values, first), TUNABLE, 1.0, ANY},
+    {TOY_PARAMETER3, "kick", OF_MODEL(struct hammer_values, kick), TUNABLE, 1.0, ANY},
+    {TOY_INPUT, "f", OF_MODEL(struct hammer_values, f), INPUT, 0.0, ANY},
+    {TOY_POSITION, "x", OF_MODEL(struct hammer_values, x), STATE, 1.0, ANY},
+    {TOY_SPEED, "v", OF_MODEL(struct hammer_values, v), STATE, 0.0, ANY},
+    {TOY_ACCELERATION, "a", OF_MODEL(struct hammer_values, a), OUTPUT, 0.0, ANY},
+    OWN,
+};
+
 static const short row_of_reference[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16};
 
-#define DESCRIPTION(text, model_symbol, table, indicators)                                         \
+#define DESCRIPTION(text, model_symbol, table, indicators, has_times)                              \
     {                                                                                              \
         .name = (text), .guid = "{" text "}", .default_tolerance = 1e-8, .model = &(model_symbol), \
         .variables = (table), .variable_count = sizeof(table) / sizeof *(table),                   \
         .row_of_reference = row_of_reference, .indicator_count = (indicators),                     \
+        .has_time_events = (has_times),                                                            \
         .reference_count = sizeof row_of_reference / sizeof row_of_reference[0],                   \
     }
 
 const struct model_description ball_description =
-    DESCRIPTION("Ball", ball_model, ball_variables, 2);
+    DESCRIPTION("Ball", ball_model, ball_variables, 2, false);
 const struct model_description block_description =
-    DESCRIPTION("Block", block_model, block_variables, 3);
+    DESCRIPTION("Block", block_model, block_variables, 3, false);
+const struct model_description hammer_description =
+    DESCRIPTION("Hammer", hammer_model, hammer_variables, 1, true);

@@ -1,5 +1,5 @@
-/* The smallest models with events, with tables of variables written by hand: a ball that bounces,
- * and a block with dry friction. */
+/* The smallest models with events, with tables of variables written by hand: a ball that bounces, a
+ * block with dry friction, and a hammer that strikes a mass at given times. */
 #ifndef TOY_H
 #define TOY_H
 
@@ -30,7 +30,26 @@ struct block_values {
     int direction;    /* mode: -1, 0 (it sticks), 1 */
 };
 
-/* References of both, in the order of the parameters, the input and the states. */
+/* A mass in front of an elastic wall at x = 0: v' = f. The hammer changes v by `kick` at the times
+ * start + first + n period. */
+struct hammer_values {
+    double period; /* s */
+    double first;  /* s */
+    double kick;   /* m/s */
+    double f;      /* m/s2, input */
+    double x;      /* m */
+    double v;      /* m/s */
+    double a;      /* m/s2, calculated */
+    // modes
+    int is_started;
+    int strokes;
+    int hits; /* of the wall */
+    // discrete states
+    double start; /* s */
+    double last;  /* m/s2: f at the last stroke */
+};
+
+/* References of all, in the order of the parameters, the input and the states. */
 enum toy_reference {
     TOY_TIME,
     TOY_PARAMETER1,
@@ -53,5 +72,6 @@ enum toy_reference {
 
 extern const struct model_description ball_description;
 extern const struct model_description block_description;
+extern const struct model_description hammer_description;
 
 #endif

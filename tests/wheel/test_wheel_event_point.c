@@ -30,8 +30,8 @@ static void step(enum event_handling at_event) {
 }
 
 static void update(void) {
-    bool states_changed;
-    ASSERT_OK(instance_update_discrete_states(instance, &states_changed));
+    struct discrete_update update;
+    ASSERT_OK(instance_update_discrete_states(instance, &update));
 }
 
 /* The times of importers are rounded; that of the instance goes on as if the step had not ended. */

@@ -24,7 +24,7 @@ static void assert_caught(struct instance *caught, int catches) {
     TEST_ASSERT_EQUAL_DOUBLE(3.0 * catches, get_real(caught, WHEEL_lost_speed));
 }
 
-static void test_snapshots_keep_modes_and_sums(void) {
+static void test_snapshots_keep_modes_and_discrete_states(void) {
     struct instance_snapshot *before = NULL;
     struct instance_snapshot *after = NULL;
     ASSERT_OK(instance_save(instance, 0, &before));
@@ -61,7 +61,7 @@ static enum status transfer(struct instance **other) {
     return status;
 }
 
-static void test_serialized_states_keep_modes_and_sums(void) {
+static void test_serialized_states_keep_modes_and_discrete_states(void) {
     struct instance *other;
     ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
     ASSERT_OK(set_boolean(WHEEL_is_reversed, 1));
@@ -92,10 +92,10 @@ static void assert_event_points_are_possible(void) {
     instance->state.event_point = (enum event_point)3;
     assert_forged_is_refused("event_point = 3 is impossible");
     instance->state.event_point = EVENT_DUE;
-    assert_forged_is_refused("indicators of the event that is due = 0 is impossible");
+    assert_forged_is_refused("causes of the event that is due = 0 is impossible");
     instance->state = kept;
     instance->memory.due[1] = true;
-    assert_forged_is_refused("indicators of the event that is due = 1 is impossible");
+    assert_forged_is_refused("causes of the event that is due = 1 is impossible");
     instance->memory.due[1] = false;
     instance->state.cut_end.s = NAN;
     assert_forged_is_refused("the end of the step cut short = nan is impossible");
@@ -245,7 +245,7 @@ static void test_wrong_bindings_of_discrete_variables_are_refused(void) {
 }
 
 /* A sum that is no variable. */
-static void test_a_forged_sum_without_a_name_is_refused(void) {
+static void test_a_forged_discrete_state_without_a_name_is_refused(void) {
     struct model_description fewer = changeable();
     short table[WHEEL_lost_speed + 1];
     fewer.variable_count = (size_t)model_description.row_of_reference[WHEEL_lost_speed];
@@ -267,5 +267,5 @@ static void test_a_forged_sum_without_a_name_is_refused(void) {
     ASSERT_OK(instance_serialize(instance, snapshot, bytes, sizeof bytes));
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                           instance_deserialize(instance, bytes, size, &read));
-    assert_text("a sum over events = nan is impossible");
+    assert_text("a discrete state = nan is impossible");
 }

@@ -1,0 +1,71 @@
+/* A step that is being done, for the files that do it: stepping.c, step_inputs.c and step_events.c.
+ */
+#ifndef INSTANCE_STEP_H
+#define INSTANCE_STEP_H
+
+#include "history.h"
+#include "internals.h"
+#include "model_modes.h"
+#include "stepping.h"
+
+struct step {
+    struct instance *instance;
+    const struct step_options *options;
+    struct clock_time begin;
+    struct clock_time end;          /* where it is to end; it may come forward */
+    struct clock_time until;        /* end of its present part: that, or a time event before */
+    bool meets_time_event;          /* at the end of its present part */
+    bool is_early;                  /* it has come forward */
+    bool is_over;                   /* the step is to end where it is */
+    struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
+    enum status answer;             /* of options->accept */
+    int events;                     /* so far */
+    int64_t steps_before;           /* internal ones, since initialization */
+};
+
+/* ---- Integration (stepping.c) --------------------------------------------------------------- */
+
+/* To step->until, or to a state event before it. */
+MUST_CHECK NONNULL enum status instance_move(struct step *step, enum continuation continuation);
+
+/* Internal steps that the step may still take. */
+static inline int64_t instance_steps_left(const struct step *step) {
+    const struct instance_state *state = &step->instance->state;
+    return state->own.max_internal_steps - (state->statistics.steps - step->steps_before);
+}
+
+/* ---- Inputs (step_inputs.c) ----------------------------------------------------------------- */
+
+/* Those at the time of the instance, elapsed s after the beginning of the step. */
+NONNULL void instance_place_inputs(struct instance *instance, double elapsed);
+
+/* Sets the inputs of the step to polynomials through the values that the importer gives. */
+MUST_CHECK NONNULL enum status instance_ask_inputs(const struct step *step, double t, double h);
+
+/* From now on the last value of an input is the one that was set for the end of the step; where the
+ * step ended earlier, the value that the input has there. */
+NONNULL void instance_hold_last_nodes(const struct step *step);
+
+/* ---- Events (step_events.c) ----------------------------------------------------------------- */
+
+/* Sets the end of the next part of the step. A time event so little after the end of the step that
+ * rounding may have put it there belongs to this step. */
+static inline void instance_set_part(struct step *step) {
+    const double time = instance_next_time(step->instance);
+    step->until = step->end;
+    if (time == INFINITY) {
+        step->meets_time_event = false;
+        return;
+    }
+    const double h = clock_difference(step->end, step->begin);
+    step->meets_time_event = time - step->end.s <= clock_slack(step->end.s, h);
+    if (time < step->end.s) {
+        step->until = (struct clock_time){.s = time};
+    }
+}
+
+/* To step->end over all events on the way. */
+MUST_CHECK NONNULL enum status instance_move_over_events(struct step *step,
+                                                         enum continuation continuation);
+
+#endif

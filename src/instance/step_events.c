@@ -1,0 +1,121 @@
+#include "step.h"
+
+#include "event_point.h"
+#include "fields.h"
+
+#include <string.h>
+
+/* As instance_move where no state moves: time passes until an input sets them free. */
+static enum status rest(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    instance_hold(instance, step->end,
+                  continuation == CONTINUE_AFTER_EVENT ? instance->memory.current
+                                                       : instance->memory.pending);
+    const struct integrator_start start = {
+        .span = state->span,
+        // inputs that are held leave the modes as they are
+        .indicators = instance->inputs_move ? instance_describe_indicators(instance) : NULL,
+    };
+    state->next_step = 0.0;
+    return integrator_rest(instance->integrator,
+                           doubles_of(instance->memory.held, instance->model->states), &start,
+                           clock_difference(step->until, state->restart_time), &state->latest_time);
+}
+
+/* The instance goes to the time of an event, and its modes change, unless the event is left. */
+static enum status meet_event(struct step *step, struct clock_time time) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    const bool *fired = instance->fired;
+    const struct clock_time end = step->end;
+    instance_set_clock(instance, time);
+    instance_place_inputs(instance, clock_difference(state->time, step->begin));
+    instance->step_met_event = true;
+    if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
+        step->is_early = clock_difference(end, state->time) > 0.0;
+        step->end = state->time;
+        if (step->options->at_event == EVENTS_LEFT) {
+            instance_leave_event(instance, fired, end);
+            return STATUS_OK;
+        }
+    }
+    enum status status = instance_count_event(instance, fired, &step->events);
+    if (status == STATUS_OK) {
+        status = instance_update_modes(instance, fired);
+    }
+    if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
+        instance_note_event(instance, end);
+    }
+    return status;
+}
+
+/* The modes at the beginning of a step, and how the integrator goes on from there. */
+static enum status begin_modes(struct step *step, enum continuation *continuation) {
+    struct instance *instance = step->instance;
+    struct instance_state *state = &instance->state;
+    if (state->event_point == EVENT_DUE) {
+        const enum status status = instance_pass_due_event(instance, &step->events);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        *continuation =
+            instance_continuation(instance, clock_difference(step->end, state->restart_time));
+    }
+    state->event_point = NO_EVENT;
+    return *continuation == CONTINUE_AFTER_CHANGE ? instance_update_modes(instance, NULL)
+                                                  : STATUS_OK;
+}
+
+/* To the end of the present part of the step, or to a state event before it. */
+static enum status move_part(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    if (instance->integrator == NULL) {
+        return STATUS_OK;
+    }
+    if (instance_is_at_rest(instance)) {
+        return rest(step, continuation);
+    }
+    return continuation == CONTINUE_AFTER_EVENT && instance_steps_left(step) <= 0
+               ? STATUS_TOO_MANY_STEPS
+               : instance_move(step, continuation);
+}
+
+/* Writes the event to which the last part has come, and its time; false: there is none. */
+static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
+    const struct instance *instance = step->instance;
+    const size_t count = instance->model->events->indicator_count;
+    const bool *fired =
+        has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
+    *time = step->until;
+    memset(instance->fired, 0, instance_event_size(instance->model));
+    if (fired != NULL) {
+        memcpy(instance->fired, fired, count * sizeof *fired);
+        *time = clock_add(instance->state.restart_time, instance->state.latest_time);
+    } else {
+        instance->fired[count] = step->meets_time_event;
+    }
+    return fired != NULL || step->meets_time_event;
+}
+
+enum status instance_move_over_events(struct step *step, enum continuation continuation) {
+    struct instance *instance = step->instance;
+    enum status status = begin_modes(step, &continuation);
+    while (status == STATUS_OK) {
+        instance_set_part(step);
+        const bool moves = clock_difference(step->until, instance->state.time) > 0.0;
+        if (moves) {
+            status = move_part(step, continuation);
+        }
+        struct clock_time time;
+        if (status != STATUS_OK || !find_event(step, moves, &time)) {
+            break;
+        }
+        status = meet_event(step, time);
+        if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
+            break;
+        }
+        continuation = CONTINUE_AFTER_EVENT;
+    }
+    return status;
+}

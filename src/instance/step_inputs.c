@@ -1,0 +1,59 @@
+#include "step.h"
+
+#include "fields.h"
+
+#include <math.h>
+
+void instance_place_inputs(struct instance *instance, double elapsed) {
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
+        u[i] = memory->current[i].d[0];
+    }
+}
+
+void instance_hold_last_nodes(const struct step *step) {
+    const struct instance *instance = step->instance;
+    const struct instance_memory *memory = &instance->memory;
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
+        memory->pending[i].d[0] =
+            step->is_early ? memory->current[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
+    }
+}
+
+static enum status set_polynomials(struct instance *instance, double h) {
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial input =
+            polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
+        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+            if (!isfinite(input.d[k])) {
+                return instance_not_finite(instance, "a derivative of an input");
+            }
+        }
+        memory->pending[i] = input;
+        memory->current[i] = input;
+        u[i] = input.d[0];
+    }
+    instance->outputs_are_valid = false;
+    return STATUS_OK;
+}
+
+enum status instance_ask_inputs(const struct step *step, double t, double h) {
+    struct instance *instance = step->instance;
+    for (int k = 0; k < POLYNOMIAL_NODES; k++) {
+        const double time =
+            k == POLYNOMIAL_NODES - 1 ? step->end.s : t + k * (h / (POLYNOMIAL_NODES - 1));
+        const enum status status = step->options->ask_inputs(step->options->context, time);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] = instance->memory.pending[i].d[0];
+        }
+    }
+    return set_polynomials(instance, clock_difference(step->end, step->begin));
+}

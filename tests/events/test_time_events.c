@@ -1,0 +1,277 @@
+/* Time events: a hammer strikes a mass at given times, with each method. The motion between two
+ * strokes is that of a constant force. */
+#include "continuous_states.h"
+#include "derivatives.h"
+#include "internals.h"
+#include "serialization.h"
+#include "toy_run.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const double period = 0.3, first = 0.07, kick = 0.25, force = 0.5;
+
+void setUp(void) {}
+
+void tearDown(void) {
+    instance_destroy(toy);
+    toy = NULL;
+}
+
+static const struct hammer_values *hammer(void) {
+    return (const void *)toy->memory.values;
+}
+
+static void start_hammer(int method, double start_time, double between, double offset) {
+    const struct instance_experiment experiment = {.start_time = start_time};
+    create(&hammer_description);
+    ASSERT_OK(instance_setup_experiment(toy, &experiment));
+    set_int(TOY_METHOD, method);
+    set(TOY_TOLERANCE, 1e-10);
+    set(TOY_PARAMETER1, between);
+    set(TOY_PARAMETER2, offset);
+    set(TOY_PARAMETER3, kick);
+    set(TOY_INPUT, force);
+    initialize();
+}
+
+/* The motion from x = 1 m at rest, t s after the start. */
+static void expected_motion(double t, double x[2]) {
+    x[0] = 1.0 + 0.5 * force * t * t;
+    x[1] = force * t;
+    for (int n = 0; first + n * period <= t; n++) {
+        x[0] += kick * (t - first - n * period);
+        x[1] += kick;
+    }
+}
+
+static void test_the_motion_between_strokes(void) {
+    static const double steps[] = {0.001, 0.007, 0.25, 5.0};
+    for (int method = 1; method <= 4; method++) {
+        for (int i = 0; i < 4; i++) {
+            const double h = steps[i];
+            const int count = (int)(5.0 / h);
+            double x[2];
+            start_hammer(method, 2.0, period, first);
+            run(2.0, h, count);
+            expected_motion(count * h, x);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9, x[0], get(TOY_POSITION));
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9, x[1], get(TOY_SPEED));
+            const int strokes = 1 + (int)((count * h - first) / period);
+            TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
+            TEST_ASSERT_EQUAL_INT(strokes, get_int(TOY_EVENTS));
+            TEST_ASSERT_EQUAL_DOUBLE(2.0 + first + (strokes - 1) * period, get(TOY_LAST_EVENT));
+        }
+    }
+}
+
+/* A force that changes along a line is read where the stroke is. */
+static void test_inputs_are_those_of_the_time(void) {
+    static const double steps[] = {0.01, 0.05, 0.125};
+    for (int i = 0; i < 3; i++) {
+        const double h = steps[i];
+        start_hammer(1, 0.0, period, first);
+        for (int k = 0; k < (int)(1.0 / h); k++) {
+            const unsigned input = TOY_INPUT;
+            const int order = 1;
+            const double slope = 2.0;
+            set(TOY_INPUT, slope * k * h);
+            ASSERT_OK(instance_set_input_derivatives(toy, &input, 1, &order, &slope));
+            ASSERT_OK(instance_do_step(toy, k * h, h));
+            if (hammer()->strokes > 0) {
+                const double stroke = first + (hammer()->strokes - 1) * period;
+                TEST_ASSERT_DOUBLE_WITHIN(1e-15, slope * stroke, hammer()->last);
+            }
+        }
+        TEST_ASSERT_EQUAL_INT(4, hammer()->strokes);
+    }
+}
+
+/* Strokes on the grid of the communication points, which the importer adds up with rounding errors:
+ * each belongs to the step that it ends. */
+static void test_a_stroke_at_the_end_of_a_step(void) {
+    static const double steps[] = {0.1, 1e-3, 1.0 / 3.0};
+    for (int i = 0; i < 3; i++) {
+        const double h = steps[i];
+        double t = 10.0;
+        start_hammer(1, t, h, h);
+        for (int n = 1; n <= 1000; n++) {
+            ASSERT_OK(instance_do_step(toy, t, h));
+            t += h;
+            TEST_ASSERT_EQUAL_INT(n, hammer()->strokes);
+        }
+    }
+}
+
+/* With the force held, the bits do not depend on the communication points. */
+static void test_later_points_do_not_change_the_motion(void) {
+    static const double steps[] = {0x1p-9, 0x1p-7, 0x1p-1};
+    for (int method = 1; method <= 4; method += method == 2 ? 2 : 1) {
+        double x[2];
+        for (int i = 0; i < 3; i++) {
+            start_hammer(method, 0.0, period, first);
+            run(0.0, 0x1p-10, 1); // the first point is the same
+            ASSERT_OK(instance_do_step(toy, 0x1p-10, steps[i] - 0x1p-10));
+            run(steps[i], steps[i], (int)(5.0 / steps[i]) - 1);
+            if (i == 0) {
+                x[0] = get(TOY_POSITION);
+                x[1] = get(TOY_SPEED);
+            }
+            TEST_ASSERT_EQUAL_MEMORY(&x[0], &(double){get(TOY_POSITION)}, sizeof(double));
+            TEST_ASSERT_EQUAL_MEMORY(&x[1], &(double){get(TOY_SPEED)}, sizeof(double));
+        }
+    }
+}
+
+/* v = -1 m/s from x = 1 m: the wall is hit after the stroke or before it. */
+static void test_state_events_beside_time_events(void) {
+    static const double offsets[] = {0.5, 2.0};
+    static const double hit_at[] = {0.5 + 0.5 / 0.75, 1.0};
+    for (int method = 1; method <= 4; method++) {
+        for (int i = 0; i < 2; i++) {
+            prepare(&hammer_description, method, 1e-10);
+            set(TOY_PARAMETER1, 100.0);
+            set(TOY_PARAMETER2, offsets[i]);
+            set(TOY_PARAMETER3, kick);
+            set(TOY_SPEED, -1.0);
+            initialize();
+            run(0.0, 3.0, 1);
+            TEST_ASSERT_EQUAL_INT(1, hammer()->hits);
+            TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
+            const double speed = i == 0 ? 0.75 : 1.0;
+            const double struck = i == 0 ? 0.0 : kick * (3.0 - offsets[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9, speed * (3.0 - hit_at[i]) + struck, get(TOY_POSITION));
+        }
+    }
+}
+
+/* Rounding decides which of two comes first; neither is lost. */
+static void test_a_stroke_at_the_wall(void) {
+    for (int method = 1; method <= 4; method++) {
+        prepare(&hammer_description, method, 1e-10);
+        set(TOY_PARAMETER1, 100.0);
+        set(TOY_PARAMETER3, kick);
+        set(TOY_SPEED, -1.0);
+        initialize();
+        run(0.0, 3.0, 1);
+        TEST_ASSERT_EQUAL_INT(1, hammer()->hits);
+        TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
+        const bool is_struck_first = get(TOY_SPEED) < 1.0;
+        const double speed = is_struck_first ? 1.0 - kick : 1.0 + kick;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * speed, get(TOY_POSITION));
+    }
+}
+
+/* The limit is for events that could follow each other without end. */
+static void test_a_step_may_have_more_time_events_than_max_events(void) {
+    start_hammer(1, 0.0, 1e-3, 1e-3);
+    run(0.0, 5.0005, 1);
+    TEST_ASSERT_EQUAL_INT(5000, hammer()->strokes);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 5000 * kick + force * 5.0005, get(TOY_SPEED));
+}
+
+static void test_time_events_without_progress_are_refused(void) {
+    start_hammer(1, 0.0, 0.0, 0.1);
+    last_text[0] = '\0';
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_do_step(toy, 0.0, 1.0));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "ended at 0.1"), last_text);
+}
+
+static void go_on(double t, double x[2]) {
+    run(t, 0.05, 3);
+    run(t + 0.15, 0.8, 1);
+    x[0] = get(TOY_POSITION);
+    x[1] = get(TOY_SPEED);
+}
+
+/* Back to before a stroke, between two strokes, and by bytes in another instance. */
+static void test_rollback_across_strokes(void) {
+    for (int method = 1; method <= 4; method++) {
+        double straight[2];
+        double again[2];
+        for (int k = 0; k < 8; k++) {
+            struct instance_snapshot *snapshot = NULL;
+            struct instance_snapshot *read = NULL;
+            start_hammer(method, 0.0, period, first);
+            run(0.0, 0.05, k);
+            const double t = k * 0.05;
+            ASSERT_OK(instance_save(toy, 0, &snapshot));
+            go_on(t, straight);
+            const int strokes = hammer()->strokes;
+            ASSERT_OK(instance_restore(toy, snapshot));
+            go_on(t, again);
+            TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
+            TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
+
+            const size_t size = instance_serialized_size(toy);
+            unsigned char *bytes = malloc(size);
+            ASSERT_OK(instance_serialize(toy, snapshot, bytes, size));
+            create(&hammer_description);
+            ASSERT_OK(instance_deserialize(toy, bytes, size, &read));
+            ASSERT_OK(instance_restore(toy, read));
+            free(bytes);
+            go_on(t, again);
+            TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
+        }
+    }
+}
+
+/* A step that ends at the stroke, with the stroke still due. */
+static void test_a_stroke_is_left_to_event_mode(void) {
+    const struct step_options left = {.at_event = EVENTS_LEFT};
+    struct discrete_update update;
+    start_hammer(1, 0.0, period, first);
+    ASSERT_OK(instance_do_step_with(toy, 0.0, 1.0, &left));
+    TEST_ASSERT_TRUE(instance_met_event(toy) && instance_time(toy) == first);
+    TEST_ASSERT_EQUAL_INT(0, hammer()->strokes);
+    ASSERT_OK(instance_update_discrete_states(toy, &update));
+    TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
+    TEST_ASSERT_EQUAL_DOUBLE(first + period, update.next_time);
+    ASSERT_OK(instance_do_step_with(toy, first, 0.1, &left));
+    TEST_ASSERT_FALSE(instance_met_event(toy));
+    ASSERT_OK(instance_do_step_with(toy, first + 0.1, 0.2, &left)); // with rounding: at the end
+    TEST_ASSERT_TRUE(instance_met_event(toy));
+    ASSERT_OK(instance_do_step_with(toy, first + 0.1 + 0.2, 0.1, &left)); // passes it first
+    TEST_ASSERT_EQUAL_INT(2, hammer()->strokes);
+}
+
+/* An integrator outside goes to the time that it was given. */
+static void test_integrated_from_outside(void) {
+    struct discrete_update update;
+    create(&hammer_description);
+    const struct instance_experiment experiment = {.start_time = 1.0};
+    ASSERT_OK(instance_setup_experiment(toy, &experiment));
+    set(TOY_PARAMETER2, first);
+    instance_integrate_outside(toy);
+    initialize();
+    ASSERT_OK(instance_update_discrete_states(toy, &update));
+    TEST_ASSERT_FALSE(update.states_changed);
+    for (int n = 1; n <= 3; n++) {
+        const double t = 1.0 + first + (n - 1) * 1.0;
+        TEST_ASSERT_EQUAL_DOUBLE(t, update.next_time);
+        ASSERT_OK(instance_enter_continuous_time(toy));
+        ASSERT_OK(instance_set_time(toy, t - 0.01));
+        instance_enter_event_mode(toy);
+        ASSERT_OK(instance_update_discrete_states(toy, &update));
+        TEST_ASSERT_EQUAL_INT(n - 1, hammer()->strokes);
+        ASSERT_OK(instance_enter_continuous_time(toy));
+        ASSERT_OK(instance_set_time(toy, t));
+        instance_enter_event_mode(toy);
+        for (int k = 0; k < 2; k++) {
+            ASSERT_OK(instance_update_discrete_states(toy, &update));
+            TEST_ASSERT_EQUAL_INT(k == 0, update.states_changed);
+            TEST_ASSERT_EQUAL_INT(n, hammer()->strokes);
+        }
+    }
+}
+
+static void test_a_declaration_that_does_not_fit_the_model_is_refused(void) {
+    struct model_description wrong = hammer_description;
+    struct instance *none = NULL;
+    wrong.has_time_events = false;
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
+    wrong = ball_description;
+    wrong.has_time_events = true;
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_create(&wrong, &last_text_sink, &none));
+    TEST_ASSERT_NULL(none);
+}
