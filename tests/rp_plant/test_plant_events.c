@@ -307,7 +307,8 @@ static void test_places_in_the_value_structure(void) {
     TEST_ASSERT_EQUAL_size_t(RP_PLANT_INDICATORS, events->indicator_count);
     TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, modes), events->modes.offset);
     TEST_ASSERT_EQUAL_size_t(5 * sizeof(int), events->modes.size);
-    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, sums), events->discrete_states.offset);
+    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, sums),
+                             events->discrete_states.offset);
     TEST_ASSERT_EQUAL_size_t(4 * sizeof(double), events->discrete_states.size);
     TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, payload_attached),
                              events->discrete_inputs.offset);
