@@ -2,8 +2,9 @@
 
 random_motions.py FMU [--count 200] [--seed 0] [--compliant] prints how the errors are distributed
 and the cases that fail. A case has friction, stops and a payload; it ends with its tenth event or
-after 4 s. It is drawn again where events are closer than 1 us, where an indicator falls slower than SLOWEST,
-where a decision at an event could as well have been another one, or with fewer than 3 events.
+after 4 s. It is drawn again where events are closer than 1 us, where an indicator falls slower than
+SLOWEST, where a decision at an event could as well have been another one, or with fewer than 3
+events.
 """
 
 import argparse
@@ -114,7 +115,7 @@ def random_case(random: np.random.Generator) -> Case:
 
 
 def compliant_case(random: np.random.Generator) -> Case:
-    """The same with compliant stops of joint 2, and often of joint 1; a few motions start in one."""
+    """The same with compliant stops of joint 2, often of joint 1; a few motions start in one."""
     case = random_case(random)
     values = dict(case.values)
     for joint, stiffest in (("1", 4.0), ("2", 5.0)):
