@@ -18,7 +18,7 @@ EQUATION void efforts_of_inputs(const struct plant *plant, const struct rp_plant
     if (w[0] != 0.0 || w[1] != 0.0 || w[2] != 0.0) {
         plant_wrench_forces(plant, w, Q);
     }
-    plant_efforts(plant, &p, modes->joint, inputs->tau, Q, efforts);
+    plant_efforts(plant, &p, modes, inputs->tau, Q, efforts);
 }
 
 double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint) {

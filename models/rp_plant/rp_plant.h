@@ -1,5 +1,5 @@
 /* Equations of the plant: the RP manipulator (rp_manipulator.h) with what a real one has: armature
- * and damping of its drives, dry friction, rigid stops, a wrench at its end effector, a payload.
+ * and damping of its drives, dry friction, stops, a wrench at its end effector, a payload.
  *
  *   D q'' + C q' + g = tau + Q - damping q' - friction + stop                     (N.m, N)
  *
@@ -18,6 +18,7 @@
 enum rp_plant_stops {
     RP_PLANT_STOPS_NONE = 1,
     RP_PLANT_STOPS_RIGID = 2,
+    RP_PLANT_STOPS_COMPLIANT = 3,
 };
 
 /* What happens to the velocities when the payload is grasped. */
@@ -31,6 +32,14 @@ enum rp_plant_joint_mode {
     RP_PLANT_STUCK = 0,     /* held by friction or at a closed stop */
     RP_PLANT_FORWARD = 1,   /* slides, friction drives it backward */
     RP_PLANT_FREE = 2,      /* moves without friction */
+};
+
+/* Contact of a joint with a compliant stop, times the side: 1 at the lower stop, -1 at the upper.
+ */
+enum rp_plant_contact {
+    RP_PLANT_APART = 0,
+    RP_PLANT_PUSHED = 1, /* the stop pushes the joint back */
+    RP_PLANT_LET_GO = 2, /* the joint leaves faster than the stop can follow: no force */
 };
 
 enum rp_plant_payload_mode {
@@ -55,6 +64,8 @@ struct rp_plant_parameters {
     double payload_inertia;       /* kg.m2, >= 0: about its center of mass, along z0 */
     double payload_x;             /* m: its center of mass in frame 2, along x2 */
     double payload_z;             /* m: the same, along z2 (the slide) */
+    double stop_stiffness[2];     /* N.m/rad, N/m, > 0: of compliant stops */
+    double stop_damping[2];       /* s/rad, s/m, >= 0: of compliant stops, by Hunt and Crossley */
     int stops[2];                 /* enum rp_plant_stops */
     int grasp;                    /* enum rp_plant_grasp */
 };
@@ -66,8 +77,9 @@ struct rp_plant_inputs {
 };
 
 struct rp_plant_modes {
-    int joint[2]; /* enum rp_plant_joint_mode */
-    int payload;  /* enum rp_plant_payload_mode */
+    int joint[2];   /* enum rp_plant_joint_mode */
+    int payload;    /* enum rp_plant_payload_mode */
+    int contact[2]; /* enum rp_plant_contact, times the side */
 };
 
 struct rp_plant_inertia {
@@ -78,7 +90,7 @@ struct rp_plant_inertia {
 /* A motion in given modes, which need not be those that follow from the rest. */
 struct rp_plant_motion {
     double ddq[2];      /* rad/s2, m/s2; 0 for a stuck joint */
-    double reaction[2]; /* N.m, N: of a stuck joint friction - stop, else 0 */
+    double reaction[2]; /* N.m, N: of a stuck joint friction - rigid stop, else 0 */
 };
 
 /* Friction of a joint at rest at most (N.m, N). */
@@ -89,7 +101,8 @@ double rp_plant_breakaway(const struct rp_plant_parameters *p, int joint);
  * past the event that ends the mode. */
 double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint, double speed);
 
-/* +1: the joint rests on its lower stop and can only move forward; -1: on its upper one; 0. */
+/* +1: the joint rests on its lower rigid stop and can only move forward; -1: on its upper one; 0.
+ */
 int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q);
 
 void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double q2,
@@ -100,7 +113,9 @@ double rp_plant_kinetic_energy(const struct rp_plant_parameters *p, bool attache
                                const double q[2], const double dq[2]);
 
 /* b: all generalized forces but those that hold joints at rest. A joint that slides has its
- * friction in it, a stuck one has none:  b = tau + Q - damping q' - friction - C q' - g */
+ * friction in it, a stuck one has none:
+ *
+ *   b = tau + Q - damping q' - friction + compliant stop - C q' - g */
 void rp_plant_forces(const struct rp_plant_parameters *p, const struct rp_plant_modes *modes,
                      const double q[2], const double dq[2], const struct rp_plant_inputs *inputs,
                      double forces[2]);

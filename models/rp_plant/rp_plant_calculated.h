@@ -11,18 +11,20 @@ struct plant_hold {
     real friction, stop;
 };
 
-EQUATION struct plant_hold plant_hold(const struct rp_plant_parameters *const p[SOURCES], int mode,
-                                      int i, real q, real dq, real reaction) {
-    const real zero = constant(0.0);
+EQUATION struct plant_hold plant_hold(const struct rp_plant_parameters *const p[SOURCES],
+                                      const struct rp_plant_modes *modes, int i, real q, real dq,
+                                      real reaction) {
+    const int mode = modes->joint[i];
+    const real compliant = plant_compliant_force(p, modes->contact[i], i, q, dq);
     if (mode != RP_PLANT_STUCK) {
-        return (struct plant_hold){plant_friction(p, mode, i, dq), zero};
+        return (struct plant_hold){plant_friction(p, mode, i, dq), compliant};
     }
     const real breakaway = plant_breakaway(p, i);
     const int closed = rp_plant_closed_stop(p[0], i, value_of(q));
     const struct rp_plant_hold held =
         rp_plant_hold(value_of(reaction), value_of(breakaway), closed);
     if (held.stop == 0.0) {
-        return (struct plant_hold){reaction, zero};
+        return (struct plant_hold){reaction, compliant};
     }
     const real friction = scaled(-closed, breakaway);
     return (struct plant_hold){friction, minus(friction, reaction)};
@@ -58,11 +60,20 @@ EQUATION void write_end_effector(struct rp_plant_values *const to[TARGETS], cons
     WRITE(to, ee_rate, hand->dq[0]);
 }
 
-EQUATION void write_energies(struct rp_plant_values *const to[TARGETS], const struct plant *plant,
+EQUATION void write_energies(struct rp_plant_values *const to[TARGETS],
+                             const struct rp_plant_parameters *const p[SOURCES],
+                             const struct rp_plant_modes *modes, const struct plant *plant,
                              const real tau[2]) {
     const real *dq = plant->arm.dq;
     const real kinetic_energy = plant_kinetic_energy(plant);
-    const real potential_energy = arm_potential_energy(&plant->arm);
+    real potential_energy = arm_potential_energy(&plant->arm);
+    for (int i = 0; i < 2; i++) {
+        const int contact = modes->contact[i];
+        if (contact != RP_PLANT_APART) {
+            const real stored = plant_stop_energy(p, contact, i, plant->arm.q[i]);
+            potential_energy = plus(potential_energy, stored);
+        }
+    }
     WRITE(to, kinetic_energy, kinetic_energy);
     WRITE(to, potential_energy, potential_energy);
     WRITE(to, total_energy, plus(kinetic_energy, potential_energy));
@@ -118,7 +129,7 @@ EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
     real ddq[2];
     real reaction[2];
     plant_wrench_forces(&plant, wrench, applied);
-    plant_efforts(&plant, p, modes->joint, tau, applied, efforts);
+    plant_efforts(&plant, p, modes, tau, applied, efforts);
     plant_motion(&plant, modes->joint, efforts, ddq, reaction);
     WRITE(to, ddq[0], ddq[0]);
     WRITE(to, ddq[1], ddq[1]);
@@ -127,7 +138,7 @@ EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
     real driven[2];
     real power = constant(0.0);
     for (int i = 0; i < 2; i++) {
-        const struct plant_hold hold = plant_hold(p, modes->joint[i], i, q[i], dq[i], reaction[i]);
+        const struct plant_hold hold = plant_hold(p, modes, i, q[i], dq[i], reaction[i]);
         const real damped = times(READ(p, damping[i]), dq[i]);
         const real accelerated = times(READ(p, armature[i]), ddq[i]);
         const real held = minus(hold.friction, hold.stop);
@@ -137,15 +148,15 @@ EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
         WRITE(to, stop_force[i], hold.stop);
 
         real z[PLANT_INDICATORS];
-        plant_indicators(p, modes->joint[i], i, q[i], dq[i], reaction[i], z);
+        plant_indicators(p, modes, i, q[i], dq[i], reaction[i], z);
         for (int k = 0; k < PLANT_INDICATORS; k++) {
-            WRITE(to, indicators[PLANT_INDICATORS * i + k], z[k]);
+            WRITE(to, indicators[plant_indicator_index(i, k)], z[k]);
         }
     }
     WRITE(to, friction_power, power);
 
     write_end_effector(to, &plant.hand, ddq);
-    write_energies(to, &plant, tau);
+    write_energies(to, p, modes, &plant, tau);
     write_terms(to, &plant);
     const struct joint_loads loads = plant_loads(&plant, wrench, driven, ddq);
     write_loads(to, &loads);

@@ -38,6 +38,10 @@ static enum status check_not_negative(const struct rp_plant_parameters *p, char 
         {"stribeck_velocity2", p->stribeck_velocity[1]},
         {"payload_mass", p->payload_mass},
         {"payload_inertia", p->payload_inertia},
+        {"stop_stiffness1", p->stop_stiffness[0]},
+        {"stop_stiffness2", p->stop_stiffness[1]},
+        {"stop_damping1", p->stop_damping[0]},
+        {"stop_damping2", p->stop_damping[1]},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         if (isfinite(all[i].value) && all[i].value >= 0.0) {
@@ -90,9 +94,9 @@ static enum status check_friction(const struct rp_plant_parameters *p, int i, ch
 static enum status check_stops(const struct rp_plant_parameters *p, int i, char *text,
                                size_t size) {
     const int joint = i + 1;
-    if (p->stops[i] != RP_PLANT_STOPS_NONE && p->stops[i] != RP_PLANT_STOPS_RIGID) {
-        (void)snprintf(text, size, "stops%d = %d is refused: it must be %d or %d", joint,
-                       p->stops[i], RP_PLANT_STOPS_NONE, RP_PLANT_STOPS_RIGID);
+    if (p->stops[i] < RP_PLANT_STOPS_NONE || p->stops[i] > RP_PLANT_STOPS_COMPLIANT) {
+        (void)snprintf(text, size, "stops%d = %d is refused: it must be within %d and %d", joint,
+                       p->stops[i], RP_PLANT_STOPS_NONE, RP_PLANT_STOPS_COMPLIANT);
         return STATUS_INVALID_PARAMETERS;
     }
     if (!(p->restitution[i] >= 0.0 && p->restitution[i] <= 1.0)) {
@@ -100,13 +104,20 @@ static enum status check_stops(const struct rp_plant_parameters *p, int i, char 
                        joint, p->restitution[i]);
         return STATUS_INVALID_PARAMETERS;
     }
-    if (p->stops[i] == RP_PLANT_STOPS_RIGID &&
+    if (p->stops[i] == RP_PLANT_STOPS_COMPLIANT &&
+        !(isfinite(p->stop_stiffness[i]) && p->stop_stiffness[i] > 0.0)) {
+        (void)snprintf(text, size,
+                       "stop_stiffness%d = %.17g is refused: with compliant stops it must be "
+                       "finite and above 0",
+                       joint, p->stop_stiffness[i]);
+        return STATUS_INVALID_PARAMETERS;
+    }
+    if (p->stops[i] != RP_PLANT_STOPS_NONE &&
         !(isfinite(p->lower[i]) && isfinite(p->upper[i]) && p->lower[i] < p->upper[i])) {
-        (void)snprintf(
-            text, size,
-            "lower%d = %.17g and upper%d = %.17g are refused: with rigid stops they must be "
-            "finite and lower%d below upper%d",
-            joint, p->lower[i], joint, p->upper[i], joint, joint);
+        (void)snprintf(text, size,
+                       "lower%d = %.17g and upper%d = %.17g are refused: with stops they must be "
+                       "finite and lower%d below upper%d",
+                       joint, p->lower[i], joint, p->upper[i], joint, joint);
         return STATUS_INVALID_PARAMETERS;
     }
     return STATUS_OK;

@@ -7,6 +7,8 @@
 #include "rp_payload.h"
 #include "rp_plant.h"
 
+#include <stdlib.h>
+
 /* The plant in a state, with what many equations share. */
 struct plant {
     struct arm hand; /* without payload and armature: where the end effector is */
@@ -131,19 +133,61 @@ EQUATION real plant_friction(const struct rp_plant_parameters *const p[SOURCES],
     return scaled(mode, plant_sliding_friction(p, i, scaled(mode, dq)));
 }
 
-/* tau + Q - damping q' - friction of the joint where it slides */
-EQUATION real plant_effort(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
-                           real dq, real applied) {
+/* ---- Compliant stops ------------------------------------------------------------------------ */
+
+/* d of the stop that the joint is in contact with. */
+EQUATION real plant_penetration(const struct rp_plant_parameters *const p[SOURCES], int contact,
+                                int i, real q) {
+    return contact > 0 ? minus(READ(p, lower[i]), q) : minus(q, READ(p, upper[i]));
+}
+
+/* 1 + c d': the stop pushes while this is above 0. */
+EQUATION real plant_push(const struct rp_plant_parameters *const p[SOURCES], int contact, int i,
+                         real dq) {
+    const real y = times(READ(p, stop_damping[i]), dq);
+    return contact > 0 ? minus(constant(1.0), y) : plus(constant(1.0), y);
+}
+
+/* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it goes on past d = 0, up to
+ * the event that ends the contact. */
+EQUATION real plant_compliant_force(const struct rp_plant_parameters *const p[SOURCES], int contact,
+                                    int i, real q, real dq) {
+    if (abs(contact) != RP_PLANT_PUSHED) {
+        return constant(0.0);
+    }
+    const real elastic = times(READ(p, stop_stiffness[i]), plant_penetration(p, contact, i, q));
+    const real force = times(elastic, plant_push(p, contact, i, dq));
+    return contact > 0 ? force : negative(force);
+}
+
+/* k d^2 / 2, also of a stop that the joint leaves behind: what it does not give back is lost. */
+EQUATION real plant_stop_energy(const struct rp_plant_parameters *const p[SOURCES], int contact,
+                                int i, real q) {
+    const real d = plant_penetration(p, contact, i, q);
+    return scaled(0.5, times(READ(p, stop_stiffness[i]), times(d, d)));
+}
+
+/* ---- Efforts -------------------------------------------------------------------------------- */
+
+/* tau + Q - damping q' - friction of the joint where it slides + force of its compliant stop */
+EQUATION real plant_effort(const struct rp_plant_parameters *const p[SOURCES],
+                           const struct rp_plant_modes *modes, int i, real q, real dq,
+                           real applied) {
     const real damped = minus(applied, times(READ(p, damping[i]), dq));
-    return minus(damped, plant_friction(p, mode, i, dq));
+    const real rubbed = minus(damped, plant_friction(p, modes->joint[i], i, dq));
+    const int contact = modes->contact[i];
+    return contact == RP_PLANT_APART ? rubbed
+                                     : plus(rubbed, plant_compliant_force(p, contact, i, q, dq));
 }
 
 EQUATION void plant_efforts(const struct plant *plant,
-                            const struct rp_plant_parameters *const p[SOURCES], const int mode[2],
-                            const real tau[2], const real Q[2], real efforts[2]) {
+                            const struct rp_plant_parameters *const p[SOURCES],
+                            const struct rp_plant_modes *modes, const real tau[2], const real Q[2],
+                            real efforts[2]) {
+    const real *q = plant->arm.q;
     const real *dq = plant->arm.dq;
-    efforts[0] = plant_effort(p, mode[0], 0, dq[0], plus(tau[0], Q[0]));
-    efforts[1] = plant_effort(p, mode[1], 1, dq[1], plus(tau[1], Q[1]));
+    efforts[0] = plant_effort(p, modes, 0, q[0], dq[0], plus(tau[0], Q[0]));
+    efforts[1] = plant_effort(p, modes, 1, q[1], dq[1], plus(tau[1], Q[1]));
 }
 
 /* efforts - C q' - g */
@@ -227,7 +271,12 @@ EQUATION void plant_motion(const struct plant *plant, const int mode[2], const r
 
 /* ---- Event indicators ----------------------------------------------------------------------- */
 
-enum { PLANT_INDICATORS = 4 }; /* of a joint */
+enum { PLANT_INDICATORS = 5, PLANT_PUSH = 4 }; /* of a joint; the last one of them */
+
+/* Its place among all: the fifth ones come last. */
+static inline size_t plant_indicator_index(int joint, int k) {
+    return k == PLANT_PUSH ? (size_t)(2 * PLANT_PUSH + joint) : (size_t)(PLANT_PUSH * joint + k);
+}
 
 /* Those of a stuck joint on its lower and upper side; a closed stop leaves the one that opens. */
 EQUATION void plant_stuck_indicators(const struct rp_plant_parameters *const p[SOURCES], int i,
@@ -238,10 +287,29 @@ EQUATION void plant_stuck_indicators(const struct rp_plant_parameters *const p[S
     z[1] = closed > 0 ? constant(1.0) : plus(breakaway, reaction);
 }
 
-/* Above 0 while the mode is valid: joint i breaks away forward, or comes to rest if it slides;
- * breaks away backward; reaches its lower stop; its upper stop. 1: unused. */
-EQUATION void plant_indicators(const struct rp_plant_parameters *const p[SOURCES], int mode, int i,
-                               real q, real dq, real reaction, real z[PLANT_INDICATORS]) {
+/* Those of a moving joint at its stops. In contact with a compliant one it leaves that; whether the
+ * stop pushes is a question only if it is damped. */
+EQUATION void plant_stop_indicators(const struct rp_plant_parameters *const p[SOURCES], int contact,
+                                    int i, real q, real dq, real z[PLANT_INDICATORS]) {
+    if (contact == RP_PLANT_APART) {
+        z[2] = minus(q, READ(p, lower[i]));
+        z[3] = minus(READ(p, upper[i]), q);
+        return;
+    }
+    z[contact > 0 ? 2 : 3] = plant_penetration(p, contact, i, q);
+    if (p[0]->stop_damping[i] > 0.0) {
+        const real push = plant_push(p, contact, i, dq);
+        z[PLANT_PUSH] = abs(contact) == RP_PLANT_PUSHED ? push : negative(push);
+    }
+}
+
+/* Above 0 while the modes are valid: joint i breaks away forward, or comes to rest if it slides;
+ * breaks away backward; reaches its lower stop, or leaves it; its upper stop; the compliant stop
+ * that it is in begins or ends to push. 1: unused. */
+EQUATION void plant_indicators(const struct rp_plant_parameters *const p[SOURCES],
+                               const struct rp_plant_modes *modes, int i, real q, real dq,
+                               real reaction, real z[PLANT_INDICATORS]) {
+    const int mode = modes->joint[i];
     for (int k = 0; k < PLANT_INDICATORS; k++) {
         z[k] = constant(1.0);
     }
@@ -252,9 +320,8 @@ EQUATION void plant_indicators(const struct rp_plant_parameters *const p[SOURCES
     if (mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) {
         z[0] = scaled(mode, dq);
     }
-    if (p[0]->stops[i] == RP_PLANT_STOPS_RIGID) {
-        z[2] = minus(q, READ(p, lower[i]));
-        z[3] = minus(READ(p, upper[i]), q);
+    if (p[0]->stops[i] == RP_PLANT_STOPS_RIGID || p[0]->stops[i] == RP_PLANT_STOPS_COMPLIANT) {
+        plant_stop_indicators(p, modes->contact[i], i, q, dq, z);
     }
 }
 

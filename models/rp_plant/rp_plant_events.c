@@ -1,21 +1,24 @@
 #include "rp_plant_events.h"
 
 #include "arithmetic_double.h"
+#include "rp_plant_contact.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_impact.h"
 #include "rp_plant_modes.h"
 #include "rp_plant_series.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-enum { SLIP_FORWARD, SLIP_BACKWARD, LOWER, UPPER }; /* the indicators of a joint */
+enum { SLIP_FORWARD, SLIP_BACKWARD, LOWER, UPPER, PUSH }; /* the indicators of a joint */
 
 /* What has fired, by the modes that held until now. */
 struct fired {
     bool halted[2]; /* a sliding joint has come to rest */
     int leaves[2];  /* the direction in which a stuck joint breaks away, else 0 */
-    int hit[2];     /* +1: the lower stop is reached, -1: the upper one, else 0 */
+    int hit[2];     /* +1: the lower stop is reached or left, -1: the upper one, else 0 */
+    bool turned[2]; /* the compliant stop begins or ends to push */
 };
 
 /* ---- Stops ---------------------------------------------------------------------------------- */
@@ -24,15 +27,18 @@ struct fired {
  * moved since. */
 static const double near_limit = 1e-9;
 
-/* Puts joints that have reached a stop, or are past it, on it. */
+/* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones. */
 static void arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
         const double hit = fired->hit[i] > 0 ? p->lower[i] : p->upper[i];
+        const bool is_near = fired->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit;
         side[i] = rp_plant_closed_stop(p, i, values->q[i]);
-        if (side[i] == 0 && p->stops[i] == RP_PLANT_STOPS_RIGID &&
-            fabs(values->q[i] - hit) <= near_limit) {
+        if (side[i] == 0 && is_near && p->stops[i] == RP_PLANT_STOPS_RIGID) {
             side[i] = fired->hit[i];
+        }
+        if (is_near && rp_plant_has_contacts(p, i)) {
+            values->q[i] = hit;
         }
         if (side[i] != 0) {
             values->q[i] = side[i] > 0 ? p->lower[i] : p->upper[i];
@@ -146,7 +152,10 @@ static struct fired read_fired(const struct rp_plant_values *values, const bool 
         return fired;
     }
     for (int i = 0; i < 2; i++) {
-        const bool *of_joint = at_zero + PLANT_INDICATORS * (size_t)i;
+        bool of_joint[PLANT_INDICATORS];
+        for (int k = 0; k < PLANT_INDICATORS; k++) {
+            of_joint[k] = at_zero[plant_indicator_index(i, k)];
+        }
         const int mode = values->modes.joint[i];
         fired.halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
@@ -155,23 +164,31 @@ static struct fired read_fired(const struct rp_plant_values *values, const bool 
         if (mode != RP_PLANT_STUCK && of_joint[LOWER] != of_joint[UPPER]) {
             fired.hit[i] = of_joint[LOWER] ? 1 : -1;
         }
+        fired.turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
     }
     return fired;
 }
 
 bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
     const int *joint = modes->joint;
+    const int *contact = modes->contact;
     return joint[0] >= RP_PLANT_BACKWARD && joint[0] <= RP_PLANT_FREE &&
            joint[1] >= RP_PLANT_BACKWARD && joint[1] <= RP_PLANT_FREE &&
-           modes->payload >= RP_PLANT_UNDECIDED && modes->payload <= RP_PLANT_RELEASED;
+           modes->payload >= RP_PLANT_UNDECIDED && modes->payload <= RP_PLANT_RELEASED &&
+           contact[0] >= -RP_PLANT_LET_GO && contact[0] <= RP_PLANT_LET_GO &&
+           contact[1] >= -RP_PLANT_LET_GO && contact[1] <= RP_PLANT_LET_GO;
 }
 
 /* A joint slides only where there is friction, and is free only where there is none; one that is
- * held stands still, by friction or on a stop. */
+ * held stands still, by friction or on a stop. Contacts follow from the state. */
 static bool fits(const struct rp_plant_values *values, int joint) {
     const struct rp_plant_parameters *p = &values->parameters;
     const bool has_friction = rp_plant_breakaway(p, joint) > 0.0;
     const int mode = values->modes.joint[joint];
+    if (!rp_plant_contact_fits(p, joint, values->q[joint], values->dq[joint],
+                               values->modes.contact[joint])) {
+        return false;
+    }
     if (mode == RP_PLANT_STUCK) {
         return values->dq[joint] == 0.0 &&
                (has_friction || rp_plant_closed_stop(p, joint, values->q[joint]) != 0);
@@ -196,6 +213,10 @@ static enum status update(void *values_pointer, const struct event *event) {
             values->dq[i] = 0.0;
             jumps = true;
         }
+        if (fired.turned[i]) {
+            rp_plant_turn_contact(&values->parameters, i, &values->dq[i],
+                                  &values->modes.contact[i]);
+        }
     }
     if (take_payload(values)) {
         jumps = true;
@@ -213,13 +234,15 @@ static enum status update(void *values_pointer, const struct event *event) {
         rp_plant_decide(p, values->q, values->dq, &values->inputs, &values->modes, &decision);
         rp_plant_break_away(values, event, &decision, jumps ? none : fired.leaves);
     }
+    rp_plant_begin_contacts(p, values->q, values->dq, &values->inputs, &values->modes);
     return STATUS_OK;
 }
 
 static bool are_possible(const void *values_pointer) {
     const struct rp_plant_parameters *p =
         &((const struct rp_plant_values *)values_pointer)->parameters;
-    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) || p->payload_mass > 0.0 ||
+    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) ||
+           rp_plant_has_contacts(p, 0) || rp_plant_has_contacts(p, 1) || p->payload_mass > 0.0 ||
            p->payload_inertia > 0.0;
 }
 
@@ -230,10 +253,36 @@ static bool is_at_rest(const void *values_pointer) {
     return modes.joint[0] == RP_PLANT_STUCK && modes.joint[1] == RP_PLANT_STUCK;
 }
 
-/* As plant_indicators. */
-static void describe_joint(const struct rp_plant_values *values, int mode, int joint,
+/* As plant_stop_indicators. */
+static void describe_stops(const struct rp_plant_values *values, int contact, int joint,
                            struct indicator indicators[PLANT_INDICATORS]) {
     const struct rp_plant_parameters *p = &values->parameters;
+    const size_t q = (size_t)joint;
+    const double dq = values->dq[joint];
+    // a contact that has just begun, or ended, rises as much as its joint moves that way
+    const struct indicator over_lower = {INDICATOR_OF_STATE, q, 1.0, -p->lower[joint], dq > 0.0};
+    const struct indicator below_lower = {INDICATOR_OF_STATE, q, -1.0, p->lower[joint], dq < 0.0};
+    const struct indicator below_upper = {INDICATOR_OF_STATE, q, -1.0, p->upper[joint], dq < 0.0};
+    const struct indicator over_upper = {INDICATOR_OF_STATE, q, 1.0, -p->upper[joint], dq > 0.0};
+    if (contact == RP_PLANT_APART) {
+        indicators[LOWER] = over_lower;
+        indicators[UPPER] = below_upper;
+        return;
+    }
+    const int side = contact > 0 ? 1 : -1;
+    indicators[side > 0 ? LOWER : UPPER] = side > 0 ? below_lower : over_upper;
+    if (p->stop_damping[joint] > 0.0) {
+        const double sign = abs(contact) == RP_PLANT_PUSHED ? 1.0 : -1.0;
+        const double factor = -sign * side * p->stop_damping[joint];
+        indicators[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false};
+    }
+}
+
+/* As plant_indicators. */
+static void describe_joint(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
+                           int joint, struct indicator indicators[PLANT_INDICATORS]) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const int mode = modes->joint[joint];
     const size_t q = (size_t)joint;
     for (int k = 0; k < PLANT_INDICATORS; k++) {
         indicators[k] = (struct indicator){.kind = INDICATOR_UNUSED};
@@ -252,12 +301,8 @@ static void describe_joint(const struct rp_plant_values *values, int mode, int j
         indicators[SLIP_FORWARD] =
             (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
     }
-    if (p->stops[joint] == RP_PLANT_STOPS_RIGID) {
-        const double dq = values->dq[joint];
-        indicators[LOWER] =
-            (struct indicator){INDICATOR_OF_STATE, q, 1.0, -p->lower[joint], dq > 0.0};
-        indicators[UPPER] =
-            (struct indicator){INDICATOR_OF_STATE, q, -1.0, p->upper[joint], dq < 0.0};
+    if (p->stops[joint] == RP_PLANT_STOPS_RIGID || rp_plant_has_contacts(p, joint)) {
+        describe_stops(values, modes->contact[joint], joint, indicators);
     }
 }
 
@@ -266,7 +311,11 @@ static void describe(const void *values_pointer, struct indicator indicators[]) 
     const struct rp_plant_modes modes =
         rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
     for (int i = 0; i < 2; i++) {
-        describe_joint(values, modes.joint[i], i, indicators + PLANT_INDICATORS * (size_t)i);
+        struct indicator of_joint[PLANT_INDICATORS];
+        describe_joint(values, &modes, i, of_joint);
+        for (int k = 0; k < PLANT_INDICATORS; k++) {
+            indicators[plant_indicator_index(i, k)] = of_joint[k];
+        }
     }
 }
 
@@ -283,15 +332,18 @@ static enum status indicators(const void *values_pointer, double t, const double
         rp_plant_motion(p, &modes, x, x + 2, &inputs, &motion);
     }
     for (int i = 0; i < 2; i++) {
-        plant_indicators(&p, modes.joint[i], i, x[i], x[2 + i], motion.reaction[i],
-                         z + PLANT_INDICATORS * (size_t)i);
+        double of_joint[PLANT_INDICATORS];
+        plant_indicators(&p, &modes, i, x[i], x[2 + i], motion.reaction[i], of_joint);
+        for (int k = 0; k < PLANT_INDICATORS; k++) {
+            z[plant_indicator_index(i, k)] = of_joint[k];
+        }
     }
     return STATUS_OK;
 }
 
 static const char *const indicator_names[RP_PLANT_INDICATORS] = {
-    "slip1_forward", "slip1_backward", "stop1_lower", "stop1_upper",
-    "slip2_forward", "slip2_backward", "stop2_lower", "stop2_upper",
+    "slip1_forward",  "slip1_backward", "stop1_lower", "stop1_upper", "slip2_forward",
+    "slip2_backward", "stop2_lower",    "stop2_upper", "stop1_push",  "stop2_push",
 };
 
 const struct model_events rp_plant_events = {

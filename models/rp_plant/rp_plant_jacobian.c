@@ -18,7 +18,7 @@ void rp_plant_jacobians(const struct rp_plant_parameters *p, const struct rp_pla
     real ddq[2];
     real reaction[2];
     plant_wrench_forces(&plant, wrench, applied);
-    plant_efforts(&plant, &p, modes->joint, tau, applied, efforts);
+    plant_efforts(&plant, &p, modes, tau, applied, efforts);
     plant_motion(&plant, modes->joint, efforts, ddq, reaction);
     for (int i = 0; i < 2; i++) {
         for (int j = 0; j < 2; j++) {

@@ -12,7 +12,7 @@
 
 _Static_assert(sizeof(struct rp_plant_inputs) == sizeof(double[5]),
                "the inputs are one array of doubles");
-_Static_assert(sizeof(struct rp_plant_modes) == sizeof(int[3]), "the modes are one array of ints");
+_Static_assert(sizeof(struct rp_plant_modes) == sizeof(int[5]), "the modes are one array of ints");
 _Static_assert(sizeof(struct rp_plant_sums) == sizeof(double[4]),
                "the sums are one array of doubles");
 _Static_assert(offsetof(struct rp_plant_values, dq) ==
@@ -21,7 +21,7 @@ _Static_assert(offsetof(struct rp_plant_values, dq) ==
 _Static_assert(offsetof(struct rp_plant_values, ddq) ==
                    offsetof(struct rp_plant_values, dq) + sizeof(double[2]),
                "their derivatives are one array: dq, then ddq");
-_Static_assert((int)RP_PLANT_INDICATORS == 2 * (int)PLANT_INDICATORS, "four of each joint");
+_Static_assert((int)RP_PLANT_INDICATORS == 2 * (int)PLANT_INDICATORS, "five of each joint");
 
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {

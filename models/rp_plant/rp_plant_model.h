@@ -6,7 +6,7 @@
 #include "model.h"
 #include "rp_plant.h"
 
-enum { RP_PLANT_INDICATORS = 8 }; /* four of joint 1, then those of joint 2 */
+enum { RP_PLANT_INDICATORS = 10 }; /* four of joint 1, four of joint 2; a fifth of each */
 
 /* Sums over events since the start. */
 struct rp_plant_sums {
@@ -33,7 +33,7 @@ struct rp_plant_values {
     double ee_angle;           /* rad, of the slide z2 from x0 */
     double ee_rate;            /* rad/s */
     double kinetic_energy;     /* J: energies include armature and an attached payload */
-    double potential_energy;
+    double potential_energy;   /* with that of compliant stops */
     double total_energy;
     double actuator_power; /* W */
     double D[2][2];        /* with armature and an attached payload */
@@ -42,8 +42,8 @@ struct rp_plant_values {
     struct rp_joint_loads loads;
     double friction[2];    /* N.m, N: dry friction, positive against a forward motion */
     double friction_power; /* W: what dry friction and damping take */
-    double stop_force[2];  /* N.m, N: of a closed stop on the joint */
-    double indicators[RP_PLANT_INDICATORS]; /* rad/s, m/s; N.m, N; rad, m; 1: unused */
+    double stop_force[2];  /* N.m, N: of a stop on the joint, but impacts */
+    double indicators[RP_PLANT_INDICATORS]; /* rad/s, m/s; N.m, N; rad, m; 1; 1: unused */
 };
 
 extern const struct model rp_plant_model;

@@ -13,17 +13,23 @@ struct rp_plant_decision {
     struct rp_plant_outcome outcome;
 };
 
-/* Whether anything can hold a joint: dry friction or stops. */
+/* Whether anything can hold a joint: dry friction or rigid stops. */
 static inline bool rp_plant_can_be_held(const struct rp_plant_parameters *p, int joint) {
     return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
            p->stops[joint] == RP_PLANT_STOPS_RIGID;
+}
+
+/* Whether a joint can be in contact with a compliant stop. */
+static inline bool rp_plant_has_contacts(const struct rp_plant_parameters *p, int joint) {
+    return p->stops[joint] == RP_PLANT_STOPS_COMPLIANT;
 }
 
 static inline bool rp_plant_slides(int mode) {
     return mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
 }
 
-/* Writes which joints are at rest, and the joints' modes as long as these stay. True: one is. */
+/* Writes the contacts, which joints are at rest, and the joints' modes as long as these stay. True:
+ * one is at rest. */
 bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                         struct rp_plant_modes *modes, struct rp_plant_rest *rest);
 

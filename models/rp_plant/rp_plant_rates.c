@@ -26,7 +26,7 @@ void rp_plant_reaction_rates(const struct rp_plant_parameters *p,
     real ddq[2];
     real reaction[2];
     plant_wrench_forces(&plant, wrench, applied);
-    plant_efforts(&plant, sources, modes->joint, tau, applied, efforts);
+    plant_efforts(&plant, sources, modes, tau, applied, efforts);
     plant_motion(&plant, modes->joint, efforts, ddq, reaction);
     rates[0] = reaction[0].first;
     rates[1] = reaction[1].first;

@@ -1,7 +1,7 @@
 /* Recurrences for the coefficients of a motion in given modes. Symbols are those of rp_series.c,
  * with link 2 and its payload as one body and the armature b1 in J. With the armature b2 and the
- * efforts E_i = tau_i + Q_i - d_i q_i' - f_i, row 1 plus a times row 2 of the equations of motion,
- * and row 2 over m2, are
+ * efforts E_i = tau_i + Q_i - d_i q_i' - f_i + p_i, row 1 plus a times row 2 of the equations of
+ * motion, and row 2 over m2, are
  *
  *   (N + a b2 v)' = E1 + a E2 + a m2 P w - g c1 (m1 lc1 + m2 L)
  *   (v - a w + (b2 / m2) v)' = E2 / m2 + P w - g s1
@@ -25,6 +25,7 @@
 #include "rp_plant_modes.h"
 #include "rp_series.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* Inputs: tau1, f2, and the wrench. */
@@ -50,7 +51,8 @@ enum row {
     RATIO_E = EXPONENTIAL + 2, // r e
     FORWARD = RATIO_E + 2,     // indicators of a stuck joint
     BACKWARD = FORWARD + 2,
-    ROWS = BACKWARD + 2
+    DEPTH = BACKWARD + 2, // penetration of a compliant stop
+    ROWS = DEPTH + 2
 };
 
 _Static_assert(X == (int)RP_SERIES_ROWS, "the rows of the manipulator come first");
@@ -104,6 +106,7 @@ static bool has_payload(const struct motion *m) {
 static bool is_plain(const struct motion *m) {
     const struct rp_plant_parameters *p = m->p;
     return m->modes.joint[0] == RP_PLANT_FREE && m->modes.joint[1] == RP_PLANT_FREE &&
+           m->modes.contact[0] == RP_PLANT_APART && m->modes.contact[1] == RP_PLANT_APART &&
            p->armature[0] == 0.0 && p->armature[1] == 0.0 && p->damping[0] == 0.0 &&
            p->damping[1] == 0.0 && !m->has_wrench && !has_payload(m);
 }
@@ -220,11 +223,30 @@ static double sliding_friction(const struct motion *m, int i, int k, double row[
     return k == 0 ? breakaway * e + coulomb * (1.0 - e) : (breakaway - coulomb) * e;
 }
 
+/* As plant_compliant_force:  s k (d + c (d d')) with d' = -s q', s: the side */
+static double compliant_force(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
+    const int contact = m->modes.contact[i];
+    if (abs(contact) != RP_PLANT_PUSHED) {
+        return 0.0;
+    }
+    const double *q = row[Q1 + i];
+    double *d = row[DEPTH + i];
+    d[k] = -contact * q[k];
+    if (k == 0) {
+        d[0] = contact > 0 ? m->p->lower[i] - q[0] : q[0] - m->p->upper[i];
+    }
+    const double damped = m->p->stop_damping[i] * jet_product(d, row[W + i], k);
+    return m->p->stop_stiffness[i] * (contact * d[k] - damped);
+}
+
 static void write_efforts(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
     for (int i = 0; i < 2; i++) {
         double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
         if (rp_plant_slides(m->modes.joint[i])) {
             effort -= m->modes.joint[i] * sliding_friction(m, i, k, row);
+        }
+        if (m->modes.contact[i] != RP_PLANT_APART) {
+            effort += compliant_force(m, i, k, row);
         }
         row[E1 + i][k] = effort;
     }
@@ -384,7 +406,7 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
 
 /* 0: one that is never of the model. */
 static const size_t row_of_indicator[RP_PLANT_INDICATORS] = {
-    FORWARD, BACKWARD, 0, 0, FORWARD + 1, BACKWARD + 1, 0, 0,
+    FORWARD, BACKWARD, 0, 0, FORWARD + 1, BACKWARD + 1, 0, 0, 0, 0,
 };
 
 const struct series rp_plant_series = {

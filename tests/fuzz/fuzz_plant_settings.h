@@ -4,7 +4,7 @@
 
 #include "fuzz_instance.h"
 
-enum { FUZZ_PLANT_INDICATORS = 8 };
+enum { FUZZ_PLANT_INDICATORS = 10 };
 
 /* 0, or of either sign. */
 double fuzz_signed(struct fuzz_input *input, double low, double high);

@@ -7,14 +7,16 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Parameters up to payload_z, inputs, states, and as doubles: payload_attached, modes. */
+/* Parameters up to stop_damping, inputs, states, and as doubles: payload_attached, modes, stops. */
 struct model_row {
-    double parameters[28];
+    double parameters[32];
     double inputs[5];
     double q[2];
     double dq[2];
     double attached;
     double joint[2];
+    double contact[2];
+    double stops[2];
 };
 
 struct model_results {
@@ -26,10 +28,11 @@ struct model_results {
     double gravity[2];
     double loads[6]; /* f1_x, f1_z, tau1_y, f2_x, f2_z, tau2_y */
     double friction[2];
+    double stop_force[2];
 };
 
-_Static_assert(offsetof(struct rp_plant_parameters, stops) == sizeof(double[28]),
-               "28 parameters are doubles and come first");
+_Static_assert(offsetof(struct rp_plant_parameters, stops) == sizeof(double[32]),
+               "32 parameters are doubles and come first");
 
 static struct rp_plant_values values_of(const struct model_row *row) {
     struct rp_plant_values v = {.payload_attached = row->attached != 0.0};
@@ -38,8 +41,11 @@ static struct rp_plant_values values_of(const struct model_row *row) {
     memcpy(v.q, row->q, sizeof v.q);
     memcpy(v.dq, row->dq, sizeof v.dq);
     v.modes.payload = row->attached != 0.0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
-    v.modes.joint[0] = (int)row->joint[0];
-    v.modes.joint[1] = (int)row->joint[1];
+    for (int i = 0; i < 2; i++) {
+        v.modes.joint[i] = (int)row->joint[i];
+        v.modes.contact[i] = (int)row->contact[i];
+        v.parameters.stops[i] = (int)row->stops[i];
+    }
     return v;
 }
 
@@ -59,6 +65,7 @@ static void evaluate_model(const void *row, void *results_pointer) {
         .loads = {loads->f1[0], loads->f1[2], loads->tau1[1], loads->f2[0], loads->f2[2],
                   loads->tau2[1]},
         .friction = {v.friction[0], v.friction[1]},
+        .stop_force = {v.stop_force[0], v.stop_force[1]},
     };
 }
 

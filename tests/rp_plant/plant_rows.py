@@ -15,12 +15,14 @@ JOINT = (
 PAYLOAD = ("payload_mass", "payload_inertia", "payload_x", "payload_z")
 INPUTS = ("tau1", "f2", "ee_fx", "ee_fy", "ee_mz")
 STATES = ("q1", "q2", "dq1", "dq2")
-PARAMETERS = (*ARM, *(f"{name}{joint}" for name in JOINT for joint in (1, 2)), *PAYLOAD)
-KNOWNS = (*PARAMETERS, *INPUTS, *STATES, "attached", "mode1", "mode2")
+COMPLIANT = ("stop_stiffness1", "stop_stiffness2", "stop_damping1", "stop_damping2")
+PARAMETERS = (*ARM, *(f"{name}{joint}" for name in JOINT for joint in (1, 2)), *PAYLOAD, *COMPLIANT)
+SWITCHES = ("attached", "mode1", "mode2", "contact1", "contact2", "stops1", "stops2")
+KNOWNS = (*PARAMETERS, *INPUTS, *STATES, *SWITCHES)
 RESULTS = (
     "ddq1", "ddq2", "ee_ax", "ee_ay", "kinetic_energy", "potential_energy", "D11", "D12", "D22",
     "coriolis1", "coriolis2", "gravity1", "gravity2", "f1_x", "f1_z", "tau1_y", "f2_x", "f2_z",
-    "tau2_y", "friction1", "friction2",
+    "tau2_y", "friction1", "friction2", "stop_force1", "stop_force2",
 )  # fmt: skip
 FREE, STUCK = 2.0, 0.0
 ORDERS = 13  # of series, from 0 on
@@ -59,14 +61,14 @@ def evaluate(program: Path, cases: list[Mapping[str, float]]) -> list[dict[str, 
 def expand(
     program: Path, cases: list[Mapping[str, float]], units: np.ndarray, inputs: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of the states, (n, 4, ORDERS), and of the indicators, (n, 8, ORDERS).
+    """Coefficients of the states, (n, 4, ORDERS), and of the indicators, (n, 10, ORDERS).
 
     `units`: (n,) s; `inputs`: (n, 5, 4) coefficients in these units.
     """
     values = [DEFAULT | dict(case) for case in cases]
     knowns = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values])
     rows = np.hstack([knowns, units[:, np.newaxis], inputs.reshape(len(inputs), -1)])
-    found = _run(program, "series", rows, 12 * ORDERS).reshape(-1, 12, ORDERS)
+    found = _run(program, "series", rows, 14 * ORDERS).reshape(-1, 14, ORDERS)
     return found[:, :4], found[:, 4:]
 
 

@@ -9,7 +9,7 @@ from cosim.fmu_file import Fmu
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 STEPS = {"1 ms": 1e-3, "10 ms": 1e-2, "1 s": 1.0}
-NONE, RIGID = 1, 2  # stops
+NONE, RIGID, COMPLIANT = 1, 2, 3  # stops
 KEEP_VELOCITY, AT_REST = 1, 2  # grasp
 FIRM = 1000.0  # N.m, N: dry friction that holds a joint whatever happens
 

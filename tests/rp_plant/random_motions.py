@@ -1,9 +1,10 @@
 """Random motions of the built FMU of the plant, event by event, against an independent simulation.
 
-random_motions.py FMU [--count 200] [--seed 0] prints how the errors are distributed and the cases
-that fail. A case has friction, stops and a payload; it ends with its tenth event or after 4 s. It
-is drawn again where events are closer than 1 us, where an indicator falls slower than SLOWEST,
-where a decision at an event could as well have been another one, or with fewer than 3 events.
+random_motions.py FMU [--count 200] [--seed 0] [--compliant] prints how the errors are distributed
+and the cases that fail. A case has friction, stops and a payload; it ends with its tenth event or
+after 4 s. It is drawn again where events are closer than 1 us, where an indicator falls slower than
+SLOWEST, where a decision at an event could as well have been another one, or with fewer than 3
+events.
 """
 
 import argparse
@@ -24,7 +25,15 @@ from cosim.fmu_file import Fmu
 from models.rp_plant.references.equations import INPUTS, STATES
 from models.rp_plant.references.motion import Event, Motion
 from models.rp_plant.references.solver import Solver
-from tests.rp_plant.plant_runs import AT_REST, KEEP_VELOCITY, METHODS, NONE, RIGID, started
+from tests.rp_plant.plant_runs import (
+    AT_REST,
+    COMPLIANT,
+    KEEP_VELOCITY,
+    METHODS,
+    NONE,
+    RIGID,
+    started,
+)
 
 MOST_EVENTS, FEWEST_EVENTS = 10, 3
 STOP = 4.0  # s
@@ -103,6 +112,20 @@ def random_case(random: np.random.Generator) -> Case:
         jump = {"payload_attached": attached, "tau1": within(-15, 15), "f2": within(-12, 12)}
         changes.append((t, jump))
     return Case(values, rates, tuple(changes))
+
+
+def compliant_case(random: np.random.Generator) -> Case:
+    """The same with compliant stops of joint 2, often of joint 1; a few motions start in one."""
+    case = random_case(random)
+    values = dict(case.values)
+    for joint, stiffest in (("1", 4.0), ("2", 5.0)):
+        if joint == "2" or random.integers(4) > 0:
+            values[f"stops{joint}"] = COMPLIANT
+        values[f"stop_stiffness{joint}"] = float(10 ** random.uniform(2, stiffest))
+        values[f"stop_damping{joint}"] = float(random.choice([0.0, 0.3, 1.0, 5.0]))
+        if random.integers(6) == 0 and values[f"stops{joint}"] == COMPLIANT:
+            values[f"q{joint}"] = values[f"upper{joint}"] + 0.02
+    return Case(values, case.rates, case.changes)
 
 
 @dataclass(frozen=True)
@@ -217,14 +240,20 @@ class Outcome:
     errors: dict[str, Errors]
 
 
-def judge_all(fmu: Fmu, solver: Solver, count: int, seed: int) -> tuple[list[Outcome], Counter]:
+def judge_all(
+    fmu: Fmu,
+    solver: Solver,
+    count: int,
+    seed: int,
+    draw: Callable[[np.random.Generator], Case] = random_case,
+) -> tuple[list[Outcome], Counter]:
     """Outcomes of random cases, and how many were drawn again for which reason."""
     start = fmu.model.start_values
     outcomes: list[Outcome] = []
     again: Counter = Counter()
     number = 0
     while len(outcomes) < count:
-        case = random_case(np.random.default_rng((seed, number)))
+        case = draw(np.random.default_rng((seed, number)))
         number += 1
         truth = simulate(solver, case, start)
         if isinstance(truth, str):
@@ -241,9 +270,11 @@ def main() -> int:
     parser.add_argument("fmu", type=Path)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--compliant", action="store_true", help="most stops are compliant")
     arguments = parser.parse_args()
     with Fmu(arguments.fmu) as fmu:
-        outcomes, again = judge_all(fmu, Solver(), arguments.count, arguments.seed)
+        draw = compliant_case if arguments.compliant else random_case
+        outcomes, again = judge_all(fmu, Solver(), arguments.count, arguments.seed, draw)
     kinds = Counter(event.what for outcome in outcomes for event in outcome.truth.events)
     print("drawn again:", dict(again), "- events:", dict(kinds))
     failed = False

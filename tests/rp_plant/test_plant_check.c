@@ -94,14 +94,36 @@ static void test_breakaway_above_coulomb_needs_a_stribeck_velocity(void) {
 
 static void test_limits(void) {
     v.parameters.lower[1] = 2.0;
-    assert_refused("lower2 = 2 and upper2 = 2 are refused: with rigid stops they must be finite "
-                   "and lower2 below upper2");
+    assert_refused("lower2 = 2 and upper2 = 2 are refused: with stops they must be finite and "
+                   "lower2 below upper2");
     v.parameters.stops[1] = RP_PLANT_STOPS_NONE;
     assert_accepted();
     v.parameters.stops[1] = RP_PLANT_STOPS_RIGID;
     v.parameters.lower[1] = -INFINITY;
-    assert_refused("lower2 = -inf and upper2 = 2 are refused: with rigid stops they must be finite "
-                   "and lower2 below upper2");
+    assert_refused("lower2 = -inf and upper2 = 2 are refused: with stops they must be finite and "
+                   "lower2 below upper2");
+}
+
+static void test_compliant_stops(void) {
+    v.parameters.stop_damping[1] = 0.5;
+    v.parameters.stops[1] = RP_PLANT_STOPS_COMPLIANT;
+    assert_refused("stop_stiffness2 = 0 is refused: with compliant stops it must be finite and "
+                   "above 0");
+    v.parameters.stop_stiffness[1] = 1e4;
+    assert_accepted();
+    v.q[1] = 2.5; // a start in a stop
+    assert_accepted();
+    v.parameters.lower[1] = 3.0;
+    assert_refused("lower2 = 3 and upper2 = 2 are refused: with stops they must be finite and "
+                   "lower2 below upper2");
+    v.parameters.lower[1] = -1.0;
+    v.parameters.stop_stiffness[1] = INFINITY;
+    assert_refused("stop_stiffness2 = inf is refused: it must be finite and not below 0");
+    v.parameters.stop_stiffness[1] = -2.0;
+    assert_refused("stop_stiffness2 = -2 is refused: it must be finite and not below 0");
+    v.parameters.stop_stiffness[1] = 1e4;
+    v.parameters.stop_damping[1] = -0.5;
+    assert_refused("stop_damping2 = -0.5 is refused: it must be finite and not below 0");
 }
 
 static void test_restitution(void) {
@@ -117,8 +139,10 @@ static void test_restitution(void) {
 }
 
 static void test_items_of_the_enumerations(void) {
-    v.parameters.stops[0] = 3;
-    assert_refused("stops1 = 3 is refused: it must be 1 or 2");
+    v.parameters.stops[0] = 4;
+    assert_refused("stops1 = 4 is refused: it must be within 1 and 3");
+    v.parameters.stops[0] = 0;
+    assert_refused("stops1 = 0 is refused: it must be within 1 and 3");
     v.parameters.stops[0] = RP_PLANT_STOPS_NONE;
     v.parameters.grasp = 0;
     assert_refused("grasp = 0 is refused: it must be 1 or 2");

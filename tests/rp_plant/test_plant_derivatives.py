@@ -7,7 +7,7 @@ from fmpy import read_model_description
 
 from cosim.fmu_file import Fmu
 from tests.rp_plant.plant_model_exchange import STATES, PlantModel, model, unknowns
-from tests.rp_plant.plant_runs import RIGID, modes, started
+from tests.rp_plant.plant_runs import COMPLIANT, RIGID, modes, started
 
 FRICTION = {
     "coulomb_friction1": 1.0,
@@ -20,6 +20,7 @@ FRICTION = {
     "armature2": 0.2,
 }
 STOP = {"stops2": RIGID, "lower2": -0.2, "upper2": 0.4, "f2": -9.0}
+BUFFER = {"stops2": COMPLIANT, "upper2": 0.04, "stop_stiffness2": 400.0, "stop_damping2": 0.5}
 PAYLOAD = {
     "payload_mass": 0.7,
     "payload_inertia": 0.02,
@@ -40,6 +41,13 @@ CASES = {
     "joint 2 held": (POINT | FRICTION | {"dq1": 1.1}, (1, 0), 0),
     "both held": (POINT | FRICTION | {"tau1": 9.0}, (0, 0), 0),
     "joint 2 at its stop": (POINT | FRICTION | STOP | {"dq1": -0.8, "q2": -0.2}, (-1, 0), -1),
+    "pushed by a compliant stop": (POINT | MOVING | BUFFER, (2, 2), 0),
+    "let go by a compliant stop": (POINT | MOVING | BUFFER | {"dq2": -2.5}, (2, 2), 0),
+    "held in a compliant stop": (
+        POINT | BUFFER | {"dq1": 1.1, "coulomb_friction2": 90.0},
+        (2, 0),
+        0,
+    ),
     "the payload at the stop": (POINT | STOP | PAYLOAD | {"dq1": -0.8, "q2": -0.2}, (2, 0), -1),
 }
 KNOWNS = (*STATES, *INPUTS)

@@ -1,7 +1,8 @@
 """Energy of the built FMU: its change is the work of efforts and wrench less the losses.
 
-Losses of friction and damping are quadratures here, in steps that end beside the events; those of
-impacts and grasps are outputs. A payload brings its energy along, and takes it away.
+Losses of friction, damping and compliant stops are quadratures here, in steps that end beside the
+events; those of impacts and grasps are outputs. A payload brings its energy along, and takes it
+away.
 """
 
 import math
@@ -16,8 +17,8 @@ from cosim import simulation
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from models.rp_plant.references.equations import INPUTS
-from tests.rp_plant.plant_runs import AT_REST, METHODS, RIGID, read, started
-from tests.rp_plant.random_motions import Case, random_case
+from tests.rp_plant.plant_runs import AT_REST, COMPLIANT, METHODS, RIGID, read, started
+from tests.rp_plant.random_motions import Case, compliant_case, random_case
 from tests.support.cosim_project import load, names_of
 from tests.support.paths import ROOT
 
@@ -25,8 +26,10 @@ TOLERANCE, ALLOWED = 1e-8, 100.0  # error in tolerances of the largest energy
 BESIDE = 1e-9  # s, from an event to the ends of the steps around it
 BOOLE = np.array([7, 32, 12, 32, 7]) / 90
 POWERS = ("actuator_power", "friction_power", "ee_vx", "ee_vy", "ee_rate")
+STATES_AND_STOPS = ("q1", "q2", "dq1", "dq2", "stop_force1", "stop_force2")
 ENERGIES = ("kinetic_energy", "potential_energy", "impact_loss", "grasp_loss")
-CASES = (0, 1, 2, 3, 10, 25)  # in the last two a slide is lifted off its stop slowly
+# in the last two rigid ones a slide is lifted off its stop slowly
+CASES = [*((random_case, n) for n in (0, 1, 2, 3, 10, 25)), *((compliant_case, n) for n in (1, 2))]
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +40,11 @@ def opened() -> Iterator[Fmu]:
 
 
 class Balance:
-    """Steps an instance and adds up the work done on it less what friction and damping take (J).
+    """Steps an instance and adds up the work done on it less what friction, damping and compliant
+    stops take (J).
 
-    `drive(t)` sets the inputs of a step that begins at t, `wrench(t)` is that at the end effector.
+    `drive(t)` sets the inputs of a step that begins at t, `wrench(t)` is that at the end effector;
+    `values`: parameters.
     """
 
     def __init__(
@@ -47,11 +52,13 @@ class Balance:
         instance: Instance,
         drive: Callable[[float], None],
         wrench: Callable[[float], Sequence[float]],
+        values: Mapping[str, float],
     ) -> None:
         self.work = 0.0
         self.largest = 0.0  # |K| + |P|
         self._instance, self._drive, self._wrench = instance, drive, wrench
         self._powers, self._energies = instance.reals(POWERS), instance.reals(ENERGIES)
+        self._stops, self._values = instance.reals(STATES_AND_STOPS), values
 
     def energy(self) -> np.ndarray:
         """Kinetic and potential energy, losses of impacts and grasps."""
@@ -110,7 +117,19 @@ class Balance:
         self._powers.get()
         drives, friction, vx, vy, rate = self._powers.view
         fx, fy, mz = self._wrench(t)
-        return drives - friction + fx * vx + fy * vy + mz * rate
+        return drives - friction - self._stop_loss() + fx * vx + fy * vy + mz * rate
+
+    def _stop_loss(self) -> float:
+        """What compliant stops get and do not store, W."""
+        self._stops.get()
+        x, values, lost = self._stops.view, self._values, 0.0
+        for i in (1, 2):
+            if values[f"stops{i}"] == COMPLIANT:
+                q, rate, force = x[i - 1], x[i + 1], x[i + 3]
+                below, above = values[f"lower{i}"] - q, q - values[f"upper{i}"]
+                stored = max(above, 0.0) - max(below, 0.0)
+                lost -= (force + values[f"stop_stiffness{i}"] * stored) * rate
+        return lost
 
 
 def payload_energy(instance: Instance, values: Mapping[str, float], moves: bool) -> float:
@@ -150,12 +169,13 @@ def test_energy_of_a_scenario(opened: Fmu, name: str) -> None:
                 if values.dtype != bool:
                     instance.set(name, values[i].item())
 
-        balance, extra = Balance(instance, drive, lambda _: (0.0, 0.0, 0.0)), 0.0
+        values = scenario.start_values
+        balance, extra = Balance(instance, drive, lambda _: (0.0, 0.0, 0.0), values), 0.0
         start = balance.energy()
         attached = scenario.input("payload_attached")
         for i, t in enumerate(scenario.times[:-1].tolist()):
             if i and attached[i] != attached[i - 1]:
-                extra += brought(instance, scenario.start_values, attached[i])
+                extra += brought(instance, values, attached[i])
                 instance.set("payload_attached", bool(attached[i]))
                 t = balance.jump(t, t + BESIDE)
             balance.step(t, float(scenario.times[i + 1]))
@@ -164,10 +184,12 @@ def test_energy_of_a_scenario(opened: Fmu, name: str) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("number", CASES)
-def test_energy_of_a_random_motion(opened: Fmu, number: int, method: str) -> None:
+@pytest.mark.parametrize(("draw", "number"), CASES)
+def test_energy_of_a_random_motion(
+    opened: Fmu, draw: Callable[[np.random.Generator], Case], number: int, method: str
+) -> None:
     """Inputs are ramps in about every second case."""
-    case = random_case(np.random.default_rng((15, number)))
+    case = draw(np.random.default_rng((15, number)))
     smooth = INPUTS if case.rates else ()
     with started(opened, method, TOLERANCE, smooth, **case.values) as instance:
         check_random(instance, case, dict(opened.model.start_values) | case.values)
@@ -188,7 +210,7 @@ def check_random(instance: Instance, case: Case, values: Mapping[str, float]) ->
     def wrench(t: float) -> list[float]:
         return [case.inputs(t)[name] for name in INPUTS[2:]]
 
-    balance, extra = Balance(instance, drive, wrench), 0.0
+    balance, extra = Balance(instance, drive, wrench, values), 0.0
     start = balance.energy()
     points = sorted({*(np.arange(1001) / 1000).tolist(), *(at for at, _ in case.changes if at < 1)})
     changes = dict(case.changes)

@@ -4,6 +4,7 @@
 #include "unity.h"
 
 #include <float.h>
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -16,6 +17,8 @@ enum {
     BACKWARD2,
     LOWER2,
     UPPER2,
+    PUSH1,
+    PUSH2,
 };
 
 static const struct model_events *events;
@@ -64,6 +67,12 @@ static void next_sample(void) {
         v.parameters.lower[i] = bits % 3 == 0 ? v.q[i] : v.q[i] - 0.5;
         v.parameters.upper[i] = bits % 3 == 1 ? v.q[i] : v.q[i] + 0.5;
         v.parameters.stops[i] = bits % 5 == 0 ? RP_PLANT_STOPS_NONE : RP_PLANT_STOPS_RIGID;
+        if (bits % 5 > 2) {
+            v.parameters.stops[i] = RP_PLANT_STOPS_COMPLIANT;
+            v.parameters.stop_stiffness[i] = 300.0;
+            v.parameters.stop_damping[i] = 0.25 * (double)(bits % 4);
+            v.q[i] += bits % 7 < 3 ? 0.0 : bits % 7 < 5 ? 0.75 : -0.75;
+        }
     }
 }
 
@@ -290,30 +299,40 @@ static void test_when_events_are_possible(void) {
     }
     p->stops[1] = RP_PLANT_STOPS_RIGID;
     TEST_ASSERT_TRUE(events->are_possible(&v));
+    p->stops[1] = RP_PLANT_STOPS_COMPLIANT;
+    TEST_ASSERT_TRUE(events->are_possible(&v));
 }
 
 static void test_places_in_the_value_structure(void) {
     TEST_ASSERT_EQUAL_size_t(RP_PLANT_INDICATORS, events->indicator_count);
     TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, modes), events->modes.offset);
-    TEST_ASSERT_EQUAL_size_t(3 * sizeof(int), events->modes.size);
-    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, sums), events->discrete_states.offset);
+    TEST_ASSERT_EQUAL_size_t(5 * sizeof(int), events->modes.size);
+    TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, sums),
+                             events->discrete_states.offset);
     TEST_ASSERT_EQUAL_size_t(4 * sizeof(double), events->discrete_states.size);
     TEST_ASSERT_EQUAL_size_t(offsetof(struct rp_plant_values, payload_attached),
                              events->discrete_inputs.offset);
     TEST_ASSERT_EQUAL_size_t(sizeof(int), events->discrete_inputs.size);
     TEST_ASSERT_EQUAL_STRING("slip2_backward", events->indicator_names[BACKWARD2]);
+    TEST_ASSERT_EQUAL_STRING("stop2_push", events->indicator_names[PUSH2]);
 }
 
 static void test_modes_that_exist(void) {
     for (int mode = -2; mode <= 3; mode++) {
         const bool is_joint_mode = mode >= -1 && mode <= 2;
         TEST_ASSERT_EQUAL_INT(is_joint_mode,
-                              rp_plant_modes_exist(&(struct rp_plant_modes){{mode, 0}, 1}));
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{mode, 0}, 1, {0, 0}}));
         TEST_ASSERT_EQUAL_INT(is_joint_mode,
-                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, mode}, 1}));
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, mode}, 1, {0, 0}}));
         TEST_ASSERT_EQUAL_INT(mode >= 0 && mode <= 2,
-                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, mode}));
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, mode, {0, 0}}));
+        TEST_ASSERT_EQUAL_INT(mode <= 2,
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, 1, {mode, 0}}));
+        TEST_ASSERT_EQUAL_INT(mode <= 2,
+                              rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, 1, {0, mode}}));
     }
+    TEST_ASSERT_FALSE(rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, 1, {-3, 0}}));
+    TEST_ASSERT_FALSE(rp_plant_modes_exist(&(struct rp_plant_modes){{0, 0}, 1, {0, INT_MIN}}));
 }
 
 /* With parameters that have been set since, any decided mode is possible; with those that it was
@@ -340,7 +359,8 @@ static void test_modes_that_fit_parameters_and_states(void) {
 static void test_a_joint_is_held_at_rest_by_friction_or_on_a_stop(void) {
     for (int joint = 0; joint < 2; joint++) {
         plant_test_start(&v);
-        v.modes = (struct rp_plant_modes){{RP_PLANT_FREE, RP_PLANT_FREE}, RP_PLANT_RELEASED};
+        v.modes =
+            (struct rp_plant_modes){{RP_PLANT_FREE, RP_PLANT_FREE}, RP_PLANT_RELEASED, {0, 0}};
         v.modes.joint[joint] = RP_PLANT_STUCK;
         v.parameters.lower[joint] = -1.0;
         v.parameters.upper[joint] = 0.5;
@@ -366,13 +386,16 @@ static void test_modes_after_an_update_are_possible(void) {
         for (int joint = 0; joint < 2; joint++) {
             v.dq[joint] = i / (2 + 2 * joint) % 3 == 0 ? 0.0 : v.dq[joint];
             if (i % 5 < 3) {
-                v.parameters.stops[joint] = RP_PLANT_STOPS_RIGID;
+                v.parameters.stops[joint] =
+                    (i + joint) % 7 < 3 ? RP_PLANT_STOPS_COMPLIANT : RP_PLANT_STOPS_RIGID;
+                v.parameters.stop_stiffness[joint] = 100.0;
+                v.parameters.stop_damping[joint] = i % 2 == 0 ? 0.0 : 1.0;
                 v.parameters.lower[joint] = v.q[joint] - (i % 5 == 0 ? 0.0 : 0.5);
                 v.parameters.upper[joint] = v.q[joint] + (i % 5 == 1 ? 0.0 : 0.5);
                 v.parameters.restitution[joint] = 0.5 * joint;
             }
         }
-        plant_test_update(&v, i % 11 < RP_PLANT_INDICATORS ? i % 11 : -1);
+        plant_test_update(&v, i % 13 < RP_PLANT_INDICATORS ? i % 13 : -1);
         TEST_ASSERT_TRUE(events->modes_are_possible(&v, true));
     }
 }

@@ -13,7 +13,7 @@ from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.scenario import Scenario
 from cosim.simulation import initialize
-from tests.rp_plant.plant_runs import METHODS, NONE, RIGID, started
+from tests.rp_plant.plant_runs import COMPLIANT, METHODS, NONE, RIGID, started
 from tests.support.cosim_project import load, names_of
 from tests.support.paths import ROOT
 
@@ -28,7 +28,7 @@ INDICATORS = [
     kind
     for i in (1, 2)
     for kind in (f"slip{i}_forward", f"slip{i}_backward", f"stop{i}_lower", f"stop{i}_upper")
-]
+] + ["stop1_push", "stop2_push"]
 
 
 # ---- Interface -------------------------------------------------------------------------------
@@ -54,7 +54,7 @@ def test_states_may_jump_and_indicators_are_counted(plant: Fmu) -> None:
         root = ET.fromstring(archive.read("modelDescription.xml"))
     variables = {v.get("name"): v for v in root.find("ModelVariables")}
     if plant.model.fmi_version == "2.0":
-        assert root.get("numberOfEventIndicators") == "8"
+        assert root.get("numberOfEventIndicators") == "10"
         jump = [name for name, v in variables.items() if v[0].get("reinit") == "true"]
     else:
         found = root.iterfind("ModelStructure/EventIndicator")
@@ -121,7 +121,11 @@ OUT_OF_RANGE = {
     "stribeck_velocity2": -0.1,
     "restitution1": 1.1,
     "restitution2": -0.1,
-    "stops1": 3,
+    "stop_stiffness1": -1.0,
+    "stop_stiffness2": -1.0,
+    "stop_damping1": -0.1,
+    "stop_damping2": -0.1,
+    "stops1": 4,
     "stops2": 0,
     "payload_mass": -0.1,
     "payload_inertia": -0.1,
@@ -144,6 +148,11 @@ TOGETHER = [
     ({"stops1": RIGID, "lower1": 0.5, "upper1": 0.5}, ("lower1 = 0.5", "upper1 = 0.5")),
     ({"stops2": RIGID, "q2": 0.75}, ("q2 = 0.75", "upper2 = 0.5")),
     ({"stops1": RIGID, "q1": -3.0}, ("q1 = -3", "lower1 = -2.5")),
+    ({"stops1": COMPLIANT}, ("stop_stiffness1 = 0",)),
+    (
+        {"stops2": COMPLIANT, "stop_stiffness2": 1e4, "lower2": 0.5, "upper2": 0.25},
+        ("lower2 = 0.5", "upper2 = 0.25"),
+    ),
 ]
 
 

@@ -25,6 +25,14 @@ static void next_sample(void) {
     }
 }
 
+/* Every second one in compliant stops. */
+static void next_sample_at_stops(int n) {
+    next_sample();
+    if (n % 2 == 0) {
+        plant_test_random_contacts(&random_source, &v);
+    }
+}
+
 /* ---- Friction ------------------------------------------------------------------------------- */
 
 static void test_friction_falls_from_breakaway_to_coulomb(void) {
@@ -104,7 +112,7 @@ static void test_motion_obeys_the_equations(void) {
         struct rp_plant_inertia inertia;
         struct rp_plant_motion motion;
         double forces[2];
-        next_sample();
+        next_sample_at_stops(n);
         const bool attached = v.modes.payload == RP_PLANT_ATTACHED;
         rp_plant_inertia(&v.parameters, attached, v.q[1], &inertia);
         rp_plant_forces(&v.parameters, &v.modes, v.q, v.dq, &v.inputs, forces);
@@ -221,7 +229,7 @@ static bool state_rests(int state) {
 static void test_jacobian_is_that_of_the_right_hand_side(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         double J[PLANT_STATES][PLANT_STATES];
-        next_sample();
+        next_sample_at_stops(n);
         v.parameters.arm.I1z += 1.0;
         double u[PLANT_INPUTS];
         const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
@@ -245,7 +253,7 @@ static void test_jacobian_is_that_of_the_right_hand_side(void) {
 static void test_jacobian_is_what_propagation_gives(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         double J[PLANT_STATES][PLANT_STATES];
-        next_sample();
+        next_sample_at_stops(n);
         double u[PLANT_INPUTS];
         const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
         memcpy(u, &v.inputs, sizeof u);
@@ -267,7 +275,7 @@ static void test_rates_of_the_reactions(void) {
         struct rp_plant_values first;
         struct rp_plant_inputs du;
         double rates[2];
-        next_sample();
+        next_sample_at_stops(n);
         plant_test_outputs(&v);
         memset(&first, 0, sizeof first);
         memcpy(first.q, v.dq, sizeof v.dq);

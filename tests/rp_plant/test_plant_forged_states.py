@@ -7,13 +7,13 @@ import pytest
 
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
-from tests.rp_plant.plant_runs import RIGID, last_event, modes, started
+from tests.rp_plant.plant_runs import COMPLIANT, RIGID, last_event, modes, started
 from tests.rp_plant.test_plant_rollback import Run, packed, unpack
 from tests.support.instances import ERROR, status_of
 
 HASH = 8  # bytes at the end: FNV-1a of all before
 STUCK, FREE, RELEASED = 0, 2, 2
-Modes = tuple[int, int, int]  # of joint 1, joint 2, payload
+Modes = tuple[int, ...]  # of joint 1, joint 2, payload; contacts of both joints
 
 # sliding forward and backward with friction in both joints, far from stops
 SLIDING = {"coulomb_friction1": 1.0, "coulomb_friction2": 1.0, "dq1": 2.0, "dq2": -0.5, "g": 0.0}
@@ -116,11 +116,27 @@ def test_nothing_is_held_without_friction_or_a_closed_stop(plant: Fmu) -> None:
         assert_refused(instance, content, "the modes since the restart are impossible")
 
 
+def test_contacts_follow_from_the_state(plant: Fmu) -> None:
+    """A joint between its compliant stops is in none of them, and one within is not pulled."""
+    stop = {"stops2": COMPLIANT, "upper2": 0.3, "stop_stiffness2": 100.0, "stop_damping2": 1.0}
+    for q2, contact, impossible in ((0.1, 0, (1, -1, 3)), (0.4, -1, (0, 1, -2, -3))):
+        with started(plant, "cvode_adams", dq1=1.0, q2=q2, g=0.0, **stop) as instance:
+            instance.do_step(0.0, 1e-3)
+            instance.do_step(1e-3, 1e-3)
+            assert modes(instance) == (FREE, FREE)
+            content = packed(instance)
+            free = (FREE, FREE, RELEASED, 0)
+            assert forged(content, (*free, contact), (*free, contact)) == content
+            for other in impossible:
+                damaged = forged(content, (*free, contact), (*free, other))
+                assert_refused(instance, damaged, " are impossible")
+
+
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_sums_that_are_not_finite_are_refused(moving: Run, value: float) -> None:
-    """The four sums follow the modes."""
+    """The four sums follow the modes and contacts."""
     content = packed(moving.instance)
-    place = content.index(fields(SLIDING_MODES)) + 3 * len(field(0))
+    place = content.index(fields(SLIDING_MODES)) + 5 * len(field(0))
     for i in range(4):
         at = place + 8 * i
         damaged = content[:at] + struct.pack("<d", value) + content[at + 8 :]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.rp_plant.plant_rows import FREE, STUCK, evaluate
+from tests.rp_plant.plant_runs import COMPLIANT
 from tests.rp_plant.plant_symbolic import SmoothPlant
 
 CASES = 400
@@ -35,6 +36,40 @@ def random_case(random: np.random.Generator) -> Case:
     }  # fmt: skip
 
 
+def in_stops(random: np.random.Generator, case: Case) -> Case:
+    """The same with joints in compliant stops (contact 1, -1), let go by them (2, -2) or apart."""
+    found = dict(case)
+    for joint in (1, 2):
+        contact = int(random.integers(-2, 3))
+        depth = float(random.integers(1, 64)) / 256
+        limit = "lower" if contact > 0 else "upper"
+        found |= {f"contact{joint}": contact, f"stops{joint}": COMPLIANT}
+        found |= {f"lower{joint}": -9.0, f"upper{joint}": 9.0}
+        if contact != 0:
+            found[f"{limit}{joint}"] = found[f"q{joint}"] + np.sign(contact) * depth
+        found[f"stop_stiffness{joint}"] = float(random.integers(1, 500))
+        found[f"stop_damping{joint}"] = float(random.integers(4)) / 4
+    return found
+
+
+def stop_force(case: Case, joint: int) -> mpmath.mpf:
+    """Hunt's and Crossley's on joint 1 or 2, as the contact is."""
+    contact = case[f"contact{joint}"]
+    if abs(contact) != 1:
+        return mpmath.mpf(0)
+    pressed = case[f"stop_stiffness{joint}"] * mpmath.mpf(depth_of(case, joint))
+    into = -contact * mpmath.mpf(case[f"dq{joint}"])
+    return contact * pressed * (1 + case[f"stop_damping{joint}"] * into)
+
+
+def depth_of(case: Case, joint: int) -> float:
+    """Penetration, exact in binary; 0: apart."""
+    contact, q = case[f"contact{joint}"], case[f"q{joint}"]
+    if contact == 0:
+        return 0.0
+    return case[f"lower{joint}"] - q if contact > 0 else q - case[f"upper{joint}"]
+
+
 @pytest.fixture(scope="module")
 def exact() -> SmoothPlant:
     return SmoothPlant()
@@ -59,8 +94,9 @@ def assert_accelerations(exact: SmoothPlant, case: Case, found: Case) -> Case:
     """Both rows of D ddq = forces, or of one where the other joint is stuck."""
     D, applied = exact.evaluate("mass_matrix", case), exact.evaluate("applied", case)
     coriolis, gravity = exact.evaluate("coriolis", case), exact.evaluate("gravity", case)
-    forces = applied - coriolis - gravity
-    scale = 10 + size(applied) + size(coriolis) + size(gravity)
+    stops = mpmath.matrix([stop_force(case, i) if "contact1" in case else 0 for i in (1, 2)])
+    forces = applied - coriolis - gravity + stops
+    scale = 10 + size(applied) + size(coriolis) + size(gravity) + size(stops)
     moves = [i for i in range(2) if case.get(f"mode{i + 1}", FREE) == FREE]
     rows = mpmath.matrix([[D[i, j] for j in moves] for i in moves])
     inverse = rows**-1
@@ -94,6 +130,29 @@ def test_motion_beside_a_stuck_joint(
     changed = [case | held for case in cases]
     for case, found in zip(changed, evaluate(program, changed), strict=True):
         assert_accelerations(exact, case, found)
+
+
+def test_motion_in_compliant_stops(program: Path, exact: SmoothPlant, cases: list[Case]) -> None:
+    """Forces, energies and joint loads; in every third case friction holds joint 1."""
+    random = np.random.default_rng(16)
+    changed = []
+    for number, case in enumerate(cases):
+        held = {"mode1": STUCK, "coulomb_friction1": 1e4, "dq1": 0.0} if number % 3 == 0 else {}
+        changed.append(in_stops(random, case) | held)
+    names = ("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")
+    for case, found in zip(changed, evaluate(program, changed), strict=True):
+        moved = assert_accelerations(exact, case, found)
+        stored = mpmath.mpf(0)
+        for joint in (1, 2):
+            force = stop_force(case, joint)
+            assert_close(found[f"stop_force{joint}"], force, 1 + abs(force), case)
+            stored += case[f"stop_stiffness{joint}"] * mpmath.mpf(depth_of(case, joint)) ** 2 / 2
+        energy = exact.evaluate("potential_energy", case) + stored
+        assert_close(found["potential_energy"], energy, 100 + abs(energy), case)
+        loads = exact.evaluate("loads", moved)
+        scale = 100 * (10 + abs(found["ddq1"]) + abs(found["ddq2"]))
+        for i, name in enumerate(names):
+            assert_close(found[name], loads[i], scale, (name, case))
 
 
 def test_terms_and_energies(program: Path, exact: SmoothPlant, cases: list[Case]) -> None:

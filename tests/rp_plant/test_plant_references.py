@@ -23,7 +23,8 @@ def columns(run: Scenario) -> dict[str, np.ndarray]:
 
 def test_expected_scenarios_are_there() -> None:
     assert SCENARIOS.keys() == {
-        "grasp_at_rest", "power_off", "spin_up", "stick_slip", "thrown_against_stop",
+        "grasp_at_rest", "power_off", "rubber_buffers", "spin_up", "stick_slip",
+        "thrown_against_stop",
     }  # fmt: skip
 
 
@@ -50,6 +51,19 @@ def test_the_slide_kicks_joint_1_loose_and_the_arm_rests_on_its_stop() -> None:
     assert found["q1"][-1] == run.parameters["lower1"]
     assert found["dq1"][-1] == found["dq2"][-1] == 0
     assert np.sum(np.diff(found["impact_loss"]) > 0) >= 3
+
+
+def test_the_buffers_push_and_friction_holds_both_joints_pressed_in() -> None:
+    run = SCENARIOS["rubber_buffers"]
+    found = columns(run)
+    assert np.min(found["stop_force1"]) >= 0 and np.max(found["stop_force1"]) > 20
+    assert np.min(found["stop_force2"]) < -20 and np.max(found["stop_force2"]) > 20
+    assert found["q1"][-1] < run.parameters["lower1"] and found["q2"][-1] > run.parameters["upper2"]
+    assert found["dq1"][-1] == found["dq2"][-1] == 0
+    # pulled out, the slide is in its lower buffer without a force for a moment
+    left = (found["q2"] < run.parameters["lower2"]) & (found["stop_force2"] == 0)
+    assert np.any(left)
+    assert not np.any(found["stop_impulse2"]) and not np.any(found["impact_loss"])
 
 
 def test_the_arm_sticks_and_slips() -> None:

@@ -16,6 +16,7 @@ from cosim.fmu_file import Fmu
 from tests.rp_plant.plant_runs import (
     AT_REST,
     BOUNCY_STOPS,
+    COMPLIANT,
     FIRM,
     FRICTION,
     METHODS,
@@ -32,6 +33,19 @@ SEQUENCES = int(os.environ.get("PLANT_SEQUENCES", "100"))
 PAYLOAD = {"payload_mass": 0.8, "payload_inertia": 0.01, "payload_x": 0.05, "payload_z": 0.1}
 BUSY = FRICTION | BOUNCY_STOPS | PAYLOAD | {"grasp": AT_REST, "dq1": 1.2, "dq2": -0.4}
 
+# stops that give way, one of them damped
+BUFFERS = {
+    "stops1": COMPLIANT,
+    "lower1": -0.6,
+    "upper1": 0.9,
+    "stop_stiffness1": 500.0,
+    "stops2": COMPLIANT,
+    "lower2": -0.1,
+    "upper2": 0.2,
+    "stop_stiffness2": 4000.0,
+    "stop_damping2": 0.5,
+}
+
 each_method = pytest.mark.parametrize("method", METHODS)
 
 
@@ -41,6 +55,8 @@ MOTIONS = {
     "bounces": BOUNCY_STOPS
     | {"q1": 0.7, "dq2": 0.5, "coulomb_friction1": FIRM, "restitution2": 0.8},
     "slides": FRICTION | {"tau1": 14.0, "f2": 3.0, "dq1": -1.0, "dq2": 0.8},
+    "buffers": BUFFERS
+    | {"dq1": 1.2, "dq2": -0.8, "coulomb_friction1": 0.5, "coulomb_friction2": 0.5},
     "everything": FRICTION | BOUNCY_STOPS | {"dq1": 1.2, "dq2": -0.4},
 }
 
@@ -149,10 +165,12 @@ class RandomCase:
 
 
 def random_case(number: int) -> tuple[RandomCase, random.Random]:
-    """The case of this number, and the chance that goes on from there."""
+    """The case of this number, and the chance that goes on from there. A third of the cases have
+    compliant stops."""
     chance = random.Random(number)
     moves = sequence(chance.randint(10, 50), chance)
-    return RandomCase([*METHODS][number % len(METHODS)], random_start(chance), moves), chance
+    start = random_start(chance) | (BUFFERS if number % 3 == 2 else {})
+    return RandomCase([*METHODS][number % len(METHODS)], start, moves), chance
 
 
 def test_most_random_cases_meet_events(plant: Fmu) -> None:

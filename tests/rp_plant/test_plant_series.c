@@ -287,7 +287,8 @@ static void assert_reach(double expected, double dq2) {
 /* Where friction depends on the velocity, it changes by vs at most, but 6 vs from rest. */
 static void test_reach_of_a_velocity(void) {
     plant_test_start(&plant);
-    plant.modes = (struct rp_plant_modes){{RP_PLANT_FORWARD, RP_PLANT_FORWARD}, RP_PLANT_RELEASED};
+    plant.modes =
+        (struct rp_plant_modes){{RP_PLANT_FORWARD, RP_PLANT_FORWARD}, RP_PLANT_RELEASED, {0, 0}};
     plant.parameters.coulomb_friction[1] = 1.0;
     plant.parameters.stribeck_velocity[1] = 0.25;
     assert_reach(INFINITY, 0.5);
@@ -306,7 +307,8 @@ static void test_reach_of_a_velocity(void) {
 static void test_friction_of_a_fast_joint_is_constant(void) {
     static row constant[MAX_ROWS];
     plant_test_start(&plant);
-    plant.modes = (struct rp_plant_modes){{RP_PLANT_STUCK, RP_PLANT_FORWARD}, RP_PLANT_RELEASED};
+    plant.modes =
+        (struct rp_plant_modes){{RP_PLANT_STUCK, RP_PLANT_FORWARD}, RP_PLANT_RELEASED, {0, 0}};
     plant.parameters.coulomb_friction[0] = 100.0;
     plant.parameters.coulomb_friction[1] = 1.0;
     plant.parameters.stribeck_velocity[1] = 0.25;

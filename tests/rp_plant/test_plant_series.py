@@ -15,7 +15,7 @@ import sympy as sp
 
 from tests.rp_plant.plant_rows import FREE, INPUTS, ORDERS, STATES, STUCK, expand
 from tests.rp_plant.plant_symbolic import NAMES, SmoothPlant
-from tests.rp_plant.test_plant_lagrangian import Case, random_case
+from tests.rp_plant.test_plant_lagrangian import Case, in_stops, random_case
 
 CASES = 64
 MODES = (-1.0, STUCK, 1.0, FREE)
@@ -115,6 +115,8 @@ class Reference:
             mode = case[f"mode{i + 1}"]
             if mode in (-1, 1):
                 forces[i] = forces[i] - mode * friction(case, i, x[2 + i])
+            if abs(case.get(f"contact{i + 1}", 0)) == 1:
+                forces[i] = forces[i] + stop_force(case, i, x[i], x[2 + i])
         return D, forces
 
     def accelerations(
@@ -160,6 +162,14 @@ def friction(case: Case, i: int, dq: Series) -> Series | float:
         return coulomb
     ratio = dq / vs
     return coulomb + (breakaway(case, i) - coulomb) * exponential(-(ratio * ratio))
+
+
+def stop_force(case: Case, i: int, q: Series, dq: Series) -> Series:
+    """Hunt's and Crossley's, on the joint."""
+    side = case[f"contact{i + 1}"]
+    limit = case[f"lower{i + 1}"] if side > 0 else case[f"upper{i + 1}"]
+    depth, into = (limit - q) * side, dq * -side
+    return side * case[f"stop_stiffness{i + 1}"] * depth * (case[f"stop_damping{i + 1}"] * into + 1)
 
 
 # ---- Cases -----------------------------------------------------------------------------------
@@ -218,8 +228,10 @@ def cases() -> list[tuple[Case, np.ndarray, list[Series], list[Series]]]:
     random = np.random.default_rng(4)
     reference = Reference()
     found = []
-    for number in range(CASES):
+    for number in range(CASES + CASES // 2):
         case = plant_case(random, number)
+        if number >= CASES:
+            case = in_stops(random, case)
         inputs = input_polynomials(random, case)
         found.append((case, inputs, *reference.expand(case, inputs)))
     return found

@@ -12,7 +12,7 @@ import heyoka as hy
 import numpy as np
 
 from cosim.errors import UserError
-from models.rp_plant.references import automaton, equations
+from models.rp_plant.references import automaton, contacts, equations
 from models.rp_plant.references.automaton import real
 from models.rp_plant.references.equations import INPUTS, STATES
 from models.rp_plant.references.solver import LIMITS, NUMBERS, PLACE, RATES, Solver
@@ -31,7 +31,8 @@ class Event:
     """What happened, where, and how fast its indicator fell."""
 
     time: float  # s
-    what: str  # forward, backward: breaks away or, sliding, comes to rest; lower, upper: an impact
+    what: str  # forward, backward: breaks away or, sliding, comes to rest; lower, upper: an
+    # impact, or a contact begins or ends; push: a compliant stop begins or ends to push
     joint: int  # 1 or 2
     speed: float  # of the indicator, in its unit per s
 
@@ -78,13 +79,14 @@ class Motion:
         self._numbers = np.zeros(len(NUMBERS), real)
         for name, value in equations.prepared(dict(values)).items():
             self._put(name, value)
-        for name in LIMITS:
+        for name in (*LIMITS, *contacts.PARAMETERS):
             self._put(name, values[name])
         self._rigid = [values[f"stops{i}"] == RIGID for i in (1, 2)]
         self._restitution = [real(values[f"restitution{i}"]) for i in (1, 2)]
         self._at_rest_grasp = values["grasp"] == AT_REST
         self._put("attached", float(bool(values["payload_attached"])))
         self._put_inputs(values, rates or {})
+        self._contacts = contacts.Contacts(values)
         self._strike()
         self._decide()
 
@@ -133,7 +135,8 @@ class Motion:
         return numbers
 
     def _blocks(self) -> tuple[np.ndarray, ...]:
-        return self._solver.blocks(self.state, self._now())
+        inertia, forces, friction, breakaway = self._solver.blocks(self.state, self._now())
+        return inertia, forces + self._contacts.forces(self.state), friction, breakaway
 
     def _sides(self) -> list[int]:
         """+1: on the lower stop, -1: on the upper one, 0: on none."""
@@ -192,6 +195,7 @@ class Motion:
         sides = self._sides()
         for _ in range(automaton.MOST_IMPACTS):
             if all(sides[i] * self.state[2 + i] >= 0 for i in (0, 1)):
+                self._contacts.find(self.state)
                 return
             self._strike_once(sides)
         raise UserError("impacts at one instant do not end")
@@ -251,12 +255,14 @@ class Motion:
         sides = self._sides()
         for i, joint in enumerate((1, 2)):
             held, direction = self.joints.held[i], self.joints.direction[i]
+            contact, compliant = self._contacts.now[i], self._contacts.possible[i]
             numbers[PLACE[f"direction{joint}"]] = direction
             watched = {
                 "forward": sides[i] >= 0 if held else direction != 0,
                 "backward": held and sides[i] <= 0,
-                "lower": not held and self._rigid[i],
-                "upper": not held and self._rigid[i],
+                "lower": not held and (self._rigid[i] or (contact >= 0 and compliant)),
+                "upper": not held and (self._rigid[i] or (contact <= 0 and compliant)),
+                "push": not held and contact != 0,
             }
             for what, counts in watched.items():
                 counts = counts and self.time >= self._quiet[i]
@@ -286,7 +292,9 @@ class Motion:
         return found[1:]
 
     def _move_until(self, end: real) -> tuple[str, int, real] | None:
-        taylor, (names, evaluate) = self._solver.integrator(tuple(self.joints.held))
+        taylor, (names, evaluate) = self._solver.integrator(
+            tuple(self.joints.held), tuple(self._contacts.now)
+        )
         numbers = self._watch()
         taylor.pars[:] = numbers[: len(taylor.pars)]
         taylor.time = self.time
@@ -336,6 +344,7 @@ class Motion:
         if not strides:
             return real(np.inf)
         inertia, forces, friction, _ = self._solver.blocks(state, self._now())
+        forces = forces + self._contacts.forces(state)
         rates = np.abs(self._moving(inertia, forces - friction))
         return min([stride / rates[i] for i, stride in strides if rates[i] > 0], default=np.inf)
 
@@ -367,7 +376,12 @@ class Motion:
 
     def _happen(self, what: str, i: int, speed: real) -> None:
         self.events.append(Event(float(self.time), what, i + 1, float(speed)))
-        if what in ("lower", "upper"):
+        if what == "push":
+            self._contacts.pass_push(i)
+        elif what in ("lower", "upper") and self._contacts.possible[i]:
+            self.state[i] = self._get(f"{what}{i + 1}")
+            self._contacts.pass_limit(i, what)
+        elif what in ("lower", "upper"):
             self.state[i] = self._get(f"{what}{i + 1}")
             self._strike()
             self._decide()
@@ -399,11 +413,13 @@ class Motion:
                 strict=True,
             )
         )
-        friction, stops, power = list(friction), [real(0), real(0)], real(0)
+        stored = self._contacts.energy(self.state)
+        found |= {name: found[name] + stored for name in ("potential_energy", "total_energy")}
+        friction, stops, power = list(friction), list(self._contacts.forces(self.state)), real(0)
         for i in (0, 1):
             if held[i]:  # friction carries what it can, the stop the rest
                 friction[i] = min(max(reaction[i], -breakaway[i]), breakaway[i])
-                stops[i] = friction[i] - reaction[i] if self._sides()[i] != 0 else real(0)
+                stops[i] += friction[i] - reaction[i] if self._sides()[i] != 0 else real(0)
             rate = self.state[2 + i]
             power += (friction[i] + self._get(f"damping{i + 1}") * rate) * rate
         found |= {"friction1": friction[0], "friction2": friction[1], "friction_power": power}

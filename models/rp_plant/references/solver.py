@@ -1,7 +1,7 @@
 """The plant's equations compiled by heyoka in long double, with terminal events.
 
-Which joints are held is constant between two events; each combination has an integrator of its
-own. What else is constant there is a number at its place in `NUMBERS`.
+Which joints are held and which are in a compliant stop is constant between two events; each
+combination has its integrator. What else is constant there is a number at its place in `NUMBERS`.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from cosim.errors import UserError
-from models.rp_plant.references import equations
+from models.rp_plant.references import contacts, equations
 from models.rp_plant.references.automaton import real
 from models.rp_plant.references.equations import INPUTS, PARAMETERS, STATES, SWITCHES
 
@@ -21,7 +21,10 @@ RATES = tuple(f"rate_{name}" for name in INPUTS)
 WATCHED = tuple(
     f"watch_{what}{i}" for what in ("forward", "backward", "lower", "upper") for i in (1, 2)
 )
-NUMBERS = (*PARAMETERS, *INPUTS, *RATES, *SWITCHES, *LIMITS, *WATCHED)
+NUMBERS = (
+    *(*PARAMETERS, *INPUTS, *RATES, *SWITCHES, *LIMITS, *WATCHED),
+    *(*contacts.PARAMETERS, "watch_push1", "watch_push2"),
+)
 PLACE = {name: i for i, name in enumerate(NUMBERS)}
 LAST = hy.par[len(NUMBERS) - 1]  # evaluated too, so that all functions take all numbers
 # s, from an event to the next of its kind: heyoka's own may be seconds. Cooldowns are never reset:
@@ -46,7 +49,7 @@ class Solver:
             list(e.outputs.values()), (*self._states, *hy.make_vars(*equations.ACCELERATIONS))
         )
         self.output_names = list(e.outputs)
-        self._integrators: dict[tuple[bool, bool], tuple[hy.taylor_adaptive_ldbl, list]] = {}
+        self._integrators: dict[tuple, tuple[hy.taylor_adaptive_ldbl, list]] = {}
 
     def _numbers(self, with_time: bool) -> dict[sp.Symbol, hy.expression]:
         """Parameters at their places; inputs are linear in time."""
@@ -61,15 +64,20 @@ class Solver:
         converted = [hy.from_sympy(sp.sympify(x), numbers) for x in expressions]
         return hy.cfunc([*converted, LAST], vars=list(variables), fp_type=real)
 
-    def integrator(self, held: tuple[bool, bool]) -> tuple[hy.taylor_adaptive_ldbl, list]:
-        """Integrator of this combination of held joints, and (what, joint) of each event."""
-        if held not in self._integrators:
-            self._integrators[held] = self._make(held)
-        return self._integrators[held]
+    def integrator(
+        self, held: tuple[bool, bool], contact: tuple[int, int]
+    ) -> tuple[hy.taylor_adaptive_ldbl, list]:
+        """Integrator of held joints and contacts, and (what, joint) of each event."""
+        if (held, contact) not in self._integrators:
+            self._integrators[held, contact] = self._make(held, contact)
+        return self._integrators[held, contact]
 
-    def _make(self, held: tuple[bool, bool]) -> tuple[hy.taylor_adaptive_ldbl, list]:
+    def _make(
+        self, held: tuple[bool, bool], contact: tuple[int, int]
+    ) -> tuple[hy.taylor_adaptive_ldbl, list]:
         e = self._equations
-        D, b = e.inertia, e.forces - e.friction
+        forces = e.forces + sp.Matrix([contacts.force(i + 1, contact[i]) for i in (0, 1)])
+        D, b = e.inertia, forces - e.friction
         if held == (False, False):
             determinant = D[0, 0] * D[1, 1] - D[0, 1] ** 2
             ddq = [
@@ -88,13 +96,19 @@ class Solver:
 
         for i in (0, 1):
             if held[i]:
-                reaction = e.forces[i] - D[i, 1 - i] * ddq[1 - i]
+                reaction = forces[i] - D[i, 1 - i] * ddq[1 - i]
                 add("forward", i, e.breakaway[i] - reaction)
                 add("backward", i, e.breakaway[i] + reaction)
             else:
                 add("forward", i, sp.Symbol(f"direction{i + 1}") * dq[i])
-                add("lower", i, q[i] - sp.Symbol(f"lower{i + 1}"))
-                add("upper", i, sp.Symbol(f"upper{i + 1}") - q[i])
+                inside = contacts.penetration(i + 1, contact[i])
+                lower = q[i] - sp.Symbol(f"lower{i + 1}")
+                upper = sp.Symbol(f"upper{i + 1}") - q[i]
+                add("lower", i, inside if contact[i] > 0 else lower)
+                add("upper", i, inside if contact[i] < 0 else upper)
+                if contact[i] != 0:
+                    sign = 1 if abs(contact[i]) == contacts.PUSHES else -1
+                    add("push", i, sign * contacts.push(i + 1, contact[i]))
         numbers = self._numbers(True)
         rates = [
             *(sp.Integer(0) if held[i] else dq[i] for i in (0, 1)),

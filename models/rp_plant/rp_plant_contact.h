@@ -1,0 +1,31 @@
+/* Contacts with compliant stops, which follow from positions and velocities.
+ *
+ * The force is 0 where a contact begins or ends, but its slope jumps; the same holds where the
+ * velocity out of a damped stop passes 1 / c, from where on the stop does not push. Both are
+ * events, so that no internal step goes over a kink. */
+#ifndef RP_PLANT_CONTACT_H
+#define RP_PLANT_CONTACT_H
+
+#include "rp_plant.h"
+
+/* Writes modes->contact from positions and velocities; it keeps what a damped stop does at the
+ * velocity where that changes. A joint at rest exactly on a limit is apart. */
+void rp_plant_find_contacts(const struct rp_plant_parameters *p, const double q[2],
+                            const double dq[2], struct rp_plant_modes *modes);
+
+/* After the joints' modes are decided: a joint at rest exactly on a limit is in contact where it
+ * begins to move into the stop. */
+void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q[2],
+                             const double dq[2], const struct rp_plant_inputs *inputs,
+                             struct rp_plant_modes *modes);
+
+/* Whether the contact can be that of a joint in this state. */
+bool rp_plant_contact_fits(const struct rp_plant_parameters *p, int joint, double q, double dq,
+                           int contact);
+
+/* The stop that a joint is in begins or ends to push: writes the contact that follows, and the
+ * velocity at which this happens. */
+void rp_plant_turn_contact(const struct rp_plant_parameters *p, int joint, double *dq,
+                           int *contact);
+
+#endif
