@@ -14,7 +14,10 @@ static struct rp_plant_parameters plant;
 static struct rp_controller_inputs inputs;
 static double w[2];
 
-static const struct rp_plant_modes attached = {{RP_PLANT_FREE, RP_PLANT_FREE}, RP_PLANT_ATTACHED};
+static const struct rp_plant_modes attached = {
+    .joint = {RP_PLANT_FREE, RP_PLANT_FREE},
+    .payload = RP_PLANT_ATTACHED,
+};
 
 void setUp(void) {
     random_source.state = 16;
