@@ -12,13 +12,13 @@ SOURCES = sorted(path for path in (ROOT / "cosim").rglob("*") if path.suffix in 
 SOLVER = {"time", "solver_steps", "solver_rhs_evaluations"}  # of every model with states
 # words of English, letters and an argument of Ecos that are names of variables too
 WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
-WORDS |= {"start_time", "position"}
+WORDS |= {"start_time", "position", "delay"}
 
 
 @pytest.fixture(scope="module")
 def names() -> set[str]:
     """Names of models, FMUs, systems and variables."""
-    found = {*FMUS, *(fmu.stem for fmu in FMUS.values()), "closed_loop", "ClosedLoop"}
+    found = {*FMUS, *(fmu.stem for fmu in FMUS.values()), "closed_loop", "ClosedLoop", "Machine"}
     for model in FMUS:
         found |= set(declared(model).variables) - SOLVER - WORDS
     assert {"q1", "tau1", "Kp1", "q1_ref", "kinetic_energy"} <= found

@@ -138,7 +138,7 @@ def test_drives_and_encoders_are_what_their_pages_say() -> None:
     for joint, effort, gear in ((1, "tau1", 100.0), (2, "f2", 200.0 * np.pi)):
         current = columns[f"actuator.current{joint}"]
         np.testing.assert_allclose(columns[f"actuator.{effort}"], 0.05 * gear * current, rtol=1e-13)
-        resolution = (5.992112452678286e-06, 1e-6)[joint - 1]
+        resolution = (5.992112452678286e-06, 1.25e-6)[joint - 1]
         counted = columns[f"sensor.counts{joint}"] * resolution
         np.testing.assert_allclose(columns[f"sensor.q{joint}_measured"], counted, rtol=1e-15)
         # a sample is that of the point before its step: less than two steps old
