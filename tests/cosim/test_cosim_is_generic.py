@@ -15,12 +15,13 @@ WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency",
 WORDS |= {"start_time", "position"}
 WORDS |= {"start_time"}
 WORDS |= {"delay"}  # an argument of tqdm
+WORDS |= {"start_time", "position", "delay"}
 
 
 @pytest.fixture(scope="module")
 def names() -> set[str]:
     """Names of models, FMUs, systems and variables."""
-    found = {*FMUS, *(fmu.stem for fmu in FMUS.values()), "closed_loop", "ClosedLoop"}
+    found = {*FMUS, *(fmu.stem for fmu in FMUS.values()), "closed_loop", "ClosedLoop", "Machine"}
     for model in FMUS:
         found |= set(declared(model).variables) - SOLVER - WORDS
     assert {"q1", "tau1", "Kp1", "q1_ref", "kinetic_energy"} <= found

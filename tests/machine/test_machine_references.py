@@ -1,0 +1,104 @@
+"""The machine's references: made again, and their components against closed forms."""
+
+import numpy as np
+import pytest
+
+from cosim.errors import UserError
+from models.machine.experiment import STEPS_PER_SECOND
+from models.machine.references import make_references
+from models.machine.references.components import Actuator, Environment, Sensor, Ticks, real
+from models.machine.references.machine import COMPONENTS, completed, declared
+from models.rp_plant.references.solver import Solver
+from tests.machine.test_machine import VARIANTS, reference
+
+STOP = 0.3  # s, of what is made again
+
+
+@pytest.fixture(scope="module")
+def solver() -> Solver:
+    return Solver()
+
+
+def test_variants_are_those_of_the_system() -> None:
+    assert set(make_references.variants()) == set(VARIANTS)
+
+
+@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip"])
+def test_made_again_it_begins_alike(solver: Solver, variant: str) -> None:
+    parameters = make_references.variants()[variant]
+    times, names, files = make_references.make(solver, parameters, STOP)
+    assert len(times) == round(STOP * STEPS_PER_SECOND) // make_references.KEPT + 1
+    for file, values in files.items():
+        kept = reference(variant, file)
+        for name, column in zip(names, values.T, strict=True):
+            rows = kept[name][: len(times)]
+            scale = max(np.abs(rows).max(), 1e-3)
+            assert np.abs(column - rows).max() <= 1e-13 * scale, (file, name)
+
+
+def test_columns_are_all_outputs() -> None:
+    names = [*make_references.columns(), *make_references.DISCRETE]
+    assert len(names) == len(set(names))
+    for component, model in declared().items():
+        assert {f"{component}.{name}" for name in model.real_outputs} <= set(names)
+    assert set(declared()) == set(COMPONENTS)
+
+
+def test_unknown_parameters_are_refused() -> None:
+    with pytest.raises(UserError, match=r"no parameter 'plant\.m3'"):
+        completed({"plant.m3": 1.0})
+
+
+def test_currents_follow_the_step_response() -> None:
+    values = dict(completed({})["actuator"])
+    actuator = Actuator(values)
+    still = {"dq1": 0.0, "dq2": 0.0}
+    inputs = still | {"tau1_cmd": 2.0, "f2_cmd": 1e6}
+    for i in range(5):
+        actuator.step(inputs, real(i) / 1000, real(i + 1) / 1000)
+    reached = 1 - np.exp(-5.0)
+    found = actuator.outputs(still)
+    assert float(found["tau1"]) == pytest.approx(2.0 * reached, rel=1e-14)
+    assert float(found["current2"]) == pytest.approx(values["current_max2"] * reached, rel=1e-14)
+
+
+def test_counts_come_late_and_round_half_up() -> None:
+    values = completed({})["sensor"] | {"sample_time": 1.5e-3, "latency": 1}
+    values |= {"resolution1": 0.5, "resolution2": 1.0}
+    sensor = Sensor(values, {"q1": 0.0, "q2": 0.0})
+    shown = []
+    for i in range(1, 7):
+        q = {"q1": 0.25 * i, "q2": -0.5 * i}
+        if i == 3:  # its end is a tick
+            with pytest.raises(UserError, match=r"tick 2 is at the communication point 0\.003 s"):
+                sensor.step(q, real(0), real(3) / 1000)
+            break
+        sensor.step(q, real(0), real(i) / 1000)
+        shown.append([int(sensor.outputs({})[f"counts{j}"]) for j in (1, 2)])
+    assert shown == [[0, 0], [0, 0]]
+    assert sensor._counts == [[0, 0], [1, -1]]
+
+
+def test_ticks_do_not_drift() -> None:
+    ticks = Ticks(0.1)
+    assert list(ticks.until(real("0.95"))) == list(range(1, 10))
+    assert ticks.time(10) == 10 * real(0.1)
+
+
+def test_the_wall_answers_by_its_law() -> None:
+    values = completed({})["environment"]
+    values |= {"stiffness": 100.0, "damping": 3.0, "position": 1.0, "angle": np.pi / 2}
+    values |= {"tip_x": 0.2, "tip_z": 0.1}
+    wall = Environment(values)
+    # frame 2 turned by 90 degrees: z2 points along y0, x2 along -x0
+    motion = {"ee_x": 2.0, "ee_y": 0.5, "ee_vx": 0.0, "ee_vy": -1.0}
+    motion |= {"ee_angle": np.pi / 2, "ee_rate": 0.5}
+    found = {name: float(value) for name, value in wall.outputs(motion).items()}
+    depth, speed = 1.0 - 0.6, -1.0 + 0.5 * -0.2
+    force = 100.0 * depth - 3.0 * speed
+    assert found["penetration"] == pytest.approx(depth, rel=1e-14)
+    assert found["wall_force"] == pytest.approx(force, rel=1e-14)
+    assert found["ee_fy"] == pytest.approx(force, rel=1e-14)
+    assert found["ee_mz"] == pytest.approx(-0.2 * force, rel=1e-12)
+    away = wall.outputs(motion | {"ee_vy": 50.0})
+    assert away["wall_force"] == 0 and away["ee_fy"] == 0
