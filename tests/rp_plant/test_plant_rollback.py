@@ -155,19 +155,44 @@ def random_start(chance: random.Random) -> dict[str, float]:
     }
 
 
+@dataclasses.dataclass(frozen=True)
+class RandomCase:
+    """A random start, and steps from there."""
+
+    method: str
+    start: dict[str, float]
+    moves: list[Move]
+
+
+def random_case(number: int) -> tuple[RandomCase, random.Random]:
+    """The case of this number, and the chance that goes on from there."""
+    chance = random.Random(number)
+    moves = sequence(chance.randint(10, 50), chance)
+    start = random_start(chance) | (BUFFERS if number % 3 == 2 else {})
+    return RandomCase([*METHODS][number % len(METHODS)], start, moves), chance
+
+
+def test_most_random_cases_meet_events(plant: Fmu) -> None:
+    """Otherwise the next test would jump across nothing."""
+    count = 0
+    for number in range(40):
+        case, _ = random_case(number)
+        with busy(plant, case.method, case.start) as run:
+            for t, move in zip(times(case.moves), case.moves, strict=False):
+                run.do(t, move)
+            count += last_event(run.instance).count > 0
+    assert count >= 30
+
+
 @pytest.mark.parametrize("number", range(SEQUENCES))
 def test_random_rollback(plant: Fmu, number: int) -> None:
     """Saved states and jumps back at random, across events, with every method; a third of them with
     compliant stops."""
-    chance = random.Random(number)
-    method = [*METHODS][number % len(METHODS)]
-    moves = sequence(chance.randint(10, 50), chance)
+    case, chance = random_case(number)
+    method, start, moves = case.method, case.start, case.moves
     at = times(moves)
-    start = random_start(chance) | (BUFFERS if number % 3 == 2 else {})
     with busy(plant, method, start) as run:
         expected = [run.do(t, move) for t, move in zip(at, moves, strict=False)]
-        # few starts are such that both joints are held by friction or stops for good
-        assert last_event(run.instance).count > 0 or modes(run.instance) == (0, 0)
     with busy(plant, method, start) as run:
         saved = []
         position, left = 0, 4 * len(moves)
