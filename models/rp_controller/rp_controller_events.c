@@ -31,8 +31,8 @@ static double next_time(const void *values_pointer) {
         return INFINITY;
     }
     const double sample = sample_time_of(values, values->samples.taken);
-    const double show = show_time(values);
-    return show < sample ? show : sample;
+    const double due = show_time(values);
+    return due < sample ? due : sample;
 }
 
 /* ---- Samples -------------------------------------------------------------------------------- */
@@ -46,7 +46,7 @@ static bool are_finite(const double x[2]) {
 static enum status take_sample(struct rp_controller_values *values) {
     const struct rp_controller_parameters *p = &values->parameters;
     struct rp_controller_samples *samples = &values->samples;
-    struct rp_controller_command command;
+    struct rp_controller_command command = {{0.0}};
     double integral[2];
     double rate[2];
     for (int i = 0; i < 2; i++) {

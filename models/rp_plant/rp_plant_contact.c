@@ -56,12 +56,10 @@ static bool is_at_rest_on_limit(const struct rp_plant_parameters *p, int joint, 
     return is_compliant(p, joint) && dq == 0.0 && (q == p->lower[joint] || q == p->upper[joint]);
 }
 
-/* 0 for a joint that stays. */
+/* A joint that breaks away has no acceleration yet; one that is held has none at all. */
 static int first_direction(int mode, double ddq) {
-    if (mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD) {
-        return mode;
-    }
-    return mode == RP_PLANT_STUCK ? 0 : sign_of(ddq);
+    const bool slides = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
+    return slides ? mode : sign_of(ddq);
 }
 
 void rp_plant_begin_contacts(const struct rp_plant_parameters *p, const double q[2],
