@@ -135,12 +135,12 @@ def test_effective_mass() -> None:
 
 # ---- The FMUs ------------------------------------------------------------------------------------
 
-MOTION = ("ee_x", "ee_vx")
-WRENCH = ("ee_fx",)
+MOTION = ("ee_x", "ee_vx", "ee_y", "ee_vy", "ee_angle", "ee_rate")
+WRENCH = ("ee_fx", "ee_fy", "ee_mz")
 
 
 class Loop:
-    """The slide of the plant at q1 = 0, a = 0, g = 0: a mass m2 pressed against the wall."""
+    """Plant and wall, stepped as cosim/coupling/master.py does, the plant first."""
 
     def __init__(self, arm: Instance, wall: Instance, order: str, inputs: str) -> None:
         self.arm, self.wall = arm, wall
@@ -174,7 +174,7 @@ class Loop:
         instance.step(self.count * STEP, STEP)
 
     def step(self) -> None:
-        """Arm first in Gauss-Seidel order."""
+        """From one communication point to the next."""
         before = self.arm_values, self.arm_slopes
         self.move(self.arm, WRENCH, self.wall_values, self.wall_slopes)
         self.arm_values, self.arm_slopes = self.read(self.arm, MOTION)
@@ -195,7 +195,8 @@ def motion(
 ) -> Iterator[np.ndarray]:
     """Deviations of the loop from its equilibrium: depth, velocity, force, slope, acceleration.
 
-    It starts 1 mm deeper, with the force of the equilibrium.
+    The slide at q1 = 0, a = 0, g = 0 is a mass m2. It starts 1 mm deeper, with the force of the
+    equilibrium.
     """
     equilibrium = FORCE / CONTACT.stiffness
     start = {"a": 0.0, "g": 0.0, "m2": CONTACT.mass, "q2": 1e-3, "f2": FORCE}
@@ -241,22 +242,66 @@ def test_every_step_of_the_fmus_is_that_of_the_matrix(
     assert (np.abs(rows[3:] - expected) <= 1e-9 * scale).all()
 
 
+def fitted(depth: np.ndarray) -> complex:
+    """Eigenvalue z of depth_n+2 = 2 Re(z) depth_n+1 - |z|^2 depth_n."""
+    columns = np.column_stack([depth[1:-1], depth[:-2]])
+    (twice_real, minus_square), *_ = np.linalg.lstsq(columns, depth[2:], rcond=None)
+    return complex(twice_real / 2, math.sqrt(-minus_square - twice_real**2 / 4))
+
+
 @each_case
 def test_limit_of_the_fmus_is_that_of_the_theory(
     units: tuple[LoadedFmu, LoadedFmu], order: str, inputs: str
 ) -> None:
-    """Fit x_n+2 = s x_n+1 - p x_n after the start: p = |z|^2, which is 1 at the limit."""
+    """Between two dampings, |z|^2 of the motion passes 1."""
     theory = least_damping(CONTACT, STEP, order, inputs)
     products = []
     for share in (0.9, 1.1):
         rows = np.array(list(motion(units, share * theory, order, inputs, 200)))
-        depth = rows[20:, 0]
-        (_, minus_p), *_ = np.linalg.lstsq(
-            np.column_stack([depth[1:-1], depth[:-2]]), depth[2:], rcond=None
-        )
-        products.append(-minus_p)
+        products.append(abs(fitted(rows[20:, 0])) ** 2)
     assert products[0] > 1.0 > products[1]
     measured = theory * (0.9 + 0.2 * (products[0] - 1) / (products[0] - products[1]))
     assert measured == pytest.approx(theory, rel=0.02)
     exact = exact_least_damping(CONTACT, STEP, order, inputs)
     assert measured == pytest.approx(exact, rel=1e-3)
+
+
+@each_case
+def test_the_whole_arm_vibrates_with_its_effective_mass(
+    units: tuple[LoadedFmu, LoadedFmu], order: str, inputs: str
+) -> None:
+    """Both joints free, an oblique wall, the tip beside the end effector; pressed with 1 N."""
+    q1, q2, l1, a, normal = 0.6, 0.1, 0.5, 0.15, complex(math.cos(3.4), math.sin(3.4))
+    local = complex(l1 + q2 + 0.05, a - 0.04)
+    slide = complex(math.cos(q1), math.sin(q1))
+    tip = slide * local
+    # rows of the tip's Jacobian along the normal, and the efforts that press with 1 N
+    along = np.array([(1j * tip / normal).real, (slide / normal).real])
+    stiffness, damping = 1e4, 20.0
+    wall = {"stiffness": stiffness, "damping": damping, "angle": 3.4, "tip_x": -0.04, "tip_z": 0.05}
+    wall["position"] = (tip / normal).real + 1 / stiffness
+    efforts = dict(zip(("tau1", "f2"), -along, strict=True))
+    depths = []
+    with Instance(units[0]) as arm, Instance(units[1]) as surface:
+        # 1 um deeper than the equilibrium, along the row that the wall acts on
+        arm.fmi.setupExperiment(tolerance=1e-12)
+        arm.set(a=a, l1=l1, g=0.0, q1=q1, q2=q2, **efforts)
+        arm.fmi.enterInitializationMode()
+        d11, d12, d22 = arm.get("D11", "D12", "D22")
+        inertia = np.array([[d11, d12], [d12, d22]])
+        mass = effective_mass(inertia, along)
+        shift = -1e-6 * mass * np.linalg.solve(inertia, along)
+        arm.set(q1=q1 + shift[0], q2=q2 + shift[1])
+        at_start = dict(zip(MOTION, arm.get(*MOTION), strict=True))
+        surface.initialize(**wall, **at_start)
+        arm.set(**dict(zip(WRENCH, surface.get(*WRENCH), strict=True)))
+        arm.fmi.exitInitializationMode()
+        loop = Loop(arm, surface, order, inputs)
+        for _ in range(80):
+            depths.append(surface.get("penetration")[0] - 1 / stiffness)
+            loop.step()
+    contact = Contact(mass, stiffness, damping)
+    expected = eigenvalues(contact, STEP, order, inputs)[0]
+    assert fitted(np.array(depths)[10:]) == pytest.approx(
+        complex(expected.real, abs(expected.imag)), abs=1e-4
+    )
