@@ -46,7 +46,7 @@ static bool are_finite(const double x[2]) {
 static enum status take_sample(struct rp_controller_values *values) {
     const struct rp_controller_parameters *p = &values->parameters;
     struct rp_controller_samples *samples = &values->samples;
-    struct rp_controller_command command = {{0.0}};
+    struct rp_controller_command command = {.unlimited = {0.0}, .effort = {0.0}};
     double integral[2];
     double rate[2];
     for (int i = 0; i < 2; i++) {
