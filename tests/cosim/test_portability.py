@@ -22,6 +22,7 @@ from cosim import scenario as scenarios
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmu_file import Fmu
+from tests.support.all_fmus import SYSTEMS
 from tests.support.cosim_project import (
     BUILD,
     FMUS,
@@ -161,7 +162,7 @@ def unusable(names: list[str]) -> list[str]:
 
 
 def test_names_in_the_archives_suit_every_system() -> None:
-    for path in (*FMUS.values(), BUILD / "ClosedLoop.ssp"):
+    for path in (*FMUS.values(), *(BUILD / f"{name}.ssp" for name in SYSTEMS)):
         with zipfile.ZipFile(path) as archive:
             assert unusable(archive.namelist()) == []
 
