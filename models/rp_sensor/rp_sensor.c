@@ -30,12 +30,13 @@ static double rounded(double x) {
 }
 
 int rp_sensor_count(double position, double resolution) {
+    const int most = RP_SENSOR_COUNT_MAX;
     const double x = position / resolution;
-    if (x >= RP_SENSOR_COUNT_MAX) {
-        return RP_SENSOR_COUNT_MAX;
+    if (x >= most) {
+        return most;
     }
-    if (x <= -RP_SENSOR_COUNT_MAX) {
-        return -RP_SENSOR_COUNT_MAX;
+    if (x <= -most) {
+        return -most;
     }
     return (int)rounded(x);
 }

@@ -139,7 +139,7 @@ static enum status check_parameters(const void *values_pointer, char *text, size
     const struct rp_sensor_parameters *p =
         &((const struct rp_sensor_values *)values_pointer)->parameters;
     for (int i = 0; i < 2; i++) {
-        const double largest = 2.0 * RP_SENSOR_COUNT_MAX * p->resolution[i] / p->sample_time;
+        const double largest = 2.0 * (int)RP_SENSOR_COUNT_MAX * p->resolution[i] / p->sample_time;
         if (!isfinite(largest)) {
             (void)snprintf(text, size,
                            "resolution%d = %g is refused: with sample_time = %g s the velocity of "
