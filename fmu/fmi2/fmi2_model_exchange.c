@@ -22,7 +22,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo) 
     const enum component_status status = mode_update_discrete_states(component, &update);
     const bool has_next_time = isfinite(update.next_time);
     *fmi2eventInfo = (fmi2EventInfo){
-        .newDiscreteStatesNeeded = fmi2False,
+        .newDiscreteStatesNeeded = update.is_incomplete ? fmi2True : fmi2False,
         .terminateSimulation = fmi2False,
         .nominalsOfContinuousStatesChanged = fmi2False,
         .valuesOfContinuousStatesChanged = update.states_changed ? fmi2True : fmi2False,

@@ -240,7 +240,8 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
 }
 
-/* One update brings all modes to their end: nothing is left to be done. */
+/* One update brings all modes to their end. Another one is needed only where the importer has gone
+ * past several time events. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
                                     fmi3Boolean *nominalsOfContinuousStatesChanged,
@@ -258,7 +259,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     struct discrete_update update;
     const enum component_status status = mode_update_discrete_states(component, &update);
     const bool has_next_time = isfinite(update.next_time);
-    *discreteStatesNeedUpdate = fmi3False;
+    *discreteStatesNeedUpdate = update.is_incomplete;
     *terminateSimulation = fmi3False;
     *nominalsOfContinuousStatesChanged = fmi3False;
     *valuesOfContinuousStatesChanged = update.states_changed;

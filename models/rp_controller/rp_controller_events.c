@@ -1,6 +1,7 @@
 #include "rp_controller_events.h"
 
 #include <math.h>
+#include <stdio.h>
 
 const double rp_controller_shortest_sample_time = 1e-6;
 
@@ -74,14 +75,19 @@ static void show(struct rp_controller_samples *samples) {
 }
 
 /* The first sample takes effect at once. */
-static enum status start(struct rp_controller_values *values, double t) {
+static enum status start(struct rp_controller_values *values, const struct event *event) {
+    const double t = event->t;
     const double period = values->parameters.sample_time;
     if (!(period > 0.0)) {
         values->form = RP_CONTROLLER_CONTINUOUS;
         return STATUS_OK;
     }
-    if (!(t + rp_controller_shortest_sample_time > t)) {
-        return STATUS_INVALID_TIME; // samples would have the same time
+    if (period < event_shortest_period(t)) {
+        (void)snprintf(event->reason, event->reason_size,
+                       "sample_time = %g s is refused: at a start time of %g s it must be %g s or "
+                       "more",
+                       period, t, event_shortest_period(t));
+        return STATUS_INVALID_PARAMETERS;
     }
     const enum status status = take_sample(values);
     if (status == STATUS_OK) {
@@ -113,7 +119,7 @@ static enum status pass_time(struct rp_controller_values *values) {
 static enum status update(void *values_pointer, const struct event *event) {
     struct rp_controller_values *values = values_pointer;
     if (values->form == RP_CONTROLLER_UNDECIDED) {
-        return start(values, event->t);
+        return start(values, event);
     }
     return event->is_timed ? pass_time(values) : STATUS_OK;
 }

@@ -85,8 +85,8 @@ static enum status check_parameters(const void *values_pointer, char *text, size
     }
     if (p->delay > p->sample_time) {
         (void)snprintf(text, size,
-                       "delay = %g s is refused: it must not be above sample_time = %g s", p->delay,
-                       p->sample_time);
+                       "delay = %.17g s is refused: it must not be above sample_time = %.17g s",
+                       p->delay, p->sample_time);
         return STATUS_INVALID_PARAMETERS;
     }
     return STATUS_OK;

@@ -7,6 +7,7 @@
 #include "rp_plant_modes.h"
 #include "rp_plant_series.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,16 +24,18 @@ struct fired {
 
 /* ---- Stops ---------------------------------------------------------------------------------- */
 
-/* rad, m: an event is located far better. Where q is farther from the limit, the limit has been
- * moved since. */
-static const double near_limit = 1e-9;
+/* rad, m: an event is located far better, up to the rounding of the limit. Where q is farther from
+ * it, the limit has been moved since. */
+static double near_limit(double limit) {
+    return 1e-9 + 4.0 * DBL_EPSILON * fabs(limit);
+}
 
 /* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones. */
 static void arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
     for (int i = 0; i < 2; i++) {
         const double hit = fired->hit[i] > 0 ? p->lower[i] : p->upper[i];
-        const bool is_near = fired->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit;
+        const bool is_near = fired->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
         side[i] = rp_plant_closed_stop(p, i, values->q[i]);
         if (side[i] == 0 && is_near && p->stops[i] == RP_PLANT_STOPS_RIGID) {
             side[i] = fired->hit[i];

@@ -43,10 +43,6 @@ static double next_time(const void *values_pointer) {
     return values->start + values->ticks * values->parameters.sample_time;
 }
 
-/* Of the time at the start: a shorter sample time is refused, since ticks would be the less regular
- * the fewer doubles lie between two of them. */
-static const double coarsest_time = 0x1p-40;
-
 /* Takes the sample of the start, at the end of the initialization, and that of each tick. */
 static enum status update(void *values_pointer, const struct event *event) {
     struct rp_sensor_values *values = values_pointer;
@@ -58,7 +54,12 @@ static enum status update(void *values_pointer, const struct event *event) {
         return STATUS_NOT_FINITE;
     }
     if (is_start) {
-        if (values->parameters.sample_time < coarsest_time * fabs(event->t)) {
+        const double shortest = event_shortest_period(event->t);
+        if (values->parameters.sample_time < shortest) {
+            (void)snprintf(event->reason, event->reason_size,
+                           "sample_time = %g s is refused: at a start time of %g s it must be %g s "
+                           "or more",
+                           values->parameters.sample_time, event->t, shortest);
             return STATUS_INVALID_PARAMETERS;
         }
         values->start = event->t;

@@ -10,6 +10,7 @@ NONNULL void instance_enter_event_mode(struct instance *instance);
 
 struct discrete_update {
     bool states_changed; /* states integrated outside have jumped */
+    bool is_incomplete;  /* integrated outside: the next time event is not later than now */
     double next_time;    /* s: of the next time event; INFINITY: there is none */
 };
 

@@ -60,12 +60,15 @@ static enum status update(struct instance *instance, const bool *fired) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         instance->du[i] = instance->memory.current[i].d[1];
     }
+    char reason[200] = "";
     const struct event event = {
         .t = instance->state.time.s,
         .fired = fired,
         .is_timed = is_timed(instance, fired),
         .du = instance->du,
         .tolerance = instance->tolerances,
+        .reason = reason,
+        .reason_size = sizeof reason,
     };
     const double next_time = instance_next_time(instance);
     enum status status = events->update(instance->memory.values, &event);
@@ -74,7 +77,7 @@ static enum status update(struct instance *instance, const bool *fired) {
     }
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,
-                      status_text(status));
+                      reason[0] != '\0' ? reason : status_text(status));
     }
     return status;
 }

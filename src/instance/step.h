@@ -48,19 +48,21 @@ NONNULL void instance_hold_last_nodes(const struct step *step);
 
 /* ---- Events (step_events.c) ----------------------------------------------------------------- */
 
-/* Sets the end of the next part of the step. A time event so little after the end of the step that
- * rounding may have put it there belongs to this step. */
+/* Sets the end of the next part of the step. A time event behind the end of the step by a millionth
+ * of the step, or by some roundings of the time, belongs to this step: importers that add up their
+ * steps mean the same time. */
 static inline void instance_set_part(struct step *step) {
     const double time = instance_next_time(step->instance);
     step->until = step->end;
+    step->meets_time_event = false;
     if (time == INFINITY) {
-        step->meets_time_event = false;
         return;
     }
     const double h = clock_difference(step->end, step->begin);
-    step->meets_time_event = time - step->end.s <= clock_slack(step->end.s, h);
+    step->meets_time_event = time - step->end.s <= fmax(1e-6 * h, 4.0 * clock_spacing(step->end.s));
     if (time < step->end.s) {
-        step->until = (struct clock_time){.s = time};
+        const struct clock_time now = step->instance->state.time;
+        step->until = time > now.s ? (struct clock_time){.s = time} : now;
     }
 }
 

@@ -98,6 +98,15 @@ static bool find_event(const struct step *step, bool has_moved, struct clock_tim
     return fired != NULL || step->meets_time_event;
 }
 
+/* At the end of the step, and no other time event is there. */
+static bool is_done(struct step *step) {
+    if (clock_difference(step->end, step->instance->state.time) > 0.0) {
+        return false;
+    }
+    instance_set_part(step);
+    return step->options->at_event != EVENTS_PASSED || !step->meets_time_event;
+}
+
 enum status instance_move_over_events(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     enum status status = begin_modes(step, &continuation);
@@ -112,7 +121,7 @@ enum status instance_move_over_events(struct step *step, enum continuation conti
             break;
         }
         status = meet_event(step, time);
-        if (!(clock_difference(step->end, instance->state.time) > 0.0)) {
+        if (is_done(step)) {
             break;
         }
         continuation = CONTINUE_AFTER_EVENT;

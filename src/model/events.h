@@ -40,7 +40,15 @@ struct event {
     bool is_timed;           /* the time that next_time gave has come */
     const double *du;        /* derivative of each input by the time after the event */
     const double *tolerance; /* of each state, in its unit: relative part and absolute one */
+    char *reason;            /* one line, reason_size bytes: why update fails. NULL: nobody asks */
+    size_t reason_size;
 };
+
+/* s: the shortest period of time events about the time t (s). With fewer than 4096 doubles between
+ * two of them the events would be irregular. */
+static inline double event_shortest_period(double t) {
+    return 0x1p-40 * (t < 0.0 ? -t : t);
+}
 
 /* A model without indicators has NULL for all that belongs to them. */
 struct model_events {

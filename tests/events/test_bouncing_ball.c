@@ -181,7 +181,8 @@ static void test_the_lift_takes_it_from_the_floor(void) {
 static void test_integrated_from_outside_it_bounces_once(void) {
     static const double heights[] = {-1e-3, -1e-12, 0.0, 1e-12};
     for (int i = 0; i < 4; i++) {
-        struct discrete_update update = {false, 0.0};
+        struct discrete_update update = {
+            .states_changed = false, .is_incomplete = false, .next_time = 0.0};
         prepare(&ball_description, 1, 1e-8);
         instance_integrate_outside(toy);
         initialize();
@@ -206,7 +207,8 @@ static void test_integrated_from_outside_it_bounces_once(void) {
 static void test_integrated_from_outside_nothing_happens_elsewhere(void) {
     static const double states[][2] = {{1e-3, -2.0}, {1e-12, 2.0}, {0.0, 2.0}};
     for (int i = 0; i < 3; i++) {
-        struct discrete_update update = {true, 0.0};
+        struct discrete_update update = {
+            .states_changed = true, .is_incomplete = false, .next_time = 0.0};
         prepare(&ball_description, 1, 1e-8);
         instance_integrate_outside(toy);
         initialize();

@@ -103,6 +103,33 @@ static void test_a_stroke_at_the_end_of_a_step(void) {
     }
 }
 
+/* A stroke behind a communication point belongs to the next step, however late it is: here by a
+ * thousandth of a step at 1e5 s, in steps of two lengths. */
+static void test_a_stroke_behind_a_point_waits_for_the_next_step(void) {
+    static const double steps[] = {0x1p-10, 0x1p-12};
+    for (int i = 0; i < 2; i++) {
+        const double h = steps[i];
+        start_hammer(1, 1e5, 1.0, 0x1p-3 + 0x1p-20);
+        run(1e5, h, (int)(0x1p-3 / h));
+        TEST_ASSERT_EQUAL_INT(0, hammer()->strokes);
+        run(1e5 + 0x1p-3, h, 1);
+        TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
+        TEST_ASSERT_EQUAL_DOUBLE(1e5 + 0x1p-3 + 0x1p-20, get(TOY_LAST_EVENT));
+    }
+}
+
+/* All that come at the end of a step belong to it. */
+static void test_strokes_close_to_each_other(void) {
+    start_hammer(1, 1.0, 0x1p-40, 0.25);
+    run(1.0, 0.25, 1);
+    TEST_ASSERT_GREATER_THAN_INT(1000, hammer()->strokes);
+    TEST_ASSERT_TRUE(get(TOY_TIME) == 1.25);
+    const int strokes = hammer()->strokes;
+    ASSERT_OK(instance_do_step(toy, 1.25, 3e-7));
+    TEST_ASSERT_GREATER_THAN_INT(strokes, hammer()->strokes);
+    TEST_ASSERT_TRUE(get(TOY_LAST_EVENT) >= 1.25);
+}
+
 /* With the force held, the bits do not depend on the communication points. */
 static void test_later_points_do_not_change_the_motion(void) {
     static const double steps[] = {0x1p-9, 0x1p-7, 0x1p-1};
@@ -279,6 +306,7 @@ static void test_strokes_passed_from_outside_follow_one_by_one(void) {
         ASSERT_OK(instance_update_discrete_states(toy, &update));
         TEST_ASSERT_EQUAL_INT(n < 4, update.states_changed);
         TEST_ASSERT_EQUAL_DOUBLE(first + (n < 3 ? n : 3), update.next_time);
+        TEST_ASSERT_EQUAL_INT(n < 3, update.is_incomplete);
     }
     TEST_ASSERT_EQUAL_INT(3, hammer()->strokes);
 }

@@ -135,8 +135,9 @@ static void test_the_continuous_form_has_no_events(void) {
 
 static void test_a_start_without_room_for_samples_is_refused(void) {
     v.parameters.sample_time = 1e-6;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, begin(1e12));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, begin(1e9));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, begin(1e12));
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS, begin(-1.2e6));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, begin(1e6)); // 2^-40 of it is below 1e-6
 }
 
 /* A sample that cannot be computed leaves all as it was. */
