@@ -60,9 +60,11 @@ static inline void instance_set_part(struct step *step) {
     }
     const double h = clock_difference(step->end, step->begin);
     step->meets_time_event = time - step->end.s <= fmax(1e-6 * h, 4.0 * clock_spacing(step->end.s));
-    if (time < step->end.s) {
-        const struct clock_time now = step->instance->state.time;
-        step->until = time > now.s ? (struct clock_time){.s = time} : now;
+    const struct clock_time now = step->instance->state.time;
+    if (time <= now.s) {
+        step->until = now;
+    } else if (time < step->end.s) {
+        step->until = (struct clock_time){.s = time};
     }
 }
 
