@@ -57,10 +57,16 @@ def releases(fmu: Path) -> dict[str, Path]:
     return {name: fmu.parent / "fmu" / name / "release" for name in NAMES}
 
 
-def scenarios_of(name: str) -> list[str]:
-    """Two scenarios of the model."""
-    folder = ROOT / "models" / FOLDERS[name] / "scenarios"
-    return sorted(path.stem for path in folder.glob("*.toml"))[:2]
+def scenarios_of(loaded: LoadedFmu) -> list[str]:
+    """Two scenarios of the model without Booleans, which `trace` does not set."""
+    description = loaded.description
+    booleans = {v.name for v in description.modelVariables if v.type == "Boolean"}
+    folder = ROOT / "models" / FOLDERS[description.modelName] / "scenarios"
+    scenarios = (load(path.stem) for path in sorted(folder.glob("*.toml")))
+    names = [
+        s.name for s in scenarios if booleans.isdisjoint((*s.inputs, *s.parameters, *s.initial))
+    ]
+    return [names[len(names) // 2], names[-1]]
 
 
 # ---- The same bits ------------------------------------------------------------------------------
@@ -90,9 +96,8 @@ def trace(loaded: LoadedFmu, name: str, method: int) -> Iterator[bytes]:
 
 def assert_same_bits(built: LoadedFmu, rebuilt: LoadedFmu) -> None:
     """Of every value in every scenario with every method, of states and messages."""
-    name = built.description.modelName
-    for scenario in scenarios_of(name):
-        for method in (1, 2, 3, 4) if name in TAYLOR else (1, 2, 3):
+    for scenario in scenarios_of(built):
+        for method in (1, 2, 3, 4) if built.description.modelName in TAYLOR else (1, 2, 3):
             expected = list(trace(built, scenario, method))
             assert len(set(expected)) > STEPS / 2  # it moves
             assert list(trace(rebuilt, scenario, method)) == expected, (scenario, method)
@@ -257,7 +262,7 @@ def test_every_optimizer_gives_the_same_series(
     run(compiler, "-shared", "-o", target, *sorted(objects.glob("*.o")))
     rebuilt = LoadedFmu(unpacked, unpacked)
     assert random_motions(rebuilt) == random_motions(built[build.fmu])
-    for scenario in scenarios_of(build.fmu):
+    for scenario in scenarios_of(built[build.fmu]):
         assert list(trace(rebuilt, scenario, 4)) == list(trace(built[build.fmu], scenario, 4))
 
 

@@ -185,8 +185,8 @@ static void expand_far(void) {
     memcpy(begin, inputs, sizeof begin);
     rp_plant_model.events->describe(&plant, kinds);
     const double first_unit = unit;
-    double part = 1024.0;
-    for (int halvings = 0; halvings < 30; halvings++, part *= 0.5) {
+    for (int exponent = 10; exponent > -20; exponent--) {
+        const double part = ldexp(1.0, exponent);
         unit = part * first_unit;
         for (int i = 0; i < PLANT_INPUTS; i++) {
             for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
