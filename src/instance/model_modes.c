@@ -27,8 +27,7 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
     return instance->indicators;
 }
 
-/* What the integrator may miss a state by: away from 0 the relative tolerance is the larger part.
- */
+/* What the integrator may miss a state by: away from 0 the relative part is the larger one. */
 static void write_tolerances(struct instance *instance) {
     const struct span states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
