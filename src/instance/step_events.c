@@ -63,8 +63,12 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
             instance_continuation(instance, clock_difference(step->end, state->restart_time));
     }
     state->event_point = NO_EVENT;
-    return *continuation == CONTINUE_AFTER_CHANGE ? instance_update_modes(instance, NULL)
-                                                  : STATUS_OK;
+    if (*continuation != CONTINUE_AFTER_CHANGE) {
+        return STATUS_OK;
+    }
+    // inputs whose derivatives ended with the last step are still where these led them
+    instance_place_inputs(instance, 0.0);
+    return instance_update_modes(instance, NULL);
 }
 
 /* To the end of the present part of the step, or to a state event before it. */

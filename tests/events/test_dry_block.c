@@ -47,6 +47,23 @@ static void test_a_ramp_breaks_it_away(void) {
     }
 }
 
+/* The slope ends with its step. Then the force is again the one that was set, here enough to move a
+ * block which stopped while the force was small. */
+static void test_it_breaks_away_where_a_slope_ends(void) {
+    for (int method = 1; method <= 4; method++) {
+        prepare(&block_description, method, 1e-10);
+        initialize();
+        set(TOY_INPUT, 2.0);
+        set_slope(-0.5);
+        run(0.0, 5.0, 1); // v = t - t^2 / 4 to the stop at t = 4
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, 4.0, get(TOY_LAST_EVENT));
+        run(5.0, 1.0, 1);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, 8.0 / 3.0 + 0.5, get(TOY_POSITION));
+    }
+}
+
 /* The force touches the limit and falls again. */
 static void test_a_touch_does_not_break_it_away(void) {
     const unsigned references[] = {TOY_INPUT, TOY_INPUT};
@@ -110,6 +127,7 @@ int main(void) {
     UNITY_BEGIN();
     RUN_TEST(test_it_stops_and_stays);
     RUN_TEST(test_a_ramp_breaks_it_away);
+    RUN_TEST(test_it_breaks_away_where_a_slope_ends);
     RUN_TEST(test_a_touch_does_not_break_it_away);
     RUN_TEST(test_it_holds_against_changing_forces);
     RUN_TEST(test_rollback_over_events);
