@@ -66,8 +66,7 @@ static enum status begin_modes(struct step *step, enum continuation *continuatio
     if (*continuation != CONTINUE_AFTER_CHANGE) {
         return STATUS_OK;
     }
-    // inputs whose derivatives ended with the last step are still where these led them
-    instance_place_inputs(instance, 0.0);
+    instance_begin_inputs(instance);
     return instance_update_modes(instance, NULL);
 }
 

@@ -4,6 +4,15 @@
 
 #include <math.h>
 
+void instance_begin_inputs(struct instance *instance) {
+    struct instance_memory *memory = &instance->memory;
+    double *u = doubles_of(memory->values, instance->model->inputs);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        memory->current[i] = memory->pending[i];
+        u[i] = memory->pending[i].d[0];
+    }
+}
+
 void instance_place_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
