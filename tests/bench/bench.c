@@ -12,7 +12,7 @@
 
 static const char usage[] =
     "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 "
-    "RPManipulator.so-with-idle-integrator [--repeats N] [--quick] [--json FILE] "
+    "RPManipulator.so-with-idle-integrator RPPlant.so [--repeats N] [--quick] [--json FILE] "
     "[--only GROUP[,GROUP...]]";
 
 static const struct {
@@ -24,6 +24,7 @@ static const struct {
     {"instances", measure_instances}, {"threads", measure_threads},
     {"energy", measure_energy},       {"instance", measure_instance},
     {"calls", measure_calls},         {"life", measure_life},
+    {"plant", measure_plant},
 };
 enum { GROUPS = sizeof groups / sizeof groups[0] };
 
@@ -36,7 +37,7 @@ static void choose(char *list, bool chosen[GROUPS]) {
         }
         require(i < GROUPS,
                 "no such group: steps free-motion precision step-size instances threads "
-                "energy instance calls life");
+                "energy instance calls life plant");
         chosen[i] = true;
     }
 }
@@ -46,8 +47,8 @@ int main(int count, char **arguments) {
     const char *json = NULL;
     bool all = true;
     bool chosen[GROUPS] = {false};
-    require(count >= 4, usage);
-    for (int i = 4; i < count; i++) {
+    require(count >= 5, usage);
+    for (int i = 5; i < count; i++) {
         const bool has_value = i + 1 < count;
         if (strcmp(arguments[i], "--quick") == 0) {
             bench.quick = true;
@@ -68,6 +69,7 @@ int main(int count, char **arguments) {
             "the FMU of FMI 3.0 cannot be loaded");
     require(fmu_library_open(arguments[3], &bench.idle) != NULL,
             "the FMU with an integrator that returns at once cannot be loaded");
+    require(fmu_library_open(arguments[4], &bench.plant) != NULL, "RPPlant cannot be loaded");
 
     report_open(&bench.report, json, bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {

@@ -9,7 +9,8 @@
 struct bench {
     struct fmu_functions fmu;
     struct fmu3_functions fmu3;
-    struct fmu_functions idle; /* the FMU with idle_integrator.c */
+    struct fmu_functions idle;  /* the FMU with idle_integrator.c */
+    struct fmu_functions plant; /* RPPlant */
     struct report report;
     int repeats;
     bool quick; /* little of everything: shows that it works, the figures mean nothing */
@@ -22,6 +23,9 @@ void measure_free_motion(struct bench *bench);
 /* sweeps.c: error and time over the tolerance, time over the communication step size */
 void measure_precision(struct bench *bench);
 void measure_step_sizes(struct bench *bench);
+
+/* plant.c: friction and stops, against the arm without them */
+void measure_plant(struct bench *bench);
 
 /* instances.c: many instances stepped in turn, two threads with an instance each */
 void measure_instances(struct bench *bench);

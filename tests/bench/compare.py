@@ -243,6 +243,8 @@ def main() -> None:
     parser.add_argument("--library-idle", type=Path,
                         default=build / "tests/bench/idle/RPManipulator.so",
                         help="the FMU with an integrator that returns at once")  # fmt: skip
+    parser.add_argument("--library-plant", type=Path,
+                        default=build / "fmu/RPPlant/RPPlant.so")  # fmt: skip
     parser.add_argument("--fmu", type=Path, default=build / "RPManipulator.fmu")
     parser.add_argument("--output", type=Path, default=build / "report/benchmark")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
@@ -250,7 +252,12 @@ def main() -> None:
     parser.add_argument("--readme", action="store_true", help="put it all into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
-    libraries = (options.library, options.library_fmi3, options.library_idle)
+    libraries = (
+        options.library,
+        options.library_fmi3,
+        options.library_idle,
+        options.library_plant,
+    )
     for path in (options.bench, *libraries, options.fmu):
         if not path.exists():
             sys.exit(f"{path}: no such file. Build it and run this with\n"
@@ -268,7 +275,7 @@ def main() -> None:
         peers = make_peers(own, plant, first["rows"], options.quick)
         rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
     print("sweeps, instances, threads, energy, calls", file=sys.stderr)
-    others = "precision,step-size,instances,threads,energy,instance,calls,life"
+    others = "precision,step-size,instances,threads,energy,instance,calls,life,plant"
     rest = run_bench(program, *small, "--only", others, "--repeats", str(options.repeats))
     machine = first["machine"] | {
         name: version(name) for name in ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")

@@ -23,14 +23,20 @@ static void log_text(fmi2ComponentEnvironment environment, fmi2String name, fmi2
 
 static const fmi2CallbackFunctions callbacks = {.logger = log_text};
 
+const char fmu_guid_of_arm[] = RP_MANIPULATOR_GUID;
+
+fmi2Component fmu_instantiate(const struct fmu_functions *fmu, const char *guid) {
+    fmi2Component c = fmu->Instantiate("bench", fmi2CoSimulation, guid, "", &callbacks, 0, 0);
+    require(c != NULL, "not instantiated");
+    return c;
+}
+
 fmi2Component fmu_start(const struct fmu_functions *fmu, const struct problem *problem,
                         enum method method, double tolerance) {
     static const fmi2ValueReference solver_method = RP_MANIPULATOR_solver_method;
     static const fmi2ValueReference g = RP_MANIPULATOR_g;
     const int chosen = (int)method;
-    fmi2Component c =
-        fmu->Instantiate("bench", fmi2CoSimulation, RP_MANIPULATOR_GUID, "", &callbacks, 0, 0);
-    require(c != NULL, "not instantiated");
+    fmi2Component c = fmu_instantiate(fmu, fmu_guid_of_arm);
     require(fmu->SetReal(c, states_of, 4, problem->start) == fmi2OK &&
                 fmu->SetReal(c, &g, 1, &problem->g) == fmi2OK &&
                 fmu->SetInteger(c, &solver_method, 1, &chosen) == fmi2OK &&

@@ -15,6 +15,10 @@ struct fmu_counts {
     double evaluations;    /* of the right-hand side, per communication step */
 };
 
+/* An instance of the FMU with this GUID. */
+fmi2Component fmu_instantiate(const struct fmu_functions *fmu, const char *guid);
+extern const char fmu_guid_of_arm[];
+
 /* An initialized instance at the problem's start. */
 fmi2Component fmu_start(const struct fmu_functions *fmu, const struct problem *problem,
                         enum method method, double tolerance);

@@ -104,6 +104,17 @@ def instance(rows: list[dict]) -> list[str]:
             *lines(["", "us a step", "share of a step with taylor"], cells)]  # fmt: skip
 
 
+def plant(rows: list[dict]) -> list[str]:
+    """Friction and stops, against the arm without them."""
+    cells = [
+        [f"{row['work']}, {row['run']}", number(row["us"]), number(row["ratio"]),
+         f"{row['events']:.0f}", result(row)]
+        for row in rows if row["group"] == "plant"
+    ]  # fmt: skip
+    header = ["", "us a step", "ratio", "events in 1000 steps", "must be"]
+    return ["**Friction and stops, steps of 1 ms**", "", *lines(header, cells)]
+
+
 def calls(rows: list[dict]) -> list[str]:
     """Each call by itself."""
     cells = [
@@ -140,5 +151,5 @@ def markdown(report: dict) -> str:
         f"{machine['python']}, {versions}. {missed} of the targets missed.",
         "",
     ]
-    parts = (steps, instances, threads, energy, instance, calls, life)
+    parts = (steps, instances, threads, energy, instance, plant, calls, life)
     return "\n".join(head + [line for part in parts for line in part(rows)])

@@ -20,12 +20,19 @@ import plots
 import table
 
 BENCH = [
-    os.environ[name] for name in ("RP_BENCH", "RP_LIBRARY", "RP_LIBRARY_FMI3", "RP_LIBRARY_IDLE")
+    os.environ[name]
+    for name in (
+        "RP_BENCH",
+        "RP_LIBRARY",
+        "RP_LIBRARY_FMI3",
+        "RP_LIBRARY_IDLE",
+        "RP_LIBRARY_PLANT",
+    )
 ]
 FMU = Path(os.environ["RP_FMU"])
 GROUPS = {
     "steps", "against", "precision", "step size", "instances", "threads", "energy", "instance",
-    "calls", "life",
+    "calls", "life", "plant",
 }  # fmt: skip
 METHODS = {"cvode_adams", "cvode_bdf", "erk", "taylor"}
 SHORT = arm.Work("1 ms steps, inputs changing", 1e-3, 50, "changing")
@@ -73,7 +80,7 @@ def test_bench_writes_every_group(result: dict) -> None:
     for group in ("steps", "precision", "step size"):
         runs = {row["run"] for row in result["rows"] if row["group"] == group}
         assert runs >= {"plain loop"} | METHODS
-    for group in ("calls", "life"):
+    for group in ("calls", "life", "plant"):
         assert {row["run"] for row in result["rows"] if row["group"] == group} == METHODS
     for group in ("instances", "threads"):
         runs = {row["run"] for row in result["rows"] if row["group"] == group}
