@@ -54,6 +54,16 @@ static void test_a_ball_in_the_air_does_not_rest(void) {
     check(&now->is_resting, &held->is_resting, 1, "the modes since the restart are impossible");
 }
 
+/* What update writes is 0 until it is called. */
+static void test_no_stroke_before_the_start(void) {
+    prepare(&hammer_description, 1, 1e-8);
+    struct hammer_values *now = (void *)toy->memory.values;
+    ASSERT_OK(pass_on());
+    now->start = 1.0;
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, pass_on());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "the modes are impossible"), last_text);
+}
+
 static void test_a_block_slides_where_its_velocity_points(void) {
     start(&block_description);
     struct block_values *now = (void *)toy->memory.values;

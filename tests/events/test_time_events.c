@@ -263,6 +263,26 @@ static void test_a_stroke_is_left_to_event_mode(void) {
 }
 
 /* An integrator outside goes to the time that it was given. */
+static enum status rising_force(void *context, double time) {
+    (void)context;
+    set(TOY_INPUT, 2.0 * time);
+    return STATUS_OK;
+}
+
+/* Where a step ends at a stroke, an input that it asked for keeps the value that it has there, not
+ * the one that was given for the end. */
+static void test_an_input_stays_where_the_stroke_is(void) {
+    static const enum event_handling handlings[] = {EVENTS_END, EVENTS_LEFT};
+    for (int i = 0; i < 2; i++) {
+        const struct step_options options = {.ask_inputs = rising_force, .at_event = handlings[i]};
+        start_hammer(1, 0.0, period, first);
+        ASSERT_OK(instance_do_step_with(toy, 0.0, 0.2, &options));
+        TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(toy));
+        ASSERT_OK(instance_do_step(toy, first, 0.1));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, first * first + kick + 2.0 * first * 0.1, get(TOY_SPEED));
+    }
+}
+
 static void test_integrated_from_outside(void) {
     struct discrete_update update;
     create(&hammer_description);
