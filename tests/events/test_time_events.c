@@ -160,6 +160,7 @@ static void test_state_events_beside_time_events(void) {
             set(TOY_PARAMETER1, 100.0);
             set(TOY_PARAMETER2, offsets[i]);
             set(TOY_PARAMETER3, kick);
+            set_int(TOY_MAX_EVENTS, 1); // of state events
             set(TOY_SPEED, -1.0);
             initialize();
             run(0.0, 3.0, 1);
