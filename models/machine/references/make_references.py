@@ -2,12 +2,13 @@
 
 For every variant ``sampled.csv``, the machine stepped in Jacobi order and read before inputs are
 set, and ``ecos.csv``, the same read after inputs are set, as Ecos does. machine.py steps the
-components, components.py has their equations. Variants without dry friction, contact or integral
+components, components.py has their equations; ``tightest.csv`` has the samples of the encoders that
+were nearest to another count. Variants without dry friction, contact or integral
 action have a ``monolithic.csv`` too, the solution in continuous time of monolithic.py.
 """
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +19,14 @@ sys.path.insert(0, str(FOLDER.parents[2]))
 from cosim.model import Value
 from models import system_references
 from models.machine.experiment import STEPS_PER_SECOND, STOP
-from models.machine.references.machine import COMPONENTS, DISCRETE, columns, sampled
+from models.machine.references.components import Sample
+from models.machine.references.machine import COMPONENTS, DISCRETE, Machine, columns
 from models.machine.references.monolithic import monolithic
 from models.rp_plant.references.solver import Solver
 from models.system_references import KEPT, communication_points
 
-FILES = {"sampled.csv": "before", "ecos.csv": "after"}
+FILES = ("sampled.csv", "ecos.csv")  # read before inputs are set, and after it
+TIGHTEST = 200  # samples of either joint that are kept
 CONTINUOUS = ("pick_and_place", "pick_and_place_untold")  # variants with monolithic.csv
 
 Files = dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]
@@ -38,14 +41,26 @@ def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) ->
     """Times and columns of the files of a machine in steps, by the name of the file."""
     times = communication_points(stop, STEPS_PER_SECOND)
     names = [*columns(), *DISCRETE]
-    runs = sampled(solver, parameters, times)
-    return {
+    machine = Machine(solver, parameters, times)
+    runs = dict(zip(FILES, machine.run(), strict=True))
+    stepped = {
         file: (
             times[::KEPT],
-            {name: np.array([row[name] for row in runs[read][::KEPT]]) for name in names},
+            {name: np.array([row[name] for row in rows[::KEPT]]) for name in names},
         )
-        for file, read in FILES.items()
+        for file, rows in runs.items()
     }
+    return stepped | {"tightest.csv": _tightest(machine.sensor.samples)}
+
+
+def _tightest(samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Times and columns of the samples with the least margins of either joint, in their order."""
+    margins = np.array([sample.margins for sample in samples])
+    positions = np.array([sample.positions for sample in samples])
+    kept = np.unique(np.argsort(margins, axis=0, kind="stable")[:TIGHTEST])
+    columns = {f"plant.q{i}": positions[kept, i - 1] for i in (1, 2)}
+    columns |= {f"margin{i}": margins[kept, i - 1] for i in (1, 2)}
+    return np.array([samples[k].time for k in kept]), columns
 
 
 def make_continuous(parameters: Mapping[str, Value]) -> Files:
