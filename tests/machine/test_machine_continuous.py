@@ -62,15 +62,15 @@ def test_errors_fall_by_the_order_and_vanish_in_the_limit(
     assert reached <= BOUND, name
 
 
-def test_a_controller_that_is_told_tracks_ten_times_better(
+def test_a_known_payload_is_tracked_ten_times_better(
     runs: dict[tuple[str, str], list[Columns]],
 ) -> None:
     """In continuous time, over the whole motion and in the limits of both engines at first."""
-    told, untold = (continuous.reference(variant) for variant in VARIANTS)
-    assert continuous.tracking_error(told) < 0.1 * continuous.tracking_error(untold)
-    assert continuous.tracking_error(told) == pytest.approx(0.17e-3, rel=0.02)
+    known, unknown = (continuous.reference(variant) for variant in VARIANTS)
+    assert continuous.tracking_error(known) < 0.1 * continuous.tracking_error(unknown)
+    assert continuous.tracking_error(known) == pytest.approx(0.17e-3, rel=0.02)
     # hanging down at rest, the slide carries what the law does not know of: m2 Kp2 e = mp g
-    sag = continuous.tracking_error(untold)
+    sag = continuous.tracking_error(unknown)
     assert sag == pytest.approx(9.81 / 400, rel=0.03)
     rows = len(next(iter(runs.values()))[0]["plant.q1"])
     for method in SHORT_METHODS:

@@ -3,8 +3,8 @@
 For every variant ``sampled.csv``, the machine stepped in Jacobi order and read before inputs are
 set, and ``ecos.csv``, the same read after inputs are set, as Ecos does. machine.py steps the
 components, components.py has their equations; ``tightest.csv`` has the samples of the encoders that
-were nearest to another count. Variants without dry friction, contact or integral
-action have a ``monolithic.csv`` too, the solution in continuous time of monolithic.py.
+were nearest to another count. ``pick_and_place`` and ``pick_and_place_untold`` have a
+``monolithic.csv`` too, the solution in continuous time of monolithic.py.
 """
 
 import sys
