@@ -25,7 +25,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.coupling.connected_instance import ConnectedInstance, Wiring
-from cosim.coupling.switches import Switches, is_switch
+from cosim.coupling.switches import Switches, split
 from cosim.errors import UserError
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
@@ -125,9 +125,7 @@ class Master:
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
-        switches, real = [], []
-        for connection in connections:
-            (switches if is_switch(fmus, connection) else real).append(connection)
+        switches, real = split(fmus, connections)
         _check(fmus, real, self.extrapolates)
         for component, name in also:
             _find(fmus, component, name, None)
@@ -234,7 +232,7 @@ class Master:
             for component in self.components.values():
                 with component.instance.explained(when):
                     component.set_inputs(self.values[component.sources])
-        names = ", ".join(self.names[i] for i in changing)
+        names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
 
     def _read_early(self, component: ConnectedInstance) -> None:

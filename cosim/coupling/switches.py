@@ -16,42 +16,51 @@ class Switches:
     instances : mapping of str to Instance
         By name of the component.
     connections : iterable of Connection
-        Those of `are_switches`.
+        As `split` gives them.
     """
 
     def __init__(
         self, instances: Mapping[str, Instance], connections: Iterable[Connection]
     ) -> None:
-        self._ends = [
-            (instances[c.start_component], c.start_connector, instances[c.end_component])
-            + (c.end_connector,)
-            for c in connections
-        ]
+        self._instances = instances
+        self._connections = list(connections)
 
-    def transfer(self) -> bool:
-        """Set the inputs whose sources have another value; whether there are any."""
-        changed = False
-        for source, output, target, name in self._ends:
-            value = source.boolean(output)
-            if value != target.boolean(name):
-                target.set(name, value)
-                changed = True
+    def transfer(self) -> list[str]:
+        """Set the inputs whose sources have another value; which these are."""
+        changed = []
+        for c in self._connections:
+            source, target = self._instances[c.start_component], self._instances[c.end_component]
+            value = source.boolean(c.start_connector)
+            if value != target.boolean(c.end_connector):
+                target.set(c.end_connector, value)
+                changed.append(f"{c.end_component}.{c.end_connector}")
         return changed
 
 
-def is_switch(fmus: Mapping[str, Fmu], connection: Connection) -> bool:
-    """Whether a connection begins at a Boolean output.
+def split(
+    fmus: Mapping[str, Fmu], connections: Iterable[Connection]
+) -> tuple[list[Connection], list[Connection]]:
+    """Connections that begin at a Boolean output, and the others.
 
     Raises
     ------
     UserError
-        If it does, and does not end at a Boolean input.
+        If one of the first does not end at a Boolean input, or two end at the same one.
     """
-    if not _is(fmus, connection.start_component, connection.start_connector, "output"):
-        return False
-    if not _is(fmus, connection.end_component, connection.end_connector, "input"):
-        raise UserError(f"{connection}: a Boolean feeds a Boolean input only")
-    return True
+    switches: list[Connection] = []
+    others: list[Connection] = []
+    for connection in connections:
+        is_switch = _is(fmus, connection.start_component, connection.start_connector, "output")
+        (switches if is_switch else others).append(connection)
+    seen = set()
+    for connection in switches:
+        end = connection.end_component, connection.end_connector
+        if not _is(fmus, *end, "input"):
+            raise UserError(f"{connection}: a Boolean feeds a Boolean input only")
+        if end in seen:
+            raise UserError(f"{'.'.join(end)}: is connected more than once")
+        seen.add(end)
+    return switches, others
 
 
 def _is(fmus: Mapping[str, Fmu], component: str, name: str, causality: str) -> bool:

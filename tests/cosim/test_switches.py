@@ -107,3 +107,5 @@ def test_a_boolean_feeds_a_boolean_only(fmus: dict[str, Fmu]) -> None:
     wrong = Connection("trajectory", "payload_attached", "plant", "tau1")
     with pytest.raises(UserError, match=r"payload_attached -> plant\.tau1: a Boolean feeds"):
         Master(fmus, [wrong])
+    with pytest.raises(UserError, match=r"^plant\.payload_attached: is connected more than once"):
+        Master(fmus, [*REAL, *WRENCH, *SWITCHES, SWITCHES[-1]])

@@ -68,7 +68,6 @@ def test_a_known_payload_is_tracked_ten_times_better(
     """In continuous time, over the whole motion and in the limits of both engines at first."""
     known, unknown = (continuous.reference(variant) for variant in VARIANTS)
     assert continuous.tracking_error(known) < 0.1 * continuous.tracking_error(unknown)
-    assert continuous.tracking_error(known) == pytest.approx(0.17e-3, rel=0.02)
     # hanging down at rest, the slide carries what the law does not know of: m2 Kp2 e = mp g
     sag = continuous.tracking_error(unknown)
     assert sag == pytest.approx(9.81 / 400, rel=0.03)

@@ -121,6 +121,8 @@ def test_accelerations_are_those_of_the_equations_by_hand() -> None:
     [
         ({"plant.coulomb_friction1": 0.1}, r"plant\.coulomb_friction1 has to be 0"),
         ({"controller.Ki2": 1.0}, r"controller\.Ki2 has to be 0"),
+        ({"controller.mode": 1}, r"controller\.mode keeps its default"),
+        ({"environment.position": 0.6}, r"the wall is touched"),
         ({"controller.tau1_max": 5.0}, r"controller\.tau1 reaches its limit 5\.0"),
         ({"actuator.voltage_max1": 0.1}, r"actuator\.voltage1 reaches its limit 0\.1"),
     ],

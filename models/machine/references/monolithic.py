@@ -18,7 +18,7 @@ from cosim.model import Value
 from models.closed_loop.references import equations as motion
 from models.closed_loop.references.closed_loop import prepare
 from models.closed_loop.references.loop import COEFFICIENTS
-from models.machine.references.components import UNKNOWN_TO_THE_CONTROLLER, real
+from models.machine.references.components import UNKNOWN_TO_THE_CONTROLLER, Environment, real
 from models.machine.references.machine import completed
 from models.rp_plant.references import equations as plant
 from models.rp_plant.references.equations import INPUTS, STATES
@@ -39,6 +39,8 @@ LEFT_OUT = (
     *(f"plant.{kind}_friction{i}" for kind in ("coulomb", "breakaway") for i in (1, 2)),
     *("controller.Ki1", "controller.Ki2"),
 )
+# other items of these have other equations
+DEFAULTS = ("trajectory.motion", "controller.mode", "plant.stops1", "plant.stops2", "plant.grasp")
 
 Columns = dict[str, np.ndarray]
 
@@ -59,6 +61,9 @@ class Monolith:
             component, _, variable = name.partition(".")
             if values[component][variable] != 0:
                 raise UserError(f"{name} has to be 0 for the machine in continuous time")
+        for name in DEFAULTS:
+            if name in parameters:
+                raise UserError(f"{name} keeps its default for the machine in continuous time")
         trajectory = {
             name: value
             for name, value in parameters.items()
@@ -83,6 +88,7 @@ class Monolith:
         self._carried = tuple(map(real, times)) if times[0] < times[1] else (real(0), real(0))
         self._start = [*(values["plant"][n] for n in STATES)]
         self._start += [values["actuator"][n] for n in CURRENTS]
+        self._wall = Environment(values["environment"])
         self._compile()
 
     def _par(self, name: str) -> hy.expression:
@@ -197,6 +203,7 @@ class Monolith:
                 rows.append(self._outputs(taylor.state, pars=taylor.pars, time=time)[:-1].copy())
         columns = dict(zip(COLUMNS, np.array(rows).T, strict=True))
         self._check_limits(columns)
+        self._check_wall(columns)
         return columns
 
     def _at(self, time: real) -> np.ndarray:
@@ -214,6 +221,14 @@ class Monolith:
         for name, limit in limits.items():
             if np.abs(columns[name]).max() >= self._numbers[limit]:
                 raise UserError(f"{name} reaches its limit {float(self._numbers[limit])!r}")
+
+    def _check_wall(self, columns: Columns) -> None:
+        """The wall has no place in the equations either."""
+        sources = (*EFFECTOR, "q1", "dq1")
+        for row in zip(*(columns[f"plant.{name}"] for name in sources), strict=True):
+            found = self._wall.outputs(dict(zip(Environment.INPUTS, row, strict=True)))
+            if found["penetration"] > 0:
+                raise UserError("the wall is touched")
 
 
 def monolithic(parameters: Mapping[str, Value], times: Iterable[float]) -> Columns:
