@@ -217,6 +217,11 @@ class Instance(ABC):
     @abstractmethod
     def _integer(self, reference: int) -> int: ...
 
+    def boolean(self, name: str) -> bool:
+        """Value of a Boolean variable."""
+        with self.explained(f"({name})"):
+            return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
+
     @abstractmethod
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
         """The Real variables `names`, to get or set at once, many times.

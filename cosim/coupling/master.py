@@ -1,17 +1,20 @@
 """A master that steps connected FMUs.
 
-Every component is an instance of an FMU; connections lead from Real outputs to Real inputs. Other
-inputs keep their values from before initialization. In Jacobi order all components make a step,
-then all outputs are read; each step takes its inputs from what was read at its beginning. In
-Gauss-Seidel order the components step one after the other, and each takes the newest outputs: those
-of the end of the step from components before it, those of its beginning from itself and the
-components behind it.
+Every component is an instance of an FMU; connections lead from Real outputs to Real inputs, or from
+Boolean outputs to Boolean inputs. Other inputs keep their values from before initialization. In
+Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
+what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
+each takes the newest outputs: those of the end of the step from components before it, those of its
+beginning from itself and the components behind it.
 
 Inputs are held over a step, or are straight lines through the value of their source at the time at
 which it was read, with its slope there: in Jacobi order they extrapolate from the beginning of the
 step, in Gauss-Seidel order those from components before it meet value and slope at the end of the
 step. FMI 3.0 knows slopes of inputs only within a step: at the start, those of outputs miss what
 they owe to the slopes of inputs.
+
+A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
+values jump to what follows from it at this time, as at the start.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -22,6 +25,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.coupling.connected_instance import ConnectedInstance, Wiring
+from cosim.coupling.switches import Switches, split
 from cosim.errors import UserError
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
@@ -92,7 +96,8 @@ class Master:
     names : tuple of str
         "component.variable" of all that is read, by component, outputs first.
     values : ndarray, shape (len(names),)
-        As read right after the last step, before inputs are set for the next one.
+        As read right after the last step, before inputs are set for the next one; where a Boolean
+        has changed, after all that follows from it.
     slopes : ndarray, shape (len(names),)
         Their derivatives with respect to time; only those that are connected, and only if
         `inputs` is "extrapolated".
@@ -120,21 +125,22 @@ class Master:
         self.extrapolates = inputs == "extrapolated"
         self.jacobi = order == "jacobi"
         self.time, self.do_steps = 0.0, 0
-        connections = list(connections)
-        _check(fmus, connections, self.extrapolates)
+        switches, real = split(fmus, connections)
+        _check(fmus, real, self.extrapolates)
         for component, name in also:
             _find(fmus, component, name, None)
         self._stack = ExitStack()
         try:
             instances = {}
             for name, fmu in fmus.items():
-                fed = [c.end_connector for c in connections if c.end_component == name]
+                fed = [c.end_connector for c in real if c.end_component == name]
                 instance = fmu.instance(name, fed if self.extrapolates else ())
                 instances[name] = self._stack.enter_context(instance)
         except BaseException:
             self._stack.close()
             raise
-        self._connect(instances, connections, also)
+        self._connect(instances, real, also)
+        self._switches = Switches(instances, switches)
 
     def __enter__(self) -> "Master":
         return self
@@ -206,26 +212,27 @@ class Master:
         self.time = start
         for component in self.components.values():
             component.begin(start, stop, parameters.get(component.name, {}))
-        self._propagate()
+        self._propagate(self._read_early, "in initialization")
         for component in self.components.values():
             component.instance.exit_initialization()
         if self.extrapolates:
             self._propagate_slopes()
 
-    def _propagate(self) -> None:
+    def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
         """Set inputs until no output follows any more: along direct feedthrough, once each."""
         before = np.full(len(self.names), np.nan)
         for _ in range(len(self.components) + 2):
+            switched = self._switches.transfer()
             for component in self.components.values():
-                self._read_early(component)
+                read(component)
             changing = np.flatnonzero(before != self.values)
-            if not len(changing):
+            if not (len(changing) or switched):
                 return
             before = self.values.copy()
             for component in self.components.values():
-                with component.instance.explained("in initialization"):
+                with component.instance.explained(when):
                     component.set_inputs(self.values[component.sources])
-        names = ", ".join(self.names[i] for i in changing)
+        names = ", ".join([*(self.names[i] for i in changing), *switched])
         raise UserError(f"the connections form an algebraic loop: {names}")
 
     def _read_early(self, component: ConnectedInstance) -> None:
@@ -238,18 +245,19 @@ class Master:
         self._check_finite(component)
 
     def _propagate_slopes(self) -> None:
-        """Slopes at the start: once per component, since those of inputs show in outputs'."""
+        """Slopes at one time: once per component, since those of inputs show in outputs'."""
+        when = f"for slopes at t = {self.time!r} s"
         for _ in self.components:
             for component in self.components.values():
-                with component.instance.explained(f"at the start, t = {self.time!r} s,"):
+                with component.instance.explained(when):
                     component.read_slopes()
             for component in self.components.values():
-                with component.instance.explained(f"at the start, t = {self.time!r} s,"):
+                with component.instance.explained(when):
                     component.set_lines(
                         self.values[component.sources], self.slopes[component.sources]
                     )
         for component in self.components.values():
-            with component.instance.explained(f"at the start, t = {self.time!r} s,"):
+            with component.instance.explained(when):
                 component.read_slopes()
 
     # ---- Steps -----------------------------------------------------------------------------------
@@ -271,6 +279,10 @@ class Master:
             for component in group:
                 self._read(component, end)
         self.time = end
+        if self._switches.transfer():
+            self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
+            if self.extrapolates:
+                self._propagate_slopes()
 
     def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
         """Inputs at the beginning of the step, of sources ahead and of others."""

@@ -5,31 +5,16 @@ cosim/system/study.py says what each name means.
 
 from pathlib import Path
 
-import numpy as np
-
-from cosim.system.comparison import Outcome
-from cosim.system.study import Measure
 from models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
-from models.closed_loop.motion_figure import PICTURE, distance, figure
+from models.closed_loop.motion_figure import ARM, PICTURE, figure
+from models.system_figure import tracking_error
 
 __all__ = ["EXPERIMENT", "MEASURES", "PICTURE", "figure", "study_coupling"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
 
-def tracking_error(outcome: Outcome) -> float:
-    """Largest distance of the end effector from its reference, mm."""
-    return 1e3 * float(np.max(distance(outcome)))
-
-
-MEASURES = (
-    Measure(
-        "tracking error",
-        "mm",
-        "largest distance of the end effector from its reference",
-        tracking_error,
-    ),
-)
+MEASURES = (tracking_error(ARM),)
 
 
 def study_coupling(ssp: Path, report: Path) -> bool:

@@ -8,16 +8,12 @@ import numpy as np
 from cosim.system.comparison import Outcome
 from cosim.system.study import Measure
 from models.machine.experiment import START, STEPS_PER_SECOND, STOP
-from models.machine.machine_figure import PICTURE, distance, figure
+from models.machine.machine_figure import ARM, PICTURE, figure
+from models.system_figure import tracking_error
 
 __all__ = ["EXPERIMENT", "MEASURES", "PICTURE", "figure"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
-
-
-def tracking_error(outcome: Outcome) -> float:
-    """Largest distance of the end effector from its reference, mm."""
-    return 1e3 * float(np.max(distance(outcome)))
 
 
 def contact_force(outcome: Outcome) -> float:
@@ -31,12 +27,7 @@ def stuck(outcome: Outcome) -> float:
 
 
 MEASURES = (
-    Measure(
-        "tracking error",
-        "mm",
-        "largest distance of the end effector from its reference",
-        tracking_error,
-    ),
+    tracking_error(ARM),
     Measure("contact force", "N", "largest force of the wall", contact_force),
     Measure("stuck", "%", "share of the time for which friction holds joint 1", stuck),
 )

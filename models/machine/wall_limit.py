@@ -11,11 +11,8 @@ measures it in Ecos and under cosim's master, and draws wall_limit.png beside th
 """
 
 import math
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import matplotlib as mpl
 import numpy as np
@@ -24,12 +21,11 @@ from matplotlib.figure import Figure
 from cosim import project
 from cosim.coupling.master import Master
 from cosim.fmu_file import Fmu
-from cosim.model import Model
 from cosim.report.style import ERRORS, RUN, STYLE, save
-from cosim.system import ecos, ssp
+from cosim.system import ssp
 from cosim.system.ssp import Ssp
-from cosim.system.structure import Connection
 from models.machine.stability import Contact, exact_least_damping, least_damping
+from models.machine.systems import direct, fmus_of, run_in_ecos, write_system
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -42,12 +38,8 @@ FAR = 50.0  # m, to where the controller wants the slide
 MOVED = 2e-7  # m, out of equilibrium
 STIFFNESSES = (2e3, 5e3, 1e4, 2e4)  # N/m, of the picture
 CASES = tuple((o, i) for i in ("held", "extrapolated") for o in ("jacobi", "gauss_seidel"))
-STRUCTURE = "SystemStructure.ssd"
-VARIANT = "pressed"
 DEPTH = "environment.penetration"
-SEQUENCE = ("trajectory", "controller", "actuator", "plant", "environment")
 
-Parameters = Mapping[str, Mapping[str, float]]
 Measure = Callable[[float, float], np.ndarray]  # stiffness, damping -> depths (rows,) m
 
 
@@ -92,75 +84,26 @@ def in_ecos(opened: Ssp) -> Measure:
     """Runs the machine in Ecos."""
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
-        with TemporaryDirectory(prefix="cosim-") as folder:
-            path = Path(folder) / "Pressed.ssp"
-            write_system(opened, path, pressed(stiffness, damping))
-            with ssp.unpacked(path) as other:
-                return ecos.run(other, VARIANT, [DEPTH]).values[:, 0]
+        run = run_in_ecos(opened, pressed(stiffness, damping), STEPS * STEP, STEP, [DEPTH])
+        return run[:, 0]
 
     return measure
 
 
-def write_system(opened: Ssp, path: Path, parameters: Parameters) -> None:
-    """An SSP of the machine with one short variant, of these parameters."""
-    first = next(iter(opened.system.parameters))
-    text = (opened.folder / STRUCTURE).read_text(encoding="utf-8")
-    old = f'stopTime="{opened.system.stop:g}"'
-    if old not in text:
-        raise ValueError(f"{opened.path}: no {old}")
-    text = text.replace(old, f'stopTime="{STEPS * STEP:g}"')
-    for variant in opened.system.parameters:
-        for component in opened.models:
-            binding = f'<ssd:ParameterBinding source="resources/{component}_{variant}.ssv"/>'
-            # the first variant is bound first and last
-            name = f'<ssd:ParameterBinding source="resources/{component}.ssv"/>'
-            text = text.replace(binding, name if variant == first else "")
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr(STRUCTURE, text)
-        for component in opened.system.components:
-            values = values_file(opened.models[component.name], parameters[component.name])
-            archive.writestr(f"resources/{component.name}.ssv", values)
-            archive.write(opened.fmu(component.name), component.source)
-
-
-def values_file(model: Model, values: Mapping[str, float]) -> str:
-    """Text of a parameter set."""
-    rows = "".join(
-        f'<ssv:Parameter name="{name}"><ssv:Real value="{value!r}"/></ssv:Parameter>'
-        for name, value in values.items()
-        if model.variables[name].type == "Real"
-    )
-    return (
-        f'<ssv:ParameterSet version="1.0" name="{VARIANT}" '
-        'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">'
-        f"<ssv:Parameters>{rows}</ssv:Parameters></ssv:ParameterSet>"
-    )
+def write_pressed(opened: Ssp, path: Path, stiffness: float, damping: float) -> None:
+    """An SSP of the machine whose slide is pressed to the wall."""
+    write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
 
 
 # ---- cosim's master ------------------------------------------------------------------------------
 
 
-@contextmanager
-def fmus_of(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    """The FMUs of the machine but the sensor, whose outputs have no slopes, in their order."""
-    with ExitStack() as stack:
-        yield {name: stack.enter_context(Fmu(opened.fmu(name))) for name in SEQUENCE}
-
-
 def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) -> Measure:
     """Runs the machine under cosim's master; the controller sees the joints themselves."""
-    system = opened.system
-    real = [
-        Connection("plant", c.end_connector, c.end_component, c.end_connector)
-        if c.start_component == "sensor"
-        else c
-        for c in system.connections
-        if system.component(c.start_component).connectors[c.start_connector].type == "Real"
-        and c.end_component != "sensor"
-    ]
+    connections = direct(opened.system.connections)
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
-        with Master(fmus, real, order, inputs) as master:
+        with Master(fmus, connections, order, inputs) as master:
             parameters = pressed(stiffness, damping)
             del parameters["sensor"]
             master.initialize(0.0, STEPS * STEP, parameters)

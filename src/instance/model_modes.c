@@ -69,10 +69,10 @@ static enum status update(struct instance *instance, const bool *fired) {
         .reason = reason,
         .reason_size = sizeof reason,
     };
-    const double next_time = instance_next_time(instance);
+    const double passed = event.is_timed ? instance_next_time(instance) : -INFINITY;
     enum status status = events->update(instance->memory.values, &event);
     if (status == STATUS_OK && event.is_timed) {
-        status = check_next_time(instance, next_time);
+        status = check_next_time(instance, passed);
     }
     if (status != STATUS_OK) {
         message_write(&instance->sink, status, "no modes at t = %.17g: %s", event.t,

@@ -12,7 +12,9 @@ from models.machine.experiment import STEPS_PER_SECOND, STOP
 from tests.support.paths import ROOT
 
 SSP = ROOT / "build" / "Machine.ssp"
-VARIANTS = ("pick_and_place", "pick_and_place_untold", "stick_slip", "wall_contact")
+VARIANTS = (
+    *("pick_and_place", "pick_and_place_untold", "stick_slip", "wall_contact", "noisy_sensor"),
+)
 BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
 SCALE = 1e-3
 STEPS = round(STOP * STEPS_PER_SECOND)
@@ -147,7 +149,29 @@ def test_drives_and_encoders_are_what_their_pages_say() -> None:
         assert late.max() <= 2e-3 * fastest + resolution
 
 
-@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip"])
+def test_noise_and_latency_are_those_of_the_sensor() -> None:
+    """Two ticks late, with the noise that was asked for and that of rounding to counts."""
+    columns, quiet = run("noisy_sensor"), run("pick_and_place")
+    for joint, deviation, resolution in ((1, 1.2e-5, 5.992112452678286e-06), (2, 2.5e-6, 1.25e-6)):
+        counted = columns[f"sensor.counts{joint}"] * resolution
+        position = columns[f"plant.q{joint}"]
+        # a tick takes what the step began with, and shows the sample of two ticks before
+        noise = counted[4:] - position[1:-3]
+        wanted = np.hypot(deviation, resolution / np.sqrt(12))
+        assert np.std(noise) == pytest.approx(wanted, rel=0.05)
+        assert abs(np.mean(noise)) < 4 * wanted / np.sqrt(len(noise))
+        for other in (position[2:-2], position[:-4]):  # moving, it is seen that they are two
+            assert np.std(counted[4:] - other) > (2.0 if joint == 1 else 1.0) * np.std(noise)
+        # efforts shake by it, above all through the velocity
+        effort = "actuator.tau1" if joint == 1 else "actuator.f2"
+        shaking, calm = (np.std(np.diff(c[effort])) for c in (columns, quiet))
+        assert shaking > 2 * calm
+    # later feedback, a larger error; still far below that of a payload that is not known
+    assert distance(quiet).max() < distance(columns).max()
+    assert distance(columns).max() < 0.1 * distance(run("pick_and_place_untold")).max()
+
+
+@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip", "noisy_sensor"])
 def test_fmus_of_fmi_3_give_the_same_bits(variant: str) -> None:
     first, second = run(variant), run(variant, "fmi3")
     assert list(first) == list(second)

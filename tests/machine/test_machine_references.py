@@ -23,14 +23,16 @@ def test_variants_are_those_of_the_system() -> None:
     assert set(make_references.variants()) == set(VARIANTS)
 
 
-@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip"])
+@pytest.mark.parametrize("variant", ["pick_and_place", "stick_slip", "noisy_sensor"])
 def test_made_again_it_begins_alike(solver: Solver, variant: str) -> None:
     parameters = make_references.variants()[variant]
-    times, names, files = make_references.make(solver, parameters, STOP)
-    assert len(times) == round(STOP * STEPS_PER_SECOND) // make_references.KEPT + 1
-    for file, values in files.items():
+    made = make_references.make(solver, parameters, STOP)
+    for file in make_references.FILES:
+        times, columns = made[file]
+        assert len(times) == round(STOP * STEPS_PER_SECOND) // make_references.KEPT + 1
         kept = reference(variant, file)
-        for name, column in zip(names, values.T, strict=True):
+        assert list(kept) == ["time", *columns]
+        for name, column in columns.items():
             rows = kept[name][: len(times)]
             scale = max(np.abs(rows).max(), 1e-3)
             assert np.abs(column - rows).max() <= 1e-13 * scale, (file, name)
@@ -71,12 +73,16 @@ def test_counts_come_late_and_round_half_up() -> None:
         q = {"q1": 0.25 * i, "q2": -0.5 * i}
         if i == 3:  # its end is a tick
             with pytest.raises(UserError, match=r"tick 2 is at the communication point 0\.003 s"):
-                sensor.step(q, real(0), real(3) / 1000)
+                sensor.step(q, real(2) / 1000, real(3) / 1000)
             break
-        sensor.step(q, real(0), real(i) / 1000)
+        sensor.step(q, real(i - 1) / 1000, real(i) / 1000)
         shown.append([int(sensor.outputs({})[f"counts{j}"]) for j in (1, 2)])
     assert shown == [[0, 0], [0, 0]]
     assert sensor._counts == [[0, 0], [1, -1]]
+    # whole counts are half a count away from others
+    assert [[float(x) for x in s.margins] for s in sensor.samples] == [[0.25, 0.5], [0.25, 0.5]]
+    assert [[float(x) for x in s.positions] for s in sensor.samples] == [[0.0, 0.0], [0.5, -1.0]]
+    assert [float(s.time) for s in sensor.samples] == [0.0, 0.001]
 
 
 def test_ticks_do_not_drift() -> None:

@@ -46,7 +46,7 @@ def test_ecos(opened: Ssp, stiffness: float) -> None:
 def test_libcosim(opened: Ssp, tmp_path: Path) -> None:
     def measure(stiffness: float, damping: float) -> np.ndarray:
         path = tmp_path / "Pressed.ssp"
-        wall_limit.write_system(opened, path, wall_limit.pressed(stiffness, damping))
+        wall_limit.write_pressed(opened, path, stiffness, damping)
         return libcosim(path, [DEPTH], STEPS, tmp_path)[DEPTH]
 
     check(measure, STIFFNESS, "jacobi", "held")

@@ -5,12 +5,15 @@ two points nothing reaches it. All numbers are long doubles. Names are those of 
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
+import mpmath as mp
 import numpy as np
 
 from cosim.errors import UserError
 from models.rp_plant.references.equations import PARAMETERS as PLANT_PARAMETERS
 from models.rp_plant.references.solver import NUMBERS, PLACE, Solver
+from models.rp_sensor.references.make_references import noise
 
 real = np.longdouble
 Values = Mapping[str, float]
@@ -76,28 +79,48 @@ class Actuator:
         return found
 
 
+@dataclass(frozen=True)
+class Sample:
+    """What the encoders took at a tick."""
+
+    time: real  # s, of the communication point whose positions they were given
+    positions: tuple[real, ...]  # (2,) rad, m
+    margins: tuple[real, ...]  # (2,) rad, m: how far the next count is
+
+
 class Sensor:
-    """Encoders: counts at ticks, shown `latency` ticks later; velocities from their differences."""
+    """Encoders: counts at ticks, shown `latency` ticks later; velocities from their differences.
+
+    `samples` are those of all ticks, the start included.
+    """
 
     INPUTS = ("q1", "q2")
 
     def __init__(self, parameters: Values, inputs: Values, start: float = 0.0) -> None:
-        if parameters["noise1"] != 0 or parameters["noise2"] != 0:
-            raise UserError("the references are for a sensor without noise")
         self._parameters = parameters
         self._ticks = Ticks(parameters["sample_time"], start)
-        self._counts = [self._sample(inputs)]
+        self.samples: list[Sample] = []
+        self._counts: list[list[int]] = []
+        self._sample(inputs, real(start), 0)
 
-    def _sample(self, inputs: Values) -> list[int]:
-        resolution = [real(self._parameters[f"resolution{i}"]) for i in JOINTS]
-        return [
-            int(np.floor(real(inputs[f"q{i}"]) / resolution[i - 1] + real(0.5))) for i in JOINTS
-        ]
+    def _sample(self, inputs: Values, time: real, tick: int) -> None:
+        p, counts, margins = self._parameters, [], []
+        positions = tuple(real(inputs[f"q{i}"]) for i in JOINTS)
+        for j, (i, position) in enumerate(zip(JOINTS, positions, strict=True)):
+            resolution = real(p[f"resolution{i}"])
+            if p[f"noise{i}"] != 0:
+                normal = mp.nstr(noise(int(p["seed"]), j, tick), 25)
+                position = position + real(p[f"noise{i}"]) * real(normal)
+            place = position / resolution + real(0.5)
+            counts.append(int(np.floor(place)))
+            margins.append(np.abs(place - np.rint(place)) * resolution)
+        self.samples.append(Sample(time, positions, tuple(margins)))
+        self._counts.append(counts)
 
     def step(self, inputs: Values, begin: real, end: real) -> None:
         """The ticks until `end`."""
-        del begin
-        self._counts.extend(self._sample(inputs) for _ in self._ticks.until(end))
+        for k in self._ticks.until(end):
+            self._sample(inputs, begin, k)
 
     def _shown(self, back: int) -> list[int]:
         """Counts that are shown, `back` ticks ago."""

@@ -59,10 +59,8 @@ WIRES: dict[str, dict[str, str]] = {
 }
 DISCRETE = ("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2")
 DISCRETE = (*DISCRETE, "trajectory.payload_attached")
-READ = ("before", "after")
 
 Parameters = Mapping[str, Value]
-Columns = dict[str, np.ndarray]
 
 
 class Plant(Motion):
@@ -166,13 +164,6 @@ class Machine:
             inputs = {name: self._inputs(name) for name in WIRES}
             after.append(self._read(inputs, row))
         return before, after
-
-
-def sampled(
-    solver: Solver, parameters: Parameters, times: Sequence[float]
-) -> dict[str, list[dict[str, real]]]:
-    """Values of all outputs at the points `times`, by when they are read, one of `READ`."""
-    return dict(zip(READ, Machine(solver, parameters, times).run(), strict=True))
 
 
 @cache

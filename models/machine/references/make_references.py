@@ -2,85 +2,81 @@
 
 For every variant ``sampled.csv``, the machine stepped in Jacobi order and read before inputs are
 set, and ``ecos.csv``, the same read after inputs are set, as Ecos does. machine.py steps the
-components, components.py has their equations.
+components, components.py has their equations; ``tightest.csv`` has the samples of the encoders that
+were nearest to another count. ``pick_and_place`` and ``pick_and_place_untold`` have a
+``monolithic.csv`` too, the solution in continuous time of monolithic.py.
 """
 
-import argparse
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
 FOLDER = Path(__file__).resolve().parent
-ROOT = FOLDER.parents[2]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(FOLDER.parents[2]))
 
-from cosim import trajectory_csv
-from cosim.errors import UserError
+from cosim.model import Value
+from models import system_references
 from models.machine.experiment import STEPS_PER_SECOND, STOP
-from models.machine.references.machine import COMPONENTS, DISCRETE, columns, sampled
+from models.machine.references.components import Sample
+from models.machine.references.machine import COMPONENTS, DISCRETE, Machine, columns
+from models.machine.references.monolithic import monolithic
 from models.rp_plant.references.solver import Solver
+from models.system_references import KEPT, communication_points
 
-RESOURCES = FOLDER.parent / "resources"  # the parameter sets, <component>_<variant>.ssv
-NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
-FILES = {"sampled.csv": "before", "ecos.csv": "after"}
-KEPT = 20  # every so many communication points go into the files
+FILES = ("sampled.csv", "ecos.csv")  # read before inputs are set, and after it
+TIGHTEST = 200  # samples of either joint that are kept
+CONTINUOUS = ("pick_and_place", "pick_and_place_untold")  # variants with monolithic.csv
+
+Files = dict[str, tuple[np.ndarray, dict[str, np.ndarray]]]
 
 
-def variants() -> dict[str, dict[str, float]]:
+def variants() -> dict[str, dict[str, Value]]:
     """Parameters of every variant, ``component.name``."""
-    found: dict[str, dict[str, float]] = {}
-    for component in COMPONENTS:
-        for path in sorted(RESOURCES.glob(f"{component}_*.ssv")):
-            parameters = found.setdefault(path.stem.removeprefix(f"{component}_"), {})
-            for parameter in ElementTree.parse(path).iterfind(".//ssv:Parameter", NAMESPACE):
-                parameters[f"{component}.{parameter.get('name')}"] = float(
-                    parameter[0].get("value", "")
-                )
-    return found
+    return system_references.variants(FOLDER.parent, COMPONENTS)
 
 
-def communication_points(stop: float = STOP, per_second: int = STEPS_PER_SECOND) -> np.ndarray:
-    """Communication points from 0 to `stop` in s, each rounded once."""
-    return np.arange(round(stop * per_second) + 1) / per_second
-
-
-def make(
-    solver: Solver, parameters: dict[str, float], stop: float = STOP
-) -> tuple[np.ndarray, list[str], dict[str, np.ndarray]]:
-    """Times (rows,), names of the columns, and values (rows, columns) of each file."""
-    times = communication_points(stop)
+def make(solver: Solver, parameters: Mapping[str, Value], stop: float = STOP) -> Files:
+    """Times and columns of the files of a machine in steps, by the name of the file."""
+    times = communication_points(stop, STEPS_PER_SECOND)
     names = [*columns(), *DISCRETE]
-    runs = sampled(solver, parameters, times)
-    values = {
-        file: np.array([[row[name] for name in names] for row in runs[read][::KEPT]])
-        for file, read in FILES.items()
+    machine = Machine(solver, parameters, times)
+    runs = dict(zip(FILES, machine.run(), strict=True))
+    stepped = {
+        file: (
+            times[::KEPT],
+            {name: np.array([row[name] for row in rows[::KEPT]]) for name in names},
+        )
+        for file, rows in runs.items()
     }
-    return times[::KEPT], names, values
+    return stepped | {"tightest.csv": _tightest(machine.sensor.samples)}
+
+
+def _tightest(samples: Sequence[Sample]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Times and columns of the samples with the least margins of either joint, in their order."""
+    margins = np.array([sample.margins for sample in samples])
+    positions = np.array([sample.positions for sample in samples])
+    kept = np.unique(np.argsort(margins, axis=0, kind="stable")[:TIGHTEST])
+    columns = {f"plant.q{i}": positions[kept, i - 1] for i in (1, 2)}
+    columns |= {f"margin{i}": margins[kept, i - 1] for i in (1, 2)}
+    return np.array([samples[k].time for k in kept]), columns
+
+
+def make_continuous(parameters: Mapping[str, Value]) -> Files:
+    """Times and columns of monolithic.csv."""
+    times = communication_points(STOP, STEPS_PER_SECOND)[::KEPT]
+    return {"monolithic.csv": (times, monolithic(parameters, times))}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description="Makes the references of the machine.")
-    parser.add_argument("names", nargs="*", metavar="VARIANT", help="variants (default: all)")
-    parser.add_argument("--output", type=Path, default=FOLDER, metavar="DIR", help="write there")
-    arguments = parser.parse_args()
-    try:
-        known = variants()
-        for name in arguments.names:
-            if name not in known:
-                raise UserError(f"no variant {name!r} (known: {', '.join(known)})")
-        solver = Solver()
-        for name in arguments.names or known:
-            folder = arguments.output / name
-            folder.mkdir(parents=True, exist_ok=True)
-            times, names, files = make(solver, known[name])
-            for file, values in files.items():
-                rounded = values.astype(np.float64) + 0.0  # no negative zeros
-                trajectory_csv.write(folder / file, times, names, rounded)
-                print(f"{name}/{file}: {len(times)} rows")
-    except UserError as error:
-        sys.exit(f"error: {error}")
+    solver, known = Solver(), variants()
+
+    def files(name: str) -> Files:
+        found = make(solver, known[name])
+        return found | make_continuous(known[name]) if name in CONTINUOUS else found
+
+    system_references.main(FOLDER, known, files)
 
 
 if __name__ == "__main__":

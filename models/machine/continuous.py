@@ -1,0 +1,203 @@
+"""The machine in steps that become shorter, against its solution in continuous time.
+
+The sensor is left out and the controller is in its continuous form, so that nothing but the
+coupling is left between the co-simulation and references/monolithic.py. The errors fall with
+the first power of the step where inputs are held, with the second where they are extrapolated.
+What remains as the step goes to 0 is calculated from several steps by Richardson extrapolation.
+
+    build/venv/bin/python -m models.machine.continuous
+
+runs it in Ecos and under cosim's master, prints tables, and draws continuous.png beside this file.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from cosim import project, trajectory_csv
+from cosim.coupling.master import Master
+from cosim.errors import UserError
+from cosim.fmu_file import Fmu
+from cosim.model import Value
+from cosim.report.style import ERRORS, RUN, STYLE, save
+from cosim.system import ssp
+from cosim.system.ssp import Ssp
+from models.machine.experiment import STOP
+from models.machine.systems import SENSOR, direct, fmus_of, run_in_ecos
+
+FOLDER = Path(__file__).resolve().parent
+VARIANTS = ("pick_and_place", "pick_and_place_untold")
+ROWS_PER_SECOND = 50  # of the references, which all steps divide
+BOUND = 1e-7  # of the largest value of a variable, or of SMALLEST where that is larger
+SMALLEST = 1e-3  # in the unit of each variable
+
+Columns = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to step the machine.
+
+    The payload changes at 0.2005 s and 3.7005 s. These are communication points for the master,
+    which passes the change on at once. For Ecos, whose times are sums of steps, they are in the
+    middle of a step, so that the payload always changes half a step later.
+    """
+
+    name: str
+    power: int  # of the step, by which errors fall
+    per_second: tuple[int, ...]  # steps
+    order: str = ""  # of the master; none: Ecos
+    inputs: str = "held"
+
+
+METHODS = (
+    Method("Ecos", 1, (5000, 7000, 9000, 11000, 13000, 15000)),
+    Method("Jacobi, inputs held", 1, (4000, 6000, 8000, 10000, 12000, 16000), "jacobi"),
+    Method(
+        "Jacobi, inputs extrapolated", 2, (4000, 6000, 8000, 12000, 16000), "jacobi", "extrapolated"
+    ),
+    Method(
+        "Gauss-Seidel, inputs extrapolated",
+        2,
+        (4000, 6000, 8000, 12000, 16000),
+        "gauss_seidel",
+        "extrapolated",
+    ),
+)
+
+
+def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
+    """Values of a variant by component and name, with the controller in its continuous form."""
+    values = {name: dict(found) for name, found in opened.system.parameter_sets[variant].items()}
+    del values[SENSOR]
+    values["controller"] |= {"sample_time": 0.0, "delay": 0.0}
+    return values
+
+
+def reference(variant: str) -> Columns:
+    """Columns of the solution in continuous time, by name."""
+    path = project.references(FOLDER) / variant / "monolithic.csv"
+
+    def failure(message: str, line: int | None) -> UserError:
+        return UserError(f"{path}, line {line}: {message}")
+
+    names, table = trajectory_csv.read(path, failure)
+    return dict(zip(names, table.T, strict=True))
+
+
+def run(
+    opened: Ssp,
+    fmus: Mapping[str, Fmu],
+    method: Method,
+    variant: str,
+    per_second: int,
+    stop: float = STOP,
+) -> Columns:
+    """Values at the times of the reference up to `stop` in s, by name."""
+    every = per_second // ROWS_PER_SECOND
+    values = parameters(opened, variant)
+    if not method.order:
+        names = [name for name in reference(variant) if name != "time"]
+        rows = run_in_ecos(opened, values, stop, 1 / per_second, names, with_sensor=False)
+        return dict(zip(names, rows[::every].T, strict=True))
+    with Master(fmus, direct(opened.system.connections), method.order, method.inputs) as master:
+        master.initialize(0.0, stop, values)
+        rows = master.run(np.arange(round(stop * per_second) + 1) / per_second)
+        return dict(zip(master.names, rows[::every].T, strict=True))
+
+
+def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tuple[Columns, float]:
+    """Values for a step that goes to 0, and by how much they enlarge the errors of the runs.
+
+    The errors are a polynomial in the step that begins with `power` and has as many terms as it
+    takes for all runs but one.
+    """
+    steps = per_second[0] / np.array(per_second)
+    terms = steps[:, None] ** np.array([0, *range(power, power + len(runs) - 1)])
+    weights = np.linalg.solve(terms.T, np.eye(len(runs))[0])
+    columns = {
+        name: sum(w * found[name] for w, found in zip(weights, runs, strict=True))
+        for name in runs[0]
+    }
+    return columns, float(np.abs(weights).sum())
+
+
+def error(columns: Columns, expected: Columns) -> tuple[float, str]:
+    """Largest error of all variables, relative to the largest value of each, and whose it is.
+
+    `columns` have the first rows of `expected`, or all.
+    """
+    errors = {
+        name: float(
+            np.abs(columns[name] - values[: len(columns[name])]).max()
+            / max(np.abs(values).max(), SMALLEST)
+        )
+        for name, values in expected.items()
+        if name != "time"
+    }
+    worst = max(errors, key=errors.__getitem__)
+    return errors[worst], worst
+
+
+def tracking_error(columns: Columns) -> float:
+    """Largest distance of the end effector from its reference, m."""
+    away = (columns[f"plant.ee_{x}"] - columns[f"trajectory.ee_{x}_ref"] for x in "xy")
+    return float(np.hypot(*away).max())
+
+
+# ---- the picture ---------------------------------------------------------------------------------
+
+
+def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figure:
+    """Errors over the step, and the error of the limit, by variant and method."""
+    with mpl.rc_context(STYLE):
+        picture = Figure(figsize=(13, 6), layout="constrained")
+        for variant, axes in zip(VARIANTS, picture.subplots(1, 2, sharey=True), strict=True):
+            for color, method in zip((RUN, *ERRORS[:3]), METHODS, strict=True):
+                errors, left = measured[variant, method.name]
+                steps = 1e3 / np.array(method.per_second)
+                axes.loglog(steps, errors, "o-", color=color, label=method.name)
+                axes.axhline(left, color=color, linestyle=":", linewidth=1.5)
+            axes.axhline(BOUND, color="#6b7885", linewidth=1.0)
+            axes.set_xlabel("communication step (ms)")
+            axes.set_title(variant, loc="left", fontsize=11)
+        picture.axes[0].set_ylabel("largest relative error of all variables")
+        picture.axes[0].legend(loc="center right")
+        picture.suptitle(
+            "Machine without encoders and sampling: errors (points), and what is left of them for "
+            "a step that goes to 0 (dotted), with the bound",
+            x=0.015,
+            ha="left",
+            fontsize=12,
+        )
+    return picture
+
+
+def main() -> None:
+    measured: dict[tuple[str, str], tuple[list[float], float]] = {}
+    with ssp.unpacked(project.built(FOLDER, ".ssp")) as opened, fmus_of(opened) as fmus:
+        for variant in VARIANTS:
+            expected = reference(variant)
+            print(f"{variant}: tracking error {1e3 * tracking_error(expected):.4g} mm")
+            for method in METHODS:
+                runs = [run(opened, fmus, method, variant, n) for n in method.per_second]
+                errors = [error(columns, expected)[0] for columns in runs]
+                left, enlarged = limit(runs, method.per_second, method.power)
+                measured[variant, method.name] = errors, error(left, expected)[0]
+                print(
+                    f"  {method.name}: "
+                    + ", ".join(f"{x:.3g}" for x in errors)
+                    + f"; limit: {error(left, expected)[0]:.3g} ({error(left, expected)[1]}), "
+                    f"rounding times {enlarged:.3g}, "
+                    f"tracking error {1e3 * tracking_error(left):.8g} mm",
+                    flush=True,
+                )
+    save(draw(measured), FOLDER / "continuous.png")
+
+
+if __name__ == "__main__":
+    main()
