@@ -13,11 +13,10 @@ from typing import NoReturn
 
 from cosim import project
 from cosim.errors import UserError, reason
+from cosim.interruption import handle_endings
 from cosim.model import VERSIONS
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
-# signals that end the program; Windows has no SIGHUP, SIGBREAK is its Ctrl-Break and closed console
-ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -67,21 +66,12 @@ def _drop_output() -> None:
 
 
 def _as_program() -> int:
-    """`main`, ended by Ctrl-C or another of `ENDINGS`: temporary files are removed then.
+    """`main`, ended by Ctrl-C or another signal of its kind: temporary files are removed then.
 
     Compiled code of libraries may turn the exception of a signal into another one: whatever
     arrives after a signal counts as its end.
     """
-    received: list[int] = []
-
-    def stop(number: int, _: object) -> NoReturn:
-        received.append(number)
-        raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)
-
-    for ending in (getattr(signal, name) for name in ENDINGS if hasattr(signal, name)):
-        # else it is ignored: nohup does so
-        if signal.getsignal(ending) in (signal.SIG_DFL, signal.default_int_handler):
-            signal.signal(ending, stop)
+    received = handle_endings()
     try:
         return main()
     except Exception:

@@ -2,8 +2,8 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from zipfile import BadZipFile, ZipFile
 
 import fmpy
@@ -15,6 +15,7 @@ from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmi3_instance import Fmi3Instance
 from cosim.fmi_instance import Instance
 from cosim.input_files import UnreadableError
+from cosim.interruption import temporary_folder
 from cosim.model import VERSIONS, Model, described, is_known
 
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
@@ -35,9 +36,8 @@ class Fmu:
         self.guid = description.guid  # in FMI 3.0, the instantiationToken
         self.log_categories = [category.name for category in description.logCategories]
         self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
-        # Windows does not remove a library that is still loaded, as after a fatal error
-        self._unpacked = TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
-        self.folder = Path(self._unpacked.name)
+        self._unpacked = ExitStack()
+        self.folder = self._unpacked.enter_context(temporary_folder())
         try:
             fmpy.extract(self.path, self.folder)
         except OSError as error:
@@ -62,7 +62,7 @@ class Fmu:
 
     def close(self) -> None:
         """Remove the unpacked copy."""
-        self._unpacked.cleanup()
+        self._unpacked.close()
 
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
         """A new instance, of the class for the FMU's version of FMI; `name` is in its messages.

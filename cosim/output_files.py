@@ -4,8 +4,10 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from cosim.errors import UserError, reason
+from cosim.interruption import uninterrupted
 
 
 @contextmanager
@@ -28,6 +30,14 @@ def written(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise UserError(f"{path}: the report cannot be written: {reason(error)}") from error
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder for the report that cannot be made or written, before anything runs."""
+    with written(folder):
+        existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        with uninterrupted(), TemporaryFile(dir=existing, prefix="cosim-"):
+            pass
 
 
 def from_here(path: Path) -> Path:

@@ -12,7 +12,7 @@ from cosim.convergence import Convergence
 from cosim.errors import UserError
 from cosim.fmu_file import Fmu
 from cosim.model import VERSIONS
-from cosim.output_files import from_here, written
+from cosim.output_files import check_writable, from_here, written
 from cosim.progress import Progress
 from cosim.report import pages
 from cosim.scenario import Scenario
@@ -29,8 +29,7 @@ def run(options: argparse.Namespace) -> int:
         runs = Runs(fmus, twins)
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
-        with written(options.report):  # and so is a report folder that cannot be made
-            options.report.mkdir(parents=True, exist_ok=True)
+        check_writable(options.report)
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []
         if options.tolerance is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cosim import console, project
 from cosim.errors import UserError, did_you_mean
-from cosim.output_files import from_here, written
+from cosim.output_files import check_writable, from_here, written
 from cosim.system import comparison, report, ssp, study
 from cosim.system.comparison import Outcome, Reference
 from cosim.system.report import Section
@@ -55,6 +55,7 @@ def run(options: argparse.Namespace) -> int:
             for system, names in chosen:
                 print(system.folder.name, *(f"  {name}" for name in names), sep="\n")
             return 0
+        check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
                 report.remove(options.report, system.folder.name, names)
@@ -99,7 +100,8 @@ def _choose(systems: Sequence[_System], names: Sequence[str]) -> list[tuple[_Sys
             owners[variant] = f"a variant of {system.folder.name}"
     for name in names:
         if name not in owners:
-            known = "; ".join(f"{s.folder.name}: {', '.join(s.variants)}" for s in systems)
+            meant = [s for s in systems if s.folder.name in names] or systems
+            known = "; ".join(f"{s.folder.name}: {', '.join(s.variants)}" for s in meant)
             raise UserError(f"no variant {name!r}{did_you_mean(name, owners)} (there are: {known})")
     chosen = []
     for system in systems:

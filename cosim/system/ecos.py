@@ -17,13 +17,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cosim import project
 from cosim.errors import UserError, one_line
+from cosim.interruption import temporary_folder, uninterrupted
 
 if TYPE_CHECKING:  # the child does not need these modules
     from cosim.system.ssp import Ssp
@@ -70,9 +70,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
     _check_parameters(ssp, variant)
-    # Windows does not remove files that a program of a run that was interrupted still holds
-    with TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         plan = {
             "ssp": str(ssp.path.resolve()),
             "variant": variant,
@@ -120,22 +118,25 @@ def _start(folder: Path) -> int:
     """Run the child; its exit code."""
     temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))  # the last two: on Windows
     environment = os.environ | temporary | {"PYTHONUNBUFFERED": "1"}
-    with (folder / LOG).open("wb") as log:
-        child = subprocess.Popen(
-            [sys.executable, "-m", "cosim.system.ecos", str(folder)],
-            stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            cwd=project.ROOT,
-            env=environment,
-            # Ecos starts further programs, which write to the folder too
-            process_group=0 if os.name == "posix" else None,
-        )
+    child = None
     try:
+        with (folder / LOG).open("wb") as log, uninterrupted():
+            child = subprocess.Popen(
+                [sys.executable, "-m", "cosim.system.ecos", str(folder)],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                cwd=project.ROOT,
+                env=environment,
+                # Ecos starts further programs, which write to the folder too
+                process_group=0 if os.name == "posix" else None,
+            )
         return child.wait()
     except BaseException:
-        _kill(child)
-        child.wait()
+        if child is not None:
+            with uninterrupted():
+                _kill(child)
+                child.wait()
         raise
 
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from cosim.archives import check_archive
 from cosim.errors import UserError, reason
 from cosim.input_files import UnreadableError
+from cosim.interruption import temporary_folder
 from cosim.model import Model, Variable
 from cosim.system import ssp_checks
 from cosim.system.ssp_reader import SspReader
@@ -45,8 +45,7 @@ def unpacked(path: Path) -> Iterator[Ssp]:
         If it is damaged, or no system that can be run (what that is: `cosim.system.ssp_checks`).
     """
     path = Path(path)
-    with TemporaryDirectory(prefix="cosim-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         _extract(path, folder)
         system = SspReader(path, folder).system()
         yield Ssp(path, folder, system, ssp_checks.checked_models(path, folder, system))

@@ -26,7 +26,7 @@ static enum status update_discrete_states(struct instance *instance, bool *state
     }
     *states_changed = false; // continuous states are the integrator's own
     if (instance->state.event_point == EVENT_DUE) {
-        int none = 0;
+        struct event_counts none = {0};
         return instance_pass_due_event(instance, &none);
     }
     return instance_is_unchanged(instance) ? STATUS_OK : instance_update_modes(instance, NULL);

@@ -30,13 +30,13 @@ static void forget_due_forces(struct instance *instance) {
     }
 }
 
-enum status instance_pass_due_event(struct instance *instance, int *count_in_step) {
+enum status instance_pass_due_event(struct instance *instance, struct event_counts *in_step) {
     struct instance_state *state = &instance->state;
     if (state->event_point != EVENT_DUE) {
         return STATUS_OK;
     }
     const bool is_unchanged = instance_is_unchanged(instance);
-    enum status status = instance_count_event(instance, instance->memory.due, count_in_step);
+    enum status status = instance_count_event(instance, instance->memory.due, in_step);
     if (!is_unchanged) {
         forget_due_forces(instance);
     }

@@ -4,6 +4,7 @@
 #define INSTANCE_EVENT_POINT_H
 
 #include "internals.h"
+#include "model_modes.h"
 
 /* A step that would have lasted until `end` ends at the present time, where these indicators fall
  * to 0: nothing has followed from it so far. */
@@ -16,7 +17,7 @@ NONNULL void instance_note_event(struct instance *instance, struct clock_time en
 /* Brings modes, states and discrete states to what follows the event that is due, if one is. It
  * counts as one of a communication step. */
 MUST_CHECK NONNULL enum status instance_pass_due_event(struct instance *instance,
-                                                       int *count_in_step);
+                                                       struct event_counts *in_step);
 
 /* All that is set is what the integrator ran with until now: the modes are those that follow. */
 NONNULL bool instance_is_unchanged(const struct instance *instance);

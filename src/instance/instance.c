@@ -206,6 +206,7 @@ void instance_reset(struct instance *instance) {
     memset(instance->memory.block, 0, instance->memory.size);
     instance->state = (struct instance_state){.phase = PHASE_INSTANTIATED};
     instance->state.own.solver_method = INTEGRATOR_CVODE_ADAMS;
+    instance->state.own.max_internal_steps = 100000;
     instance->state.own.max_events = 1000;
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         instance_write_field(instance, &instance->description->variables[i],

@@ -178,7 +178,7 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
         is_any = true;
     }
     if (is_any) {
-        int none = 0;
+        struct event_counts none = {0};
         status = instance_count_event(instance, instance->fired, &none);
     }
     char *before = instance->second_derivatives + states.offset;
@@ -190,23 +190,38 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     return status;
 }
 
+static void refuse_state_event(const struct instance *instance, const bool fired[]) {
+    size_t first = 0;
+    while (!fired[first]) {
+        first++;
+    }
+    message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
+                  "the step ended at t = %.17g: %s fell to 0, one more event than "
+                  "max_events = %d",
+                  instance->state.own.time, instance->model->events->indicator_names[first],
+                  instance->state.own.max_events);
+}
+
+static void refuse_time_event(const struct instance *instance) {
+    message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
+                  "the step ended at t = %.17g: a time event is due there, one more than "
+                  "max_internal_steps = %d",
+                  instance->state.own.time, instance->state.own.max_internal_steps);
+}
+
 enum status instance_count_event(struct instance *instance, const bool fired[],
-                                 int *count_in_step) {
-    const struct model_events *events = instance->model->events;
+                                 struct event_counts *in_step) {
     struct instance_values *own = &instance->state.own;
-    const bool is_state_event = !is_timed(instance, fired);
-    if (is_state_event && *count_in_step >= own->max_events) {
-        size_t first = 0;
-        while (!fired[first]) {
-            first++;
-        }
-        message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
-                      "the step ended at t = %.17g: %s fell to 0, one more event than "
-                      "max_events = %d",
-                      own->time, events->indicator_names[first], own->max_events);
+    const bool is_time_event = is_timed(instance, fired);
+    if (is_time_event && in_step->of_time >= own->max_internal_steps) {
+        refuse_time_event(instance);
         return STATUS_TOO_MANY_EVENTS;
     }
-    *count_in_step += is_state_event;
+    if (!is_time_event && in_step->of_states >= own->max_events) {
+        refuse_state_event(instance, fired);
+        return STATUS_TOO_MANY_EVENTS;
+    }
+    *(is_time_event ? &in_step->of_time : &in_step->of_states) += 1;
     own->event_count += own->event_count < INT_MAX ? 1 : 0;
     own->last_event_time = own->time;
     return STATUS_OK;

@@ -35,10 +35,14 @@ MUST_CHECK NONNULL enum status instance_update_at_point(struct instance *instanc
 /* The indicators of the present modes, for the integrator; NULL: no events can be. */
 MUST_CHECK NONNULL const struct indicator *instance_describe_indicators(struct instance *instance);
 
-/* Counts an event at the current time. Fails at the first state event above the limit of a
- * communication step, whose count is in the step; time events have no limit, as each is later than
- * the one before. */
+/* Events in one communication step so far. */
+struct event_counts {
+    int of_states; /* at most max_events */
+    int of_time;   /* at most max_internal_steps: each ends a part of the step */
+};
+
+/* Counts an event at the current time. Fails, and says so, at the first one above its limit. */
 MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance, const bool fired[],
-                                                    int *count_in_step);
+                                                    struct event_counts *in_step);
 
 #endif

@@ -19,7 +19,7 @@ struct step {
     bool is_over;                   /* the step is to end where it is */
     struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
     enum status answer;             /* of options->accept */
-    int events;                     /* so far */
+    struct event_counts events;     /* so far */
     int64_t steps_before;           /* internal ones, since initialization */
 };
 

@@ -13,6 +13,18 @@ size_t sundials_memory_size(const struct ode *ode) {
     return 5376 + sizeof(double) * (25 * state_count + 2 * state_count * state_count);
 }
 
+/* SUNDIALS says how long the step is at which it fails: 0, or not a number, where the norm of the
+ * derivatives has overflowed. */
+static const char *explained(const char *text) {
+    static const char *const overflows[] = {"h = nan", "h = -nan", "hu = 0 and"};
+    for (size_t i = 0; i < sizeof overflows / sizeof overflows[0]; i++) {
+        if (strstr(text, overflows[i]) != NULL) {
+            return "the derivatives of the states are too large for a first step";
+        }
+    }
+    return text;
+}
+
 void sundials_text(int error_code, const char *module, const char *function, char *text,
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
@@ -20,7 +32,7 @@ void sundials_text(int error_code, const char *module, const char *function, cha
     (void)module;
     (void)function;
     message_write(&problem->sink, sundials->status_of_flag(problem, error_code), "%s: %s",
-                  sundials->method->name, text);
+                  sundials->method->name, explained(text));
 }
 
 void *sundials_create(size_t size, struct problem *problem, const struct method *method,

@@ -85,6 +85,8 @@ def test_an_unknown_name_is_refused(add: Add, capsys: pytest.CaptureFixture[str]
     err = refused(capsys, "nominal", "lop_two")
     assert "no variant 'lop_two', did you mean 'loop_two'? (there are: loop: nominal, " in err
     assert all(name in err for name in (*VARIANTS, *SECOND))
+    err = refused(capsys, "loop_two", "nope")  # that system's variants are meant
+    assert f"(there are: loop_two: {', '.join(SECOND)})" in err
 
 
 def test_a_name_stands_for_one_thing(add: Add, capsys: pytest.CaptureFixture[str]) -> None:

@@ -144,6 +144,24 @@ def test_report_that_cannot_be_written(
     assert_one_line(err)
 
 
+@pytest.mark.parametrize("command", [("run", SHORT), ("system", "nominal"), ("coupling",)])
+@pytest.mark.parametrize("folder", ["{}/new", "{}"], ids=["in it", "itself"])
+def test_report_in_a_folder_that_takes_no_files(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    command: tuple[str, ...],
+    folder: str,
+) -> None:
+    """Root may write everywhere but to /proc; systems without it have folders without rights."""
+    closed = Path("/proc")
+    if not closed.is_dir():
+        closed = tmp_path / "closed"
+        closed.mkdir(mode=0o500)
+    code, out, err = call(capsys, *command, "--report", folder.format(closed))
+    assert (code, out) == (2, "") and "the report cannot be written" in err  # nothing has run
+    assert_one_line(err)
+
+
 def test_interruption(
     project: Path,
     fmu: Path,

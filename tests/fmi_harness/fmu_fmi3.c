@@ -17,7 +17,7 @@ static struct fmu3_functions fmi3;
 struct fmu_fmi3_options fmu_fmi3_options;
 
 enum { INPUTS = 2, ORDERS = 4 };
-static const fmi3ValueReference inputs[INPUTS] = {FMU_NAME(tau1), FMU_NAME(f2)};
+static const fmi3ValueReference inputs[INPUTS] = {FMU_INPUTS};
 
 struct adapted {
     fmi3Instance instance;
@@ -89,8 +89,8 @@ static fmi2Component Instantiate(fmi2String name, fmi2Type type, fmi2String guid
                                  fmi2String location, const fmi2CallbackFunctions *functions,
                                  fmi2Boolean visible, fmi2Boolean logging_on) {
     const char *token = guid;
-    if (guid != NULL && strcmp(guid, FMU_NAME(GUID)) == 0) {
-        token = FMU_NAME(TOKEN_FMI3);
+    if (guid != NULL && strcmp(guid, FMU_GUID) == 0) {
+        token = FMU_TOKEN_FMI3;
     }
     struct adapted *adapted = calloc(1, sizeof *adapted + (name != NULL ? strlen(name) : 0) + 1);
     if (adapted == NULL) {
@@ -220,22 +220,12 @@ static fmi2Status SetReal(fmi2Component c, const fmi2ValueReference references[]
     return status_of(status);
 }
 
-static bool is_enumeration(fmi2ValueReference reference) {
-    static const fmi2ValueReference enumerations[] = {FMU_ENUMERATIONS};
-    for (size_t i = 0; i < sizeof enumerations / sizeof enumerations[0]; i++) {
-        if (reference == enumerations[i]) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Enumerations have functions of their own type. */
 static bool has_enumeration(const fmi2ValueReference references[], size_t count,
                             const void *values) {
     bool found = false;
     for (size_t i = 0; references != NULL && values != NULL && count < 8 && i < count; i++) {
-        found |= is_enumeration(references[i]);
+        found |= fmu_is_enumeration(references[i]);
     }
     return found;
 }
@@ -248,10 +238,10 @@ static fmi2Status GetInteger(fmi2Component c, const fmi2ValueReference reference
     fmi3Status status = fmi3OK;
     for (size_t i = 0; i < count && status == fmi3OK; i++) {
         fmi3Int64 item = values[i];
-        status = is_enumeration(references[i])
+        status = fmu_is_enumeration(references[i])
                      ? fmi3.GetInt64(instance_of(c), &references[i], 1, &item, 1)
                      : fmi3.GetInt32(instance_of(c), &references[i], 1, &values[i], 1);
-        values[i] = is_enumeration(references[i]) ? (fmi2Integer)item : values[i];
+        values[i] = fmu_is_enumeration(references[i]) ? (fmi2Integer)item : values[i];
     }
     return status_of(status);
 }
@@ -264,7 +254,7 @@ static fmi2Status SetInteger(fmi2Component c, const fmi2ValueReference reference
     fmi3Status status = fmi3OK;
     for (size_t i = 0; i < count && status == fmi3OK; i++) {
         const fmi3Int64 item = values[i];
-        status = is_enumeration(references[i])
+        status = fmu_is_enumeration(references[i])
                      ? fmi3.SetInt64(instance_of(c), &references[i], 1, &item, 1)
                      : fmi3.SetInt32(instance_of(c), &references[i], 1, &values[i], 1);
     }
@@ -407,7 +397,7 @@ static fmi2Status GetStatus(fmi2Component c, fmi2StatusKind kind, fmi2Status *va
 }
 
 static fmi2Status GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Real *value) {
-    const fmi2ValueReference time = FMU_NAME(time);
+    const fmi2ValueReference time = FMU_TIME;
     return kind == fmi2LastSuccessfulTime ? GetReal(c, &time, 1, value) : fmi2Discard;
 }
 

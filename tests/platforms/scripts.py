@@ -167,15 +167,16 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "seed": [7, -8, 9, 10],
     },
     "RPEnvironment": {"position": 0.5, "tip_x": 0.1, "stiffness": 2000.0},
-    # falls onto its stops, slides and is held
+    # falls onto its stops, rigid or compliant ones, slides and is held
     "RPPlant": {
         "m2": 1.25, "a": 0.15, "q1": 0.3, "q2": 0.1, "dq1": -0.4, "dq2": 0.2, "g": 2.5,
         "armature1": 0.03, "damping2": 0.2,
         "coulomb_friction1": 0.25, "breakaway_friction1": 0.375, "stribeck_velocity1": 0.1,
-        "coulomb_friction2": 0.125, "stops1": [2, 2, 2, 1], "lower1": -0.75, "upper1": 0.5,
-        "restitution1": 0.5, "stops2": [2, 2, 2, 2], "lower2": -0.1, "upper2": 0.2,
-        "restitution2": 0.625, "payload_mass": 0.75, "payload_inertia": 0.01,
-        "payload_x": 0.05, "payload_z": -0.1, "grasp": [1, 2, 2, 1],
+        "coulomb_friction2": 0.125, "stops1": [2, 2, 3, 1], "lower1": -0.75, "upper1": 0.5,
+        "restitution1": 0.5, "stops2": [2, 3, 2, 3], "lower2": -0.1, "upper2": 0.2,
+        "restitution2": 0.625, "stop_stiffness1": 40.0, "stop_damping1": 0.5,
+        "stop_stiffness2": 500.0, "stop_damping2": 1.5, "payload_mass": 0.75,
+        "payload_inertia": 0.01, "payload_x": 0.05, "payload_z": -0.1, "grasp": [1, 2, 2, 1],
         "solver_method": [1, 2, 3, 1],
     },
 }  # fmt: skip

@@ -261,8 +261,24 @@ def test_the_controller_sees_its_errors(native: Runner) -> None:
     assert len(laws) == 3
 
 
+def assert_stopped(points: list[dict[str, float]], joint: int, is_rigid: bool) -> None:
+    """A rigid stop is a limit; a joint goes into a compliant one, which never pulls."""
+    beyond = 0
+    for p in points:
+        q, lower, upper = (p[f"{name}{joint}"] for name in ("q", "lower", "upper"))
+        force = p[f"stop_force{joint}"]
+        if is_rigid:
+            assert lower - 1e-9 <= q <= upper + 1e-9
+        elif q < lower - 1e-9 or q > upper + 1e-9:
+            assert force >= 0.0 if q < lower else force <= 0.0
+            beyond += force != 0.0
+        elif lower + 1e-9 < q < upper - 1e-9:
+            assert force == 0.0
+    assert is_rigid or beyond > 5
+
+
 @pytest.mark.parametrize("name", ["RPPlant"])
-def test_the_plant_slides_strikes_and_is_held(native: Runner) -> None:
+def test_the_plant_slides_strikes_and_is_held(native: Runner, name: str) -> None:
     """Events with every method, in modes of all kinds."""
     model = native.model
     names = [v.name for v in model.variables if v.kind in {"Integer", "Enumeration"}]
@@ -280,9 +296,10 @@ def test_the_plant_slides_strikes_and_is_held(native: Runner) -> None:
         assert (points[-1]["grasp_loss"] > 0.0) == (variant > 1)  # at rest
         attached = [a.words for a in answers if a.call.startswith("GetBoolean 0")]
         assert {*map(tuple, attached)} == {("0",), ("1",)}
-        for point in points:
-            assert point["lower2"] - 1e-9 <= point["q2"] <= point["upper2"] + 1e-9
-            assert point["friction_power"] >= 0.0
+        for joint in (1, 2):
+            is_rigid = scripts.CHANGED[name][f"stops{joint}"][variant - 1] == 2
+            assert_stopped(points, joint, is_rigid)
+        assert all(point["friction_power"] >= 0.0 for point in points)
         ends.append(points[-1]["last_event_time"])
     assert len(set(ends)) == 3 and min(ends) > 1.0
 

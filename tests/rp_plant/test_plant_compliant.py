@@ -5,9 +5,11 @@ block of mass m. Its stop pushes with k d (1 + c d') at the penetration d.
 """
 
 import math
+import re
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
@@ -323,3 +325,16 @@ def test_rollback_across_a_contact(plant: Fmu, method: str, t: float) -> None:
         run(instance, back, 1.0)
         assert read(instance, *names) == expected
         saved.free()
+
+
+@each_method
+def test_a_stop_that_is_far_too_stiff(plant: Fmu, method: str) -> None:
+    """A step from deep in it is discarded, and the log says nothing about a step of nan."""
+    limits = {"lower2": 0.0, "upper2": 1.0, "stops2": COMPLIANT, "stop_stiffness2": 1e300}
+    with started(plant, method, 1e-8, q2=1.5, dq2=1.0, tau1=1.0, **limits) as instance:
+        with pytest.raises(FMICallException):
+            instance.do_step(0.0, 1.0)
+        assert not any(re.search(r"\bnan\b", message) for message in instance.messages)
+        if method == "cvode_adams":
+            named = "the derivatives of the states are too large for a first step"
+            assert f"cvode_adams: {named}" in instance.messages

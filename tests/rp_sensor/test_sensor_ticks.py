@@ -2,9 +2,11 @@
 independent sensor in fractions."""
 
 import random
+import re
 from fractions import Fraction
 
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
@@ -162,3 +164,26 @@ def test_the_counter_stops_at_its_ends(sensor: Fmu) -> None:
             instance.set("q1", q)
             instance.do_step(i * 0.01, 0.01)
             assert shown(instance)[0][0] == counts
+
+
+def refusal_of_step(instance: Instance, length: float) -> str:
+    """The last message of a step from 0 s that is discarded."""
+    with pytest.raises(FMICallException):
+        instance.do_step(0.0, length)
+    return instance.messages[-1]
+
+
+def test_a_huge_step_with_short_ticks_ends_soon(sensor: Fmu) -> None:
+    with started(sensor, sample_time=1e-6) as instance:
+        message = refusal_of_step(instance, 1e6)
+    time = float(re.search(r"ended at t = (\S+): a time event is due there", message)[1])
+    assert time == pytest.approx(0.100001, rel=1e-12)
+    assert message.endswith("max_internal_steps = 100000")
+
+
+def test_ticks_allowed_in_a_step(sensor: Fmu) -> None:
+    with started(sensor, sample_time=1e-3, max_internal_steps=100) as instance:
+        instance.do_step(0.0, 0.1)
+    with started(sensor, sample_time=1e-3, max_internal_steps=99) as instance:
+        message = refusal_of_step(instance, 0.1)
+    assert message.endswith("one more than max_internal_steps = 99")
