@@ -3,7 +3,7 @@
 /**
  * Draws the planar RP arm, to scale, on a canvas: `Arm.fit` gives a view, `Arm.draw` draws a scene.
  * Frames and symbols are those of models/rp_manipulator/README.md. Nothing here touches the page;
- * load shapes.js before.
+ * load shapes.js and legend.js before.
  *
  * Points are [x, y] in frame 0, in m. On link 1 a point has the coordinates `along` z1 and `across`,
  * along x1. A scene is { arm, q1, q2, ghost, tau1, f2, ee_fx, ee_fy, payload_attached,
@@ -12,12 +12,8 @@
 const Arm = (() => {
   const HELD = 0, FREE = 2; // values of mode1 and mode2; -1 and 1: slides backward, forward
   const PAD = 40; // px around what moves
-  const LONGEST = 72; // px, of an arrow
-  const WIDEST = (4 / 3) * Math.PI; // rad, of the arc of a torque
+  const {LONGEST, WIDEST} = Legend;
   const AT_STOP = 1e-6; // of the range between two stops
-  const ROW = 22; // px, height of a row of the legend
-  const FONT = '12px system-ui, sans-serif';
-  const CHARACTER = 6.7; // px, width of a character of this font, at least on average
 
   // ---- geometry
 
@@ -49,6 +45,8 @@ const Arm = (() => {
 
   // ---- view
 
+  const range = values => values.reduce(([low, high], x) => [Math.min(low, x), Math.max(high, x)],
+    [Infinity, -Infinity]);
   const largest = values => (values ?? []).reduce((most, x) => Math.max(most, Math.abs(x)), 0);
 
   /** 1, 2 or 5 times a power of ten, not below x; null for 0. */
@@ -64,20 +62,22 @@ const Arm = (() => {
    */
   function extent(motion) {
     const {arm, reference} = motion;
-    const box = {left: 0, right: 0, bottom: 0, top: 0, slide: [Infinity, -Infinity]};
-    const cover = (q1, q2) => {
-      const points = forward(arm, q1, q2);
-      for (const name of ['elbow', 'sleeve', 'endEffector', 'tip']) {
-        const [x, y] = points[name];
-        box.left = Math.min(box.left, x);
-        box.right = Math.max(box.right, x);
-        box.bottom = Math.min(box.bottom, y);
-        box.top = Math.max(box.top, y);
-      }
-      box.slide = [Math.min(box.slide[0], q2), Math.max(box.slide[1], q2)];
+    const slide = arm.stops?.q2 ?? range([...motion.q2, ...(reference?.q2 ?? [])]);
+    const box = {left: 0, right: 0, bottom: 0, top: 0, slide};
+    const cover = ([x, y]) => {
+      box.left = Math.min(box.left, x);
+      box.right = Math.max(box.right, x);
+      box.bottom = Math.min(box.bottom, y);
+      box.top = Math.max(box.top, y);
     };
-    motion.q1.forEach((q1, row) => cover(q1, motion.q2[row]));
-    reference?.q1.forEach((q1, row) => cover(q1, reference.q2[row]));
+    const coverArm = (q1, q2) => {
+      const points = forward(arm, q1, q2);
+      for (const name of ['elbow', 'sleeve', 'endEffector', 'tip']) cover(points[name]);
+      // the ends of link 2, which reaches its sleeve wherever it is
+      for (const end of slide) cover(forward(arm, q1, q2 - end).endEffector);
+    };
+    motion.q1.forEach((q1, row) => coverArm(q1, motion.q2[row]));
+    reference?.q1.forEach((q1, row) => coverArm(q1, reference.q2[row]));
     const forces = motion.ee_fx?.map((x, row) => Math.hypot(x, motion.ee_fy?.[row] ?? 0));
     return {
       ...box,
@@ -102,39 +102,6 @@ const Arm = (() => {
     return Math.min(...heights) < near && Math.max(...heights) > -near;
   }
 
-  /** Entries of the legend: [how, text]; `LEGEND` draws them. */
-  function legend(view) {
-    const number = x => String(Number(x.toPrecision(3)));
-    const entries = [['length', `${number(view.length)} m`]];
-    if (view.torque) entries.push(['torque', `τ₁ ${number(view.torque / 2)} N·m`]);
-    if (view.force) entries.push(['force', `f₂ ${number(view.force / 2)} N`]);
-    if (view.contact) entries.push(['contact', `force on the tip ${number(view.contact / 2)} N`]);
-    if (view.trace) entries.push(['trace', 'path']);
-    if (view.ghost) entries.push(['ghost', 'reference']);
-    if (view.modes) entries.push(['held', 'held by friction'], ['slides', 'slides']);
-    if (view.stops) entries.push(['stop', 'at its stop']);
-    if (view.wall) entries.push(['wall', 'wall']);
-    if (view.gravity) entries.push(['gravity', 'gravity']);
-    else if (view.gravity === 0) entries.push(['plane', 'horizontal plane']);
-    return entries;
-  }
-
-  const SWATCHES = {torque: 34, force: LONGEST / 2 + 6, contact: LONGEST / 2 + 6, trace: 26,
-    ghost: 26, held: 18, slides: 20, stop: 14, wall: 22, gravity: 14, plane: 0};
-
-  /** Places of the legend's entries below the drawing: {kind, text, x, row}, px. */
-  function placed(view) {
-    let x = 12, row = 0;
-    return legend(view).map(([kind, text]) => {
-      const swatch = kind === 'length' ? view.length * view.scale + 8 : SWATCHES[kind];
-      const width = swatch + CHARACTER * text.length;
-      if (x + width > view.width - 8 && x > 12) [x, row] = [12, row + 1];
-      const place = {kind, text, x, row, swatch};
-      x += width + 16;
-      return place;
-    });
-  }
-
   /**
    * View of a canvas of `width` times `height` px in which a motion, or an extent, is seen whole.
    * `colours` maps ink, paper, grid, accent, reference, effort, stop, good, bad to colours.
@@ -153,8 +120,8 @@ const Arm = (() => {
       const room = height - view.strip;
       view.scale = Math.max(1, Math.min((width - 2 * PAD) / wide, (room - 2 * PAD) / high));
       view.length = round(36 / view.scale);
-      view.entries = placed(view);
-      view.strip = ROW * (view.entries.at(-1).row + 1) + 8;
+      view.entries = Legend.placed(view);
+      view.strip = Legend.height(view.entries);
     }
     view.bar = Math.max(7, Math.min(18, 0.035 * view.scale * Math.hypot(wide, high) / 1.5));
     return view;
@@ -163,7 +130,7 @@ const Arm = (() => {
   /** Height in px that suits an extent on a canvas of this width. */
   function height(seen, width) {
     const scale = (width - 2 * PAD) / Math.max(seen.right - seen.left, 1e-3);
-    const wanted = scale * (seen.top - seen.bottom) + 2 * PAD + 2 * ROW;
+    const wanted = scale * (seen.top - seen.bottom) + 2 * PAD + Legend.ROW * 2;
     return Math.round(Math.max(260, Math.min(wanted, 560, 1.1 * width)));
   }
 
@@ -277,7 +244,8 @@ const Arm = (() => {
     };
     const back = collars ? collars.upper : -Math.max(high, q2) * view.scale - over;
     const front = collars ? collars.lower + thick : over - Math.min(low, q2) * view.scale;
-    return {half, thick, collars, back, front: Math.max(front, 0.5 * view.bar)};
+    const least = 0.5 * view.bar; // so that the end effector is on it
+    return {half, thick, collars, back: Math.min(back, -least), front: Math.max(front, least)};
   }
 
   /** Both links as lines: the reference, over the arm so that it is seen where both agree. */
@@ -397,57 +365,6 @@ const Arm = (() => {
     }
   }
 
-  // ---- legend
-
-  /** A length: a bar with ends. */
-  function ruler(context, colour, x, y, length) {
-    Shapes.line(context, [[x, y - 4], [x, y + 4]], colour, 1.5);
-    Shapes.line(context, [[x, y], [x + length, y]], colour, 1.5);
-    Shapes.line(context, [[x + length, y - 4], [x + length, y + 4]], colour, 1.5);
-  }
-
-  /** Samples, drawn as in the picture, half as large as the largest. */
-  const LEGEND = {
-    length: (context, view, x, y) =>
-      ruler(context, view.colours.ink, x, y, view.length * view.scale),
-    torque: (context, view, x, y) =>
-      Shapes.arcArrow(context, x + 13, y + 4, 11, Math.PI / 6, WIDEST / 2, view.colours.effort),
-    force: (context, view, x, y) =>
-      Shapes.arrow(context, x, y, LONGEST / 2, 0, view.colours.effort),
-    contact: (context, view, x, y) =>
-      Shapes.arrow(context, x, y, LONGEST / 2, 0, view.colours.bad, 3.4),
-    trace: (context, view, x, y) =>
-      Shapes.line(context, [[x, y], [x + 20, y]], view.colours.good, 2.6),
-    ghost: (context, view, x, y) =>
-      Shapes.line(context, [[x, y], [x + 20, y]], view.colours.reference, 2.2, 1, [7, 5]),
-    held: (context, view, x, y) => Shapes.padlock(context, view.colours, x + 6, y),
-    slides: (context, view, x, y) => Shapes.chevrons(context, view.colours, x + 7, y, 0),
-    stop: (context, view, x, y) => {
-      Shapes.box(context, x, y - 6, 7, 12);
-      Shapes.tinted(context, view.colours, view.colours.stop, undefined, 1);
-    },
-    wall: (context, view, x, y) => {
-      for (let i = 0; i < 3; i++) {
-        Shapes.line(context, [[x + 6 * i + 2, y - 3], [x + 6 * i - 2, y + 5]], view.colours.stop, 1);
-      }
-      Shapes.line(context, [[x - 1, y - 4], [x + 16, y - 4]], view.colours.stop, 2.5);
-    },
-    gravity: (context, view, x, y) =>
-      Shapes.arrow(context, x + 4, y - 8, 16, Math.PI / 2, view.colours.ink, 2),
-    plane: () => {},
-  };
-
-  function drawLegend(context, view) {
-    const top = view.height - view.strip + 14;
-    context.font = FONT;
-    context.textBaseline = 'middle';
-    for (const {kind, text, x, row, swatch} of view.entries) {
-      LEGEND[kind](context, view, x, top + row * ROW);
-      context.fillStyle = view.colours.ink;
-      context.fillText(text, x + swatch, top + row * ROW);
-    }
-  }
-
   /** Draws a scene on a cleared canvas whose transformation takes px of CSS. */
   function draw(context, view, scene) {
     context.save();
@@ -468,7 +385,7 @@ const Arm = (() => {
     drawEfforts(context, view, scene);
     drawModes(context, view, scene);
     context.restore();
-    drawLegend(context, view);
+    Legend.draw(context, view);
     context.restore();
   }
 

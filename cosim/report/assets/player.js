@@ -1,7 +1,7 @@
 'use strict';
 
 /**
- * Plays a motion of the arm in an element of the page; load shapes.js and arm.js before.
+ * Plays a motion of the arm in an element of the page; load shapes.js, legend.js and arm.js before.
  *
  * What is drawn is always a recorded row, never a value between two. When another row is shown, the
  * element gets the event "time", whose detail is {time, row}: time in s.
@@ -170,14 +170,16 @@ class Player {
     return texts.filter(([name]) => this.#shows(name)).map(([name, label, text]) => {
       const pair = document.createElement('div');
       pair.innerHTML = `<dt>${label}</dt><dd></dd>`;
+      pair.classList.toggle('player-words', name.startsWith('mode'));
       list.append(pair);
       return [pair.lastElementChild, scene => text(scene[name], scene)];
     });
   }
 
-  /** Whether a column is there and, of a payload, whether it is ever attached. */
+  /** Whether a column is there and, of modes and payload, whether they ever matter. */
   #shows(name) {
     const values = this.motion[name];
+    if (name.startsWith('mode')) return values != null && this.extent.modes;
     return values != null && (name !== 'payload_attached' || values.includes(true));
   }
 
@@ -253,8 +255,8 @@ class Player {
 
   /** A mode of friction in words. */
   static state(mode, limits, q) {
-    const words = {'-1': 'slides backward', 0: 'is held', 1: 'slides forward', 2: 'moves freely'};
-    const at = {'-1': ', at its lower stop', 0: '', 1: ', at its upper stop'};
+    const words = {'-1': 'slides backward', 0: 'held', 1: 'slides forward', 2: 'free'};
+    const at = {'-1': ', at lower stop', 0: '', 1: ', at upper stop'};
     return (words[mode] ?? '') + at[Arm.stopOf(limits, q)];
   }
 }

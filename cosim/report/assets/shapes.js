@@ -44,7 +44,7 @@ const Shapes = (() => {
 
   /** Arrow from (x, y) along `angle` (rad, clockwise from the right, as canvases have it). */
   function arrow(context, x, y, length, angle, colour, width = 3) {
-    if (Math.abs(length) < 1) return;
+    if (Math.abs(length) < 2) return;
     const head = Math.min(11, 0.6 * Math.abs(length));
     context.save();
     context.translate(x, y);
@@ -62,7 +62,7 @@ const Shapes = (() => {
 
   /** Arc about (x, y) from `start` by `sweep`, in rad counterclockwise, with a head. */
   function arcArrow(context, x, y, radius, start, sweep, colour) {
-    if (Math.abs(sweep) * radius < 1) return;
+    if (Math.abs(sweep) * radius < 2) return;
     const head = Math.min(11, 0.7 * radius, 0.6 * Math.abs(sweep) * radius);
     const side = Math.sign(sweep), neck = sweep - side * head / radius;
     context.save();
