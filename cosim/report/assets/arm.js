@@ -248,18 +248,26 @@ const Arm = (() => {
     return {half, thick, collars, back: Math.min(back, -least), front: Math.max(front, least)};
   }
 
-  /** Both links as lines: the reference, over the arm so that it is seen where both agree. */
+  /** The reference as an outline: a rim around the arm where both agree. */
   function drawGhost(context, view, {arm, ghost}) {
-    const {reference} = view.colours, {scale} = view;
+    const {reference, paper} = view.colours, {bar, scale} = view;
     const across = -arm.a * scale, sleeve = arm.l1 * scale, end = (arm.l1 + ghost.q2) * scale;
+    const link1 = [[0, 0], [sleeve, 0], [sleeve, across]], link2 = [[sleeve, across], [end, across]];
     onLink1(context, view, ghost.q1, () => {
-      const links = [[0, 0], [sleeve, 0], [sleeve, across], [end, across]];
-      Shapes.line(context, links, reference, 2, 1, [7, 5]);
-      Shapes.disc(context, end, across, 0.95 * view.bar);
-      context.strokeStyle = reference;
-      context.lineWidth = 2;
-      context.stroke();
+      for (const [colour, wider] of [[reference, 9], [paper, 5]]) {
+        Shapes.line(context, link1, colour, bar + wider);
+        Shapes.line(context, link2, colour, 0.64 * bar + wider);
+      }
     });
+  }
+
+  /** End effector of the reference, over the arm. */
+  function drawTarget(context, view, {arm, ghost}) {
+    const {endEffector} = forward(arm, ghost.q1, ghost.q2);
+    Shapes.disc(context, ...toPixel(view, endEffector), 0.62 * view.bar + 4);
+    context.strokeStyle = view.colours.reference;
+    context.lineWidth = 2;
+    context.stroke();
   }
 
   function drawLink1(context, view, arm) {
@@ -379,9 +387,10 @@ const Arm = (() => {
     drawTrace(context, view, scene.trace ?? []);
     drawStops1(context, view, scene);
     drawGround(context, view);
+    if (scene.ghost) drawGhost(context, view, scene);
     if (scene.payload_waits) drawWaiting(context, view, scene);
     drawArm(context, view, scene);
-    if (scene.ghost) drawGhost(context, view, scene);
+    if (scene.ghost) drawTarget(context, view, scene);
     drawEfforts(context, view, scene);
     drawModes(context, view, scene);
     context.restore();

@@ -29,7 +29,7 @@ const Legend = (() => {
   }
 
   const SWATCHES = {torque: 34, force: LONGEST / 2 + 6, contact: LONGEST / 2 + 6, trace: 26,
-    ghost: 26, held: 22, slides: 20, stop: 14, wall: 22, gravity: 14, plane: 0};
+    ghost: 31, held: 22, slides: 20, stop: 14, wall: 22, gravity: 14, plane: 0};
 
   /** Places of the legend's entries below the drawing: {kind, text, x, row}, px. */
   function placed(view) {
@@ -68,8 +68,10 @@ const Legend = (() => {
       Shapes.arrow(context, x, y, LONGEST / 2, 0, view.colours.bad, 3.4),
     trace: (context, view, x, y) =>
       Shapes.line(context, [[x, y], [x + 20, y]], view.colours.good, 2.6),
-    ghost: (context, view, x, y) =>
-      Shapes.line(context, [[x, y], [x + 20, y]], view.colours.reference, 2.2, 1, [7, 5]),
+    ghost: (context, view, x, y) => {
+      Shapes.line(context, [[x + 5, y], [x + 18, y]], view.colours.reference, 11);
+      Shapes.line(context, [[x + 5, y], [x + 18, y]], view.colours.paper, 7);
+    },
     held: (context, view, x, y) => Shapes.padlock(context, view.colours, x + 6, y),
     slides: (context, view, x, y) => Shapes.chevrons(context, view.colours, x + 7, y, 0),
     stop: (context, view, x, y) => {
