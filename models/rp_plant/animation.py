@@ -12,6 +12,7 @@ from models.rp_manipulator.animation import geometry as arm_geometry
 
 FORCES = ("ee_fx", "ee_fy")
 WITHOUT_STOPS = 1  # item of stops1 and stops2
+GRASP_AT_REST = 2  # item of grasp
 
 
 def animation(recorded: Recorded) -> Animation:
@@ -32,12 +33,16 @@ def plant_columns(recorded: Recorded) -> dict[str, np.ndarray | None]:
 
 
 def geometry(values: Mapping[str, Value]) -> dict[str, Any]:
-    """The arm's geometry with stops (rad, m) and the payload's center of mass in frame 2 (m)."""
+    """The arm's geometry with stops (rad, m), and the payload's center of mass in frame 2 (m)."""
     stops = {
         f"q{joint}": None
         if values[f"stops{joint}"] == WITHOUT_STOPS
         else [values[f"lower{joint}"], values[f"upper{joint}"]]
         for joint in (1, 2)
     }
-    payload = {"x": values["payload_x"], "z": values["payload_z"]}
+    payload = {
+        "x": values["payload_x"],
+        "z": values["payload_z"],
+        "at_rest": values["grasp"] == GRASP_AT_REST,
+    }
     return arm_geometry(values) | {"stops": stops, "payload": payload}
