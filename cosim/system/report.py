@@ -87,7 +87,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     pages.write_run(folder / f"{outcome.variant}.html", page)
     return Entry(
         name=outcome.variant,
-        title=", ".join(f"{m.name} {m.value(outcome):.3g} {m.unit}" for m in section.study.MEASURES),
+        title=", ".join(f"{name} {value}" for name, value in _measures(section, outcome)),
         group=section.title,
         page=f"{outcome.variant}.html",
         status=page.status,
@@ -96,7 +96,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         detail=f"worst variable: {outcome.worst}",
         line=sparkline(page.data.x, plots[0].curves[0].values),
         line_text=plots[0].text,
-    )  # fmt: skip
+    )
 
 
 def _every(rows: int) -> int:
@@ -132,9 +132,13 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
         ("time", f"{system.start:g} to {system.stop:g} s"),
         ("steps", str(outcome.steps)),
         ("worst error", f"{outcome.error:.1e} of {short(BOUND)} ({outcome.worst})"),
-        *((m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.study.MEASURES),
+        *_measures(section, outcome),
         ("wall time", f"{outcome.run.wall_time:.3f} s"),
     ]
+
+
+def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
+    return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.study.MEASURES]
 
 
 def _failures(outcome: Outcome) -> list[str]:
