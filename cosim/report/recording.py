@@ -24,7 +24,7 @@ import numpy as np
 from cosim import project
 from cosim import scenario as scenarios
 from cosim.comparison import Runs
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, did_you_mean, one_line
 from cosim.fmu_file import Fmu
 from cosim.output_files import whole, written
 from cosim.report import motion
@@ -75,6 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if not (options.speed > 0 and options.rate > 0 and options.width > 0):
             raise UserError("--speed, --rate and --width: expected numbers above 0")
+        if options.file.suffix != ".png":
+            raise UserError(f"{options.file}: expected a name that ends with .png")
+        if not options.file.absolute().parent.is_dir():
+            raise UserError(f"{options.file}: its folder does not exist")
         data = data_of(options.name)
         drawn = frames(data, options.speed / options.rate, options.width)
         with written(options.file):
@@ -153,6 +157,7 @@ def frames(data: dict[str, Any], step: float, width: int) -> "list[Image]":
 def _chromium() -> "Iterator[Chrome]":
     try:
         from selenium import webdriver
+        from selenium.common.exceptions import WebDriverException
     except ImportError:
         raise UserError("selenium is missing: ./setup.sh --dev installs it") from None
     missing = [program for program in PROGRAMS if shutil.which(program) is None]
@@ -164,11 +169,14 @@ def _chromium() -> "Iterator[Chrome]":
     for option in OPTIONS:
         options.add_argument(option)
     service = webdriver.ChromeService(shutil.which(PROGRAMS[1]))
-    driver = webdriver.Chrome(options=options, service=service)
     try:
-        yield driver
-    finally:
-        driver.quit()
+        driver = webdriver.Chrome(options=options, service=service)
+        try:
+            yield driver
+        finally:
+            driver.quit()
+    except WebDriverException as error:
+        raise UserError(f"Chromium failed: {one_line(error)}") from error
 
 
 def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:

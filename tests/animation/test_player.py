@@ -33,7 +33,7 @@ def test_nothing_moves_before_it_is_asked_to(page: Browser) -> None:
 
 
 def test_it_plays_to_the_end_row_after_row(page: Browser) -> None:
-    page.run("player.speed = 4; document.querySelector('.player-toggle').click()")
+    page.run("document.querySelector('.player-toggle').click()")
     assert label(page) == "Pause"
     page.wait("!player.playing")
     assert label(page) == "Play"
@@ -76,6 +76,13 @@ def test_pause_stops(page: Browser) -> None:
     stopped = row(page)
     time.sleep(0.2)
     assert row(page) == stopped < LAST
+
+
+def test_a_click_on_the_drawing_plays_and_pauses(page: Browser) -> None:
+    page.driver.find_element("css selector", "canvas").click()
+    page.wait("player.row > 0")
+    page.driver.find_element("css selector", "canvas").click()
+    assert not page.run("return player.playing")
 
 
 def test_the_slider_scrubs(page: Browser) -> None:

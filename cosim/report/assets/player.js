@@ -106,7 +106,8 @@ class Player {
 
   #frame(now) {
     if (!this.playing) return;
-    const elapsed = this.last === null ? 0 : (now - this.last) / 1000;
+    // a page in the background gets no frames: go on where it was
+    const elapsed = this.last === null ? 0 : Math.min((now - this.last) / 1000, 1);
     if (this.last === null || !this.calm.matches || elapsed >= Player.CALM) {
       this.last = now;
       this.clock += elapsed * this.speed;
