@@ -12,6 +12,7 @@
 const Arm = (() => {
   const HELD = 0, FREE = 2; // values of mode1 and mode2; -1 and 1: slides backward, forward
   const {LONGEST, WIDEST} = Legend;
+  const TURN = 1.9 * Math.PI; // rad, the most of an arc
   const AT_STOP = 1e-6; // of the range between two stops
 
   // ---- geometry
@@ -342,7 +343,9 @@ const Arm = (() => {
   function drawEfforts(context, view, scene) {
     const {effort, bad} = view.colours, {arm, q1, q2} = scene, {bar, scale} = view;
     if (view.torque && scene.tau1) {
-      const sweep = scene.tau1 / view.torque * WIDEST, [x, y] = toPixel(view, [0, 0]);
+      const [x, y] = toPixel(view, [0, 0]);
+      // a view that was not made for the torque may be too small for it
+      const sweep = Math.max(-TURN, Math.min(TURN, scene.tau1 / view.torque * WIDEST));
       Shapes.arcArrow(context, x, y, 2.6 * bar, q1 + Math.sign(sweep) * 0.35, sweep, effort);
     }
     if (view.force && scene.f2) {
