@@ -99,6 +99,19 @@ def test_the_slider_scrubs(page: Browser) -> None:
     assert page.run("return events.at(-1)") == {"time": 0.4, "row": 40}
 
 
+def test_tab_goes_through_the_controls_and_shows_where_it_is(page: Browser) -> None:
+    places = []
+    for _ in range(3):
+        page.driver.switch_to.active_element.send_keys(Keys.TAB)
+        places.append(
+            page.run(
+                "const here = document.activeElement, {outlineStyle} = getComputedStyle(here);"
+                "return [here.className || here.localName, outlineStyle]"
+            )
+        )
+    assert places == [[name, "solid"] for name in ("player-toggle", "player-time", "select")]
+
+
 @pytest.mark.parametrize("place", [".player-toggle", ".player-time"])
 def test_keys(page: Browser, place: str) -> None:
     for key, expected in (
