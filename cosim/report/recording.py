@@ -43,7 +43,7 @@ PROGRAMS = ("chromium", "chromedriver")
 OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu")
 
 LARGEST = 1_000_000  # bytes
-COLOURS = 128  # in all frames together
+COLOURS = 64  # in all frames together
 PLAYS = 3  # then it comes to rest, which readers who do not want it to move can wait for
 REST = 1.5  # s, of the last frame
 
