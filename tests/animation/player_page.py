@@ -26,7 +26,7 @@ PAGE = """<!DOCTYPE html>
   function colourAt([x, y]) {{
     const ratio = player.canvas.width / player.view.width;
     const [red, green, blue] = player.canvas.getContext('2d')
-      .getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data;
+      .getImageData(Math.floor(x * ratio), Math.floor(y * ratio), 1, 1).data;
     return [red, green, blue];
   }}
   /** What a colour of CSS is as red, green, blue. */
