@@ -138,7 +138,7 @@ def frames(data: dict[str, Any], step: float, width: int) -> "list[Image]":
     width : int
         px.
     """
-    from PIL import Image
+    from PIL.PngImagePlugin import PngImageFile
 
     style = "".join((ASSETS / name).read_text(encoding="utf-8") for name in STYLES)
     script = "".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
@@ -147,10 +147,10 @@ def frames(data: dict[str, Any], step: float, width: int) -> "list[Image]":
     times = [*np.arange(start, stop, step).tolist(), stop]
     with TemporaryDirectory(prefix="cosim-") as folder, _chromium() as driver:
         page = Path(folder) / "recording.html"
-        page.write_text(text, encoding="utf-8")
+        page.write_text(text, encoding="utf-8", newline="\n")
         driver.get(page.as_uri())
         drawn = [driver.execute_script("return frame(arguments[0])", time) for time in times]
-    return [Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB") for png in drawn]
+    return [PngImageFile(io.BytesIO(base64.b64decode(png))).convert("RGB") for png in drawn]
 
 
 @contextmanager
