@@ -4,12 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from cosim.report.recording import ASSETS, SCRIPTS, STYLES
 from tests.support.browser import Browser
-from tests.support.paths import ROOT
-
-ASSETS = ROOT / "cosim" / "report" / "assets"
-STYLES = ("page.css", "player.css")
-SCRIPTS = ("shapes.js", "legend.js", "arm.js", "player.js")
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
