@@ -225,6 +225,24 @@ def test_it_follows_the_width(page: Browser) -> None:
     assert page.run("return player.canvas.width") == 320
 
 
+def test_it_waits_in_a_hidden_element(page: Browser) -> None:
+    page.run(
+        """
+        const hidden = document.createElement('div');
+        hidden.hidden = true;
+        document.body.append(hidden);
+        window.second = new Player(hidden, player.motion);
+        second.show(50);
+        hidden.hidden = false;
+        """
+    )
+    page.wait("second.view")
+    drawn = "return ({0}.show(50), {0}.canvas.toDataURL())"
+    page.run("element.style.width = `${second.view.width}px`")
+    page.wait("player.view.width === second.view.width")
+    assert page.run(drawn.format("second")) == page.run(drawn.format("player"))
+
+
 @pytest.mark.parametrize("scale", [1, 2])
 def test_it_has_the_pixels_of_the_screen(browser: Browser, tmp_path: Path, scale: int) -> None:
     show(browser, tmp_path, synthetic(), scale=scale)

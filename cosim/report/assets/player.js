@@ -93,6 +93,7 @@ class Player {
 
   /** Draws the row that is shown again, for a page that has changed its colours or its size. */
   draw() {
+    if (!this.view) return; // the element is hidden and has no width
     const ratio = window.devicePixelRatio || 1, {width, height} = this.view;
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (this.canvas.width !== wide) this.canvas.width = wide;
