@@ -5,7 +5,7 @@
 #   ./setup.sh              for building and ./run.sh
 #   ./setup.sh --release    for ./release.sh too
 #   ./setup.sh --dev        for ./test.sh too
-#   ./setup.sh --platforms  all of it, and what runs the FMUs of other platforms in ./test.sh
+#   ./setup.sh --platforms  all of it, and what runs FMUs of other platforms and pages in ./test.sh
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -71,6 +71,9 @@ if [ "$platforms" = yes ]; then
   need gcc-aarch64-linux-gnu command -v aarch64-linux-gnu-gcc
   need libc6-dev-arm64-cross test -e /usr/aarch64-linux-gnu/include/math.h
   need gcc-mingw-w64-x86-64 command -v x86_64-w64-mingw32-gcc
+  # of the tests of pages
+  need chromium command -v chromium
+  need chromium-driver command -v chromedriver
 fi
 
 if [ "${#missing[@]}" -gt 0 ]; then

@@ -8,6 +8,7 @@ models/SYSTEM/SystemStructure.ssd       connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 models/SYSTEM/system.svg                its components and the signals between them
+models/*/animation.py                   what of a run the report animates
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
@@ -24,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that cosim.system.study describes
+ANIMATION = "animation"  # the module of a model's or system's folder for cosim.report.motion
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 
@@ -51,6 +53,33 @@ def scenario_file(name: str) -> Path:
         known = ", ".join(found) or "none"
         raise UserError(f"no scenario {name!r}{did_you_mean(name, found)} (known: {known})")
     return found[name]
+
+
+def models() -> dict[str, Path]:
+    """Folders of all models that have scenarios, by name."""
+    folders = sorted({path.parents[1] for path in ROOT.glob("models/*/scenarios/*.toml")})
+    return {folder.name: folder for folder in folders}
+
+
+def model(name: str) -> Path:
+    """Folder of a model, by its own name or that of its FMU; a UserError lists the known ones."""
+    known = models()
+    for folder in known.values():
+        if name == folder.name or is_built_from(name, folder):
+            return folder
+    guess = did_you_mean(name, known)
+    raise UserError(f"no model {name!r}{guess} (known: {', '.join(known) or 'none'})")
+
+
+def is_in_model(file: Path) -> bool:
+    """Whether a file lies where a model has its scenarios and problems."""
+    return Path(file).absolute().parent.name in SCENARIO_FOLDERS
+
+
+def is_ours(file: Path) -> bool:
+    """Whether a file is one of the project's scenarios, or lies where they do."""
+    file = Path(file).resolve()
+    return is_in_model(file) and file.parents[2] == (ROOT / "models").resolve()
 
 
 def convergence_files() -> list[Path]:

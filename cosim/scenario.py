@@ -27,6 +27,7 @@ from cosim.model import (
 )
 from cosim.signals import Constant, Signal, Sines, Switches, Table
 
+MODEL = "model"  # key of a file that is in no model's folder
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
@@ -90,8 +91,29 @@ def title(path: Path) -> str:
     return reader.text(content["title"], "title")
 
 
+def folder_of(path: Path) -> Path:
+    """Folder of the model of a scenario: that its key `model` names, or else the one it lies in.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or names no model.
+    """
+    content, reader = read_toml(path), _Reader(path)
+    if MODEL not in content:
+        if project.is_in_model(path):
+            return project.model_folder(path)
+        known = ", ".join(project.models())
+        reader.fail(f"missing key {MODEL!r}: the name of what the scenario is of (known: {known})")
+    name = reader.text(content[MODEL], MODEL)
+    try:
+        return project.model(name)
+    except UserError as error:
+        reader.fail(f"{MODEL}: {error}")
+
+
 def load(path: Path, model: Model) -> Scenario:
-    """Read and check the scenario at `path`, a file in models/<model>/scenarios/.
+    """Read and check the scenario at `path`, of the project or of a user.
 
     Parameters
     ----------
@@ -106,13 +128,13 @@ def load(path: Path, model: Model) -> Scenario:
     """
     path = Path(path)
     content = read_toml(path)
-    folder = project.model_folder(path)
+    folder = folder_of(path)
     reader = _Reader(path)
     reader.keys(
         content,
         "",
         required=("title", "description", "tolerance", "time"),
-        optional=("reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
+        optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
     )
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:

@@ -11,6 +11,7 @@ from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
     from cosim.fmu_file import Fmu
+    from tests.support.browser import Browser
 
 
 @pytest.fixture(scope="session")
@@ -46,3 +47,12 @@ def write(tmp_path: Path) -> Callable[..., Path]:
     from tests.support.toy_model import make_model
 
     return make_model(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator["Browser"]:
+    """Chromium, one for all tests; where it is not installed they are skipped, in CI they fail."""
+    from tests.support.browser import opened
+
+    with opened() as browser:
+        yield browser

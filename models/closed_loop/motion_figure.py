@@ -9,8 +9,6 @@ from cosim.system.ssp import Ssp
 from models import system_figure
 from models.system_figure import draw, draw_limit
 
-PICTURE = "joints, tracking errors, efforts, path of the end effector"
-
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 ARM = "arm"  # the component
 

@@ -5,16 +5,32 @@ cosim/system/study.py says what each name means.
 
 from pathlib import Path
 
+from cosim.system.study import Diagram
 from models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
-from models.closed_loop.motion_figure import ARM, PICTURE, figure
+from models.closed_loop.motion_figure import ARM, figure
 from models.system_figure import tracking_error
 
-__all__ = ["EXPERIMENT", "MEASURES", "PICTURE", "figure", "study_coupling"]
+__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure", "study_coupling"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
 
 MEASURES = (tracking_error(ARM),)
+
+DIAGRAMS = (
+    Diagram("joint 1", ["arm.q1"], {"arm.q1": "trajectory.q1_ref"}),
+    Diagram("joint 2", ["arm.q2"], {"arm.q2": "trajectory.q2_ref"}),
+    Diagram("tracking error of joint 1", ["controller.q1_error"]),
+    Diagram("tracking error of joint 2", ["controller.q2_error"]),
+    Diagram("torque", ["controller.tau1"]),
+    Diagram("force", ["controller.f2"]),
+    Diagram(
+        "end effector",
+        ["arm.ee_x", "arm.ee_y"],
+        {"arm.ee_x": "trajectory.ee_x_ref", "arm.ee_y": "trajectory.ee_y_ref"},
+    ),
+    Diagram("energy of the arm", ["arm.kinetic_energy", "arm.potential_energy"]),
+)
 
 
 def study_coupling(ssp: Path, report: Path) -> bool:

@@ -13,11 +13,6 @@ from cosim.system.ssp import Ssp
 from models import system_figure
 from models.system_figure import draw, draw_limit
 
-PICTURE = (
-    "joints, tracking errors, efforts, modes, currents and voltages, contact force, path of the "
-    "end effector"
-)
-
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 MOTORS = (("current", "A"), ("voltage", "V"))
 MODES = {-1: "slides back", 0: "sticks", 1: "slides forth", 2: "free"}

@@ -1,0 +1,173 @@
+"""Pages in headless Chromium, without network: what they show, ask for and complain about."""
+
+import base64
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+PROGRAMS = ("chromium", "chromedriver")
+# what a page may load: files beside it and what it holds itself
+LOCAL = ("file:", "data:", "blob:", "about:")
+OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",  # the tests may run as root
+    "--disable-dev-shm-usage",
+    "--disable-gpu",
+    "--hide-scrollbars",
+    "--force-color-profile=srgb",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--no-first-run",
+    "--host-resolver-rules=MAP * ~NOTFOUND",
+)
+
+
+class Browser:
+    """A tab of Chromium; `driver` is selenium's, for what is not here."""
+
+    def __init__(self, driver: Any) -> None:
+        self.driver = driver
+        self.errors: list[str] = []  # of the console since the page was opened
+        self.requests: list[str] = []  # addresses asked for since then that are not local
+        self.loaded: list[str] = []  # all addresses asked for since then
+
+    def open(
+        self,
+        page: Path,
+        *,
+        width: int = 1000,
+        height: int = 800,
+        dark: bool = False,
+        reduced_motion: bool = False,
+        scale: float = 1.0,
+        fragment: str = "",
+    ) -> None:
+        """Open a file in a view of `width` and `height` pixels of CSS, and wait until it is there.
+
+        `scale` is the number of the screen's pixels for one of CSS.
+        """
+        self._command(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": False},
+        )
+        features = {
+            "prefers-color-scheme": "dark" if dark else "light",
+            "prefers-reduced-motion": "reduce" if reduced_motion else "no-preference",
+        }
+        self._command(
+            "Emulation.setEmulatedMedia",
+            {"features": [{"name": name, "value": value} for name, value in features.items()]},
+        )
+        self.driver.get("about:blank")
+        self.update()
+        self.errors.clear()
+        self.requests.clear()
+        self.loaded.clear()
+        self.driver.get(page.absolute().as_uri() + fragment)
+        self.update()
+
+    def update(self) -> None:
+        """Take what happened since the last call into `errors`, `loaded` and `requests`."""
+        self.errors += [
+            f"{entry['level']}: {entry['message']}"
+            for entry in self.driver.get_log("browser")
+            if entry["level"] in ("SEVERE", "WARNING")
+        ]
+        for entry in self.driver.get_log("performance"):
+            message = json.loads(entry["message"])["message"]
+            if message["method"] == "Network.requestWillBeSent":
+                self.loaded.append(message["params"]["request"]["url"])
+            elif message["method"] == "Network.webSocketCreated":
+                self.loaded.append(message["params"]["url"])
+        self.requests = [url for url in self.loaded if not url.startswith(LOCAL)]
+
+    def check_quiet(self) -> None:
+        """Fail if the page wrote an error or a warning to the console, or asked the network."""
+        self.update()
+        assert not self.errors, self.errors
+        assert not self.requests, self.requests
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Value of the body of a function in JavaScript; `arguments` are its arguments[i]."""
+        return self.driver.execute_script(script, *arguments)
+
+    def keys(self, selector: str, *keys: str) -> None:
+        """Press keys (of selenium's Keys, or characters) in the element of a CSS selector."""
+        element = self.driver.find_element("css selector", selector)
+        self.run("arguments[0].focus()", element)
+        for key in keys:
+            element.send_keys(key)
+
+    def wait(self, condition: str, seconds: float = 10.0) -> Any:
+        """Wait until an expression in JavaScript is true; its value."""
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        message = f"not within {seconds:g} s: {condition}"
+        wait = WebDriverWait(self.driver, seconds, poll_frequency=0.02)
+        return wait.until(lambda _: self.run(f"return {condition}"), message)
+
+    def overflow(self) -> int:
+        """Pixels of CSS by which the page is wider than its view."""
+        return self.run(
+            "const root = document.documentElement; return root.scrollWidth - root.clientWidth"
+        )
+
+    def violations(self) -> list[str]:
+        """What axe-core finds against the accessibility guidelines (WCAG), contrast included."""
+        from axe_selenium_python import Axe
+
+        axe = Axe(self.driver)
+        axe.inject()
+        result = self.driver.execute_async_script(
+            "const done = arguments[arguments.length - 1];"
+            "axe.run().then(done, error => done({failure: String(error)}))"
+        )
+        assert "failure" not in result, result["failure"]
+        return [
+            f"{found['id']}: {found['help']}: {node['html'][:200]}: {node.get('failureSummary')}"
+            for found in result["violations"]
+            for node in found["nodes"]
+        ]
+
+    def screenshot(self, path: Path, *, whole: bool = False) -> None:
+        """Write a picture of the view, or of the whole page, as PNG."""
+        answer = self._command(
+            "Page.captureScreenshot", {"format": "png", "captureBeyondViewport": whole}
+        )
+        path.write_bytes(base64.b64decode(answer["data"]))
+
+    def _command(self, name: str, parameters: dict[str, Any]) -> Any:
+        return self.driver.execute_cdp_cmd(name, parameters)
+
+
+@contextmanager
+def opened() -> Iterator[Browser]:
+    """A browser; a skipped test where it is not installed, a failed one in CI."""
+    missing = [program for program in PROGRAMS if shutil.which(program) is None]
+    if missing:
+        text = f"missing: {' and '.join(missing)}: ./setup.sh --platforms installs them"
+        if os.environ.get("CI"):
+            pytest.fail(text)
+        pytest.skip(text)
+
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium")
+    for option in OPTIONS:
+        options.add_argument(option)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+    driver.set_script_timeout(60)
+    driver.set_page_load_timeout(60)
+    try:
+        yield Browser(driver)
+    finally:
+        driver.quit()
