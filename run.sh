@@ -7,6 +7,7 @@
 #   ./run.sh system                all variants of all systems in Ecos
 #   ./run.sh system NAME ...       these variants, or all of these systems; --list names both
 #   ./run.sh coupling              what the coupling of the closed loop costs
+#   ./run.sh playground            builds build/playground/index.html, the plant in a browser
 #   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
@@ -16,6 +17,15 @@ if [ "${1-}" = --help ] || [ "${1-}" = -h ]; then
   exit
 fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+
+if [ "${1-}" = playground ]; then
+  "$root/setup.sh" --release
+  log="$root/build/playground.log"
+  { cmake -S "$root" -B "$root/build" -DBUILD_TESTING=OFF && cmake --build "$root/build" --target playground; } >"$log" 2>&1 ||
+    { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
+  echo "$root/build/playground/index.html: $(wc -c <"$root/build/playground/index.html") bytes, built in $SECONDS s"
+  exit
+fi
 
 "$root/setup.sh"
 python="$root/build/venv/bin/python"
