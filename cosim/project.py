@@ -8,6 +8,7 @@ models/SYSTEM/SystemStructure.ssd       connects models to a system
 models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 models/SYSTEM/system.svg                its components and the signals between them
+models/*/animation.py                   what of a run the report animates
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
@@ -24,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that cosim.system.study describes
+ANIMATION = "animation"  # the module of a model's or system's folder for cosim.report.motion
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 

@@ -1,0 +1,137 @@
+"""What the player on a page animates of a run: a mechanism's motion and its geometry.
+
+Which variables these are is known to the folder of the model or system. Its module animation.py has
+a function `animation` from `Recorded` to `Animation`; a folder without one has nothing to animate.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, cast
+
+import numpy as np
+
+from cosim import project
+from cosim.comparison import Run
+from cosim.model import Value
+from cosim.system.comparison import Outcome
+from cosim.system.ssp import Ssp
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A run as `animation` reads it; all columns have the shape (rows,)."""
+
+    times: np.ndarray  # (rows,) s
+    columns: Mapping[str, np.ndarray]  # outputs and inputs, by name
+    references: Mapping[str, np.ndarray]  # outputs in the reference of a scenario, by name
+    values: Mapping[str, Value]  # of parameters, by name
+
+    def component(self, name: str) -> "Recorded":
+        """The same of one component of a system, without its name in front."""
+        return Recorded(
+            self.times,
+            _within(name, self.columns),
+            _within(name, self.references),
+            _within(name, self.values),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """Motion and geometry under the names that the drawing gives them (assets/arm.js)."""
+
+    columns: Mapping[str, np.ndarray | None]  # (rows,), or None: not there
+    reference: Mapping[str, np.ndarray] | None  # (rows,): the motion that is drawn as a ghost
+    arm: Mapping[str, Any]  # lengths in m, limits, what surrounds it
+
+
+def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> dict | None:
+    """Data of the player for a scenario's run; None: nothing to animate.
+
+    Parameters
+    ----------
+    run : Run
+    rows : sequence of int or slice, optional
+        Those of the recorded rows that the page holds.
+    """
+    scenario, result = run.scenario, run.result
+    # a row holds the outputs at the end of a step, so the inputs too are those of this step
+    held = np.maximum(scenario.reference_rows - 1, 0)
+    inputs = {name: values[held] for name, values in scenario.inputs.items()}
+    outputs = dict(zip(result.names, result.values.T, strict=True))
+    references = {name: run.reference.column(name) for name in result.names}
+    recorded = Recorded(
+        result.times, inputs | outputs | result.integers, references, scenario.start_values
+    )
+    return _data(scenario.model, recorded, rows)
+
+
+def of_outcome(
+    system: str,
+    ssp: Ssp,
+    outcome: Outcome,
+    rows: Sequence[int] | np.ndarray | slice = slice(None),
+) -> dict | None:
+    """Data of the player for a run of a system's variant; None: nothing to animate.
+
+    Parameters
+    ----------
+    system : str
+        Name of the system's folder.
+    ssp : Ssp
+    outcome : Outcome
+    rows : sequence of int or slice, optional
+        Those of the recorded rows that the page holds.
+    """
+    given = ssp.system.parameter_sets[outcome.variant]
+    values = {
+        f"{component}.{name}": value
+        for component, model in ssp.models.items()
+        for name, value in (model.start_values | given.get(component, {})).items()
+    }
+    columns = dict(zip(outcome.run.names, outcome.run.values.T, strict=True))
+    return _data(system, Recorded(outcome.run.times, columns, {}, values), rows)
+
+
+def _data(
+    folder: str, recorded: Recorded, rows: Sequence[int] | np.ndarray | slice
+) -> dict[str, Any] | None:
+    """What goes into the page as JSON."""
+    animate = _animate(folder)
+    if animate is None:
+        return None
+    animation = animate(recorded)
+
+    def taken(values: np.ndarray | None) -> list | None:
+        return None if values is None else values[rows].tolist()
+
+    reference = animation.reference
+    return {
+        "time": taken(recorded.times),
+        **{name: taken(values) for name, values in animation.columns.items()},
+        "reference": reference and {name: taken(values) for name, values in reference.items()},
+        "arm": dict(animation.arm),
+    }
+
+
+def _animate(folder: str) -> Callable[[Recorded], Animation] | None:
+    """Function `animation` of a folder below models/."""
+    name = f"models.{folder}.{project.ANIMATION}"
+    try:
+        found = find_spec(name)
+    except ModuleNotFoundError:  # no such folder
+        found = None
+    if found is None:
+        return None
+    return cast(Callable[[Recorded], Animation], import_module(name).animation)
+
+
+def _within(component: str, named: Mapping[str, Any]) -> dict[str, Any]:
+    prefix = f"{component}."
+    return {
+        name.removeprefix(prefix): content
+        for name, content in named.items()
+        if name.startswith(prefix)
+    }

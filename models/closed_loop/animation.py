@@ -1,0 +1,15 @@
+"""What the report animates of the closed loop: the arm, and the motion that it has to follow."""
+
+from cosim.report.motion import Animation, Recorded
+from models.rp_manipulator.animation import EFFORTS, JOINTS, acting, geometry, joints
+
+
+def animation(recorded: Recorded) -> Animation:
+    """The arm under the controller's efforts, its reference motion as a ghost."""
+    arm, controller = recorded.component("arm"), recorded.component("controller")
+    wanted = recorded.component("trajectory").columns
+    return Animation(
+        joints(arm) | {name: acting(controller, name) for name in EFFORTS},
+        {name: wanted[f"{name}_ref"] for name in JOINTS},
+        geometry(arm.values),
+    )

@@ -1,0 +1,48 @@
+"""What the report animates: the arm, of this model and of the models and systems that contain it.
+
+cosim/report/motion.py says what the names mean, cosim/report/assets/arm.js draws them.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cosim.model import Value
+from cosim.report.motion import Animation, Recorded
+
+JOINTS = ("q1", "q2")
+EFFORTS = ("tau1", "f2")
+VISIBLE = 1e-3  # rad, m: a ghost that is nearer to the arm would be hidden behind it
+
+
+def animation(recorded: Recorded) -> Animation:
+    """The arm with its efforts, and the reference where it is seen to be another motion."""
+    columns = joints(recorded) | {name: acting(recorded, name) for name in EFFORTS}
+    return Animation(columns, ghost(recorded), geometry(recorded.values))
+
+
+def joints(recorded: Recorded) -> dict[str, np.ndarray | None]:
+    """Joint variables, (rows,) each: rad, m."""
+    return {name: recorded.columns[name] for name in JOINTS}
+
+
+def acting(recorded: Recorded, name: str) -> np.ndarray | None:
+    """An effort or a force, (rows,); None if it does not act."""
+    values = recorded.columns.get(name)
+    return values if values is not None and values.any() else None
+
+
+def ghost(recorded: Recorded) -> dict[str, np.ndarray] | None:
+    """Joint variables of the reference, unless it covers the arm."""
+    if not recorded.references:
+        return None
+    reference = {name: recorded.references[name] for name in JOINTS}
+    apart = max(np.abs(recorded.columns[name] - reference[name]).max() for name in JOINTS)
+    return None if apart < VISIBLE else reference
+
+
+def geometry(values: Mapping[str, Value]) -> dict[str, Any]:
+    """Lengths of the arm in m, and gravity in m/s2."""
+    lengths = {name: values[name] for name in ("a", "l1", "lc1", "g")}
+    return lengths | {"stops": None, "wall": None, "payload": None}

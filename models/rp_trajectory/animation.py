@@ -1,0 +1,13 @@
+"""What the report animates: the arm on its reference motion."""
+
+from cosim.report.motion import Animation, Recorded
+from models.rp_manipulator.animation import JOINTS
+
+UNKNOWN = dict.fromkeys(("lc1", "g", "stops", "wall", "payload"))  # to this model
+
+
+def animation(recorded: Recorded) -> Animation:
+    """The arm where the reference motion wants it."""
+    columns = {name: recorded.columns[f"{name}_ref"] for name in JOINTS}
+    arm = {name: recorded.values[name] for name in ("a", "l1")} | UNKNOWN
+    return Animation(columns, None, arm)
