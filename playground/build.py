@@ -12,6 +12,7 @@ SHARED = Path(__file__).parents[1] / "cosim" / "report" / "assets"  # of the rep
 STYLES = (SHARED / "page.css", PAGE / "playground.css")
 SCRIPTS = (
     SHARED / "shapes.js",
+    SHARED / "legend.js",
     SHARED / "arm.js",
     *(
         PAGE / f"{name}.js"
@@ -32,7 +33,7 @@ def element(name: str, kind: str, text: str) -> str:
 
 
 def data(fmus: dict[str, Path]) -> str:
-    """Module and description of each FMU, by name; the path is the module's, the other's beside it."""
+    """Elements with module and description of each FMU; the description lies beside the module."""
     elements = []
     for name, module in fmus.items():
         description = module.with_name("modelDescription.xml").read_text()

@@ -199,10 +199,9 @@ class Reals {
     return this.values();
   }
 
-  /** @param {...number} numbers */
-  set(...numbers) {
-    const values = this.values();
-    for (let i = 0; i < this.count; i++) values[i] = numbers[i];
+  /** @param {ArrayLike<number>} numbers */
+  set(numbers) {
+    this.values().set(numbers);
     this.fmu.call('fmi2SetReal', this.references, this.count, this.address);
   }
 }

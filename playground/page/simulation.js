@@ -80,7 +80,7 @@ class Simulation {
   #effort() {
     if (!this.isControlled) return this.efforts;
     const [q1, q2, dq1, dq2] = this.motion.get();
-    this.measured.set(this.reference[0], this.reference[1], q1, q2, dq1, dq2);
+    this.measured.set([this.reference[0], this.reference[1], q1, q2, dq1, dq2]);
     const [tau1, f2] = this.commanded.get();
     return [this.efforts[0] + tau1, this.efforts[1] + f2];
   }
@@ -95,7 +95,7 @@ class Simulation {
   advance() {
     const [tau1, f2] = this.#effort();
     const [fx, fy] = this.#handForce(this.hand.target ? this.tip.get() : null);
-    this.inputs.set(tau1, f2, fx, fy);
+    this.inputs.set([tau1, f2, fx, fy]);
     const {plant, controller} = this.fmus;
     plant.doStep(this.time, Simulation.STEP);
     controller.doStep(this.time, Simulation.STEP);

@@ -4,9 +4,9 @@
 set(fmus RPPlant RPController)
 set(page ${PROJECT_BINARY_DIR}/playground/index.html)
 
-if(NOT ZIG OR CMAKE_CROSSCOMPILING)
+if(NOT CAN_RELEASE)
   add_custom_target(playground
-    COMMAND ${CMAKE_COMMAND} -E echo "The playground needs zig: ./setup.sh --release"
+    COMMAND ${CMAKE_COMMAND} -E echo "The playground needs what a release needs: ./setup.sh --release"
     COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
   return()
 endif()
@@ -18,7 +18,7 @@ foreach(name IN LISTS fmus)
 endforeach()
 # not by the files' times: the other build is the one that knows whether anything has changed
 add_custom_target(playground
-  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/build.py ${modules} --output ${page}
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/build.py ${modules} --output ${page}
   COMMENT "Writing playground/index.html"
   VERBATIM)
 add_dependencies(playground platform_wasm32-wasi)
