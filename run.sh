@@ -3,6 +3,9 @@
 #
 #   ./run.sh                       all scenarios
 #   ./run.sh NAME ...              these scenarios
+#   ./run.sh FILE.toml             a scenario of your own, from anywhere
+#   ./run.sh new NAME              write NAME.toml, a scenario to start from
+#   ./run.sh --open                then open the report in a browser; also after system
 #   ./run.sh --list                names of the scenarios, without building
 #   ./run.sh system                all variants of all systems in Ecos
 #   ./run.sh system NAME ...       these variants, or all of these systems; --list names both
@@ -42,6 +45,6 @@ if [ "${1-}" = --list ]; then
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 case "${1-}" in
-  run | system | coupling) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
+  run | new | system | coupling) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
   *) exec "$python" -P -m cosim run "$@" ;;
 esac

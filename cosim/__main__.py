@@ -115,7 +115,12 @@ def _parser() -> argparse.ArgumentParser:
         "step too. The FMUs are of FMI 2.0; those of FMI 3.0 must give the same bits. Exit code: 0 "
         "all as it should be, 1 not, 2 wrong use.",
     )
-    run.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
+    run.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="scenarios, or files FILE.toml of your own (default: all scenarios)",
+    )
     run.add_argument(
         "--fmu",
         type=Path,
@@ -123,12 +128,25 @@ def _parser() -> argparse.ArgumentParser:
         help="the FMU, for the scenarios of its model (default: that of each model, in build/)",
     )
     _add_fmi(run, None, "run only FMUs of this version of FMI")
-    _add_report(run, project.report_folder())
+    _add_report(run)
+    _add_open(run)
     run.add_argument(
         "--tolerance",
         type=_tolerance,
         metavar="X",
         help="run at this relative tolerance only, without the sweep",
+    )
+    new = commands.add_parser(
+        "new",
+        help="write a scenario to start from",
+        description="Writes NAME.toml, a scenario with comments that runs as it is: "
+        "./run.sh NAME.toml. Exit code: 0 written, 2 the file exists or cannot be written.",
+    )
+    new.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
+    new.add_argument(
+        "--model",
+        metavar="MODEL",
+        help="what to simulate (default: the model with the most scenarios)",
     )
     commands.add_parser(
         "list",
@@ -141,7 +159,6 @@ def _parser() -> argparse.ArgumentParser:
         "--ssp", type=Path, metavar="PATH", help="the system (default: all in build/)"
     )
     _add_fmi(choice, VERSIONS[0], "systems in build/ with FMUs of this version of FMI (default: 2)")
-    _add_report(system_options, project.report_folder("system"))
     system = commands.add_parser(
         "system",
         parents=[system_options],
@@ -156,8 +173,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="variants, or systems with all theirs (default: all)",
     )
+    _add_report(system)
+    _add_open(system)
+    system.add_argument(
+        "--pictures",
+        type=Path,
+        metavar="DIR",
+        help="draw each variant into a picture in this folder, too",
+    )
     system.add_argument("--list", action="store_true", help="name the systems and their variants")
-    commands.add_parser(
+    coupling = commands.add_parser(
         "coupling",
         parents=[system_options],
         help="study how far co-simulation of a system is from its exact solution",
@@ -165,6 +190,7 @@ def _parser() -> argparse.ArgumentParser:
         "with step-size control, and compares it with the solution in continuous time. Exit code: "
         "0 as expected, 1 not, 2 wrong use.",
     )
+    _add_report(coupling, "system")
     return parser
 
 
@@ -181,14 +207,19 @@ def _version(text: str) -> str:
     raise argparse.ArgumentTypeError(f"expected {known}, got {text!r}")
 
 
-def _add_report(parser: argparse.ArgumentParser, folder: Path) -> None:
+def _add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
+    folder = project.report_folder(part)
     parser.add_argument(
         "--report",
         type=Path,
         metavar="DIR",
         default=folder,
-        help=f"folder for pictures and results (default: {folder.relative_to(project.ROOT)})",
+        help=f"folder for pages and results (default: {folder.relative_to(project.ROOT)})",
     )
+
+
+def _add_open(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--open", action="store_true", help="then open the report in a browser")
 
 
 def _tolerance(text: str) -> float:

@@ -41,11 +41,13 @@ class RunTable:
     def row(self, run: Run) -> None:
         result = run.result
         text = "passed" if run.passed else f"FAILED ({run.failure})"
+        text = text if run.compared else "ran, error estimated"
+        bound = f"{run.bound:>8.0e}" if run.compared else f"{'-':>8}"
         if run.twin is not None:
             text = f"{bits(run.twin.differing):<10}  {text}"
         print(
             f"{run.scenario.name:<{self._width}}  {result.tolerance:>9.0e} {result.steps:>8} "
-            f"{run.error:>10.2e} {run.bound:>8.0e} {result.wall_time:>8.3f} s  {text}",
+            f"{run.error:>10.2e} {bound} {result.wall_time:>8.3f} s  {text}",
             flush=True,
         )
 

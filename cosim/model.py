@@ -38,6 +38,7 @@ class Variable:
     least: float  # -inf: no limit
     greatest: float  # inf: no limit
     items: Mapping[str, int] = field(default_factory=dict)  # numbers of an Enumeration, by name
+    description: str = ""
 
     def is_a(self, kind: str) -> bool:
         """Whether it is one of `KINDS`."""
@@ -68,6 +69,10 @@ class Variable:
             number = int(number)
         self.check_range(number, number)
         return number
+
+    def written(self, value: Value) -> Value:
+        """A value as a user gives it: an Enumeration's item by its name."""
+        return next((name for name, item in self.items.items() if item == value), value)
 
     def item(self, name: Any) -> int:
         """Number of an Enumeration's item."""
@@ -214,4 +219,5 @@ def _variable(variable: ModelVariable) -> Variable:
         least=convert(low) if low and kind in NUMBERS else least,
         greatest=convert(high) if high and kind in NUMBERS else greatest,
         items={item.name: int(item.value) for item in declared.items},
+        description=variable.description or "",
     )

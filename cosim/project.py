@@ -55,6 +55,28 @@ def scenario_file(name: str) -> Path:
     return found[name]
 
 
+def models() -> dict[str, Path]:
+    """Folders of all models that have scenarios, by name."""
+    folders = sorted({path.parents[1] for path in ROOT.glob("models/*/scenarios/*.toml")})
+    return {folder.name: folder for folder in folders}
+
+
+def model(name: str) -> Path:
+    """Folder of a model, by its own name or that of its FMU; a UserError lists the known ones."""
+    known = models()
+    for folder in known.values():
+        if name == folder.name or is_built_from(name, folder):
+            return folder
+    guess = did_you_mean(name, known)
+    raise UserError(f"no model {name!r}{guess} (known: {', '.join(known) or 'none'})")
+
+
+def is_ours(file: Path) -> bool:
+    """Whether a file is one of the project's scenarios, or lies where they do."""
+    file = Path(file).resolve()
+    return file.parent.name in SCENARIO_FOLDERS and file.parents[1].parent == ROOT / "models"
+
+
 def convergence_files() -> list[Path]:
     """All problems for the order of convergence."""
     return sorted(ROOT.glob("models/*/convergence/*.toml"))

@@ -27,6 +27,7 @@ from cosim.model import (
 )
 from cosim.signals import Constant, Signal, Sines, Switches, Table
 
+MODEL = "model"  # key of a file that is in no model's folder
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
@@ -90,8 +91,28 @@ def title(path: Path) -> str:
     return reader.text(content["title"], "title")
 
 
+def folder_of(path: Path) -> Path:
+    """Folder of the model of a scenario: the one it lies in, or that its key `model` names.
+
+    Raises
+    ------
+    UserError
+        If the file cannot be read, or names no model.
+    """
+    if project.is_ours(path):
+        return project.model_folder(path)
+    content, reader = read_toml(path), _Reader(path)
+    if MODEL not in content:
+        known = ", ".join(project.models())
+        reader.fail(f"missing key {MODEL!r}: the name of what the scenario is of (known: {known})")
+    try:
+        return project.model(reader.text(content[MODEL], MODEL))
+    except UserError as error:
+        reader.fail(f"{MODEL}: {error}")
+
+
 def load(path: Path, model: Model) -> Scenario:
-    """Read and check the scenario at `path`, a file in models/<model>/scenarios/.
+    """Read and check the scenario at `path`, of the project or of a user.
 
     Parameters
     ----------
@@ -106,14 +127,16 @@ def load(path: Path, model: Model) -> Scenario:
     """
     path = Path(path)
     content = read_toml(path)
-    folder = project.model_folder(path)
+    folder = folder_of(path)
     reader = _Reader(path)
     reader.keys(
         content,
         "",
         required=("title", "description", "tolerance", "time"),
-        optional=("reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
+        optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
     )
+    if MODEL in content and project.model(reader.text(content[MODEL], MODEL)) != folder:
+        reader.fail(f"{MODEL}: the file lies in the folder of {folder.name}")
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
         reader.fail(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")

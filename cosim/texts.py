@@ -27,3 +27,8 @@ def bits(differing: Sequence[str]) -> str:
 def verdict(passed: bool) -> str:
     """What a check says of itself."""
     return "passed" if passed else "FAILED"
+
+
+def number(value: float) -> str:
+    """At most nine digits, as short as they get."""
+    return f"{value:.9g}"

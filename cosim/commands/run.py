@@ -1,4 +1,7 @@
-"""`run`: simulate scenarios, compare them with their references, write a report."""
+"""`run`: simulate scenarios, compare them with their references, write a report.
+
+Files of users are run in the same way; they have no references.
+"""
 
 import argparse
 from collections.abc import Mapping, Sequence
@@ -15,6 +18,8 @@ from cosim.model import VERSIONS
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 from cosim.report import pages
+from cosim.report.browser import show
+from cosim.report.writer import ReportWriter
 from cosim.scenario import Scenario
 from cosim.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
 
@@ -23,14 +28,18 @@ QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the scenarios that the options name, or all."""
+    """Run the scenarios and files that the options name, or all scenarios."""
     with ExitStack() as stack:
-        chosen, fmus, twins = _open(options, stack)
+        chosen, own, fmus, twins = _open(options, stack)
         runs = Runs(fmus, twins)
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         with written(options.report):  # and so is a report folder that cannot be made
-            options.report.mkdir(parents=True, exist_ok=True)
+            writer = ReportWriter(options.report)
+            writer.check()
+        if chosen:
+            with written(options.report):
+                writer.forget()
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []
         if options.tolerance is not None:
@@ -39,48 +48,75 @@ def run(options: argparse.Namespace) -> int:
             done = _runs(runs, chosen, bool(twins), None, TIGHTEST)
             sweeps = _sweeps(runs, _quick(done) if options.names else chosen)
             studies = [] if options.names else _convergence(fmus, twins)
-        with written(options.report), Progress("report", len(done), "runs") as progress:
-            index = pages.write_runs(options.report, done, sweeps, studies, progress)
-    print(f"\nreport: {from_here(index)}")
+        estimated = _estimated(runs, own)
+        groups = writer.grouped([*done, *estimated])
+        with written(options.report), Progress("report", len(groups), "pages") as progress:
+            page = writer.write(groups, sweeps, studies, progress)
+    for name, file in writer.files.items():
+        print(f"\n{name}: {from_here(file)}", end="")
+    print(f"\nreport: {from_here(options.report / pages.INDEX)}")
+    if options.open:
+        show(page)
     failed = (x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
-    return console.summary(failed, chosen, "scenario")
+    return console.summary(failed, [*chosen, *own], "scenario")
 
 
 def _open(
     options: argparse.Namespace, stack: ExitStack
-) -> tuple[list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
-    """Scenarios that the options name, or all; FMUs by their models; and their twins.
+) -> tuple[list[Scenario], list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
+    """Scenarios that the options name, or all; users' own; FMUs by their models; and their twins.
 
     An FMU is opened once, and every scenario of its model is checked against it. Without names, one
     that is given runs only the scenarios of its model. There are twins if no FMU and no version of
-    FMI is given.
+    FMI is given, of the models whose scenarios have references.
     """
-    files = [project.scenario_file(name) for name in dict.fromkeys(options.names)]
     given = stack.enter_context(Fmu(options.fmu)) if options.fmu else None
     if given is not None and options.fmi not in (None, given.model.fmi_version):
         found = given.model.fmi_version
         raise UserError(f"{given.path}: is an FMU of FMI {found}, --fmi wants {options.fmi}")
+    files, own = _files(options.names)
     if not options.names:
         files = [
             file
             for file in project.scenario_files().values()
             if given is None or project.is_built_from(given.model.name, project.model_folder(file))
         ]
-    if not files:
+    if not files and not own:
         which = f" of {given.model.name}, the model of {options.fmu}" if given else ""
         raise UserError(f"{project.ROOT / 'models'}: has no scenarios{which}")
-    folders = {folder.name: folder for folder in map(project.model_folder, files)}
+    folders = {file: scenarios.folder_of(file) for file in (*files, *own)}
+    models = {folder.name: folder for folder in folders.values()}
+    compared = {folders[file].name: folders[file] for file in files}
     if given is not None:
-        fmus, twins = dict.fromkeys(folders, given), {}
+        fmus, twins = dict.fromkeys(models, given), {}
     elif options.fmi is not None:
-        fmus, twins = _built(folders, options.fmi, "--fmu", stack), {}
+        fmus, twins = _built(models, options.fmi, "--fmu", stack), {}
     else:
-        fmus = _built(folders, FIRST, "--fmu", stack)
-        twins = _built(folders, TWIN, "", stack)
+        fmus = _built(models, FIRST, "--fmu", stack)
+        twins = _built(compared, TWIN, "", stack)
     for file in files if twins else ():
-        scenarios.load(file, twins[project.model_folder(file).name].model)
-    chosen = [scenarios.load(file, fmus[project.model_folder(file).name].model) for file in files]
-    return chosen, fmus, twins
+        scenarios.load(file, twins[folders[file].name].model)
+    loaded, users = (
+        [scenarios.load(file, fmus[folders[file].name].model) for file in some]
+        for some in (files, own)
+    )
+    return loaded, users, fmus, twins
+
+
+def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
+    """Files of the project's scenarios that are named, and users' own files, by their paths."""
+    files: dict[Path, None] = {}
+    own: dict[str, Path] = {}
+    for name in dict.fromkeys(names):
+        path = Path(name)
+        if path.suffix != ".toml":
+            files[project.scenario_file(name)] = None
+        elif project.is_ours(path):
+            files[path.resolve()] = None
+        elif own.setdefault(path.stem, path) != path:
+            other = own[path.stem]
+            raise UserError(f"{path}: its page would have the name of that of {other}")
+    return list(files), list(own.values())
 
 
 def _built(
@@ -97,6 +133,8 @@ def _runs(
     runs: Runs, chosen: Sequence[Scenario], with_twins: bool, *tolerances: float | None
 ) -> list[Run]:
     """Run `chosen` at `tolerances`; None: at the tolerance of the scenario."""
+    if not chosen:
+        return []
     names = (scenario.name for scenario in chosen)
     table = console.RunTable(names, TWIN if with_twins else None)
     done = []
@@ -109,6 +147,21 @@ def _runs(
             table.row(run)
             console.messages(f"{label}: the FMU says", run.result.messages)
             done.append(run)
+    return done
+
+
+def _estimated(runs: Runs, own: Sequence[Scenario]) -> list[Run]:
+    """Run scenarios of users, which have no references."""
+    if not own:
+        return []
+    table = console.RunTable(scenario.name for scenario in own)
+    done = []
+    for scenario in own:
+        with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
+            run = runs.estimated(scenario, progress)
+        table.row(run)
+        console.messages(f"{scenario.name}: the FMU says", run.result.messages)
+        done.append(run)
     return done
 
 

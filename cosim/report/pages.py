@@ -1,19 +1,15 @@
 """HTML pages, made from the templates beside this file."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from urllib.parse import quote
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from cosim import texts, trajectory_csv
-from cosim.comparison import Run
-from cosim.convergence import Convergence
+from cosim import texts
 from cosim.output_files import whole
-from cosim.report.convergence_figure import convergence_figure
-from cosim.report.scenario_figure import scenario_figure
-from cosim.report.style import save
-from cosim.report.tolerance_figure import tolerance_figure
-from cosim.tolerance_sweep import Sweep
+from cosim.report.run_data import RunData
 
 INDEX = "index.html"
 
@@ -24,69 +20,46 @@ _templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_templates.filters |= {
-    "bits": texts.bits,
-    "milliseconds": texts.milliseconds,
-    "short": texts.short,
-}
+_templates.filters |= {"address": quote, "number": texts.number, "short": texts.short}
 
 
-def write_page(folder: Path, template: str, **values: object) -> Path:
-    """Write index.html of `folder`, complete or not at all; return its path."""
-    index = folder / INDEX
-    with whole(index) as path:
+@dataclass(frozen=True)
+class Table:
+    """A table of a page."""
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]]  # numbers are aligned to the right
+    note: str = ""
+    folded: bool = False  # shown when it is asked for
+
+
+@dataclass(frozen=True, eq=False)
+class RunPage:
+    """A page about one run, or one study, with plots."""
+
+    title: str
+    description: str
+    status: str
+    facts: Sequence[tuple[str, str]]
+    data: RunData
+    tables: Sequence[Table]
+    notes: Sequence[str] = ()
+    failures: Sequence[str] = ()
+    csv: str = ""  # file name beside the page, if there is one
+    csv_note: str = ""
+    diagram: tuple[str, str] | None = None  # file name beside the page, and what it shows
+    again: str = field(default="")  # the command that runs it again
+
+
+def write_run(path: Path, page: RunPage) -> Path:
+    """Write a page of a section of the report; return its path."""
+    return write_page(path, "run.html", root="../", page=page, text=page.data.json())
+
+
+def write_page(path: Path, template: str, **values: object) -> Path:
+    """Write a page, complete or not at all; return its path."""
+    with whole(path) as temporary:
         text = _templates.get_template(template).render(values)
-        path.write_text(text, encoding="utf-8", newline="\n")
-    return index
-
-
-def write_runs(
-    folder: Path,
-    runs: Sequence[Run],
-    sweeps: Sequence[Sweep] = (),
-    convergences: Sequence[Convergence] = (),
-    progress: Callable[[int], object] = lambda _: None,
-) -> Path:
-    """Write the page of runs with all pictures and results; return the path of index.html.
-
-    Parameters
-    ----------
-    folder : Path
-        Made if it is missing; other files in it stay.
-    runs : sequence of Run
-        The first one of each scenario is drawn against the reference.
-    sweeps : sequence of Sweep, optional
-    convergences : sequence of Convergence, optional
-    progress : callable, optional
-        Called with 1 after each of `runs`.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    grouped: dict[str, list[Run]] = {}
-    for run in runs:
-        grouped.setdefault(run.scenario.name, []).append(run)
-    for name, group in grouped.items():
-        save(scenario_figure(group), folder / f"{name}.png")
-        result = group[0].result
-        trajectory_csv.write(folder / f"{name}.csv", result.times, result.names, result.values)
-        progress(len(group))
-    if sweeps:
-        save(tolerance_figure(sweeps), folder / "accuracy.png")
-    named = {
-        "convergence" if i == 0 else f"convergence_{study.scenario.name}": study
-        for i, study in enumerate(convergences)
-    }
-    for name, study in named.items():
-        save(convergence_figure(study), folder / f"{name}.png")
-    models = [group[0].fmu.model for group in grouped.values()]
-    names = ", ".join(dict.fromkeys(model.name for model in models))
-    versions = " and ".join(dict.fromkeys(model.fmi_version for model in models))
-    return write_page(
-        folder,
-        "runs.html",
-        title=f"{names} (FMI {versions}): runs against their references",
-        twin=next((run.twin.fmi_version for run in runs if run.twin), None),
-        runs=[run for group in grouped.values() for run in group],
-        sweeps=sweeps,
-        convergences=named,
-        scenarios=[group[0].scenario for group in grouped.values()],
-    )
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    return path

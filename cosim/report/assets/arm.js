@@ -11,7 +11,6 @@
  */
 const Arm = (() => {
   const HELD = 0, FREE = 2; // values of mode1 and mode2; -1 and 1: slides backward, forward
-  const PAD = 40; // px around what moves
   const {LONGEST, WIDEST} = Legend;
   const AT_STOP = 1e-6; // of the range between two stops
 
@@ -70,9 +69,11 @@ const Arm = (() => {
       box.bottom = Math.min(box.bottom, y);
       box.top = Math.max(box.top, y);
     };
+    const seen = ['elbow', 'sleeve', 'endEffector', 'tip'];
+    if (motion.payload_attached?.includes(true)) seen.push('payload');
     const coverArm = (q1, q2) => {
       const points = forward(arm, q1, q2);
-      for (const name of ['elbow', 'sleeve', 'endEffector', 'tip']) cover(points[name]);
+      for (const name of seen) cover(points[name]);
       // the ends of link 2, which reaches its sleeve wherever it is
       for (const end of slide) cover(forward(arm, q1, q2 - end).endEffector);
     };
@@ -102,6 +103,9 @@ const Arm = (() => {
     return Math.min(...heights) < near && Math.max(...heights) > -near;
   }
 
+  /** Room around what moves, px. */
+  const margin = width => Math.max(24, Math.min(width / 14, 40));
+
   /**
    * View of a canvas of `width` times `height` px in which a motion, or an extent, is seen whole.
    * `colours` maps ink, paper, grid, accent, reference, effort, stop, good, bad to colours.
@@ -109,6 +113,7 @@ const Arm = (() => {
   function fit(source, width, height, colours) {
     const seen = 'arm' in source ? extent(source) : source;
     const wide = Math.max(seen.right - seen.left, 1e-3), high = Math.max(seen.top - seen.bottom, 1e-3);
+    const pad = margin(width);
     const view = {
       ...seen, width, height, colours,
       torque: round(seen.torque), force: round(seen.force), contact: round(seen.contact),
@@ -118,7 +123,7 @@ const Arm = (() => {
     // the rows of the legend depend on its bar's length, this on the scale, and this on the rows
     for (let pass = 0; pass < 2; pass++) {
       const room = height - view.strip;
-      view.scale = Math.max(1, Math.min((width - 2 * PAD) / wide, (room - 2 * PAD) / high));
+      view.scale = Math.max(1, Math.min((width - 2 * pad) / wide, (room - 2 * pad) / high));
       view.length = round(36 / view.scale);
       view.entries = Legend.placed(view);
       view.strip = Legend.height(view.entries);
@@ -129,8 +134,8 @@ const Arm = (() => {
 
   /** Height in px that suits an extent on a canvas of this width. */
   function height(seen, width) {
-    const scale = (width - 2 * PAD) / Math.max(seen.right - seen.left, 1e-3);
-    const wanted = scale * (seen.top - seen.bottom) + 2 * PAD + Legend.ROW * 2;
+    const pad = margin(width), scale = (width - 2 * pad) / Math.max(seen.right - seen.left, 1e-3);
+    const wanted = scale * (seen.top - seen.bottom) + 2 * pad + 2 * Legend.ROW;
     return Math.round(Math.max(260, Math.min(wanted, 560, 1.1 * width)));
   }
 

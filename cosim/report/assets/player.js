@@ -142,7 +142,7 @@ class Player {
           <select>${Player.SPEEDS.map(x => `<option value="${x}">${x} ×</option>`).join('')}</select>
         </label>
       </div>
-      <dl class="player-values"></dl>
+      <ul class="player-values"></ul>
       <p class="player-keys">Keys: <kbd>Space</kbd> plays and pauses, <kbd>←</kbd> <kbd>→</kbd> go
         by a row, with <kbd>Shift</kbd> by twenty, <kbd>Home</kbd> <kbd>End</kbd> to the ends.</p>`;
     const found = name => this.element.querySelector(name);
@@ -168,11 +168,11 @@ class Player {
       ['payload_attached', 'payload', attached => (attached ? 'attached' : 'not attached')],
     ];
     return texts.filter(([name]) => this.#shows(name)).map(([name, label, text]) => {
-      const pair = document.createElement('div');
-      pair.innerHTML = `<dt>${label}</dt><dd></dd>`;
-      pair.classList.toggle('player-words', name.startsWith('mode'));
-      list.append(pair);
-      return [pair.lastElementChild, scene => text(scene[name], scene)];
+      const item = document.createElement('li');
+      item.innerHTML = `<b>${label}</b> <span></span>`;
+      item.classList.toggle('player-words', name.startsWith('mode'));
+      list.append(item);
+      return [item.lastElementChild, scene => text(scene[name], scene)];
     });
   }
 

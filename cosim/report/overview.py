@@ -1,0 +1,107 @@
+"""The overview of a report: what ran, section by section, whichever command ran it.
+
+Each section has a folder in the report, and in it the file `ENTRIES`, which the overview is made
+from: so scenarios, systems and files of users show up together though different commands run them.
+"""
+
+import json
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from cosim.output_files import whole
+from cosim.report import assets, pages
+from cosim.report.sparkline import HEIGHT, WIDTH
+
+ENTRIES = "entries.json"
+PASSED, FAILED, RAN = "passed", "FAILED", "ran"  # RAN: there was nothing to compare with
+
+SCENARIOS, STUDIES, SYSTEM, FILES = "scenarios", "studies", "system", "files"
+# folder -> title; in the order of the overview
+SECTIONS = {
+    FILES: "Your scenarios",
+    SCENARIOS: "Scenarios",
+    SYSTEM: "Variants of the systems",
+    STUDIES: "Studies",
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of the overview."""
+
+    name: str
+    title: str
+    group: str  # model or system, with its version of FMI
+    page: str  # file name in the section's folder
+    status: str  # PASSED, FAILED or RAN
+    error: float | None  # the worst one; None: not a number, or there is none
+    bound: float | None
+    detail: str  # what the error is of
+    line: str  # path of the sparkline
+    line_text: str  # what it shows
+
+
+def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:
+    """Make `entries` those of a section, and write the overview; return its path."""
+    folder = report / section
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole(folder / ENTRIES) as path:
+        text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
+        path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    return write(report)
+
+
+def forget(report: Path, section: str) -> None:
+    """Remove the entries of a section from the overview, and the overview if nothing is left."""
+    (report / section / ENTRIES).unlink(missing_ok=True)
+    if any(read(report, name) for name in SECTIONS):
+        write(report)
+    else:
+        (report / pages.INDEX).unlink(missing_ok=True)
+
+
+def read(report: Path, section: str) -> list[Entry]:
+    """Entries of a section; those of a file that nobody can read do not count."""
+    with suppress(OSError, ValueError, TypeError):
+        content = json.loads((report / section / ENTRIES).read_text(encoding="utf-8"))
+        return [Entry(**item) for item in content]
+    return []
+
+
+def write(report: Path) -> Path:
+    """Write the overview, and what its pages load."""
+    assets.write(report)
+    sections = []
+    for folder, title in SECTIONS.items():
+        entries = read(report, folder)
+        if entries:
+            sections.append({"folder": folder, "title": title, "summary": _summary(entries)})
+            groups: dict[str, list[Entry]] = {}
+            for entry in entries:
+                groups.setdefault(entry.group, []).append(entry)
+            sections[-1]["groups"] = groups
+    statuses = [entry.status for folder in SECTIONS for entry in read(report, folder)]
+    return pages.write_page(
+        report / pages.INDEX,
+        "overview.html",
+        root="",
+        sections=sections,
+        failed=statuses.count(FAILED),
+        count=len(statuses),
+        width=WIDTH,
+        height=HEIGHT,
+    )
+
+
+def _summary(entries: Sequence[Entry]) -> dict[str, object]:
+    """How many of a section passed, and which is worst."""
+    compared = [entry for entry in entries if entry.status != RAN]
+    known = [entry for entry in compared if entry.error is not None]
+    return {
+        "count": len(entries),
+        "compared": len(compared),
+        "passed": sum(entry.status == PASSED for entry in compared),
+        "worst": max(known, key=lambda entry: entry.error, default=None),
+    }

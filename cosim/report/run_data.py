@@ -1,0 +1,127 @@
+"""Data of a page with plots: what its scripts read, as JSON in the page."""
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+MOST_ROWS = 1000  # of a page, so that a report stays small
+FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A line of a plot."""
+
+    name: str
+    values: np.ndarray  # (rows,)
+    reference: np.ndarray | None = None  # (rows,), drawn below it
+    steps: bool = False  # each row ends an interval of this value
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """Curves of one unit over the abscissa of the page."""
+
+    title: str
+    unit: str
+    curves: Sequence[Curve]
+    log: bool = False
+    levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
+
+    @property
+    def text(self) -> str:
+        """What it shows, for those who do not see it."""
+        parts = []
+        for curve in self.curves:
+            finite = curve.values[np.isfinite(curve.values)]
+            if not len(finite):
+                parts.append(f"{curve.name} has no finite values")
+                continue
+            ends = f"from {curve.values[0]:.4g} to {curve.values[-1]:.4g}"
+            parts.append(f"{curve.name} {ends}, between {finite.min():.4g} and {finite.max():.4g}")
+        unit = f" in {self.unit}" if self.unit else ""
+        return f"Plot of {self.title}{unit}: {'; '.join(parts)}"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The abscissa of all plots of a page."""
+
+    title: str = "time"
+    unit: str = "s"
+    log: bool = False
+    reversed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class RunData:
+    """Everything that the scripts of a page need."""
+
+    name: str
+    title: str
+    x: np.ndarray  # (rows,) abscissa, in order
+    plots: Sequence[Plot]
+    axis: Axis = field(default_factory=Axis)
+    motion: dict[str, Any] | None = None  # of cosim.report.motion
+
+    def json(self) -> str:
+        """Text for a script element: no text in it ends the element."""
+        packer = _Packer()
+        content = {
+            "name": self.name,
+            "title": self.title,
+            "axis": vars(self.axis),
+            "time": packer.packed(self.x),
+            "plots": [_plot(plot, packer) for plot in self.plots],
+            "motion": packer.packed(self.motion),
+            "arrays": packer.arrays,
+        }
+        text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+        return text.replace("<", "\\u003c")
+
+
+def thinned(count: int, most: int = MOST_ROWS) -> np.ndarray:
+    """Rows of `count` to show: every k-th and the last, with the smallest k for about `most`."""
+    every = max(1, -(-(count - 1) // most))
+    return np.unique(np.append(np.arange(0, count, every), count - 1))
+
+
+def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
+    content: dict[str, Any] = {"title": plot.title, "unit": plot.unit, "log": plot.log}
+    content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
+    content["curves"] = curves = []
+    for curve in plot.curves:
+        item = {"name": curve.name, "values": packer.packed(curve.values), "steps": curve.steps}
+        if curve.reference is not None:
+            # only looked at: seven digits
+            item["reference"] = packer.packed(curve.reference.astype(np.float32))
+        curves.append(item)
+    return content
+
+
+class _Packer:
+    """Arrays in base64, each once however often a page uses it."""
+
+    def __init__(self) -> None:
+        self.arrays: list[dict[str, str]] = []
+        self._known: dict[tuple[str, bytes], int] = {}
+
+    def packed(self, content: Any) -> Any:
+        """`content` with arrays, and lists of floats, replaced by their places in `arrays`."""
+        if isinstance(content, dict):
+            return {name: self.packed(value) for name, value in content.items()}
+        if isinstance(content, list) and len(content) >= FEWEST_PACKED:
+            if all(type(value) is float for value in content):
+                content = np.array(content)
+        if not isinstance(content, np.ndarray):
+            return content
+        kind = "f4" if content.dtype == np.float32 else "f8"
+        data = content.astype(f"<{kind}").tobytes()
+        if (kind, data) not in self._known:
+            self._known[kind, data] = len(self.arrays)
+            self.arrays.append({kind: base64.b64encode(data).decode("ascii")})
+        return {"array": self._known[kind, data]}

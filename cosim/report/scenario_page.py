@@ -1,0 +1,282 @@
+"""The page of a scenario, and its line in the overview."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cosim import trajectory_csv
+from cosim.comparison import Run, tighter
+from cosim.report import motion, pages
+from cosim.report.overview import FAILED, PASSED, RAN, Entry
+from cosim.report.pages import RunPage, Table
+from cosim.report.run_data import Curve, Plot, RunData, thinned
+from cosim.report.sparkline import path as sparkline
+from cosim.signals import Constant, Signal, Sines, Switches
+from cosim.texts import bits, milliseconds, number, short
+
+FLOOR = 1e-18  # errors below it, 0 among them, are drawn here; no double is that good
+
+
+def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
+    """Write the page and the values of a scenario; its line in the overview.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the section in the report.
+    runs : sequence of Run
+        Of one scenario; the first one is drawn.
+    again : str
+        Command that runs it again.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    first, scenario = runs[0], runs[0].scenario
+    columns = recorded(first)
+    csv = f"{scenario.name}.csv"
+    values = np.column_stack([column.astype(float) for column in columns.values()])
+    trajectory_csv.write(folder / csv, first.result.times, list(columns), values)
+    rows = thinned(len(first.result.times))
+    plots = _plots(runs, columns, rows)
+    data = RunData(
+        scenario.name, scenario.title, first.result.times[rows], plots,
+        motion=motion.of_run(first, rows),
+    )  # fmt: skip
+    page = RunPage(
+        title=scenario.title,
+        description=scenario.description,
+        status=status(first) if all(run.passed for run in runs) else FAILED,
+        facts=_facts(first),
+        data=data,
+        tables=_tables(runs),
+        notes=_notes(runs),
+        failures=[f"Tolerance {short(run.result.tolerance)}: {text}" for run in runs if (text := _failure(run))],
+        csv=csv,
+        csv_note=_csv_note(first, rows),
+        again=again,
+    )  # fmt: skip
+    pages.write_run(folder / f"{scenario.name}.html", page)
+    return _entry(page, runs, plots[0])
+
+
+def recorded(run: Run) -> dict[str, np.ndarray]:
+    """All columns of the values, (rows,) each: Real outputs, Integers to draw, and given inputs.
+
+    A row holds what an importer reads after a step, so it holds the inputs of that step too.
+    """
+    result, scenario = run.result, run.scenario
+    held = np.maximum(scenario.reference_rows - 1, 0)
+    drawn = {name for panel in scenario.panels for name in panel}
+    inputs = [
+        name for name, variable in run.fmu.model.variables.items()
+        if variable.causality == "input" and (name in scenario.inputs or name in drawn)
+    ]  # fmt: skip
+    return {
+        **dict(zip(result.names, result.values.T, strict=True)),
+        **result.integers,
+        **{name: scenario.input(name)[held] for name in inputs},
+    }
+
+
+def status(run: Run) -> str:
+    """What the overview says of a run."""
+    if not run.passed:
+        return FAILED
+    return PASSED if run.compared else RAN
+
+
+def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray], rows: np.ndarray) -> list[Plot]:
+    """States over their references, inputs, what the scenario asks for, and errors."""
+    run = runs[0]
+    scenario, variables = run.scenario, run.fmu.model.variables
+    states = [name for name in run.fmu.model.states if name in columns]
+    panels = [(name,) for name in states or run.result.names]
+    shown = {name for panel in scenario.panels for name in panel}
+    units: dict[str | None, list[str]] = {}
+    for name in scenario.inputs:
+        if name not in shown:
+            units.setdefault(variables[name].unit, []).append(name)
+    panels += [*map(tuple, units.values()), *scenario.panels]
+
+    def curve(name: str) -> Curve:
+        real = name in run.result.names
+        return Curve(
+            name, columns[name][rows].astype(float),
+            run.reference.column(name)[rows] if real and run.compared else None, steps=not real,
+        )  # fmt: skip
+
+    plots = [
+        Plot(", ".join(names), variables[names[0]].unit or "", [curve(name) for name in names])
+        for names in panels
+    ]
+    return [*plots, _error_plot(runs, rows)]
+
+
+def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
+    """Largest error of all outputs at each time; one curve a run."""
+    curves, levels = [], []
+    for run in runs:
+        scales = np.array([run.reference.scale(name) for name in run.result.names])
+        expected = np.column_stack([run.reference.column(name) for name in run.result.names])
+        errors = np.max(np.abs(run.result.values - expected) / scales, axis=1)[rows]
+        name = f"tolerance {short(run.result.tolerance)}"
+        curves.append(Curve(name, np.maximum(errors, FLOOR).astype(np.float32)))
+        if run.compared:
+            levels.append((f"bound {short(run.bound)}", run.bound))
+    return Plot("largest relative error of all outputs", "", curves, log=True, levels=levels)
+
+
+def _facts(run: Run) -> list[tuple[str, str]]:
+    result, model = run.result, run.fmu.model
+    bound = f" of {short(run.bound)}" if run.compared else ", estimated"
+    return [
+        ("model", f"{model.name} (FMI {model.fmi_version})"),
+        ("time", f"{number(run.scenario.start)} to {number(run.scenario.stop)} s"),
+        ("steps", f"{result.steps} {_lengths(run.scenario.steps)}"),
+        ("tolerance", short(result.tolerance)),
+        ("worst error", f"{run.error:.1e}{bound} ({run.worst})"),
+    ]
+
+
+def _lengths(steps: Sequence[float]) -> str:
+    return f"of {milliseconds(steps[0])}" if len(steps) == 1 else "of varying length"
+
+
+def _failure(run: Run) -> str:
+    """What is wrong with a run, or nothing."""
+    if run.twin is not None and run.twin.differing:
+        return f"other bits in FMI {run.twin.fmi_version}: {', '.join(run.twin.differing)}"
+    if not run.passed:
+        return f"the error of {run.worst}, {run.error:.1e}, is above its bound {short(run.bound)}"
+    return ""
+
+
+def _notes(runs: Sequence[Run]) -> list[str]:
+    texts = [f"The FMU says: {text}" for text in runs[0].result.messages]
+    if not runs[0].compared:
+        tight = short(tighter(runs[0].result.tolerance))
+        texts.append(
+            f"There is no reference for this scenario. Errors are estimated from a run of the same "
+            f"FMU at tolerance {tight}; they have no bound."
+        )
+    return texts
+
+
+def _csv_note(run: Run, rows: np.ndarray) -> str:
+    count = len(run.result.times)
+    every = run.scenario.reference_every
+    texts = []
+    if every > 1:
+        texts.append(f"The file has every {every}th communication point.")
+    if len(rows) < count:
+        texts.append(f"The plots show {len(rows)} of its {count} rows.")
+    return " ".join(texts)
+
+
+def _tables(runs: Sequence[Run]) -> list[Table]:
+    run = runs[0]
+    scenario, model = run.scenario, run.fmu.model
+    given = scenario.parameters | scenario.initial
+    tables = []
+    if given:
+        tables.append(_values("Parameters and initial state of this run", run, given))
+    if scenario.signals:
+        tables.append(
+            Table(
+                "Inputs",
+                ("input", "unit", "course", "meaning"),
+                [
+                    (name, model.variables[name].unit or "", describe(signal), model.variables[name].description)
+                    for name, signal in scenario.signals.items()
+                ],
+                note="Sampled at each communication point and held over the step that begins there.",
+            )
+        )  # fmt: skip
+    rest = {
+        name: value
+        for name, value in scenario.defaults.items()
+        if name not in given and name not in scenario.signals
+        and any(model.variables[name].is_a(kind) for kind in ("parameters", "initial", "inputs"))
+    }  # fmt: skip
+    if rest:
+        tables.append(_values("All other start values", run, rest, folded=True))
+    tables += [_solver(runs), _errors(runs)]
+    return tables
+
+
+def _values(title: str, run: Run, values: dict, folded: bool = False) -> Table:
+    variables = run.fmu.model.variables
+    rows = [
+        (name, _cell(variables[name].written(value)), variables[name].unit or "", variables[name].description)
+        for name, value in values.items()
+    ]  # fmt: skip
+    return Table(title, ("name", "value", "unit", "meaning"), rows, folded=folded)
+
+
+def _cell(value: object) -> object:
+    return str(value).lower() if isinstance(value, bool) else value
+
+
+def _solver(runs: Sequence[Run]) -> Table:
+    twin = runs[0].twin
+    head = ["tolerance", "steps", "solver steps", "evaluations", "wall time", "worst error", "of"]
+    rows = []
+    for run in runs:
+        result = run.result
+        own = [result.solver_steps, result.solver_rhs_evaluations]
+        row: list[object] = [short(result.tolerance), result.steps]
+        row += ["–" if value is None else value for value in own]
+        row += [f"{result.wall_time:.3f} s", f"{run.error:.2e}", run.worst]
+        if twin is not None and run.twin is not None:
+            row.append(bits(run.twin.differing))
+        rows.append(row)
+    if twin is not None:
+        head.append(f"in FMI {twin.fmi_version}")
+    return Table("Solver", head, rows)
+
+
+def _errors(runs: Sequence[Run]) -> Table:
+    head = ["output", "unit", *(f"tolerance {short(run.result.tolerance)}" for run in runs)]
+    variables = runs[0].fmu.model.variables
+    rows = [
+        [name, variables[name].unit or "", *(f"{run.errors[name]:.2e}" for run in runs if name in run.errors)]
+        for name in runs[0].errors
+    ]  # fmt: skip
+    note = "Largest difference from the reference, relative to the output's largest value."
+    return Table("Errors of all outputs", head, rows, note=note, folded=True)
+
+
+def describe(signal: Signal) -> str:
+    """An input as text."""
+    if isinstance(signal, Constant):
+        return f"constant {number(signal.value)}"
+    if isinstance(signal, Sines):
+        terms = [
+            f"{number(amplitude)} sin(2π {number(frequency)} Hz t"
+            + (f" {'+' if phase > 0 else '−'} {number(abs(phase))})" if phase else ")")
+            for amplitude, frequency, phase in signal.terms
+        ]
+        return " + ".join(([number(signal.offset)] if signal.offset else []) + terms)
+    if isinstance(signal, Switches):
+        if len(signal.points) == 1:
+            return str(signal.points[0][1]).lower()
+        return ", ".join(f"{str(on).lower()} from {number(time)} s" for time, on in signal.points)
+    low, high = (f(value for _, value in signal.points) for f in (min, max))
+    return f"table of {len(signal.points)} points between {number(low)} and {number(high)}"
+
+
+def _entry(page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
+    first = runs[0]
+    model, curve = first.fmu.model, plot.curves[0]
+    return Entry(
+        name=first.scenario.name,
+        title=page.title,
+        group=f"{model.name} (FMI {model.fmi_version})",
+        page=f"{first.scenario.name}.html",
+        status=page.status,
+        error=first.error if np.isfinite(first.error) else None,
+        bound=first.bound if first.compared else None,
+        detail=f"worst output: {first.worst}",
+        line=sparkline(page.data.x, curve.values),
+        line_text=plot.text,
+    )

@@ -1,0 +1,39 @@
+"""A small picture of a curve, for one line of a table."""
+
+import numpy as np
+
+WIDTH, HEIGHT, MARGIN = 100.0, 24.0, 2.0  # of the view box
+COLUMNS = 60  # the curve's extremes in each are drawn
+
+
+def path(x: np.ndarray, y: np.ndarray) -> str:
+    """Path of an SVG in a view box of `WIDTH` by `HEIGHT`; empty if nothing is finite.
+
+    Parameters
+    ----------
+    x : ndarray, shape (rows,)
+        In order.
+    y : ndarray, shape (rows,)
+    """
+    finite = np.isfinite(y)
+    x, y = x[finite], y[finite]
+    if not len(x):
+        return ""
+    column = np.zeros(len(x), int)
+    span = x[-1] - x[0]
+    if span > 0:
+        column = np.minimum((x - x[0]) / span * COLUMNS, COLUMNS - 1).astype(int)
+    rows = {0, len(x) - 1}
+    for i in np.unique(column):
+        members = np.flatnonzero(column == i)
+        rows |= {int(members[np.argmin(y[members])]), int(members[np.argmax(y[members])])}
+    kept = sorted(rows)
+    across = (x[kept] - x[0]) / span if span > 0 else np.zeros(len(kept))
+    height = np.ptp(y)
+    up = (y[kept] - y.min()) / height if height > 0 else np.full(len(kept), 0.5)
+    points = zip(
+        MARGIN + across * (WIDTH - 2 * MARGIN),
+        HEIGHT - MARGIN - up * (HEIGHT - 2 * MARGIN),
+        strict=True,
+    )
+    return "M" + "L".join(f"{a:.4g} {b:.4g}" for a, b in points)

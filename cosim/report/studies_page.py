@@ -1,0 +1,127 @@
+"""Pages of the studies over scenarios: error over the tolerance, and over the communication step."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from cosim import project, reference
+from cosim.convergence import Convergence
+from cosim.report import pages
+from cosim.report.overview import FAILED, PASSED, Entry
+from cosim.report.pages import RunPage, Table
+from cosim.report.run_data import Axis, Curve, Plot, RunData
+from cosim.report.scenario_page import FLOOR
+from cosim.report.sparkline import path as sparkline
+from cosim.texts import milliseconds, short, verdict
+from cosim.tolerance_sweep import Sweep
+
+ACCURACY = "accuracy"  # name of the page over the tolerance
+UPDATE = "intermediate update"
+UPDATE_NOTE = (
+    "With intermediate update of FMI 3.0, the FMU asks for the inputs at four times of a step and "
+    "uses the cubic through them. The error then falls with the fourth power of the step, without "
+    "input derivatives, and is smaller than with three of them."
+)
+
+
+def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
+    """Write the page of errors over the tolerance; its line in the overview."""
+    x = np.array(sweeps[0].tolerances)
+    models: dict[str, list[Sweep]] = {}
+    for sweep in sweeps:
+        models.setdefault(sweep.scenario.model, []).append(sweep)
+    limit = Curve(
+        f"{reference.ERROR_PER_TOLERANCE:g} × tolerance", reference.ERROR_PER_TOLERANCE * x
+    )
+    plots = [
+        Plot(
+            f"largest error, scenarios of {model}",
+            "",
+            [*(Curve(sweep.scenario.name, _drawn(sweep.errors)) for sweep in own), limit],
+            log=True,
+        )
+        for model, own in models.items()
+    ]
+    rows = [
+        [
+            sweep.scenario.name,
+            *(f"{error:.1e}" for error in sweep.errors),
+            verdict(sweep.passed),
+        ]
+        for sweep in sweeps
+    ]
+    passed = all(sweep.passed for sweep in sweeps)
+    data = RunData(ACCURACY, "", x, plots, Axis("relative tolerance", "", log=True, reversed=True))
+    page = RunPage(
+        title="Error against tolerance",
+        description="Each scenario at eight tolerances: the largest relative error of all outputs.",
+        status=PASSED if passed else FAILED,
+        facts=[("scenarios", str(len(sweeps)))],
+        data=data,
+        tables=[Table("Errors", ["scenario", *map(short, x), "result"], rows)],
+        failures=[f"{sweep.scenario.name}: {text}" for sweep in sweeps for text in sweep.violations],
+    )  # fmt: skip
+    worst = max(sweeps, key=lambda sweep: np.nan_to_num(sweep.errors[-1], nan=np.inf))
+    return _write(folder, page, worst.errors[-1], f"at {short(x[-1])}, {worst.scenario.name}")
+
+
+def write_convergence(folder: Path, study: Convergence) -> Entry:
+    """Write the page of errors over the communication step; its line in the overview."""
+    scenario, steps = study.scenario, np.asarray(study.problem.steps, float)
+    model = project.model_folder(scenario.path).name
+    curves = [Curve(row.name, _drawn(row.errors)) for row in study.rows]
+    data = RunData(
+        scenario.name,
+        "",
+        1e3 * steps,
+        [Plot("error of the final state", "", curves, log=True)],
+        Axis("communication step", "ms", log=True),
+    )
+    rows = [
+        [row.name, *(f"{e:.1e}" for e in row.errors), f"{row.slope:.2f}", verdict(row.holds)]
+        for row in study.rows
+    ]
+    updated = any(row.name == UPDATE for row in study.rows)
+    page = RunPage(
+        title="Error against communication step",
+        description=f"{scenario.title}: {scenario.description}",
+        status=PASSED if study.passed else FAILED,
+        facts=[("model", model), ("tolerance", short(scenario.tolerance))],
+        data=data,
+        tables=[
+            Table(
+                "Errors",
+                ["known of the inputs", *map(milliseconds, steps), "slope", "result"],
+                rows,
+            )
+        ],
+        notes=[UPDATE_NOTE] if updated else [],
+        failures=study.violations,
+    )
+    worst = max(study.rows, key=lambda row: row.errors[-1])
+    return _write(folder, page, worst.errors[-1], f"at {milliseconds(steps[-1])}, {worst.name}")
+
+
+def _drawn(errors: Sequence[float] | np.ndarray) -> np.ndarray:
+    return np.maximum(np.asarray(errors, float), FLOOR)
+
+
+def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
+    folder.mkdir(parents=True, exist_ok=True)
+    name = page.data.name
+    pages.write_run(folder / f"{name}.html", page)
+    plot = page.data.plots[0]
+    line = sparkline(-np.log10(page.data.x), np.log10(plot.curves[0].values))
+    return Entry(
+        name=name,
+        title=page.title,
+        group="Errors over all scenarios",
+        page=f"{name}.html",
+        status=page.status,
+        error=float(error) if np.isfinite(error) else None,
+        bound=None,
+        detail=detail,
+        line=line,
+        line_text=plot.text,
+    )

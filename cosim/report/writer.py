@@ -1,0 +1,90 @@
+"""What the command `run` puts into a report."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from cosim.comparison import Run
+from cosim.convergence import Convergence
+from cosim.output_files import from_here
+from cosim.report import overview, scenario_page, studies_page
+from cosim.report.overview import FILES, SCENARIOS, STUDIES
+from cosim.tolerance_sweep import Sweep
+
+
+class ReportWriter:
+    """Writes pages of scenarios, of users' own files and of studies into a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
+
+    def check(self) -> None:
+        """Fail now, not after all runs, if the folder cannot be made or written to."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        probe = self.folder / ".probe"
+        probe.touch()
+        probe.unlink()
+
+    def forget(self) -> None:
+        """Take what an earlier run found out of the overview."""
+        overview.forget(self.folder, SCENARIOS)
+        overview.forget(self.folder, STUDIES)
+
+    @staticmethod
+    def grouped(runs: Sequence[Run]) -> dict[Path, list[Run]]:
+        """Runs by scenario."""
+        groups: dict[Path, list[Run]] = {}
+        for run in runs:
+            groups.setdefault(run.scenario.path, []).append(run)
+        return groups
+
+    def write(
+        self,
+        groups: Mapping[Path, Sequence[Run]],
+        sweeps: Sequence[Sweep] = (),
+        studies: Sequence[Convergence] = (),
+        progress: Callable[[int], object] = lambda _: None,
+    ) -> Path:
+        """Write all pages; return the one to open: that of a single file, or the overview.
+
+        Parameters
+        ----------
+        groups : mapping
+            Runs by scenario; the first one of each is drawn.
+        sweeps : sequence of Sweep, optional
+        studies : sequence of Convergence, optional
+        progress : callable, optional
+            Called with 1 after each scenario.
+        """
+        scenarios, files = [], []
+        for group in groups.values():
+            scenario = group[0].scenario
+            if group[0].compared:
+                again = f"./run.sh {scenario.name}"
+                scenarios.append(scenario_page.write(self.folder / SCENARIOS, group, again))
+            else:
+                again = f"./run.sh '{from_here(scenario.path)}'"
+                files.append(scenario_page.write(self.folder / FILES, group, again))
+                self.files[scenario.name] = self.folder / FILES / files[-1].page
+            progress(1)
+        written = [studies_page.write_sweeps(self.folder / STUDIES, sweeps)] if sweeps else []
+        written += [studies_page.write_convergence(self.folder / STUDIES, x) for x in studies]
+        index = self._record(scenarios, files, written)
+        return index if scenarios or len(files) != 1 else self.folder / FILES / files[0].page
+
+    def _record(
+        self,
+        scenarios: Sequence[overview.Entry],
+        files: Sequence[overview.Entry],
+        studies: Sequence[overview.Entry],
+    ) -> Path:
+        """Put the entries into the overview; files of earlier runs stay there."""
+        index = self.folder / "index.html"
+        if scenarios or not files:
+            index = overview.record(self.folder, SCENARIOS, scenarios)
+            index = overview.record(self.folder, STUDIES, studies)
+        if files:
+            names = {entry.name for entry in files}
+            before = [e for e in overview.read(self.folder, FILES) if e.name not in names]
+            index = overview.record(self.folder, FILES, [*files, *before])
+        return index

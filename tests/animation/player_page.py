@@ -1,0 +1,73 @@
+"""Pages that hold a player and nothing else."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from tests.support.browser import Browser
+from tests.support.paths import ROOT
+
+ASSETS = ROOT / "cosim" / "report" / "assets"
+STYLES = ("page.css", "player.css")
+SCRIPTS = ("shapes.js", "legend.js", "arm.js", "player.js")
+
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>Arm</title>
+<link rel="icon" href="data:,">{styles}</head>
+<body><main><h1>Arm</h1><div id="player"></div></main>
+<script type="application/json" id="motion">{motion}</script>{scripts}
+<script>
+  const element = document.getElementById('player');
+  const events = [];
+  element.addEventListener('time', event => events.push(event.detail));
+  const player = new Player(element, JSON.parse(document.getElementById('motion').textContent));
+  /** Colour of the canvas at a place in px of CSS. */
+  function colourAt([x, y]) {{
+    const ratio = player.canvas.width / player.view.width;
+    const [red, green, blue] = player.canvas.getContext('2d')
+      .getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data;
+    return [red, green, blue];
+  }}
+  /** What a colour of CSS is as red, green, blue. */
+  function parsed(colour) {{
+    const context = new OffscreenCanvas(1, 1).getContext('2d');
+    context.fillStyle = colour;
+    context.fillRect(0, 0, 1, 1);
+    return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
+  }}
+</script></body></html>
+"""
+
+ARM = {"a": 0.1, "l1": 0.5, "lc1": 0.25, "g": 9.81, "stops": None, "wall": None, "payload": None}
+
+
+def synthetic(**changes: Any) -> dict[str, Any]:
+    """A motion of 101 rows in 1 s, in which joint 1 turns by a quarter and link 2 slides out."""
+    time = [row / 100 for row in range(101)]
+    motion = {
+        "time": time,
+        "q1": [1.5 * t for t in time],
+        "q2": [0.3 * t for t in time],
+        "reference": None,
+        "arm": ARM,
+    }
+    return motion | changes
+
+
+def write(folder: Path, motion: dict[str, Any]) -> Path:
+    """Page in `folder` that plays `motion`."""
+    styles = "".join(
+        f'<link rel="stylesheet" href="{(ASSETS / name).as_uri()}">' for name in STYLES
+    )
+    scripts = "".join(f'<script src="{(ASSETS / name).as_uri()}"></script>' for name in SCRIPTS)
+    page = folder / "player.html"
+    text = PAGE.format(styles=styles, scripts=scripts, motion=json.dumps(motion, allow_nan=False))
+    page.write_text(text, encoding="utf-8")
+    return page
+
+
+def show(browser: Browser, folder: Path, motion: dict[str, Any], **view: Any) -> None:
+    """Open a page that plays `motion`; fail if it complains."""
+    browser.open(write(folder, motion), **view)
+    browser.check_quiet()

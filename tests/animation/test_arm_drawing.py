@@ -1,0 +1,246 @@
+"""What the drawing shows is what was recorded: places, lengths, angles, marks."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from tests.animation.player_page import ARM, show, synthetic
+from tests.support.browser import Browser
+
+CONSTANT = {"time": [0.0, 1.0, 2.0], "q1": [0.0] * 3, "q2": [0.2] * 3}  # nothing moves
+NEAR = 12  # of 255: edges are smoothed
+
+# pixels of a colour in a box, in px of CSS: how many, and from where to where
+PIXELS = """
+  const [name, left, top, right, bottom] = arguments;
+  const colour = parsed(player.view.colours[name]);
+  const found = {count: 0, left: Infinity, right: -Infinity};
+  for (let y = top; y <= bottom; y++) for (let x = left; x <= right; x++) {
+    const here = colourAt([x, y]);
+    if (here.some((channel, i) => Math.abs(channel - colour[i]) > 12)) continue;
+    found.count += 1;
+    found.left = Math.min(found.left, x);
+    found.right = Math.max(found.right, x);
+  }
+  return found;
+"""
+
+
+def still(browser: Browser, folder: Path, **changes) -> None:
+    """An arm at rest with the slide along x."""
+    show(browser, folder, synthetic(**CONSTANT, **changes), width=800)
+
+
+def alike(one: list[int], other: list[int]) -> bool:
+    return all(abs(a - b) <= NEAR for a, b in zip(one, other, strict=True))
+
+
+def test_the_end_effector_moves_where_the_motion_says(browser: Browser, tmp_path: Path) -> None:
+    motion = synthetic()
+    show(browser, tmp_path, motion)
+    centres = {}
+    for row in (0, 30, 60, 100):
+        browser.run("player.show(arguments[0])", row)
+        q1, L = motion["q1"][row], ARM["l1"] + motion["q2"][row]
+        x = L * math.cos(q1) - ARM["a"] * math.sin(q1)
+        y = L * math.sin(q1) + ARM["a"] * math.cos(q1)
+        ring, good, centres[row] = browser.run(
+            """
+            const [x, y] = Arm.toPixel(player.view, arguments[0]);
+            const radius = 0.62 * player.view.bar;
+            const around = [...Array(8).keys()].map(i => i * Math.PI / 4);
+            return [around.map(angle => colourAt(
+              [x + radius * Math.cos(angle), y + radius * Math.sin(angle)])),
+              parsed(player.view.colours.good), [x, y]];
+            """,
+            [x, y],
+        )
+        assert sum(alike(colour, good) for colour in ring) >= 6, row
+    browser.run("player.show(0)")
+    paper = browser.run("return parsed(player.view.colours.paper)")
+    for row in (60, 100):  # the arm has left, or is not there yet
+        assert alike(browser.run("return colourAt(arguments[0])", centres[row]), paper)
+
+
+def test_links_join_their_points(browser: Browser, tmp_path: Path) -> None:
+    show(browser, tmp_path, synthetic())
+    for row in (50, 100):
+        *link1, link2 = browser.run(
+            """
+            player.show(arguments[0]);
+            const {arm, q1, q2} = player.motion, {row, view} = player;
+            const {elbow, sleeve, endEffector} = Arm.forward(arm, q1[row], q2[row]);
+            const between = (one, other, part) => one.map((x, i) => x + part * (other[i] - x));
+            return [between([0, 0], elbow, 0.3), between([0, 0], elbow, 0.8),
+              between(elbow, sleeve, 0.4), between(sleeve, endEffector, 0.6)]
+              .map(point => colourAt(Arm.toPixel(view, point)));
+            """,
+            row,
+        )
+        paper, grid = browser.run(
+            "return ['paper', 'grid'].map(name => parsed(player.view.colours[name]))"
+        )
+        assert link1[0] == link1[1] == link1[2]
+        for colour in (link1[0], link2):
+            assert not alike(colour, paper)
+            assert not alike(colour, grid)
+        assert not alike(link1[0], link2)
+
+
+def test_the_trace_is_the_path_so_far(browser: Browser, tmp_path: Path) -> None:
+    show(browser, tmp_path, synthetic())
+    browser.run("player.show(60)")
+    path, pixel, good = browser.run(
+        "return [player.scene.trace, colourAt(Arm.toPixel(player.view, player.path[57])),"
+        " parsed(player.view.colours.good)]"
+    )
+    assert path == browser.run("return player.path.slice(0, 61)")
+    browser.run("player.show(0)")
+    before = browser.run("return colourAt(Arm.toPixel(player.view, player.path[57]))")
+    assert not alike(before, good)
+    assert not alike(before, pixel)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_force_is_as_long_as_it_is_large(browser: Browser, tmp_path: Path, sign: int) -> None:
+    still(browser, tmp_path, f2=[20.0 * sign, 10.0 * sign, 0.0])
+    left, top, sleeve = browser.run(
+        "const [x, y] = Arm.toPixel(player.view, [0.5, 0.1]); const {bar} = player.view;"
+        "return [Math.round(x - 90), Math.round(y - 2.3 * bar), Math.round(x)]"
+    )
+    bar = browser.run("return player.view.bar")
+    box = ("effort", left, top, left + 180, round(top + 1.1 * bar))
+    found = []
+    for row in range(3):
+        browser.run("player.show(arguments[0])", row)
+        found.append(browser.run(PIXELS, *box))
+    end = "right" if sign > 0 else "left"
+    assert sign * (found[0][end] - sleeve) == pytest.approx(72, abs=2)
+    assert sign * (found[1][end] - sleeve) == pytest.approx(36, abs=2)
+    assert found[2]["count"] == 0
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_torque_is_an_arc_of_its_size(browser: Browser, tmp_path: Path, sign: int) -> None:
+    still(browser, tmp_path, tau1=[5.0 * sign, 2.5 * sign, 0.0])
+    effort = browser.run("return parsed(player.view.colours.effort)")
+
+    def lit(degrees: float) -> bool:
+        colour = browser.run(
+            """
+            const [x, y] = Arm.toPixel(player.view, [0, 0]), radius = 2.6 * player.view.bar;
+            const angle = arguments[0];
+            return colourAt([x + radius * Math.cos(angle), y - radius * Math.sin(angle)]);
+            """,
+            sign * math.radians(degrees),
+        )
+        return alike(colour, effort)
+
+    begin = math.degrees(0.35)
+    angles = {0: 240, 1: 120}  # degrees, of the largest torque on the scale and of half of it
+    for row, angle in angles.items():
+        browser.run("player.show(arguments[0])", row)
+        assert lit(begin + 5)
+        assert lit(begin + angle - 8)
+        assert not lit(begin + angle + 8)
+    browser.run("player.show(2)")
+    assert not any(lit(degrees) for degrees in range(25, 300, 5))
+
+
+def test_a_force_on_the_tip_points_from_it(browser: Browser, tmp_path: Path) -> None:
+    still(browser, tmp_path, ee_fx=[0.0, 3.0, 0.0], ee_fy=[0.0, 4.0, 0.0])
+    bad = browser.run("return parsed(player.view.colours.bad)")
+    along = [
+        browser.run(
+            """
+            player.show(arguments[0]);
+            const [x, y] = Arm.toPixel(player.view, player.path[0]);
+            return [20, 40, 60].map(r => colourAt([x + 0.6 * r, y - 0.8 * r]));
+            """,
+            row,
+        )
+        for row in (0, 1)
+    ]
+    assert not any(alike(colour, bad) for colour in along[0])
+    assert all(alike(colour, bad) for colour in along[1])
+
+
+def test_a_stop_that_is_struck_is_filled(browser: Browser, tmp_path: Path) -> None:
+    arm = ARM | {"stops": {"q1": None, "q2": [-0.1, 0.2]}}
+    motion = synthetic(**CONSTANT | {"q2": [0.2, 0.1, -0.1]}, arm=arm)
+    show(browser, tmp_path, motion, width=800)
+    stop = browser.run("return parsed(player.view.colours.stop)")
+    filled = []
+    for row, q2 in enumerate(motion["q2"]):
+        browser.run("player.show(arguments[0])", row)
+        # the middles of the collars, half of their height off the axis of link 2
+        colours = browser.run(
+            """
+            const {scale, bar} = player.view, q2 = arguments[0];
+            const [x, y] = Arm.toPixel(player.view, [0.5 + q2, 0.1]);
+            return [1.15 * bar + 0.1 * scale + 0.3 * bar, -1.15 * bar - 0.2 * scale - 0.3 * bar]
+              .map(along => colourAt([x + along, y - 0.5 * bar]));
+            """,
+            q2,
+        )
+        filled.append([alike(colour, stop) for colour in colours])
+    assert filled == [[False, True], [False, False], [True, False]]
+
+
+def test_modes_of_friction_have_marks(browser: Browser, tmp_path: Path) -> None:
+    still(browser, tmp_path, mode1=[0, 1, 2], mode2=[2, 2, -1])
+    box = browser.run(
+        "const [x, y] = Arm.toPixel(player.view, [0, 0]), {bar} = player.view;"
+        "return [x - 2.4 * bar, y - 2.4 * bar, x + 2.4 * bar, y + 2.4 * bar].map(Math.round)"
+    )
+    counts = []
+    for row in range(3):
+        browser.run("player.show(arguments[0])", row)
+        counts.append(browser.run(PIXELS, "accent", *box)["count"])
+    assert counts[0] > 40  # a padlock
+    assert counts[1] > 20  # chevrons
+    assert counts[2] == 0
+    words = browser.run("return [...document.querySelectorAll('li span')].map(x => x.textContent)")
+    assert words[-2:] == ["free", "slides backward"]
+
+
+def test_the_payload_is_drawn_while_it_is_attached(browser: Browser, tmp_path: Path) -> None:
+    arm = ARM | {"payload": {"x": 0.1, "z": 0.1, "at_rest": False}}
+    attached = [False, True, False]
+    for at_rest, shown in ((False, attached), (True, [True, True, False])):
+        arm["payload"]["at_rest"] = at_rest
+        still(browser, tmp_path, arm=arm, payload_attached=attached)
+        paper = browser.run("return parsed(player.view.colours.paper)")
+        for row, expected in enumerate(shown):
+            colour = browser.run(
+                """
+                player.show(arguments[0]);
+                const [x, y] = Arm.toPixel(player.view, [0.8, 0.2]);
+                return colourAt([x + player.view.bar, y + player.view.bar]);
+                """,
+                row,
+            )
+            assert alike(colour, paper) != expected
+
+
+def test_the_reference_is_another_outline(browser: Browser, tmp_path: Path) -> None:
+    still(browser, tmp_path, reference={"q1": [0.4] * 3, "q2": [0.2] * 3})
+    colour, reference = browser.run(
+        """
+        const [x, y] = Arm.toPixel(player.view, [0.25 * Math.cos(0.4), 0.25 * Math.sin(0.4)]);
+        const beside = player.view.bar / 2 + 3.5;
+        return [colourAt([x - beside * Math.sin(0.4), y - beside * Math.cos(0.4)]),
+          parsed(player.view.colours.reference)];
+        """
+    )
+    assert alike(colour, reference)
+
+
+def test_the_wall_is_where_its_parameters_say(browser: Browser, tmp_path: Path) -> None:
+    wall = {"position": 0.06, "angle": math.pi / 2, "tip_x": 0.0, "tip_z": 0.0}
+    still(browser, tmp_path, arm=ARM | {"wall": wall})
+    stop = browser.run("return parsed(player.view.colours.stop)")
+    for y, expected in ((0.06, True), (0.08, False)):
+        colour = browser.run("return colourAt(Arm.toPixel(player.view, [0.55, arguments[0]]))", y)
+        assert alike(colour, stop) == expected

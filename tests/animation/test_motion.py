@@ -1,0 +1,180 @@
+"""What the player gets of a run: rows of its CSV file, inputs, parameters."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim import project, trajectory_csv
+from cosim.comparison import Run, Runs
+from cosim.fmu_file import Fmu
+from cosim.report import motion
+from cosim.system import comparison, ecos, ssp
+from cosim.system.comparison import Outcome
+from tests.animation.player_page import show
+from tests.support.browser import Browser
+from tests.support.cosim_project import BUILD, FMUS, load, names_of
+from tests.support.paths import ROOT
+
+ANIMATED = ("rp_manipulator", "rp_plant", "rp_trajectory")
+SYSTEMS = {"closed_loop": "ClosedLoop", "machine": "Machine"}
+COLUMNS = ("q1", "q2", "tau1", "f2", "ee_fx", "ee_fy", "payload_attached", "mode1", "mode2")
+
+
+def run(name: str) -> Run:
+    """A scenario of the project, run now."""
+    scenario = load(name)
+    with Fmu(FMUS[scenario.model]) as fmu:
+        return Runs({scenario.model: fmu}).run(scenario, scenario.tolerance)
+
+
+@pytest.fixture(scope="module")
+def grasp() -> Run:
+    return run("grasp_at_rest")
+
+
+@pytest.fixture(scope="module", params=SYSTEMS)
+def variants(request: pytest.FixtureRequest) -> Iterator[tuple[str, ssp.Ssp, list[Outcome]]]:
+    """A system with its references in the place of runs: they have the same columns."""
+    folder = ROOT / "models" / request.param
+    with ssp.unpacked(BUILD / f"{SYSTEMS[request.param]}.ssp") as opened:
+        outcomes = []
+        for variant in opened.system.parameters:
+            path = project.variant_reference_file(folder, variant)
+            names, table = trajectory_csv.read(path, lambda text, _: ValueError(text))
+            done = ecos.Run(names[1:], table[:, 0], table[:, 1:], 0.0, ())
+            outcomes.append(Outcome(variant, len(table) - 1, done, {}))
+        yield request.param, opened, outcomes
+
+
+def test_rows_are_those_of_the_csv_file(grasp: Run, tmp_path: Path) -> None:
+    result = grasp.result
+    file = tmp_path / "run.csv"
+    trajectory_csv.write(file, result.times, result.names, result.values)
+    names, table = trajectory_csv.read(file, lambda text, _: ValueError(text))
+    rows = slice(None, None, 7)
+    data = json.loads(json.dumps(motion.of_run(grasp, rows), allow_nan=False))
+    assert data["time"] == table[rows, 0].tolist()
+    for name in ("q1", "q2"):
+        assert data[name] == table[rows, names.index(name)].tolist()
+    assert data["mode1"] == result.integers["mode1"][rows].tolist()
+    assert 0 in data["mode2"]
+
+
+def test_inputs_are_those_of_the_step_that_ends_at_the_row(grasp: Run) -> None:
+    data, scenario = motion.of_run(grasp), grasp.scenario
+    times = np.array(data["time"])
+    attached = np.array(data["payload_attached"])
+    # set at 0.5 s, so in the step from there on, and taken back at 1.6 s
+    np.testing.assert_array_equal(attached, (times > 0.5 + 1e-9) & (times < 1.6 + 1e-9))
+    for name in ("tau1", "f2"):
+        values = scenario.inputs[name]
+        before = np.maximum(np.searchsorted(scenario.times, times) - 1, 0)
+        assert data[name] == values[before].tolist()
+    assert data["ee_fx"] is data["ee_fy"] is None  # it does not act
+
+
+def test_geometry_is_that_of_the_parameters(grasp: Run) -> None:
+    arm = motion.of_run(grasp)["arm"]
+    assert (arm["a"], arm["l1"], arm["lc1"], arm["g"]) == (0.08, 0.5, 0.25, 0.0)
+    assert arm["payload"] == {"x": 0.03, "z": 0.05, "at_rest": True}
+    assert arm["stops"] == {"q1": None, "q2": None}
+    assert motion.of_run(run("power_off"))["arm"]["payload"]["at_rest"] is False
+    stops = motion.of_run(run("spin_up"))["arm"]["stops"]
+    assert stops == {"q1": None, "q2": [-0.3, 0.3]}
+
+
+def test_a_ghost_is_where_the_reference_is_elsewhere(grasp: Run) -> None:
+    assert motion.of_run(grasp)["reference"] is None  # it would hide behind the arm
+    column = grasp.result.names.index("q2")
+    grasp.result.values[-1, column] += 2e-3
+    try:
+        reference = motion.of_run(grasp)["reference"]
+    finally:
+        grasp.result.values[-1, column] -= 2e-3
+    assert reference["q2"] == grasp.reference.column("q2").tolist()
+    assert reference["q1"] == grasp.reference.column("q1").tolist()
+
+
+@pytest.mark.parametrize("model", FMUS)
+def test_models_with_an_arm_are_animated(model: str) -> None:
+    data = motion.of_run(run(names_of(model)[0]))
+    assert (data is not None) == (model in ANIMATED)
+    if data is not None:
+        given = {name: data[name] for name in COLUMNS if data.get(name) is not None}
+        assert {"q1", "q2"} <= set(given)
+        assert {len(values) for values in given.values()} == {len(data["time"])}
+
+
+def test_a_folder_that_is_none_is_not_animated(grasp: Run, monkeypatch) -> None:
+    monkeypatch.setitem(grasp.scenario.__dict__, "model", "no_such_model")
+    assert motion.of_run(grasp) is None
+
+
+def test_systems_show_arm_and_reference_motion(
+    variants: tuple[str, ssp.Ssp, list[Outcome]],
+) -> None:
+    system, opened, outcomes = variants
+    arm = {"closed_loop": "arm", "machine": "plant"}[system]
+    for outcome in outcomes:
+        rows = slice(None, None, 3)
+        data = json.loads(json.dumps(motion.of_outcome(system, opened, outcome, rows)))
+        assert data["time"] == outcome.run.times[rows].tolist()
+        for name in ("q1", "q2"):
+            assert data[name] == outcome.column(f"{arm}.{name}")[rows].tolist()
+            wanted = outcome.column(f"trajectory.{name}_ref")[rows].tolist()
+            assert data["reference"][name] == wanted
+        given = opened.system.parameter_sets[outcome.variant][arm]
+        assert data["arm"]["g"] == given.get("g", 9.81)
+        assert data["arm"]["l1"] == 0.5  # the start value in the FMU
+
+
+def test_the_machine_has_payload_and_wall(
+    variants: tuple[str, ssp.Ssp, list[Outcome]],
+) -> None:
+    system, opened, outcomes = variants
+    if system != "machine":
+        assert all(motion.of_outcome(system, opened, x)["arm"]["wall"] is None for x in outcomes)
+        return
+    data = {x.variant: motion.of_outcome(system, opened, x) for x in outcomes}
+    wall = data["wall_contact"]
+    assert wall["arm"]["wall"]["position"] == 0.02
+    assert max(wall["ee_fy"]) > 5
+    held = data["pick_and_place"]
+    assert held["ee_fy"] is None
+    assert held["payload_attached"][0] is False
+    assert True in held["payload_attached"]
+    assert set(data["stick_slip"]["mode1"]) >= {-1, 0, 1}
+
+
+def test_systems_record_what_is_animated() -> None:
+    """The references stand for runs above; runs have these columns as well."""
+    for system, name in SYSTEMS.items():
+        with ssp.unpacked(BUILD / f"{name}.ssp") as opened:
+            recorded = {*comparison.recorded(opened), *comparison.discrete(opened)}
+            path = project.variant_reference_file(
+                ROOT / "models" / system, next(iter(opened.system.parameters))
+            )
+            names, _ = trajectory_csv.read(path, lambda text, _: ValueError(text))
+            assert set(names[1:]) <= recorded
+
+
+def test_the_page_draws_these_rows(grasp: Run, browser: Browser, tmp_path: Path) -> None:
+    data = motion.of_run(grasp, slice(None, None, 2))
+    show(browser, tmp_path, data)
+    for time in (0.0, 0.4, 0.501, 1.2, 2.4):
+        browser.run("player.seek(arguments[0])", time)
+        scene, shown = browser.run("return [player.scene, player.time]")
+        row = int(np.argmin(np.abs(grasp.result.times - shown)))
+        assert shown == grasp.result.times[row]
+        assert abs(shown - time) <= 0.005
+        for name in ("q1", "q2"):
+            assert scene[name] == grasp.result.values[row, grasp.result.names.index(name)]
+        for mode in ("mode1", "mode2"):
+            assert scene[mode] == grasp.result.integers[mode][row]
+        assert (scene["payload_waits"] is not None) == (time <= 0.5)
+    waits = data["payload_attached"].index(True)
+    browser.run("player.show(0)")
+    assert browser.run("return player.scene.payload_waits.q1") == data["q1"][waits]

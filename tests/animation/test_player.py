@@ -1,0 +1,212 @@
+"""The player: plays, goes to a time, obeys keys, and suits who looks at it."""
+
+import time
+from pathlib import Path
+
+import pytest
+from selenium.webdriver.common.keys import Keys
+
+from tests.animation.player_page import show, synthetic
+from tests.support.browser import Browser
+
+LAST = 100  # row of `synthetic`
+
+
+@pytest.fixture
+def page(browser: Browser, tmp_path: Path) -> Browser:
+    show(browser, tmp_path, synthetic())
+    return browser
+
+
+def row(page: Browser) -> int:
+    return page.run("return player.row")
+
+
+def label(page: Browser) -> str:
+    return page.run("return document.querySelector('.player-toggle').ariaLabel")
+
+
+def test_nothing_moves_before_it_is_asked_to(page: Browser) -> None:
+    time.sleep(0.2)
+    assert row(page) == 0
+    assert label(page) == "Play"
+
+
+def test_it_plays_to_the_end_row_after_row(page: Browser) -> None:
+    page.run("player.speed = 4; document.querySelector('.player-toggle').click()")
+    assert label(page) == "Pause"
+    page.wait("!player.playing")
+    assert label(page) == "Play"
+    rows = page.run("return events.map(event => event.row)")
+    assert rows == sorted(set(rows))
+    assert rows[-1] == LAST
+    assert len(rows) > 3
+    page.run("player.play()")  # begins once more
+    page.wait("player.row > 0 && player.row < 100")
+
+
+def test_speed_is_that_of_the_clock(page: Browser) -> None:
+    """A second at a tenth of the speed takes ten; here a part of it."""
+    passed, shown = page.driver.execute_async_script(
+        """
+        const done = arguments[0];
+        const select = document.querySelector('.player-speed select');
+        select.value = '0.1';
+        select.dispatchEvent(new Event('change'));
+        player.play();
+        let first = null;
+        element.addEventListener('time', ({detail}) => {
+          first ??= {at: performance.now(), time: detail.time};
+          if (detail.row >= 12) {
+            player.pause();
+            done([(performance.now() - first.at) / 1000, detail.time - first.time]);
+          }
+        });
+        """
+    )
+    # a frame more or less at both ends, on a busy machine
+    assert shown == pytest.approx(0.1 * passed, abs=0.02)
+
+
+def test_pause_stops(page: Browser) -> None:
+    page.run("player.speed = 0.25; player.play()")
+    page.wait("player.row > 2")
+    page.keys(".player-toggle", Keys.SPACE)
+    assert not page.run("return player.playing")
+    stopped = row(page)
+    time.sleep(0.2)
+    assert row(page) == stopped < LAST
+
+
+def test_the_slider_scrubs(page: Browser) -> None:
+    page.run(
+        """
+        const slider = document.querySelector('.player-time');
+        slider.value = 40;
+        slider.dispatchEvent(new Event('input'));
+        """
+    )
+    assert row(page) == 40
+    assert page.run("return document.querySelector('.player-clock').textContent") == "0.400 s"
+    assert page.run("return document.querySelector('.player-time').ariaValueText") == "0.400 s"
+    assert page.run("return events.at(-1)") == {"time": 0.4, "row": 40}
+
+
+@pytest.mark.parametrize("place", [".player-toggle", ".player-time"])
+def test_keys(page: Browser, place: str) -> None:
+    for key, expected in (
+        (Keys.ARROW_RIGHT, 1),
+        (Keys.ARROW_RIGHT, 2),
+        (Keys.ARROW_LEFT, 1),
+        (Keys.SHIFT + Keys.ARROW_RIGHT, 21),
+        (Keys.END, LAST),
+        (Keys.ARROW_RIGHT, LAST),
+        (Keys.SHIFT + Keys.ARROW_LEFT, 80),
+        (Keys.HOME, 0),
+        (Keys.ARROW_LEFT, 0),
+    ):
+        page.keys(place, key)
+        assert row(page) == expected
+    page.keys(place, Keys.SPACE)
+    assert page.run("return player.playing")
+    page.wait("player.row > 0")
+    page.keys(place, Keys.SPACE)
+    assert not page.run("return player.playing")
+
+
+def test_keys_of_the_list_of_speeds_stay_its_own(page: Browser) -> None:
+    page.keys(".player-speed select", Keys.END)
+    assert row(page) == 0
+    assert page.run("return player.speed") == 4
+
+
+@pytest.mark.parametrize(
+    ("asked", "shown"),
+    [(0.304, 30), (0.306, 31), (-5, 0), (7, LAST), (1, LAST), (0.5, 50)],
+)
+def test_seek_shows_the_nearest_row(page: Browser, asked: float, shown: int) -> None:
+    page.run("player.seek(arguments[0])", asked)
+    assert row(page) == shown
+    assert page.run("return events.length") == 1 + (shown != 0)
+    page.run("player.seek(arguments[0])", asked)
+    assert page.run("return events.length") == 1 + (shown != 0)  # no event, as nothing changes
+
+
+def test_times_far_away_and_uneven(browser: Browser, tmp_path: Path) -> None:
+    late = synthetic(time=[1e6 + (row / 100) ** 2 for row in range(101)])
+    show(browser, tmp_path, late)
+    for asked, expected in ((1e6 + 0.251, 50), (1e6 + 0.99, 99), (0, 0)):
+        browser.run("player.seek(arguments[0])", asked)
+        assert row(browser) == expected
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_few_rows(browser: Browser, tmp_path: Path, count: int) -> None:
+    motion = synthetic(time=[0.0, 0.1][:count], q1=[0.3, 0.4][:count], q2=[0.0, 0.1][:count])
+    show(browser, tmp_path, motion)
+    browser.run("player.play()")
+    browser.wait("!player.playing")
+    assert row(browser) == count - 1
+    browser.check_quiet()
+
+
+def test_less_motion_is_a_picture_now_and_then(browser: Browser, tmp_path: Path) -> None:
+    show(browser, tmp_path, synthetic(), reduced_motion=True)
+    browser.run("player.play()")
+    browser.wait("!player.playing")
+    rows = browser.run("return events.map(event => event.row)")
+    assert 2 <= len(rows) <= 3  # one each half of a second, of one second
+    assert rows[-1] == LAST
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [400, 1000])
+def test_it_fits_and_is_accessible(
+    browser: Browser, tmp_path: Path, dark: bool, width: int
+) -> None:
+    zeros, modes = [0.0] * 100, [0, 1] * 50
+    motion = synthetic(
+        tau1=[*zeros, 3.0],
+        f2=[*zeros, 3.0],
+        ee_fx=[*zeros, 3.0],
+        mode1=[*modes, 2],
+        mode2=[*modes, 2],
+        payload_attached=[True] * 101,
+    )
+    motion["arm"] = motion["arm"] | {
+        "stops": {"q1": [-1.0, 1.5], "q2": None},
+        "wall": {"position": 0.0, "angle": 0.3, "tip_x": 0.0, "tip_z": 0.0},
+        "payload": {"x": 0.0, "z": 0.1, "at_rest": False},
+    }
+    show(browser, tmp_path, motion, width=width, dark=dark)
+    assert browser.overflow() == 0
+    assert browser.violations() == []
+    texts, right = browser.run(
+        """
+        const context = player.canvas.getContext('2d');
+        context.font = '12px system-ui, sans-serif';
+        const {entries, width} = player.view;
+        return [entries.map(({text}) => text), Math.max(...entries.map(
+          ({text, x, swatch}) => x + swatch + context.measureText(text).width - width))];
+        """
+    )
+    assert right <= 0  # the legend ends within the canvas
+    assert {"held by friction", "slides", "at its stop", "wall", "path", "gravity"} <= set(texts)
+    paper = browser.run("return [colourAt([2, 2]), parsed(player.view.colours.paper)]")
+    assert paper[0] == paper[1]
+    assert (sum(paper[0]) < 200) == dark
+
+
+def test_it_follows_the_width(page: Browser) -> None:
+    before = page.run("return player.view.width")
+    page.run("element.style.width = '320px'")
+    page.wait("player.view.width === 320")
+    assert before > 320
+    assert page.run("return player.canvas.width") == 320
+
+
+@pytest.mark.parametrize("scale", [1, 2])
+def test_it_has_the_pixels_of_the_screen(browser: Browser, tmp_path: Path, scale: int) -> None:
+    show(browser, tmp_path, synthetic(), scale=scale)
+    width, pixels = browser.run("return [player.canvas.clientWidth, player.canvas.width]")
+    assert pixels == scale * width
