@@ -23,6 +23,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
 if [ "${1-}" = playground ]; then
   "$root/setup.sh" --release
+  SECONDS=0
   log="$root/build/playground.log"
   { cmake -S "$root" -B "$root/build" -DBUILD_TESTING=OFF && cmake --build "$root/build" --target playground; } >"$log" 2>&1 ||
     { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }

@@ -46,7 +46,7 @@ class EnergyChart {
     const end = Math.max(this.rows.at(-1)?.[0] ?? 0, EnergyChart.SPAN);
     const x = time => width * (1 - (end - time) / EnergyChart.SPAN);
     const y = energy => 8 + (height - 16) * (high - energy) / (high - low);
-    this.#drawAxis(context, style, width, y, low, high);
+    this.#drawAxis(context, style, width, y);
     EnergyChart.CURVES.forEach(([, colour], i) => {
       context.strokeStyle = style.getPropertyValue(colour);
       context.lineWidth = 2;
@@ -56,20 +56,30 @@ class EnergyChart {
       context.stroke();
     });
     context.setLineDash([]);
+    this.#drawEnds(context, style, height, low, high);
   }
 
-  #drawAxis(context, style, width, y, low, high) {
+  #drawAxis(context, style, width, y) {
     context.strokeStyle = style.getPropertyValue('--grid');
     context.lineWidth = 1;
     context.beginPath();
     context.moveTo(0, y(0));
     context.lineTo(width, y(0));
     context.stroke();
-    context.fillStyle = style.getPropertyValue('--ink');
+  }
+
+  /** Ends of the axis, legible over the curves. */
+  #drawEnds(context, style, height, low, high) {
     context.font = '12px system-ui, sans-serif';
-    context.textBaseline = 'top';
-    context.fillText(`${high.toPrecision(3)} J`, 4, 4);
-    context.textBaseline = 'bottom';
-    context.fillText(`${low.toPrecision(3)} J`, 4, this.canvas.clientHeight - 4);
+    context.fillStyle = style.getPropertyValue('--ink');
+    context.strokeStyle = style.getPropertyValue('--paper');
+    context.lineWidth = 4;
+    context.lineJoin = 'round';
+    for (const [energy, baseline, y] of [[high, 'top', 4], [low, 'bottom', height - 4]]) {
+      context.textBaseline = baseline;
+      const text = `${energy.toPrecision(3)} J`;
+      context.strokeText(text, 4, y);
+      context.fillText(text, 4, y);
+    }
   }
 }

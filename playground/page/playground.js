@@ -10,7 +10,6 @@ class Playground {
   /** @param {Fmu} plant @param {Fmu} controller */
   constructor(plant, controller) {
     this.simulation = new Simulation(plant, controller);
-    this.isRunning = true;
     this.speed = 1;
     this.saved = null;
     this.debt = 0; // s, simulated time that is due
@@ -26,6 +25,8 @@ class Playground {
     this.#addLegend();
     this.#addButtons();
     this.#addHistory();
+    this.#addKeys();
+    this.play(!matchMedia('(prefers-reduced-motion: reduce)').matches);
     this.show();
     requestAnimationFrame(now => this.#frame(now, now, 0));
   }
@@ -39,7 +40,11 @@ class Playground {
   }
 
   #scene() {
-    return Settings.scenes[document.getElementById('setting').value];
+    const {plant, controller} = Settings.scenes[document.getElementById('setting').value];
+    const {common} = Settings;
+    return {
+      plant: {...common.plant, ...plant}, controller: {...common.controller, ...controller},
+    };
   }
 
   #addControls() {
@@ -100,7 +105,7 @@ class Playground {
     const on = (id, act) => document.getElementById(id).addEventListener('click', act);
     on('play', () => this.play(!this.isRunning));
     on('reset', () => this.reset());
-    on('back', () => this.goBack(this.simulation.time - Playground.BACK));
+    on('back', () => this.#stepBack());
     on('save', () => this.save());
     on('restore', () => this.restore());
     on('measure', () => {
@@ -119,6 +124,16 @@ class Playground {
     this.history.addEventListener('input', () => {
       this.play(false);
       this.goBack(this.history.valueAsNumber);
+    });
+  }
+
+  /** Keys of the drawing, besides those that push the arm. */
+  #addKeys() {
+    const acts = {' ': () => this.play(!this.isRunning), Backspace: () => this.#stepBack()};
+    this.stage.canvas.addEventListener('keydown', event => {
+      if (!(event.key in acts)) return;
+      event.preventDefault();
+      acts[event.key]();
     });
   }
 
@@ -165,6 +180,10 @@ class Playground {
   /** @param {number} time in s */
   goBack(time) {
     if (this.simulation.goBack(time)) this.#arrive();
+  }
+
+  #stepBack() {
+    this.goBack(this.simulation.time - Playground.BACK);
   }
 
   /** Show the state that the simulation has jumped to. */

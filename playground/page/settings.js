@@ -2,7 +2,10 @@
 
 /** What the playground starts with and what it has sliders for. Names and units are the FMUs'. */
 const Settings = {
-  /** Scenes: what differs from the start values of the FMUs, by FMU. */
+  /** In all scenes: erk, the method for inputs that change in each step. */
+  common: {plant: {solver_method: 3}, controller: {solver_method: 3}},
+
+  /** Scenes: what else differs from the start values of the FMUs, by FMU. */
   scenes: {
     'Friction and stops': {
       plant: {

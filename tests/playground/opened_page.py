@@ -25,12 +25,17 @@ class OpenedPage:
     def __init__(self, browser: Browser, path: Path, **view: Any) -> None:
         self.browser = browser
         browser.open(path, **view)
-        failure = browser.driver.execute_async_script(
-            "const done = arguments[0];"
-            "playground.then(it => { window.tested = it; it.play(false); done(''); },"
-            "error => done(String(error.stack)))"
-        )
-        assert not failure, failure
+        begun = browser.driver.execute_async_script("""
+            const done = arguments[0];
+            playground.then(it => {
+              window.tested = it;
+              const {isRunning} = it;
+              it.play(false);
+              done({isRunning});
+            }, error => done({failure: String(error.stack)}));
+        """)
+        assert "failure" not in begun, begun["failure"]
+        self.was_running = begun["isRunning"]
 
     def run(self, script: str, *arguments: Any) -> Any:
         """Value of the body of a function that knows simulation, plant and controller."""

@@ -172,6 +172,7 @@ def test_save_and_restore(opened: OpenedPage) -> None:
     type_number(opened, "efforts-tau1", "7")
     type_number(opened, "plant-m1", "4")
     opened.run("for (let n = 0; n < 300; n++) simulation.step()")
+    click(opened, "#reset")
     click(opened, "#restore")
     assert opened.run("return [simulation.time, plant.get('q1')]") == before
     values = [
@@ -262,7 +263,25 @@ def test_push_by_keys(opened: OpenedPage) -> None:
     assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
 
 
+def test_keys_of_the_drawing(opened: OpenedPage) -> None:
+    opened.run("for (let n = 0; n < 400; n++) simulation.step()")
+    before = opened.run("return simulation.steps")
+    opened.browser.keys("#stage", Keys.BACKSPACE)
+    assert before - 250 <= opened.run("return simulation.steps") <= before - 200
+    opened.browser.keys("#stage", " ")
+    assert opened.text("#play") == "Pause"
+    opened.browser.keys("#stage", " ")
+    assert opened.text("#play") == "Play"
+
+
 # ---- Looks
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+def test_it_runs_at_once_unless_motion_is_unwanted(
+    browser: Browser, page: Path, reduced: bool
+) -> None:
+    assert OpenedPage(browser, page, reduced_motion=reduced).was_running != reduced
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
