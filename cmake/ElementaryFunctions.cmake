@@ -26,7 +26,7 @@ set(files
   sqrt sqrt_data
   ceil fabs floor fmax fmin remainder remquo)
 if(WASM)
-  # zig links its C library first: under names of their own, these do not meet theirs. Four are instructions.
+  # zig links its C library first: with other names its functions do not get in the way. Those left out are instructions.
   list(REMOVE_ITEM files sqrt sqrt_data ceil fabs floor)
   set(names "")
   foreach(name IN ITEMS ${files} __exp_data __log_data __pow_log_data)

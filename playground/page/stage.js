@@ -41,7 +41,7 @@ class Stage {
     };
   }
 
-  /** Choose the scale anew: after the window or a parameter has changed. */
+  /** Choose the scale: after the window or a parameter has changed. */
   fit() {
     const ratio = window.devicePixelRatio || 1;
     const {clientWidth: width, clientHeight: height} = this.canvas;
