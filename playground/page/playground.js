@@ -289,3 +289,8 @@ async function loadFmu(name) {
 /** @type {Promise<Playground>} */
 const playground = Promise.all(['RPPlant', 'RPController'].map(loadFmu))
   .then(([plant, controller]) => new Playground(plant, controller));
+playground.catch(error => {
+  const message = document.getElementById('message');
+  message.textContent = `The playground does not start: ${error.message}`;
+  message.hidden = false;
+});

@@ -111,22 +111,29 @@ class Stage {
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
+  /** Whether the end effector can be taken there. @param {[number, number]} place px */
+  #isInReach([x, y]) {
+    const tip = this.simulation.tip.get();
+    const [tipX, tipY] = Arm.toPixel(this.view, [tip[0], tip[1]]);
+    return Math.hypot(x - tipX, y - tipY) <= Stage.GRIP;
+  }
+
   #listenToPointer() {
     const {canvas, simulation} = this;
-    const move = event => { simulation.hand.target = Arm.toMetres(this.view, this.#place(event)); };
-    const release = () => { simulation.hand.target = null; };
+    const pull = event => { simulation.hand.target = Arm.toMetres(this.view, this.#place(event)); };
     canvas.addEventListener('pointerdown', event => {
-      const [x, y] = this.#place(event);
-      const tip = simulation.tip.get();
-      const [tipX, tipY] = Arm.toPixel(this.view, [tip[0], tip[1]]);
-      if (Math.hypot(x - tipX, y - tipY) > Stage.GRIP) return;
+      if (!this.#isInReach(this.#place(event))) return;
       canvas.setPointerCapture(event.pointerId);
-      move(event);
+      pull(event);
     });
     canvas.addEventListener('pointermove', event => {
-      if (canvas.hasPointerCapture(event.pointerId)) move(event);
+      if (canvas.hasPointerCapture(event.pointerId)) pull(event);
     });
-    canvas.addEventListener('lostpointercapture', release);
+    canvas.addEventListener('lostpointercapture', () => { simulation.hand.target = null; });
+    // a finger that starts elsewhere scrolls the page
+    canvas.addEventListener('touchstart', event => {
+      if (this.#isInReach(this.#place(event.touches[0]))) event.preventDefault();
+    }, {passive: false});
   }
 
   #listenToKeys() {

@@ -234,20 +234,32 @@ def test_drag_by_mouse(opened: OpenedPage) -> None:
     assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
 
 
+def touch(opened: OpenedPage, kind: str, *points: tuple[float, float]) -> None:
+    opened.browser.driver.execute_cdp_cmd(
+        "Input.dispatchTouchEvent",
+        {"type": kind, "touchPoints": [{"x": px, "y": py} for px, py in points]},
+    )
+
+
 def test_drag_by_touch(opened: OpenedPage) -> None:
     x, y = drag_place(opened)
-
-    def touch(kind: str, *points: tuple[float, float]) -> None:
-        opened.browser.driver.execute_cdp_cmd(
-            "Input.dispatchTouchEvent",
-            {"type": kind, "touchPoints": [{"x": px, "y": py} for px, py in points]},
-        )
-
-    touch("touchStart", (x, y))
-    touch("touchMove", (x + 50, y - 50))
+    touch(opened, "touchStart", (x, y))
+    for way in range(10, 60, 10):  # far enough for a page to scroll
+        touch(opened, "touchMove", (x + way, y - way))
     opened.run("simulation.step()")
     assert opened.value("ee_fx") > 1 and opened.value("ee_fy") > 1
-    touch("touchEnd")
+    touch(opened, "touchEnd")
+    opened.run("simulation.step()")
+    assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
+
+
+def test_a_finger_elsewhere_scrolls(opened: OpenedPage) -> None:
+    x, y = drag_place(opened)
+    before = opened.browser.run("return scrollY")
+    for kind, way in (("touchStart", 0), ("touchMove", 30), ("touchMove", 60), ("touchMove", 120)):
+        touch(opened, kind, (x - 150, y + 150 - way))
+    touch(opened, "touchEnd")
+    opened.browser.wait(f"scrollY > {before}")
     opened.run("simulation.step()")
     assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
 
