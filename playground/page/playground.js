@@ -14,7 +14,9 @@ class Playground {
     this.saved = null;
     this.debt = 0; // s, simulated time that is due
     this.message = document.getElementById('message');
-    for (const fmu of [plant, controller]) fmu.onWarning = text => this.say(fmu, text);
+    for (const fmu of [plant, controller]) {
+      fmu.onWarning = text => this.say(`${fmu.description.name}: ${text}`);
+    }
     this.#addScenes();
     this.simulation.start(this.#scene());
     this.controls = new Controls(this.simulation, (...change) => this.change(...change));
@@ -160,7 +162,8 @@ class Playground {
       this.message.hidden = true;
     } catch (error) {
       if (!(error instanceof FmuError)) throw error;
-      this.say(fmu, `${variable.name} = ${value} is refused.\n${error.message}`);
+      const shown = variable.items.find(item => item.value === value)?.name ?? value;
+      this.say(`${fmu.description.name} refuses ${variable.name} = ${shown}:\n${error.message}`);
     }
     this.stage.fit();
     this.show();
@@ -195,9 +198,9 @@ class Playground {
     this.show();
   }
 
-  /** @param {Fmu} fmu @param {string} text */
-  say(fmu, text) {
-    this.message.textContent = `${fmu.description.name}: ${text}`;
+  /** @param {string} text */
+  say(text) {
+    this.message.textContent = text;
     this.message.hidden = false;
   }
 
@@ -244,8 +247,7 @@ class Playground {
     this.debt = 0;
     this.play(false);
     this.goBack(this.simulation.time);
-    this.message.textContent = error.message;
-    this.message.hidden = false;
+    this.say(error.message);
   }
 
   /** Numbers, history and energies as they are now. */

@@ -116,7 +116,7 @@ def test_a_refused_value_shows_the_message(opened: OpenedPage, plant: Native) ->
     type_number(opened, "plant-m2", "-1")
     said = plant.refusal({}, "m2", -1.0)
     assert "m2 = -1" in said
-    assert opened.text("#message") == f"RPPlant: m2 = -1 is refused.\n{said}"
+    assert opened.text("#message") == f"RPPlant refuses m2 = -1:\n{said}"
     assert opened.value("m2") == 1
     assert find(opened, "#plant-m2 + input").get_property("value") == "1"
     steps = opened.run("simulation.step(); return simulation.steps")
@@ -131,6 +131,13 @@ def test_values_that_do_not_fit_are_refused(opened: OpenedPage, plant: Native) -
     said = plant.refusal(FRICTION, "coulomb_friction1", 5.0)
     assert opened.text("#message").endswith(f"\n{said}")
     assert opened.value("coulomb_friction1") == 0.4
+
+
+def test_a_refused_choice_goes_back(opened: OpenedPage, plant: Native) -> None:
+    choose(opened, "#plant-stops1", "compliant")
+    said = plant.refusal({}, "stops1", 3)
+    assert opened.text("#message") == f"RPPlant refuses stops1 = compliant:\n{said}"
+    assert find(opened, "#plant-stops1").get_property("value") == "1"
 
 
 def test_a_step_that_fails_says_so(opened: OpenedPage) -> None:
@@ -302,7 +309,7 @@ def test_readable(browser: Browser, page: Path, width: int, dark: bool) -> None:
     """No overflow and nothing that axe-core finds, with all groups open and a message shown."""
     opened = OpenedPage(browser, page, width=width, dark=dark)
     opened.run("document.querySelectorAll('details').forEach(it => { it.open = true; });"
-               "window.tested.say(plant, 'a message '.repeat(30))")  # fmt: skip
+               "window.tested.say('a message '.repeat(30))")  # fmt: skip
     assert browser.overflow() == 0
     assert browser.violations() == []
     browser.check_quiet()
