@@ -84,7 +84,7 @@ function(add_fmu name)
   target_link_libraries(${name}_description PUBLIC instance ${ARG_LIBRARY} ${name}_interface)
 
   # the page inside the FMU
-  file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg)
+  file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg ${folder}/*.png)
   add_custom_command(
     OUTPUT ${out}/documentation/index.html
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py

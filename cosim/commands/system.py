@@ -9,6 +9,9 @@ from pathlib import Path
 from cosim import console, project
 from cosim.errors import UserError, did_you_mean
 from cosim.output_files import from_here, written
+from cosim.report import overview
+from cosim.report.browser import show
+from cosim.report.overview import Entry
 from cosim.system import comparison, report, ssp, study
 from cosim.system.comparison import Outcome, Reference
 from cosim.system.report import Section
@@ -59,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
             for system, names in chosen:
                 report.remove(options.report, system.folder.name, names)
         plans = [_planned(system, names) for system, names in chosen]
-        return _run(plans, options.report)
+        return _run(plans, options)
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
@@ -123,26 +126,36 @@ def _planned(system: _System, names: Sequence[str]) -> _Plan:
     )
 
 
-def _run(plans: Sequence[_Plan], folder: Path) -> int:
+def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> int:
     """Run the plans; a row appears as a variant ends, and its files are written then."""
     outcomes: list[Outcome] = []
-    sections = []
+    entries: list[Entry] = []
     for plan in plans:
-        opened, known = plan.system.ssp, plan.study
-        table = console.VariantTable(plan.references, known.MEASURES)
-        own = []
+        section = Section(plan.system.folder, plan.system.ssp, plan.study)
+        table = console.VariantTable(plan.references, plan.study.MEASURES)
         for name, reference in plan.references.items():
-            outcome = comparison.simulate(opened, name, reference)
+            outcome = comparison.simulate(section.ssp, name, reference)
             table.row(outcome)
             console.messages(name, outcome.run.messages)
-            with written(folder):
-                report.write_variant(folder, known.figure(opened, outcome), outcome)
-            own.append(outcome)
-        sections.append(Section(plan.system.folder, opened, known, own))
-        outcomes += own
+            with written(options.report):
+                entries.append(report.write_variant(options.report, section, outcome))
+            if options.pictures:
+                with written(options.pictures):
+                    _draw(options.pictures, section, outcome)
+            outcomes.append(outcome)
         print()
-    with written(folder):
-        index = report.write_page(folder, sections)
+    with written(options.report):
+        index = overview.record(options.report, overview.SYSTEM, entries)
     print(f"report: {from_here(index)}")
+    if options.open:
+        show(index)
     failed = (outcome.variant for outcome in outcomes if not outcome.passed)
     return console.summary(failed, outcomes, "variant")
+
+
+def _draw(folder: Path, section: Section, outcome: Outcome) -> None:
+    """Write the picture of a run, as READMEs have it."""
+    from cosim.report.style import save  # matplotlib takes long to import
+
+    folder.mkdir(parents=True, exist_ok=True)
+    save(section.study.figure(section.ssp, outcome), folder / f"{outcome.variant}.png")

@@ -39,4 +39,8 @@ def _plotly() -> bytes:
     assert version is not None
     packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")
     script = (SOURCES / TEMPLATE).read_text(encoding="utf-8")
-    return script.replace("@VERSION@", version[1].decode("ascii")).replace("@PACKED@", packed).encode("utf-8")
+    return (
+        script.replace("@VERSION@", version[1].decode("ascii"))
+        .replace("@PACKED@", packed)
+        .encode("utf-8")
+    )

@@ -1,7 +1,7 @@
 """HTML pages, made from the templates beside this file."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
@@ -49,7 +49,7 @@ class RunPage:
     csv: str = ""  # file name beside the page, if there is one
     csv_note: str = ""
     diagram: tuple[str, str] | None = None  # file name beside the page, and what it shows
-    again: str = field(default="")  # the command that runs it again
+    again: str = ""  # the command that runs it again
 
 
 def write_run(path: Path, page: RunPage) -> Path:

@@ -114,9 +114,9 @@ class _Packer:
         """`content` with arrays, and lists of floats, replaced by their places in `arrays`."""
         if isinstance(content, dict):
             return {name: self.packed(value) for name, value in content.items()}
-        if isinstance(content, list) and len(content) >= FEWEST_PACKED:
-            if all(type(value) is float for value in content):
-                content = np.array(content)
+        long = isinstance(content, list) and len(content) >= FEWEST_PACKED
+        if long and all(type(value) is float for value in content):
+            content = np.array(content)
         if not isinstance(content, np.ndarray):
             return content
         kind = "f4" if content.dtype == np.float32 else "f8"

@@ -39,9 +39,12 @@ def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
     rows = thinned(len(first.result.times))
     plots = _plots(runs, columns, rows)
     data = RunData(
-        scenario.name, scenario.title, first.result.times[rows], plots,
+        scenario.name,
+        scenario.title,
+        first.result.times[rows],
+        plots,
         motion=motion.of_run(first, rows),
-    )  # fmt: skip
+    )
     page = RunPage(
         title=scenario.title,
         description=scenario.description,
@@ -50,11 +53,11 @@ def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
         data=data,
         tables=_tables(runs),
         notes=_notes(runs),
-        failures=[f"Tolerance {short(run.result.tolerance)}: {text}" for run in runs if (text := _failure(run))],
+        failures=[text for run in runs if (text := _failure(run))],
         csv=csv,
         csv_note=_csv_note(first, rows),
         again=again,
-    )  # fmt: skip
+    )
     pages.write_run(folder / f"{scenario.name}.html", page)
     return _entry(page, runs, plots[0])
 
@@ -68,9 +71,10 @@ def recorded(run: Run) -> dict[str, np.ndarray]:
     held = np.maximum(scenario.reference_rows - 1, 0)
     drawn = {name for panel in scenario.panels for name in panel}
     inputs = [
-        name for name, variable in run.fmu.model.variables.items()
+        name
+        for name, variable in run.fmu.model.variables.items()
         if variable.causality == "input" and (name in scenario.inputs or name in drawn)
-    ]  # fmt: skip
+    ]
     return {
         **dict(zip(result.names, result.values.T, strict=True)),
         **result.integers,
@@ -101,9 +105,11 @@ def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray], rows: np.ndarray
     def curve(name: str) -> Curve:
         real = name in run.result.names
         return Curve(
-            name, columns[name][rows].astype(float),
-            run.reference.column(name)[rows] if real and run.compared else None, steps=not real,
-        )  # fmt: skip
+            name,
+            columns[name][rows].astype(float),
+            run.reference.column(name)[rows] if real and run.compared else None,
+            steps=not real,
+        )
 
     plots = [
         Plot(", ".join(names), variables[names[0]].unit or "", [curve(name) for name in names])
@@ -144,10 +150,11 @@ def _lengths(steps: Sequence[float]) -> str:
 
 def _failure(run: Run) -> str:
     """What is wrong with a run, or nothing."""
+    place = f"Tolerance {short(run.result.tolerance)}:"
     if run.twin is not None and run.twin.differing:
-        return f"other bits in FMI {run.twin.fmi_version}: {', '.join(run.twin.differing)}"
+        return f"{place} other bits in FMI {run.twin.fmi_version}: {', '.join(run.twin.differing)}"
     if not run.passed:
-        return f"the error of {run.worst}, {run.error:.1e}, is above its bound {short(run.bound)}"
+        return f"{place} error {run.error:.1e} of {run.worst}, above its bound {short(run.bound)}"
     return ""
 
 
@@ -186,18 +193,20 @@ def _tables(runs: Sequence[Run]) -> list[Table]:
                 "Inputs",
                 ("input", "unit", "course", "meaning"),
                 [
-                    (name, model.variables[name].unit or "", describe(signal), model.variables[name].description)
+                    (name, known.unit or "", describe(signal), known.description)
                     for name, signal in scenario.signals.items()
+                    if (known := model.variables[name])
                 ],
-                note="Sampled at each communication point and held over the step that begins there.",
+                note="Sampled at communication points, each held over the step that begins there.",
             )
-        )  # fmt: skip
+        )
     rest = {
         name: value
         for name, value in scenario.defaults.items()
-        if name not in given and name not in scenario.signals
+        if name not in given
+        and name not in scenario.signals
         and any(model.variables[name].is_a(kind) for kind in ("parameters", "initial", "inputs"))
-    }  # fmt: skip
+    }
     if rest:
         tables.append(_values("All other start values", run, rest, folded=True))
     tables += [_solver(runs), _errors(runs)]
@@ -207,9 +216,10 @@ def _tables(runs: Sequence[Run]) -> list[Table]:
 def _values(title: str, run: Run, values: dict, folded: bool = False) -> Table:
     variables = run.fmu.model.variables
     rows = [
-        (name, _cell(variables[name].written(value)), variables[name].unit or "", variables[name].description)
+        (name, _cell(known.written(value)), known.unit or "", known.description)
         for name, value in values.items()
-    ]  # fmt: skip
+        if (known := variables[name])
+    ]
     return Table(title, ("name", "value", "unit", "meaning"), rows, folded=folded)
 
 
@@ -239,9 +249,10 @@ def _errors(runs: Sequence[Run]) -> Table:
     head = ["output", "unit", *(f"tolerance {short(run.result.tolerance)}" for run in runs)]
     variables = runs[0].fmu.model.variables
     rows = [
-        [name, variables[name].unit or "", *(f"{run.errors[name]:.2e}" for run in runs if name in run.errors)]
+        [name, variables[name].unit or "", *(f"{run.errors[name]:.2e}" for run in runs)]
         for name in runs[0].errors
-    ]  # fmt: skip
+        if all(name in run.errors for run in runs)
+    ]
     note = "Largest difference from the reference, relative to the output's largest value."
     return Table("Errors of all outputs", head, rows, note=note, folded=True)
 

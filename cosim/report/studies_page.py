@@ -1,4 +1,4 @@
-"""Pages of the studies over scenarios: error over the tolerance, and over the communication step."""
+"""Pages of the studies: error over the tolerance, and over the communication step."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -60,8 +60,8 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
         facts=[("scenarios", str(len(sweeps)))],
         data=data,
         tables=[Table("Errors", ["scenario", *map(short, x), "result"], rows)],
-        failures=[f"{sweep.scenario.name}: {text}" for sweep in sweeps for text in sweep.violations],
-    )  # fmt: skip
+        failures=[f"{s.scenario.name}: {text}" for s in sweeps for text in s.violations],
+    )
     worst = max(sweeps, key=lambda sweep: np.nan_to_num(sweep.errors[-1], nan=np.inf))
     return _write(folder, page, worst.errors[-1], f"at {short(x[-1])}, {worst.scenario.name}")
 

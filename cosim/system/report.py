@@ -1,63 +1,175 @@
-"""Results of systems' runs as files: a picture and the values of each variant, and a page."""
+"""The report's pages of systems: one a variant, with the diagram of the system."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from matplotlib.figure import Figure
+import numpy as np
 
 from cosim import project, trajectory_csv
 from cosim.output_files import whole
-from cosim.report import pages
-from cosim.report.style import save
+from cosim.report import motion, overview, pages
+from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
+from cosim.report.pages import RunPage, Table
+from cosim.report.run_data import Curve, Plot, RunData
+from cosim.report.sparkline import path as sparkline
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
-from cosim.system.study import Study
+from cosim.system.study import Diagram, Study
+from cosim.texts import milliseconds, short
+
+MOST_ROWS = 600  # of a file of values, which has many columns
 
 
 @dataclass(frozen=True)
 class Section:
-    """Runs of one system, for the page."""
+    """A system whose variants are run."""
 
     folder: Path
     ssp: Ssp
     study: Study
-    outcomes: Sequence[Outcome]
 
     @property
     def name(self) -> str:
         """Name of the system."""
         return self.folder.name
 
+    @property
+    def title(self) -> str:
+        """The system and the version of FMI of its components."""
+        versions = sorted({model.fmi_version for model in self.ssp.models.values()})
+        return f"{self.ssp.path.stem} (FMI {' and '.join(versions)})"
 
-def remove(folder: Path, system: str, variants: Sequence[str]) -> None:
-    """Remove what an earlier run left of these variants, and the page that shows it."""
-    (folder / pages.INDEX).unlink(missing_ok=True)
+
+def remove(report: Path, system: str, variants: Sequence[str]) -> None:
+    """Remove what an earlier run left of these variants, and of all from the overview."""
+    folder = report / SYSTEM
+    overview.forget(report, SYSTEM)
     (folder / f"{system}.svg").unlink(missing_ok=True)
     for variant in variants:
-        for suffix in (".csv", ".png"):
+        for suffix in (".csv", ".html"):
             (folder / f"{variant}{suffix}").unlink(missing_ok=True)
+    with suppress(OSError):  # not there, or there is more in it
+        folder.rmdir()
 
 
-def write_variant(folder: Path, figure: Figure, outcome: Outcome) -> None:
-    """Write the picture and all recorded values of a run; a file is complete or not there."""
+def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
+    """Write the page and the values of a run, complete or not at all; its line in the overview."""
+    folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
-    run = outcome.run
-    save(figure, folder / f"{outcome.variant}.png")
-    trajectory_csv.write(folder / f"{outcome.variant}.csv", run.times, run.names, run.values)
-
-
-def write_page(folder: Path, sections: Sequence[Section]) -> Path:
-    """Write index.html over the runs of `write_variant`, and the diagrams; return its path."""
-    for section in sections:
-        with whole(folder / f"{section.name}.svg") as path:
-            path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
-    versions = {model.fmi_version for section in sections for model in section.ssp.models.values()}
-    names = ", ".join(section.ssp.path.stem for section in sections)
-    return pages.write_page(
-        folder,
-        "system.html",
-        title=f"{names} (FMI {' and '.join(sorted(versions))}): runs against their references",
+    run, csv = outcome.run, f"{outcome.variant}.csv"
+    every = _every(len(run.times))
+    rows = np.arange(0, len(run.times), every)
+    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows])
+    with whole(folder / f"{section.name}.svg") as path:
+        path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
+    plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
+    step = milliseconds(every * section.ssp.system.step)
+    moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    page = RunPage(
+        title=f"{section.ssp.path.stem}: {outcome.variant}",
+        description=f"Run by Ecos with steps of {milliseconds(section.ssp.system.step)}.",
+        status=PASSED if outcome.passed else FAILED,
+        facts=_facts(section, outcome),
+        data=RunData(outcome.variant, "", run.times[rows], plots, motion=moving),
+        tables=[*_parameters(section.ssp, outcome.variant), _errors(section.ssp, outcome)],
+        notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
+        failures=[*_failures(outcome), *run.messages],
+        csv=csv,
+        csv_note=f"The file has a row every {step}.",
+        diagram=(
+            f"{section.name}.svg",
+            f"Components of {section.ssp.path.stem} and the signals between them",
+        ),
+        again=f"./run.sh system {outcome.variant}",
+    )
+    pages.write_run(folder / f"{outcome.variant}.html", page)
+    return Entry(
+        name=outcome.variant,
+        title=", ".join(f"{name} {value}" for name, value in _measures(section, outcome)),
+        group=section.title,
+        page=f"{outcome.variant}.html",
+        status=page.status,
+        error=float(outcome.error) if np.isfinite(outcome.error) else None,
         bound=BOUND,
-        sections=sections,
+        detail=f"worst variable: {outcome.worst}",
+        line=sparkline(page.data.x, plots[0].curves[0].values),
+        line_text=plots[0].text,
+    )
+
+
+def _every(rows: int) -> int:
+    """Least of 1, 2, 5, 10, ... such that every such row makes `MOST_ROWS` steps at most."""
+    size = 1
+    while True:
+        for factor in (1, 2, 5):
+            if (rows - 1) / (factor * size) <= MOST_ROWS:
+                return factor * size
+        size *= 10
+
+
+def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram, rows: np.ndarray) -> Plot:
+    curves = []
+    for name in diagram.curves:
+        wanted = diagram.references.get(name)
+        curves.append(
+            Curve(
+                name,
+                outcome.column(name)[rows],
+                None if wanted is None else outcome.column(wanted)[rows],
+                steps=ssp.variable(name).type != "Real",
+            )
+        )
+    units = [ssp.variable(name).unit or "" for name in diagram.curves]
+    return Plot(diagram.title, units[0], curves)
+
+
+def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
+    system = section.ssp.system
+    return [
+        ("system", section.title),
+        ("time", f"{system.start:g} to {system.stop:g} s"),
+        ("steps", str(outcome.steps)),
+        ("worst error", f"{outcome.error:.1e} of {short(BOUND)} ({outcome.worst})"),
+        *_measures(section, outcome),
+        ("wall time", f"{outcome.run.wall_time:.3f} s"),
+    ]
+
+
+def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
+    return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.study.MEASURES]
+
+
+def _failures(outcome: Outcome) -> list[str]:
+    if outcome.passed:
+        return []
+    return [f"the error of {outcome.worst}, {outcome.error:.1e}, is above its bound {short(BOUND)}"]
+
+
+def _parameters(ssp: Ssp, variant: str) -> list[Table]:
+    """What the variant sets, component by component."""
+    rows = []
+    for component, values in ssp.system.parameter_sets[variant].items():
+        for name, value in values.items():
+            known = ssp.models[component].variables[name]
+            shown = known.written(value)
+            text = str(shown).lower() if isinstance(shown, bool) else shown
+            rows.append((component, name, text, known.unit or "", known.description))
+    head = ("component", "name", "value", "unit", "meaning")
+    note = "What is not here has its start value in the FMU."
+    return [Table("Parameters of this variant", head, rows, note=note)] if rows else []
+
+
+def _errors(ssp: Ssp, outcome: Outcome) -> Table:
+    rows = [
+        (name, ssp.variable(name).unit or "", f"{error:.2e}")
+        for name, error in outcome.errors.items()
+    ]
+    note = (
+        "Largest difference from the reference of Ecos's order, relative to the variable's largest "
+        "value."
+    )
+    return Table(
+        "Errors of all variables", ("variable", "unit", "error"), rows, note=note, folded=True
     )

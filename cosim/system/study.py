@@ -3,8 +3,8 @@
 The folder has a module study.py with the names of `Study`; `load` gives it.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Protocol, cast
@@ -28,15 +28,24 @@ class Measure:
     value: Callable[[Outcome], float]
 
 
+@dataclass(frozen=True)
+class Diagram:
+    """Variables of one unit to draw together, each ``component.variable``."""
+
+    title: str
+    curves: Sequence[str]
+    references: Mapping[str, str] = field(default_factory=dict)  # what a curve should follow
+
+
 class Study(Protocol):
     """The module study.py of a system's folder."""
 
     EXPERIMENT: tuple[float, float, float]  # start, stop and step in s that the references are for
     MEASURES: Sequence[Measure]
-    PICTURE: str  # what `figure` shows, in place of the picture
+    DIAGRAMS: Sequence[Diagram]  # of the page of a variant
 
     def figure(self, ssp: Ssp, outcome: Outcome) -> Figure:
-        """Picture of a run of one variant."""
+        """Picture of a run of one variant, for READMEs."""
         ...
 
 

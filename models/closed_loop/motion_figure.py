@@ -10,8 +10,6 @@ from cosim.report.style import DASHED, ERRORS, MUTED, REFERENCE, RUN, STYLE
 from cosim.system.comparison import Outcome
 from cosim.system.ssp import Ssp
 
-PICTURE = "joints, tracking errors, efforts, path of the end effector"
-
 JOINTS = (("q1", "rad"), ("q2", "m"))
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 REACHED = 0.999  # of a limit; from there on the limit is drawn

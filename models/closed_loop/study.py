@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from cosim.system.comparison import Outcome
-from cosim.system.study import Measure
+from cosim.system.study import Diagram, Measure
 from models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
-from models.closed_loop.motion_figure import PICTURE, distance, figure
+from models.closed_loop.motion_figure import distance, figure
 
-__all__ = ["EXPERIMENT", "MEASURES", "PICTURE", "figure", "study_coupling"]
+__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure", "study_coupling"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
@@ -29,6 +29,21 @@ MEASURES = (
         "largest distance of the end effector from its reference",
         tracking_error,
     ),
+)
+
+DIAGRAMS = (
+    Diagram("joint 1", ["arm.q1"], {"arm.q1": "trajectory.q1_ref"}),
+    Diagram("joint 2", ["arm.q2"], {"arm.q2": "trajectory.q2_ref"}),
+    Diagram("tracking error of joint 1", ["controller.q1_error"]),
+    Diagram("tracking error of joint 2", ["controller.q2_error"]),
+    Diagram("torque", ["controller.tau1"]),
+    Diagram("force", ["controller.f2"]),
+    Diagram(
+        "end effector",
+        ["arm.ee_x", "arm.ee_y"],
+        {"arm.ee_x": "trajectory.ee_x_ref", "arm.ee_y": "trajectory.ee_y_ref"},
+    ),
+    Diagram("energy of the arm", ["arm.kinetic_energy", "arm.potential_energy"]),
 )
 
 

@@ -11,8 +11,6 @@ from cosim.report.style import ERRORS, MUTED, REFERENCE, RUN, STYLE
 from cosim.system.comparison import Outcome
 from cosim.system.ssp import Ssp
 
-PICTURE = "joints, tracking errors, efforts, modes, contact force, path of the end effector"
-
 JOINTS = (("q1", "rad", "tau1", "N·m"), ("q2", "m", "f2", "N"))
 MODES = {-1: "slides back", 0: "sticks", 1: "slides forth", 2: "free"}
 CARRIED = "#f4e3d3"  # while the payload is attached

@@ -6,11 +6,11 @@ cosim/system/study.py says what each name means.
 import numpy as np
 
 from cosim.system.comparison import Outcome
-from cosim.system.study import Measure
+from cosim.system.study import Diagram, Measure
 from models.machine.experiment import START, STEPS_PER_SECOND, STOP
-from models.machine.machine_figure import PICTURE, distance, figure
+from models.machine.machine_figure import distance, figure
 
-__all__ = ["EXPERIMENT", "MEASURES", "PICTURE", "figure"]
+__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
@@ -39,4 +39,22 @@ MEASURES = (
     ),
     Measure("contact force", "N", "largest force of the wall", contact_force),
     Measure("stuck", "%", "share of the time for which friction holds joint 1", stuck),
+)
+
+# in the order in which signals flow
+DIAGRAMS = (
+    Diagram("joint 1", ["plant.q1"], {"plant.q1": "trajectory.q1_ref"}),
+    Diagram("joint 2", ["plant.q2"], {"plant.q2": "trajectory.q2_ref"}),
+    Diagram("measured velocity of joint 1", ["sensor.dq1_measured", "plant.dq1"]),
+    Diagram("measured velocity of joint 2", ["sensor.dq2_measured", "plant.dq2"]),
+    Diagram("tracking error of joint 1", ["controller.q1_error"]),
+    Diagram("tracking error of joint 2", ["controller.q2_error"]),
+    Diagram("torque: wanted, of the motor", ["controller.tau1", "actuator.tau1"]),
+    Diagram("force: wanted, of the motor", ["controller.f2", "actuator.f2"]),
+    Diagram("currents of the motors", ["actuator.current1", "actuator.current2"]),
+    Diagram("voltages of the motors", ["actuator.voltage1", "actuator.voltage2"]),
+    Diagram("modes of friction", ["plant.mode1", "plant.mode2"]),
+    Diagram("force of the wall", ["environment.wall_force"]),
+    Diagram("wrench at the end effector", ["environment.ee_fx", "environment.ee_fy"]),
+    Diagram("payload attached", ["trajectory.payload_attached"]),
 )

@@ -16,7 +16,9 @@ class Player {
     this.element = element;
     this.motion = motion;
     this.extent = Arm.extent(motion);
-    this.path = motion.q1.map((q1, row) => Arm.forward(motion.arm, q1, motion.q2[row]).endEffector);
+    // Array.from: columns may be typed arrays
+    this.path = Array.from(motion.q1,
+      (q1, row) => Arm.forward(motion.arm, q1, motion.q2[row]).endEffector);
     this.grasp = motion.payload_attached?.indexOf(true) ?? -1;
     this.row = -1;
     this.speed = 1;

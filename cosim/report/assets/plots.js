@@ -105,6 +105,7 @@ const Plots = (() => {
 
   const CONFIG = {
     displaylogo: false,
+    showTips: false,
     responsive: true,
     modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'],
   };
@@ -126,7 +127,8 @@ const Plots = (() => {
       const own = { values: curve.values, text: entry(curve.name, palette.curves[i % COLOURS]) };
       own.text.dataset.curve = curve.name;
       if (!curve.reference) return [own];
-      return [own, { values: curve.reference, text: entry('reference', palette.reference) }];
+      const name = plot.curves.length > 1 ? `reference of ${curve.name}` : 'reference';
+      return [own, { values: curve.reference, text: entry(name, palette.reference) }];
     });
     for (const level of plot.levels ?? []) entry(level.name, palette.ink);
     return found;
@@ -228,7 +230,8 @@ const Plots = (() => {
 
     async draw() {
       const plotly = await plotlyReady;
-      document.getElementById('js-plotly-tester')?.setAttribute('aria-hidden', 'true');
+      // what the library measures texts with, out of sight: into a landmark like all else
+      document.querySelector('main').append(document.getElementById('js-plotly-tester'));
       for (const plot of this.plots) {
         await plot.draw(plotly);
         this.listen(plotly, plot);

@@ -1,0 +1,51 @@
+"""`new`: write a scenario with comments, for a user to start from."""
+
+import argparse
+from pathlib import Path
+
+from cosim import project, scenario_template
+from cosim.errors import UserError, reason
+from cosim.fmu_file import read_model
+from cosim.output_files import whole
+
+SUFFIX = ".toml"
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write the file; 0 if it is there then."""
+    path = _path(options.name)
+    folder = project.model(options.model) if options.model else _usual_model()
+    model = read_model(project.built(folder, ".fmu"))
+    text = scenario_template.text(path.stem, folder.name, model)
+    try:
+        path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
+    except FileExistsError:
+        raise UserError(f"{path}: exists already, choose another name") from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    try:
+        with whole(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    print(f"{path}: written; run it by ./run.sh '{path}'")
+    return 0
+
+
+def _path(name: str) -> Path:
+    """File for a name, with or without its suffix; UserError for one that no file can have."""
+    path = Path(name)
+    if not path.name or not path.stem.strip() or name.endswith(("/", "\\")):
+        raise UserError(f"{name!r} is no name for a scenario")
+    if any(not character.isprintable() for character in name):
+        raise UserError(f"{name!r}: a name has printable characters only")
+    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+
+
+def _usual_model() -> Path:
+    """Folder of the model that has the most scenarios."""
+    folders = list(project.models().values())
+    if not folders:
+        raise UserError(f"{project.ROOT / 'models'}: has no scenarios")
+    return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))
