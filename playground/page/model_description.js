@@ -8,6 +8,7 @@
  * @property {'Real'|'Integer'|'Boolean'|'Enumeration'} type
  * @property {string} causality
  * @property {string} variability
+ * @property {string} initial '' where it has none
  * @property {string} unit '' where it has none
  * @property {string} description
  * @property {number|null} start
@@ -50,6 +51,7 @@ class ModelDescription {
       type: of.tagName,
       causality: element.getAttribute('causality'),
       variability: element.getAttribute('variability'),
+      initial: element.getAttribute('initial') ?? '',
       unit: of.getAttribute('unit') ?? '',
       description: element.getAttribute('description') ?? '',
       start: of.tagName === 'Boolean' ? Number(of.getAttribute('start') === 'true') : number('start'),
@@ -64,10 +66,5 @@ class ModelDescription {
     const variable = this.variables.get(name);
     if (!variable) throw new Error(`${this.name} has no variable ${name}`);
     return variable;
-  }
-
-  /** All parameters. @returns {Variable[]} */
-  parameters() {
-    return [...this.variables.values()].filter(variable => variable.causality === 'parameter');
   }
 }

@@ -55,12 +55,10 @@ class Simulation {
     }
   }
 
-  /** Values that bring an FMU to where it is now, when it starts again. */
-  #present(name) {
-    const fmu = this.fmus[name];
-    const states = {plant: ['q1', 'q2', 'dq1', 'dq2'], controller: ['integral1', 'integral2']}[name];
+  /** Parameters, states and inputs, which bring an FMU to where it is now when it starts again. */
+  #present(fmu) {
     const variables = [...fmu.description.variables.values()].filter(
-      ({name, causality}) => causality === 'parameter' || causality === 'input' || states.includes(name));
+      ({causality, initial}) => causality === 'input' || initial === 'exact');
     return Object.fromEntries(variables.map(({name}) => [name, fmu.get(name)]));
   }
 
@@ -114,7 +112,8 @@ class Simulation {
     try {
       const fmu = this.fmus[name];
       if (fmu.description.find(variable).variability === 'fixed') {
-        const values = {plant: this.#present('plant'), controller: this.#present('controller')};
+        const {plant, controller} = this.fmus;
+        const values = {plant: this.#present(plant), controller: this.#present(controller)};
         values[name][variable] = value;
         this.#initialize(values);
       } else {
