@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.platforms.platforms import newest_source
 from tests.playground.native import Native
 from tests.playground.opened_page import OpenedPage
 from tests.support.browser import Browser
@@ -16,7 +17,8 @@ from tests.support.paths import ROOT
 def page(fmu: Path) -> Path:
     """The page beside the built FMU; tests are skipped where it was not built, and fail in CI."""
     path = fmu.parent / "playground" / "index.html"
-    newest = max(source.stat().st_mtime for source in (ROOT / "playground").rglob("*.*"))
+    scripts = [*(ROOT / "playground").rglob("*.*"), *(ROOT / "cosim/report/assets").iterdir()]
+    newest = max(newest_source(), *(script.stat().st_mtime for script in scripts))
     if path.is_file() and path.stat().st_mtime >= newest:
         return path
     reason = f"{path} is missing or older than its sources: ./run.sh playground builds it"
