@@ -22,13 +22,13 @@ tolerance = 1e-8  # of the integrator, relative: between 0 and 1
 {panels}
 [time]
 start = 0.0  # s
-stop = 5.0  # s
+stop = 2.0  # s
 step = 0.01  # s; or a pattern that is repeated until stop: [0.01, 0.002]
 """
 INPUT_HELP = """\
 # An input is one of
 #   constant = 1.5
-#   table = [[0.0, 0.0], [2.0, 1.5]]  # [time in s from start, value], linear in between
+#   table = [[0.0, 0.0], [1.0, 1.5]]  # [time in s from start, value], linear in between
 #   sines = [{ amplitude = 1.5, frequency = 0.5, phase = 0.0 }]  # Hz, rad; `offset = 1.0` beside it
 # A Boolean one is `constant = true`, or a table that holds from each time on. An input that is not
 # here has its start value.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-MOST_ROWS = 1000  # of a page, so that a report stays small
+MOST_ROWS = 800  # of a page, so that a report stays small
 FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
 
 
@@ -20,6 +20,7 @@ class Curve:
     values: np.ndarray  # (rows,)
     reference: np.ndarray | None = None  # (rows,), drawn below it
     steps: bool = False  # each row ends an interval of this value
+    limit: bool = False  # is not a result but what results stay below
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +78,18 @@ class RunData:
             "axis": vars(self.axis),
             "time": packer.packed(self.x),
             "plots": [_plot(plot, packer) for plot in self.plots],
-            "motion": packer.packed(self.motion),
+            "motion": self._motion(packer),
             "arrays": packer.arrays,
         }
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
         return text.replace("<", "\\u003c")
+
+    def _motion(self, packer: "_Packer") -> dict[str, Any] | None:
+        if self.motion is None:
+            return None
+        reference = self.motion["reference"]
+        ghost = reference and {name: np.array(x, np.float32) for name, x in reference.items()}
+        return packer.packed(self.motion | {"reference": ghost})
 
 
 def thinned(count: int, most: int = MOST_ROWS) -> np.ndarray:
@@ -96,6 +104,7 @@ def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content["curves"] = curves = []
     for curve in plot.curves:
         item = {"name": curve.name, "values": packer.packed(curve.values), "steps": curve.steps}
+        item["limit"] = curve.limit
         if curve.reference is not None:
             # only looked at: seven digits
             item["reference"] = packer.packed(curve.reference.astype(np.float32))

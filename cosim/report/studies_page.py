@@ -32,7 +32,9 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
     for sweep in sweeps:
         models.setdefault(sweep.scenario.model, []).append(sweep)
     limit = Curve(
-        f"{reference.ERROR_PER_TOLERANCE:g} × tolerance", reference.ERROR_PER_TOLERANCE * x
+        f"{reference.ERROR_PER_TOLERANCE:g} × tolerance",
+        reference.ERROR_PER_TOLERANCE * x,
+        limit=True,
     )
     plots = [
         Plot(

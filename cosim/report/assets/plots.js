@@ -37,7 +37,12 @@ const Plots = (() => {
   }
 
   /** At most nine digits, as short as they get. */
-  const shown = (number) => (Number.isFinite(number) ? String(Number(number.toPrecision(9))) : '–');
+  function shown(number) {
+    if (!Number.isFinite(number)) return '–';
+    const rounded = Number(number.toPrecision(9));
+    const tiny = rounded !== 0 && Math.abs(rounded) < 1e-4;
+    return tiny ? rounded.toExponential() : String(rounded);
+  }
 
   function colours() {
     const style = getComputedStyle(document.documentElement);
@@ -57,7 +62,7 @@ const Plots = (() => {
     const references = plot.curves
       .filter((curve) => curve.reference)
       .map((curve) => ({
-        x, y: curve.reference, mode, line: { color: palette.reference, width: 5 }, marker: { size: 10 },
+        x, y: curve.reference, mode, line: { color: palette.reference, width: 5, simplify: false }, marker: { size: 10 },
       }));
     const levels = (plot.levels ?? []).map((level) => ({
       x: [x[0], x[x.length - 1]],
@@ -70,10 +75,11 @@ const Plots = (() => {
       y: curve.values,
       mode,
       line: {
-        color: palette.curves[i % COLOURS],
-        width: 1.6,
+        color: curve.limit ? palette.ink : palette.curves[i % COLOURS],
+        width: curve.limit ? 1 : 1.6,
+        simplify: false,
         shape: curve.steps ? 'vh' : 'linear',
-        dash: DASHES[Math.floor(i / COLOURS) % DASHES.length],
+        dash: curve.limit ? 'dash' : DASHES[Math.floor(i / COLOURS) % DASHES.length],
       },
       marker: { size: 5 },
     }));
@@ -112,25 +118,28 @@ const Plots = (() => {
 
   /** Entries of the legend, which show the values at the cursor too. */
   function entries(list, plot, palette) {
-    const entry = (name, colour) => {
+    const entry = (name, colour, limit = false) => {
       const item = document.createElement('li');
       const swatch = document.createElement('span');
       swatch.className = 'swatch';
       swatch.style.borderColor = colour;
+      if (limit) swatch.style.borderTopStyle = 'dashed';
       const value = document.createElement('span');
       item.append(swatch, `${name} `, value);
       list.append(item);
       return value;
     };
+    const label = (curve, i) =>
+      curve.limit ? [curve.name, palette.ink, true] : [curve.name, palette.curves[i % COLOURS]];
     list.replaceChildren();
     const found = plot.curves.flatMap((curve, i) => {
-      const own = { values: curve.values, text: entry(curve.name, palette.curves[i % COLOURS]) };
+      const own = { values: curve.values, text: entry(...label(curve, i)) };
       own.text.dataset.curve = curve.name;
       if (!curve.reference) return [own];
       const name = plot.curves.length > 1 ? `reference of ${curve.name}` : 'reference';
       return [own, { values: curve.reference, text: entry(name, palette.reference) }];
     });
-    for (const level of plot.levels ?? []) entry(level.name, palette.ink);
+    for (const level of plot.levels ?? []) entry(level.name, palette.ink, true);
     return found;
   }
 
@@ -230,12 +239,12 @@ const Plots = (() => {
 
     async draw() {
       const plotly = await plotlyReady;
-      // what the library measures texts with, out of sight: into a landmark like all else
-      document.querySelector('main').append(document.getElementById('js-plotly-tester'));
       for (const plot of this.plots) {
         await plot.draw(plotly);
         this.listen(plotly, plot);
       }
+      // what the library measures texts with is none for readers
+      document.getElementById('js-plotly-tester')?.setAttribute('aria-hidden', 'true');
       const dark = matchMedia('(prefers-color-scheme: dark)');
       dark.addEventListener('change', () => this.restyle(plotly));
       document.documentElement.dataset.ready = 'yes';
