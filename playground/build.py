@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import base64
+import html
 import sys
 from pathlib import Path
 
@@ -46,10 +47,25 @@ def joined(paths: tuple[Path, ...]) -> str:
     return "\n".join(path.read_text() for path in paths)
 
 
-def page(fmus: dict[str, Path]) -> str:
+def notices(licenses: list[str]) -> str:
+    """Licenses of what is in the modules, each NAME=FILE."""
+    texts = []
+    for name, _, path in (entry.partition("=") for entry in licenses):
+        texts.append(
+            f"<h3>{html.escape(name)}</h3>\n<pre>{html.escape(Path(path).read_text())}</pre>"
+        )
+    return "\n".join(texts)
+
+
+def page(fmus: dict[str, Path], licenses: list[str]) -> str:
     """The whole page."""
     text = (PAGE / "page.html").read_text()
-    parts = {"@styles@": joined(STYLES), "@scripts@": joined(SCRIPTS), "@data@": data(fmus)}
+    parts = {
+        "@styles@": joined(STYLES),
+        "@scripts@": joined(SCRIPTS),
+        "@licenses@": notices(licenses),
+        "@data@": data(fmus),
+    }
     for mark, part in parts.items():
         text = text.replace(mark, part)
     return text
@@ -58,9 +74,13 @@ def page(fmus: dict[str, Path]) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("modules", nargs="+", type=Path, help="FMUs as WebAssembly, NAME.wasm")
+    parser.add_argument(
+        "--license", action="append", default=[], metavar="NAME=FILE", help="text to show"
+    )
     parser.add_argument("--output", required=True, type=Path, help="page to write")
     arguments = parser.parse_args()
-    written = page({module.stem: module for module in arguments.modules}).encode()
+    fmus = {module.stem: module for module in arguments.modules}
+    written = page(fmus, arguments.license).encode()
     if len(written) > LARGEST:
         print(f"build.py: the page has {len(written)} bytes, more than {LARGEST}", file=sys.stderr)
         return 1

@@ -22,7 +22,10 @@ def module(tmp_path: Path) -> Path:
 
 
 def build(module: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, PROGRAM, module, "--output", module.parent / "out" / "index.html"]
+    license_file = module.with_name("LICENSE")
+    license_file.write_text("Copyright <someone>")
+    command = [sys.executable, PROGRAM, module, "--license", f"Small & Co={license_file}"]
+    command += ["--output", written(module)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -37,10 +40,11 @@ def test_the_page_holds_all_it_needs(module: Path) -> None:
     encoded = base64.b64encode(module.read_bytes()).decode()
     assert f'<script type="text/plain" id="Small-module">{encoded}</script>' in page
     assert "<fmiModelDescription/>" in page
+    assert "<h3>Small &amp; Co</h3>\n<pre>Copyright &lt;someone&gt;</pre>" in page
     for script in (PROGRAM.parent / "page").glob("*.js"):
         assert script.read_text() in page, script.name
-    assert not any(mark in page for mark in ("@styles@", "@scripts@", "@data@"))
-    assert "src=" not in page and "https:" not in page
+    assert not any(mark in page for mark in ("@styles@", "@scripts@", "@data@", "@licenses@"))
+    assert "src=" not in page
 
 
 def test_a_text_that_ends_its_element_is_refused(module: Path) -> None:

@@ -52,6 +52,13 @@ def test_size(page: Path) -> None:
     assert [path.name for path in page.parent.iterdir()] == ["index.html"]
 
 
+def test_licenses(opened: OpenedPage) -> None:
+    """Of all whose code is in the modules, as they ask for."""
+    text = opened.text("#licenses")
+    for name in ("Lawrence Livermore", "Rich Felker", "Zig contributors", "wasi-libc", "cloudlibc"):
+        assert name in text
+
+
 def test_ten_seconds_have_finite_energy(opened: OpenedPage) -> None:
     """At real time, ten times as fast; without efforts friction and impacts only take energy."""
     choose(opened, "#speed", "10")
