@@ -71,10 +71,15 @@ def model(name: str) -> Path:
     raise UserError(f"no model {name!r}{guess} (known: {', '.join(known) or 'none'})")
 
 
+def is_in_model(file: Path) -> bool:
+    """Whether a file lies where a model has its scenarios and problems."""
+    return Path(file).absolute().parent.name in SCENARIO_FOLDERS
+
+
 def is_ours(file: Path) -> bool:
     """Whether a file is one of the project's scenarios, or lies where they do."""
     file = Path(file).resolve()
-    return file.parent.name in SCENARIO_FOLDERS and file.parents[1].parent == ROOT / "models"
+    return is_in_model(file) and file.parents[2] == (ROOT / "models").resolve()
 
 
 def convergence_files() -> list[Path]:

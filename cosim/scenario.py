@@ -92,21 +92,22 @@ def title(path: Path) -> str:
 
 
 def folder_of(path: Path) -> Path:
-    """Folder of the model of a scenario: the one it lies in, or that its key `model` names.
+    """Folder of the model of a scenario: that its key `model` names, or else the one it lies in.
 
     Raises
     ------
     UserError
         If the file cannot be read, or names no model.
     """
-    if project.is_ours(path):
-        return project.model_folder(path)
     content, reader = read_toml(path), _Reader(path)
     if MODEL not in content:
+        if project.is_in_model(path):
+            return project.model_folder(path)
         known = ", ".join(project.models())
         reader.fail(f"missing key {MODEL!r}: the name of what the scenario is of (known: {known})")
+    name = reader.text(content[MODEL], MODEL)
     try:
-        return project.model(reader.text(content[MODEL], MODEL))
+        return project.model(name)
     except UserError as error:
         reader.fail(f"{MODEL}: {error}")
 
@@ -135,8 +136,6 @@ def load(path: Path, model: Model) -> Scenario:
         required=("title", "description", "tolerance", "time"),
         optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
     )
-    if MODEL in content and project.model(reader.text(content[MODEL], MODEL)) != folder:
-        reader.fail(f"{MODEL}: the file lies in the folder of {folder.name}")
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
         reader.fail(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")

@@ -64,7 +64,7 @@ def forget(report: Path, section: str) -> None:
 
 def read(report: Path, section: str) -> list[Entry]:
     """Entries of a section; those of a file that nobody can read do not count."""
-    with suppress(OSError, ValueError, TypeError):
+    with suppress(OSError, ValueError, TypeError, RecursionError):
         content = json.loads((report / section / ENTRIES).read_text(encoding="utf-8"))
         return [Entry(**item) for item in content]
     return []

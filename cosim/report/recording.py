@@ -24,7 +24,7 @@ import numpy as np
 from cosim import project
 from cosim import scenario as scenarios
 from cosim.comparison import Runs
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, did_you_mean, one_line
 from cosim.fmu_file import Fmu
 from cosim.output_files import whole, written
 from cosim.report import motion
@@ -43,7 +43,7 @@ PROGRAMS = ("chromium", "chromedriver")
 OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu")
 
 LARGEST = 1_000_000  # bytes
-COLOURS = 128  # in all frames together
+COLOURS = 64  # in all frames together
 PLAYS = 3  # then it comes to rest, which readers who do not want it to move can wait for
 REST = 1.5  # s, of the last frame
 
@@ -75,6 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if not (options.speed > 0 and options.rate > 0 and options.width > 0):
             raise UserError("--speed, --rate and --width: expected numbers above 0")
+        if options.file.suffix != ".png":
+            raise UserError(f"{options.file}: expected a name that ends with .png")
+        if not options.file.absolute().parent.is_dir():
+            raise UserError(f"{options.file}: its folder does not exist")
         data = data_of(options.name)
         drawn = frames(data, options.speed / options.rate, options.width)
         with written(options.file):
@@ -134,7 +138,7 @@ def frames(data: dict[str, Any], step: float, width: int) -> "list[Image]":
     width : int
         px.
     """
-    from PIL import Image
+    from PIL.PngImagePlugin import PngImageFile
 
     style = "".join((ASSETS / name).read_text(encoding="utf-8") for name in STYLES)
     script = "".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS)
@@ -143,16 +147,17 @@ def frames(data: dict[str, Any], step: float, width: int) -> "list[Image]":
     times = [*np.arange(start, stop, step).tolist(), stop]
     with TemporaryDirectory(prefix="cosim-") as folder, _chromium() as driver:
         page = Path(folder) / "recording.html"
-        page.write_text(text, encoding="utf-8")
+        page.write_text(text, encoding="utf-8", newline="\n")
         driver.get(page.as_uri())
         drawn = [driver.execute_script("return frame(arguments[0])", time) for time in times]
-    return [Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB") for png in drawn]
+    return [PngImageFile(io.BytesIO(base64.b64decode(png))).convert("RGB") for png in drawn]
 
 
 @contextmanager
 def _chromium() -> "Iterator[Chrome]":
     try:
         from selenium import webdriver
+        from selenium.common.exceptions import WebDriverException
     except ImportError:
         raise UserError("selenium is missing: ./setup.sh --dev installs it") from None
     missing = [program for program in PROGRAMS if shutil.which(program) is None]
@@ -164,11 +169,14 @@ def _chromium() -> "Iterator[Chrome]":
     for option in OPTIONS:
         options.add_argument(option)
     service = webdriver.ChromeService(shutil.which(PROGRAMS[1]))
-    driver = webdriver.Chrome(options=options, service=service)
     try:
-        yield driver
-    finally:
-        driver.quit()
+        driver = webdriver.Chrome(options=options, service=service)
+        try:
+            yield driver
+        finally:
+            driver.quit()
+    except WebDriverException as error:
+        raise UserError(f"Chromium failed: {one_line(error)}") from error
 
 
 def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:

@@ -4,12 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from cosim.report.recording import ASSETS, SCRIPTS, STYLES
 from tests.support.browser import Browser
-from tests.support.paths import ROOT
-
-ASSETS = ROOT / "cosim" / "report" / "assets"
-STYLES = ("page.css", "player.css")
-SCRIPTS = ("shapes.js", "legend.js", "arm.js", "player.js")
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -26,7 +22,7 @@ PAGE = """<!DOCTYPE html>
   function colourAt([x, y]) {{
     const ratio = player.canvas.width / player.view.width;
     const [red, green, blue] = player.canvas.getContext('2d')
-      .getImageData(Math.round(x * ratio), Math.round(y * ratio), 1, 1).data;
+      .getImageData(Math.floor(x * ratio), Math.floor(y * ratio), 1, 1).data;
     return [red, green, blue];
   }}
   /** What a colour of CSS is as red, green, blue. */

@@ -188,6 +188,34 @@ def test_a_stop_that_is_struck_is_filled(browser: Browser, tmp_path: Path) -> No
     assert filled == [[False, True], [False, False], [True, False]]
 
 
+def test_link_1_lies_against_the_stop_that_it_strikes(browser: Browser, tmp_path: Path) -> None:
+    limits = [-0.5, 0.8]
+    arm = ARM | {"stops": {"q1": limits, "q2": None}}
+    motion = synthetic(**CONSTANT | {"q1": [0.8, 0.0, -0.5]}, arm=arm)
+    show(browser, tmp_path, motion, width=800)
+    stop, paper = browser.run(
+        "return ['stop', 'paper'].map(name => parsed(player.view.colours[name]))"
+    )
+    filled = []
+    for row in range(3):
+        browser.run("player.show(arguments[0])", row)
+        # the middle of each block: its half and that of link 1 beyond the limit
+        colours = browser.run(
+            """
+            const {scale, bar} = player.view, [x, y] = Arm.toPixel(player.view, [0, 0]);
+            const radius = 0.42 * 0.5 * scale;
+            return arguments[0].map((limit, i) => {
+              const beyond = i ? bar : -bar, s = Math.sin(limit), c = Math.cos(limit);
+              return colourAt([x + radius * c - beyond * s, y - radius * s - beyond * c]);
+            });
+            """,
+            limits,
+        )
+        assert not any(alike(colour, paper) for colour in colours)
+        filled.append([alike(colour, stop) for colour in colours])
+    assert filled == [[False, True], [False, False], [True, False]]
+
+
 def test_modes_of_friction_have_marks(browser: Browser, tmp_path: Path) -> None:
     still(browser, tmp_path, mode1=[0, 1, 2], mode2=[2, 2, -1])
     box = browser.run(

@@ -94,6 +94,15 @@ def test_a_view_is_to_scale_and_holds_the_motion(page: Browser) -> None:
             assert 0 < top < height - view["strip"]
 
 
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e5])
+def test_any_size_fits(page: Browser, size: float) -> None:
+    box = {"left": -size, "right": size, "bottom": 0.0, "top": size}
+    view = page.run("return Arm.fit(arguments[0], 400, 300, {})", box)
+    assert 0 < view["scale"] * 2 * size <= 400
+    assert 0 < view["scale"] * size <= 300 - view["strip"]
+    assert 36 <= view["length"] * view["scale"] <= 90  # px, of the legend's bar
+
+
 def test_scales_are_round_and_not_below_what_acts(page: Browser) -> None:
     rows = [0.0] * 100
     motion = synthetic(tau1=[*rows, -13.0], f2=[*rows, 4.9], ee_fx=[*rows, 3.0], ee_fy=[*rows, 4.0])

@@ -33,7 +33,7 @@ def test_nothing_moves_before_it_is_asked_to(page: Browser) -> None:
 
 
 def test_it_plays_to_the_end_row_after_row(page: Browser) -> None:
-    page.run("player.speed = 4; document.querySelector('.player-toggle').click()")
+    page.run("document.querySelector('.player-toggle').click()")
     assert label(page) == "Pause"
     page.wait("!player.playing")
     assert label(page) == "Play"
@@ -78,6 +78,13 @@ def test_pause_stops(page: Browser) -> None:
     assert row(page) == stopped < LAST
 
 
+def test_a_click_on_the_drawing_plays_and_pauses(page: Browser) -> None:
+    page.driver.find_element("css selector", "canvas").click()
+    page.wait("player.row > 0")
+    page.driver.find_element("css selector", "canvas").click()
+    assert not page.run("return player.playing")
+
+
 def test_the_slider_scrubs(page: Browser) -> None:
     page.run(
         """
@@ -90,6 +97,19 @@ def test_the_slider_scrubs(page: Browser) -> None:
     assert page.run("return document.querySelector('.player-clock').textContent") == "0.400 s"
     assert page.run("return document.querySelector('.player-time').ariaValueText") == "0.400 s"
     assert page.run("return events.at(-1)") == {"time": 0.4, "row": 40}
+
+
+def test_tab_goes_through_the_controls_and_shows_where_it_is(page: Browser) -> None:
+    places = []
+    for _ in range(3):
+        page.driver.switch_to.active_element.send_keys(Keys.TAB)
+        places.append(
+            page.run(
+                "const here = document.activeElement, {outlineStyle} = getComputedStyle(here);"
+                "return [here.className || here.localName, outlineStyle]"
+            )
+        )
+    assert places == [[name, "solid"] for name in ("player-toggle", "player-time", "select")]
 
 
 @pytest.mark.parametrize("place", [".player-toggle", ".player-time"])
@@ -203,6 +223,24 @@ def test_it_follows_the_width(page: Browser) -> None:
     page.wait("player.view.width === 320")
     assert before > 320
     assert page.run("return player.canvas.width") == 320
+
+
+def test_it_waits_in_a_hidden_element(page: Browser) -> None:
+    page.run(
+        """
+        const hidden = document.createElement('div');
+        hidden.hidden = true;
+        document.body.append(hidden);
+        window.second = new Player(hidden, player.motion);
+        second.show(50);
+        hidden.hidden = false;
+        """
+    )
+    page.wait("second.view")
+    drawn = "return ({0}.show(50), {0}.canvas.toDataURL())"
+    page.run("element.style.width = `${second.view.width}px`")
+    page.wait("player.view.width === second.view.width")
+    assert page.run(drawn.format("second")) == page.run(drawn.format("player"))
 
 
 @pytest.mark.parametrize("scale", [1, 2])

@@ -65,6 +65,8 @@ def test_a_file_that_is_too_large_is_not_written(
         (["rubber_bufers", "a.png"], "no scenario or variant 'rubber_bufers'"),
         (["wall_touch_and_release", "a.png"], "wall_touch_and_release: nothing to animate"),
         (["spin_up", "a.png", "--speed", "0"], "expected numbers above 0"),
+        (["spin_up", "a.gif"], "a.gif: expected a name that ends with .png"),
+        (["spin_up", "no_such_folder/a.png"], "a.png: its folder does not exist"),
     ],
 )
 def test_mistakes_are_explained(

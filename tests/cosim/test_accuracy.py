@@ -13,7 +13,7 @@ from cosim import comparison, reference, simulation, tolerance_sweep
 from cosim.comparison import Runs
 from cosim.fmu_file import Fmu
 from cosim.reference import Reference
-from cosim.report import pages
+from cosim.report.writer import ReportWriter
 from cosim.tolerance_sweep import Sweep
 from tests.support.all_fmus import FOLDERS
 from tests.support.cosim_project import (
@@ -166,21 +166,25 @@ def test_nothing_runs_twice(
 
 def test_report_shows_every_scenario(runs: Runs, sweeps: dict[str, Sweep], tmp_path: Path) -> None:
     done = [runs.run(load(name), tolerance) for name in NAMES for tolerance in (1e-8, 1e-11)]
-    index = pages.write_runs(tmp_path / "new" / "report", done, list(sweeps.values()))
-    page = index.read_text(encoding="utf-8")
-    for name in [*NAMES, "accuracy"]:
-        picture = index.with_name(f"{name}.png").read_bytes()
-        assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
-        assert b"tEXt" not in picture and b"tIME" not in picture
-        assert f'src="{name}.png"' in page
-    written = np.loadtxt(index.with_name(f"{LONG}.csv"), delimiter=",", skiprows=1)
-    assert np.array_equal(written[:, 1:], runs.run(load(LONG), 1e-8).result.values)
+    writer = ReportWriter(tmp_path / "new" / "report")
+    index = writer.write(writer.grouped(done), list(sweeps.values()))
+    overview = index.read_text(encoding="utf-8")
+    for name in NAMES:
+        assert f'href="scenarios/{name}.html"' in overview
+        page = (index.parent / "scenarios" / f"{name}.html").read_text(encoding="utf-8")
+        assert f'href="{name}.csv"' in page
+    assert 'href="studies/accuracy.html"' in overview
+    written = np.loadtxt(index.parent / "scenarios" / f"{LONG}.csv", delimiter=",", skiprows=1)
+    result = runs.run(load(LONG), 1e-8).result
+    assert np.array_equal(written[:, 1 : 1 + len(result.names)], result.values)
 
 
 def test_report_shows_failures(runs: Runs, tmp_path: Path) -> None:
     run = runs.run(load(SHORT), 1e-8)
     failed = comparison.Run(run.scenario, run.fmu, run.result, run.reference, {"q1": 1.0})
     broken = Sweep(run.scenario, (1e-4, 1e-5), (1e-3, math.nan), ["<broken>"])
-    page = pages.write_runs(tmp_path, [failed], [broken]).read_text(encoding="utf-8")
-    assert page.count("FAILED") == 2
-    assert "&lt;broken&gt;" in page
+    writer = ReportWriter(tmp_path)
+    overview = writer.write(writer.grouped([failed]), [broken]).read_text(encoding="utf-8")
+    assert overview.count("FAILED") == 2 and "2 of 2 failed" in overview
+    assert "FAILED" in (tmp_path / "scenarios" / f"{SHORT}.html").read_text(encoding="utf-8")
+    assert "&lt;broken&gt;" in (tmp_path / "studies/accuracy.html").read_text(encoding="utf-8")

@@ -41,7 +41,8 @@ def test_run_passes(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
     ]
     assert [row[0] for row in rows[4:]] == [LONG, SHORT] and len(rows[4]) == 10
     assert f"report: {folder / 'index.html'}" in out and "passed: 2 scenarios" in out
-    assert (folder / f"{SHORT}.png").is_file() and (folder / "accuracy.png").is_file()
+    for page in (f"scenarios/{SHORT}", "studies/accuracy"):
+        assert (folder / f"{page}.html").is_file()
 
 
 def test_run_of_one_scenario_at_one_tolerance(
@@ -52,7 +53,7 @@ def test_run_of_one_scenario_at_one_tolerance(
     code, out, _ = call(capsys, *arguments)
     assert code == 0 and "passed: 1 scenario\n" in out
     assert out.count("1e-06") == 1 and "1e-11" not in out
-    assert not (folder / "accuracy.png").exists()
+    assert not (folder / "studies/accuracy.html").exists()
 
 
 def test_slow_scenarios_called_by_name_are_not_swept(

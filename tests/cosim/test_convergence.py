@@ -30,7 +30,7 @@ from cosim.convergence import (
 from cosim.errors import UserError
 from cosim.fmu_file import Fmu
 from cosim.project import convergence_files
-from cosim.report import pages
+from cosim.report.writer import ReportWriter
 from cosim.signals import Sines
 from tests.support.cosim_project import declared, load
 from tests.support.paths import ROOT
@@ -300,11 +300,10 @@ def test_damaged_exact_states_are_refused(tmp_path: Path, content: str | None, r
 
 
 def test_report_shows_the_order(study: Convergence, tmp_path: Path) -> None:
-    index = pages.write_runs(tmp_path, [], convergences=[study])
-    page = index.read_text(encoding="utf-8")
-    picture = (tmp_path / "convergence.png").read_bytes()
-    assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
-    assert 'src="convergence.png"' in page and "FAILED" not in page
+    index = ReportWriter(tmp_path).write({}, studies=[study])
+    assert f'href="studies/{PATH.stem}.html"' in index.read_text(encoding="utf-8")
+    page = (tmp_path / "studies" / f"{PATH.stem}.html").read_text(encoding="utf-8")
+    assert "FAILED" not in page
     for name, slope in zip(NAMES, study.slopes, strict=True):
         assert f"<td>{name}</td>" in page and f"<td>{slope:.2f}</td>" in page
     assert "at four times of a step" in page
@@ -313,12 +312,11 @@ def test_report_shows_the_order(study: Convergence, tmp_path: Path) -> None:
 def test_report_shows_a_failure(problem: Problem, tmp_path: Path) -> None:
     errors = np.array([problem.steps, problem.steps, problem.steps**3, problem.steps**4])
     broken = Convergence(problem, errors)
-    index = pages.write_runs(tmp_path, [], convergences=[made_up(problem, 1, 1, 1, 1), broken])
-    page = index.read_text(encoding="utf-8")
-    assert page.count("FAILED") == 1 and "1st derivatives: slope 1.00" in page
+    index = ReportWriter(tmp_path).write({}, studies=[broken])
+    assert "FAILED" in index.read_text(encoding="utf-8")
+    page = (tmp_path / "studies" / f"{PATH.stem}.html").read_text(encoding="utf-8")
+    assert "1st derivatives: slope" in page
     assert "intermediate update" not in page  # of an FMU of FMI 2.0
-    for name in ("convergence", f"convergence_{PATH.stem}"):  # the first one, and each further one
-        assert (tmp_path / f"{name}.png").is_file() and f'src="{name}.png"' in page
 
 
 # ---- Command line ------------------------------------------------------------------------------
@@ -346,8 +344,8 @@ def test_run_of_all_measures_the_order(
     found = [line.split() for line in lines if line.startswith(convergence.NAMES)]
     assert [row[-1] for row in found] == ["passed"] * 4
     assert [round(float(row[-2])) for row in found] == [1, 2, 3, 4]
-    assert (folder / "convergence.png").is_file()
-    assert 'src="convergence.png"' in (folder / "index.html").read_text()
+    assert (folder / "studies" / f"{PATH.stem}.html").is_file()
+    assert f'href="studies/{PATH.stem}.html"' in (folder / "index.html").read_text()
 
 
 @pytest.mark.parametrize("arguments", [[], ["--fmi", "3"]])
@@ -378,7 +376,7 @@ def test_other_runs_do_not(
     folder = project / "report"
     assert cli.main(["run", *arguments, "--fmu", str(fmu), "--report", str(folder)]) == 0
     assert PATH.stem not in capsys.readouterr().out
-    assert not (folder / "convergence.png").exists()
+    assert not (folder / "studies" / f"{PATH.stem}.html").exists()
 
 
 def test_run_with_another_exact_state_fails(

@@ -48,9 +48,10 @@ def test_a_run_compares_the_bits(built: Path, capsys: pytest.CaptureFixture[str]
         for name in (LONG, SHORT)
         for tolerance in ("1e-08", "1e-11")
     ]
-    page = (report / "index.html").read_text(encoding="utf-8")
-    assert page.count("<td>same bits</td>") == 4 and "<th>in FMI 3.0</th>" in page
-    assert "RPManipulator (FMI 2.0): runs" in page
+    for name in (LONG, SHORT):
+        page = (report / "scenarios" / f"{name}.html").read_text(encoding="utf-8")
+        assert page.count("<td>same bits</td>") == 2 and ">in FMI 3.0</th>" in page
+    assert "RPManipulator (FMI 2.0)" in (report / "index.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -66,8 +67,8 @@ def test_one_version_needs_no_other(
             capsys, "run", "--fmi", given, "--tolerance", "1e-8", "--report", report
         )
         assert (code, err) == (0, "") and "bits" not in out and "FMI" not in out
-        page = (report / "index.html").read_text(encoding="utf-8")
-        assert f"RPManipulator (FMI {full}): runs" in page and "bits" not in page
+        page = (report / "scenarios" / f"{SHORT}.html").read_text(encoding="utf-8")
+        assert f"RPManipulator (FMI {full})" in page and "bits" not in page
 
 
 @pytest.mark.parametrize("name", [NAME, f"fmi3/{NAME}"])
@@ -97,7 +98,8 @@ def test_one_bit_that_differs_fails(
     assert (code, err) == (1, "")
     assert rows(out)[0][-6:] == ["other", "bits", "FAILED", "(FMI", "3.0:", "ee_x)"]
     assert out.endswith(f"FAILED: {SHORT}\n")
-    assert "<td>other bits</td>" in (report / "index.html").read_text(encoding="utf-8")
+    page = (report / "scenarios" / f"{SHORT}.html").read_text(encoding="utf-8")
+    assert "<td>other bits</td>" in page and "other bits in FMI 3.0: ee_x" in page
 
 
 def test_bits_are_compared_and_not_numbers() -> None:

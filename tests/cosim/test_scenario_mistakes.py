@@ -247,5 +247,5 @@ def test_bytes_that_are_not_text(write) -> None:
 def test_scenario_outside_a_model(tmp_path: Path) -> None:
     path = tmp_path / "run.toml"
     path.write_text(HEAD + TIME)
-    with pytest.raises(UserError, match="expected in models/MODEL/scenarios/"):
+    with pytest.raises(UserError, match="missing key 'model'"):
         scenario.load(path, TOY)

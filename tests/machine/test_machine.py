@@ -156,15 +156,17 @@ def test_fmus_of_fmi_3_give_the_same_bits(variant: str) -> None:
 
 
 def test_the_command_runs_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["system", "stick_slip", "--report", str(tmp_path)]) == 0
+    pictures = tmp_path / "pictures"
+    arguments = ["--report", str(tmp_path), "--pictures", str(pictures)]
+    assert main(["system", "stick_slip", *arguments]) == 0
     assert "passed: 1 variant\n" in capsys.readouterr().out
-    page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    for file in ("machine.svg", "stick_slip.png"):
-        assert f'src="{file}"' in page
-        assert (tmp_path / file).stat().st_size > 1000
-    written = read_csv(tmp_path / "stick_slip.csv")
+    page = (tmp_path / "system/stick_slip.html").read_text(encoding="utf-8")
+    assert 'src="machine.svg"' in page and 'href="stick_slip.csv"' in page
+    assert (tmp_path / "system/machine.svg").stat().st_size > 1000
+    assert (pictures / "stick_slip.png").stat().st_size > 50_000
+    written = read_csv(tmp_path / "system/stick_slip.csv")
     for name, values in run("stick_slip").items():
-        np.testing.assert_array_equal(written[name], values)
+        np.testing.assert_array_equal(written[name], values[::10])
 
 
 def test_systems_are_listed_with_their_variants(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,6 +12,7 @@
 const Arm = (() => {
   const HELD = 0, FREE = 2; // values of mode1 and mode2; -1 and 1: slides backward, forward
   const {LONGEST, WIDEST} = Legend;
+  const TURN = 1.9 * Math.PI; // rad, the most of an arc
   const AT_STOP = 1e-6; // of the range between two stops
 
   // ---- geometry
@@ -108,7 +109,9 @@ const Arm = (() => {
 
   /**
    * View of a canvas of `width` times `height` px in which a motion, or an extent, is seen whole.
-   * `colours` maps ink, paper, grid, accent, reference, effort, stop, good, bad to colours.
+   * `colours` maps ink, paper, grid, accent, reference, effort, stop, good, bad to colours. The
+   * view has its `scale` (px/m), the height of the legend's `strip` and the width of link 1, `bar`
+   * (px), and what the largest arc and arrows stand for: `torque` (N.m), `force`, `contact` (N).
    */
   function fit(source, width, height, colours) {
     const seen = 'arm' in source ? extent(source) : source;
@@ -123,12 +126,12 @@ const Arm = (() => {
     // the rows of the legend depend on its bar's length, this on the scale, and this on the rows
     for (let pass = 0; pass < 2; pass++) {
       const room = height - view.strip;
-      view.scale = Math.max(1, Math.min((width - 2 * pad) / wide, (room - 2 * pad) / high));
+      view.scale = Math.min((width - 2 * pad) / wide, Math.max(room - 2 * pad, 1) / high);
       view.length = round(36 / view.scale);
       view.entries = Legend.placed(view);
       view.strip = Legend.height(view.entries);
     }
-    view.bar = Math.max(7, Math.min(18, 0.035 * view.scale * Math.hypot(wide, high) / 1.5));
+    view.bar = Math.max(7, Math.min(18, 0.023 * view.scale * Math.hypot(wide, high)));
     return view;
   }
 
@@ -192,7 +195,7 @@ const Arm = (() => {
   function drawTrace(context, view, trace) {
     if (trace.length < 2) return;
     const points = trace.map(point => toPixel(view, point));
-    Shapes.line(context, points, view.colours.good, 1.6, 0.55);
+    Shapes.line(context, points, view.colours.good, 1.6, 0.7);
     Shapes.line(context, points.slice(-Math.ceil(points.length / 8) - 1), view.colours.good, 2.6);
   }
 
@@ -342,7 +345,9 @@ const Arm = (() => {
   function drawEfforts(context, view, scene) {
     const {effort, bad} = view.colours, {arm, q1, q2} = scene, {bar, scale} = view;
     if (view.torque && scene.tau1) {
-      const sweep = scene.tau1 / view.torque * WIDEST, [x, y] = toPixel(view, [0, 0]);
+      const [x, y] = toPixel(view, [0, 0]);
+      // a view that was not made for the torque may be too small for it
+      const sweep = Math.max(-TURN, Math.min(TURN, scene.tau1 / view.torque * WIDEST));
       Shapes.arcArrow(context, x, y, 2.6 * bar, q1 + Math.sign(sweep) * 0.35, sweep, effort);
     }
     if (view.force && scene.f2) {

@@ -9,7 +9,8 @@ const Legend = (() => {
   const WIDEST = (4 / 3) * Math.PI; // rad, of the arc of the largest torque
   const ROW = 22; // px
   const FONT = '12px system-ui, sans-serif';
-  const CHARACTER = 6.7; // px, width of a character of this font, at least on average
+  const ruled = new OffscreenCanvas(1, 1).getContext('2d'); // measures texts
+  ruled.font = FONT;
 
   /** What a view needs: [kind of the sample, text]. */
   function entries(view) {
@@ -36,7 +37,7 @@ const Legend = (() => {
     let x = 12, row = 0;
     return entries(view).map(([kind, text]) => {
       const swatch = kind === 'length' ? view.length * view.scale + 8 : SWATCHES[kind];
-      const width = swatch + CHARACTER * text.length;
+      const width = swatch + ruled.measureText(text).width;
       if (x + width > view.width - 8 && x > 12) [x, row] = [12, row + 1];
       const place = {kind, text, x, row, swatch};
       x += width + 16;

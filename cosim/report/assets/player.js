@@ -93,6 +93,7 @@ class Player {
 
   /** Draws the row that is shown again, for a page that has changed its colours or its size. */
   draw() {
+    if (!this.view) return; // the element is hidden and has no width
     const ratio = window.devicePixelRatio || 1, {width, height} = this.view;
     const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (this.canvas.width !== wide) this.canvas.width = wide;
@@ -106,7 +107,8 @@ class Player {
 
   #frame(now) {
     if (!this.playing) return;
-    const elapsed = this.last === null ? 0 : (now - this.last) / 1000;
+    // a page in the background gets no frames: go on where it was
+    const elapsed = this.last === null ? 0 : Math.min((now - this.last) / 1000, 1);
     if (this.last === null || !this.calm.matches || elapsed >= Player.CALM) {
       this.last = now;
       this.clock += elapsed * this.speed;

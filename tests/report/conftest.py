@@ -1,0 +1,45 @@
+"""A report that all tests of this folder look at, and one of a user's file."""
+
+from pathlib import Path
+
+import pytest
+
+from cosim.__main__ import main
+
+SCENARIOS = ("thrown_against_stop", "actuator_torque_steps", "constant_effort_single_step")
+VARIANT = "wall_contact"
+# what may stand in a file name and in a title, and means something in HTML or in an address
+STRANGE = "Bögen & <b>50%<b> #1?"
+
+CONTENT = """\
+model = "rp_manipulator"
+title = '</script><script>alert("1")</script> "Bögen" & <b>'
+description = "A <i>swing</i> with \\\\ and 'quotes'"
+tolerance = 1e-8
+panels = [["ee_x", "ee_y"], ["tau1"]]
+[time]
+start = 0.0
+stop = 1.0
+step = 0.01
+[parameters]
+solver_method = "erk"
+[initial]
+q1 = 0.3
+[inputs.tau1]
+sines = [{ amplitude = 1.0, frequency = 1.0 }]
+[inputs.f2]
+table = [[0.0, 9.0], [0.5, 10.0]]
+"""
+
+
+@pytest.fixture(scope="session")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a report with scenarios, studies, a variant of a system, and a user's file."""
+    folder = tmp_path_factory.mktemp("report") / "der Bericht #1"
+    file = tmp_path_factory.mktemp("user") / f"{STRANGE}.toml"
+    file.write_text(CONTENT, encoding="utf-8")
+    arguments = ["--report", str(folder)]
+    assert main(["run", *SCENARIOS, *arguments]) == 0
+    assert main(["system", VARIANT, *arguments]) == 0
+    assert main(["run", str(file), *arguments]) == 0
+    return folder

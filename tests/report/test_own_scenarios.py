@@ -1,0 +1,206 @@
+"""Scenarios of users: written by `new`, run from anywhere, refused where they are wrong."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from cosim import scenario
+from cosim.report import browser as shown
+from cosim.report.overview import Entry, forget, read, record
+from tests.report.conftest import CONTENT, STRANGE
+from tests.support.cosim_project import FMUS, assert_one_line, call, declared
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+# ---- new -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", FMUS)
+def test_a_new_scenario_runs_as_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, model: str
+) -> None:
+    assert call(capsys, "new", "first", "--model", model)[0] == 0
+    loaded = scenario.load(tmp_path / "first.toml", declared(model))
+    assert loaded.model == model and loaded.start_values == declared(model).start_values
+    code, out, err = call(capsys, "run", "first.toml", "--report", "out")
+    assert (code, err) == (0, "") and "first: out/files/first.html\nreport: out/index.html" in out
+
+
+@pytest.mark.parametrize("model", FMUS)
+def test_every_line_in_a_comment_can_be_used(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, model: str
+) -> None:
+    assert call(capsys, "new", "all", "--model", model)[0] == 0
+    path = tmp_path / "all.toml"
+    used = re.sub(r"(?m)^# (\w+ = )", r"\1", path.read_text(encoding="utf-8"))
+    path.write_text(used, encoding="utf-8")
+    loaded = scenario.load(path, declared(model))
+    given = loaded.parameters | loaded.initial
+    settable = {
+        name for name, variable in declared(model).variables.items()
+        if variable.start is not None and variable.type != "String"
+        and (variable.is_a("parameters") or variable.is_a("initial"))
+    }  # fmt: skip
+    assert set(given) == settable and loaded.panels
+    assert given == {name: loaded.defaults[name] for name in settable}
+
+
+def test_the_usual_model_has_the_most_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(capsys, "new", "first.toml")[0] == 0
+    assert 'model = "rp_manipulator"' in Path("first.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", [STRANGE, "mit Leerzeichen", "a.b", 'quote " and \\ here', "-x"])
+def test_strange_names(capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str) -> None:
+    assert call(capsys, "new", "--", name)[0] == 0
+    assert f"{name}.toml" in {path.name for path in tmp_path.iterdir()}
+    assert scenario.title(tmp_path / f"{name}.toml") == name
+
+
+def test_a_file_that_exists_stays(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("mine.toml").write_text("precious", encoding="utf-8")
+    for name in ("mine", "mine.toml"):
+        code, out, err = call(capsys, "new", name)
+        assert (code, out) == (2, "") and "mine.toml: exists already" in err
+        assert_one_line(err)
+    assert Path("mine.toml").read_text(encoding="utf-8") == "precious"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["no/such/folder/x"], "x.toml: cannot be written: No such file or directory"),
+        ([""], "is no name for a scenario"),
+        (["folder/"], "is no name for a scenario"),
+        (["a\nb"], "printable characters"),
+        (["x" * 300], "cannot be written: File name too long"),
+        (["x", "--model", "rp_manipulater"], "did you mean 'rp_manipulator'?"),
+    ],
+)
+def test_what_cannot_be_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    code, out, err = call(capsys, "new", *arguments)
+    assert (code, out) == (2, "") and words in err
+    assert_one_line(err)
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- run FILE ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('model = "rp_manipulator"\n', "", "missing key 'model'"),
+        ("rp_manipulator", "rp_manipulater", "no model 'rp_manipulater', did you mean"),
+        ('"rp_manipulator"', "3", "model: expected a text, got 3"),
+        ("q1 = 0.3", "q3 = 0.3", "'q3'"),
+        ("stop = 1.0", "stop = -1.0", "[time] stop"),
+        ('"erk"', '"euler"', "solver_method"),
+        ("tolerance = 1e-8", "tolerance =", "not valid TOML"),
+    ],
+)
+def test_a_wrong_file_is_refused(
+    capsys: pytest.CaptureFixture[str], old: str, new: str, words: str
+) -> None:
+    assert old in CONTENT
+    Path("wrong.toml").write_text(CONTENT.replace(old, new), encoding="utf-8")
+    code, out, err = call(capsys, "run", "wrong.toml", "--report", "out")
+    assert (code, out) == (2, "") and "wrong.toml: " in err and words in err
+    assert err.count("wrong.toml") == 1
+    assert_one_line(err)
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("name", ["missing.toml", ".", "folder.toml"])
+def test_what_is_no_file_is_refused(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    Path("folder.toml").mkdir()
+    code, out, err = call(capsys, "run", name, "--report", "out")
+    assert (code, out) == (2, "") and name in err
+    assert_one_line(err)
+
+
+def test_two_files_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("a", "b"):
+        Path(name).mkdir()
+        Path(name, "x.toml").write_text(CONTENT, encoding="utf-8")
+    code, _, err = call(capsys, "run", "a/x.toml", "b/x.toml", "--report", "out")
+    assert code == 2 and "b/x.toml: its page would have the name of that of a/x.toml" in err
+
+
+def test_a_report_folder_that_cannot_be_made(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("x.toml").write_text(CONTENT, encoding="utf-8")
+    Path("taken").write_text("", encoding="utf-8")
+    code, out, err = call(capsys, "run", "x.toml", "--report", "taken/out")
+    assert (code, out) == (2, "") and "the report cannot be written" in err
+    assert_one_line(err)
+
+
+def test_files_stay_in_the_overview_and_scenarios_beside_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for name in ("a", "b", "a"):
+        Path(f"{name}.toml").write_text(CONTENT, encoding="utf-8")
+        assert call(capsys, "run", f"{name}.toml", "--report", "out")[0] == 0
+    quick = ("constant_effort_single_step", "--tolerance", "1e-8")
+    assert call(capsys, "run", *quick, "--report", "out")[0] == 0
+    assert [entry.name for entry in read(Path("out"), "files")] == ["a", "b"]
+    page = Path("out/index.html").read_text(encoding="utf-8")
+    for href in ("files/a", "files/b", "scenarios/constant_effort_single_step"):
+        assert page.count(f'href="{href}.html"') == 1
+
+
+def test_the_page_of_a_file_is_opened(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(shown.webbrowser, "open", lambda url: opened.append(url) or True)
+    Path("x.toml").write_text(CONTENT, encoding="utf-8")
+    assert call(capsys, "run", "x.toml", "--open", "--report", "out")[0] == 0
+    quick = ("constant_effort_single_step", "--tolerance", "1e-8")
+    assert call(capsys, "run", *quick, "--open", "--report", "out")[0] == 0
+    pages = ("out/files/x.html", "out/index.html")
+    assert opened == [Path(page).absolute().as_uri() for page in pages]
+
+
+def test_without_a_browser_the_page_is_named(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(shown.webbrowser, "open", lambda _: False)
+    shown.show(Path("index.html"))
+    assert capsys.readouterr().err.endswith(f"{Path('index.html').absolute()}\n")
+
+
+# ---- overview ------------------------------------------------------------------------------------
+
+ENTRY = Entry("a", "A", "Model", "a.html", "passed", 1e-9, 1e-6, "worst: x", "M0 0L1 1", "text")
+
+
+@pytest.mark.parametrize(
+    "damaged", ["", "{", "[1]", '[{"name": "a"}]', "null", '{"a": 1}', "\ud800", "[" * 10_000]
+)
+def test_damaged_entries_do_not_count(tmp_path: Path, damaged: str) -> None:
+    record(tmp_path, "scenarios", [ENTRY])
+    record(tmp_path, "system", [ENTRY])
+    file = tmp_path / "system/entries.json"
+    file.write_text(damaged, encoding="utf-8", errors="surrogatepass")
+    index = record(tmp_path, "scenarios", [ENTRY])
+    assert "Variants" not in index.read_text(encoding="utf-8")
+
+
+def test_what_is_forgotten_is_no_longer_shown(tmp_path: Path) -> None:
+    record(tmp_path, "scenarios", [ENTRY])
+    index = record(tmp_path, "system", [ENTRY])
+    assert json.loads((tmp_path / "system/entries.json").read_text())[0]["name"] == "a"
+    forget(tmp_path, "system")
+    page = index.read_text(encoding="utf-8")
+    assert "Scenarios" in page and "Variants" not in page
+    forget(tmp_path, "scenarios")
+    assert not index.exists()

@@ -1,0 +1,200 @@
+"""The pages of a report in a browser: quiet, readable, and true to the values they link."""
+
+import re
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from selenium.webdriver.common.keys import Keys
+
+from cosim import trajectory_csv
+from tests.report.conftest import SCENARIOS, STRANGE, VARIANT
+from tests.support.browser import Browser
+
+PAGES = (
+    "index.html",
+    f"scenarios/{SCENARIOS[0]}.html",  # with motion
+    f"scenarios/{SCENARIOS[1]}.html",  # without
+    f"scenarios/{SCENARIOS[2]}.html",  # of two rows
+    "studies/accuracy.html",
+    f"system/{VARIANT}.html",
+    f"files/{STRANGE}.html",
+)
+READY = "document.documentElement.dataset.ready === 'yes'"
+
+
+def show(browser: Browser, page: Path, **view) -> None:
+    """Open a page and wait for its plots."""
+    browser.open(page, **view)
+    if page.name != "index.html":
+        browser.wait(READY, 60)
+
+
+def read_csv(path: Path) -> dict[str, np.ndarray]:
+    names, table = trajectory_csv.read(path, lambda message, _: AssertionError(message))
+    return dict(zip(names, table.T, strict=True))
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_quiet_and_fits_a_narrow_view(browser: Browser, report: Path, name: str) -> None:
+    show(browser, report / name, width=400, dark=True)
+    browser.check_quiet()
+    assert browser.overflow() == 0
+    assert browser.run("return document.querySelectorAll('.plot svg.main-svg').length > 0") == (
+        name != "index.html"
+    )
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("name", PAGES[:2])
+def test_a_page_keeps_the_rules_of_accessibility(
+    browser: Browser, report: Path, name: str, dark: bool
+) -> None:
+    show(browser, report / name, dark=dark)
+    assert browser.violations() == []
+
+
+def test_dark_and_light_have_colours_of_their_own(browser: Browser, report: Path) -> None:
+    backgrounds = []
+    for dark in (False, True):
+        show(browser, report / f"scenarios/{SCENARIOS[1]}.html", dark=dark)
+        colour = browser.run(
+            "return [getComputedStyle(document.body).backgroundColor,"
+            "getComputedStyle(document.querySelector('.main-svg')).backgroundColor]"
+        )
+        backgrounds.append(colour)
+    assert backgrounds[0] == ["rgb(255, 255, 255)"] * 2
+    assert backgrounds[1][0] == backgrounds[1][1] != backgrounds[0][0]
+
+
+def test_the_overview_leads_to_every_page(browser: Browser, report: Path) -> None:
+    browser.open(report / "index.html")
+    links = browser.run("return [...document.links].map(link => link.getAttribute('href'))")
+    assert sorted(links) == sorted(quote(name) for name in PAGES[1:])
+    texts = browser.run(
+        "return [...document.querySelectorAll('.result span')].map(x => x.innerText)"
+    )
+    assert sum("passed" in text for text in texts) == len(PAGES) - 2
+    lines = browser.run(
+        "return [...document.querySelectorAll('svg.sparkline')].map(line => ["
+        "line.getAttribute('aria-label'), line.getBoundingClientRect().width,"
+        "line.querySelector('path').getTotalLength()])"
+    )
+    assert len(lines) == len(PAGES) - 1
+    assert all("between" in text and wide > 50 and length > 50 for text, wide, length in lines)
+
+
+def test_the_overview_is_in_view_at_once(browser: Browser, report: Path) -> None:
+    """It loads a style sheet and no script."""
+    browser.open(report / "index.html")
+    assert [url.rpartition("/")[2] for url in browser.loaded if url.startswith("file:")] == [
+        "index.html",
+        "page.css",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "curves"),
+    [
+        (f"scenarios/{SCENARIOS[0]}", {"q1", "q2", "dq1", "dq2", "mode1"}),
+        (f"scenarios/{SCENARIOS[1]}", {"current1", "tau1_cmd"}),
+        (f"system/{VARIANT}", {"plant.q1", "environment.wall_force", "plant.mode1"}),
+        (f"files/{STRANGE}", {"q1", "ee_x", "ee_y", "tau1", "f2"}),
+    ],
+)
+def test_the_cursor_shows_rows_of_the_values(
+    browser: Browser, report: Path, name: str, curves: set[str]
+) -> None:
+    show(browser, report / f"{name}.html")
+    href = browser.run("return document.querySelector('.facts a').getAttribute('href')")
+    assert href == quote(f"{Path(name).name}.csv")
+    values = read_csv(report / f"{name}.csv")
+    rows = browser.run("return page.x.length")
+    last = len(values["time"]) - 1
+    for row in (0, rows // 3, rows - 1):
+        time, shown = browser.run(
+            "page.seek(arguments[0]);"
+            "const shown = [...document.querySelectorAll('[data-curve]')];"
+            "return [page.x[page.row], shown.map(x => [x.dataset.curve, x.innerText])]",
+            row,
+        )
+        found = np.flatnonzero(values["time"] == time)
+        assert len(found) == 1 and (row < rows - 1 or found[0] == last)
+        seen = {curve: text.split()[0] for curve, text in shown if curve in values}
+        assert curves <= set(seen)
+        for curve, text in seen.items():
+            assert float(text) == float(f"{values[curve][found[0]]:.9g}"), curve
+
+
+def test_cursor_player_and_plots_are_in_step(browser: Browser, report: Path) -> None:
+    show(browser, report / f"scenarios/{SCENARIOS[0]}.html", width=1400)
+    state = "return [page.row, Number(page.bar.value), page.player.time, page.x[page.row]]"
+    browser.keys("#cursor", Keys.END, Keys.ARROW_LEFT)
+    row, bar, time, x = browser.run(state)
+    assert row == bar == browser.run("return page.x.length") - 2 and time == x
+    browser.run("page.player.seek(0.5)")
+    row, bar, time, x = browser.run(state)
+    assert row == bar and time == x == 0.5
+    lines = browser.run(
+        "return page.plots.map(plot => [plot.line.hidden, parseFloat(plot.line.style.left)"
+        " - plot.drawing._fullLayout.xaxis._offset, plot.drawing._fullLayout.xaxis._length])"
+    )
+    for hidden, place, length in lines:
+        assert not hidden and place / length == pytest.approx(0.5 / 2.0, abs=0.01)
+    # a click at three quarters of a plot
+    browser.run(
+        "const {drawing} = page.plots[2], {xaxis} = drawing._fullLayout;"
+        "const left = drawing.getBoundingClientRect().left + xaxis._offset;"
+        "drawing.dispatchEvent(new MouseEvent('click', {clientX: left + 0.75 * xaxis._length}))"
+    )
+    assert browser.run(state)[2] == pytest.approx(1.5, abs=0.02)
+    browser.check_quiet()
+
+
+def test_a_zoom_is_that_of_all_plots(browser: Browser, report: Path) -> None:
+    show(browser, report / f"system/{VARIANT}.html")
+    ranges = "page.plots.map(plot => plot.drawing._fullLayout.xaxis.range.join())"
+    browser.run("Plotly.relayout(page.plots[1].drawing, {'xaxis.range': [1, 2]})")
+    browser.wait(f"new Set({ranges}).size === 1 && {ranges}[0] === '1,2'")
+    browser.run("page.seek(0)")
+    assert browser.run("return page.plots.every(plot => plot.line.hidden)")
+    browser.run("Plotly.relayout(page.plots[0].drawing, {'xaxis.autorange': true})")
+    browser.wait(f"new Set({ranges}).size === 1 && {ranges}[0] === '0,4'")
+
+
+def test_texts_of_users_are_no_markup(browser: Browser, report: Path) -> None:
+    show(browser, report / f"files/{STRANGE}.html")
+    title = '</script><script>alert("1")</script> "Bögen" & <b>'
+    assert browser.run("return document.querySelector('h1').innerText") == title
+    assert browser.run("return document.title") == title
+    assert browser.run("return page.data.title") == title
+    assert browser.run("return document.querySelectorAll('h1 *, main > p *').length") == 0
+    browser.open(report / "index.html")
+    assert title in browser.run("return document.body.innerText")
+
+
+def test_the_page_says_what_ran(browser: Browser, report: Path) -> None:
+    show(browser, report / f"files/{STRANGE}.html")
+    browser.run("document.querySelectorAll('details').forEach(x => { x.open = true; })")
+    text = re.sub(r"\s+", " ", browser.run("return document.body.innerText"))
+    for part in (
+        "ran model RPManipulator (FMI 2.0) time 0 to 1 s steps 100 of 10 ms",
+        "solver_method erk",
+        "q1 0.3 rad Angle of joint 1",
+        "tau1 N.m 1 sin(2π 1 Hz t)",
+        "f2 N table of 2 points between 9 and 10",
+        "Errors are estimated from a run of the same FMU at tolerance 1e-11",
+    ):
+        assert part in text, part
+
+
+def test_every_plot_and_picture_has_a_text(browser: Browser, report: Path) -> None:
+    show(browser, report / f"system/{VARIANT}.html")
+    texts = browser.run(
+        "return [...document.querySelectorAll('.drawing')].map(x => x.getAttribute('aria-label'))"
+    )
+    assert len(texts) == len(set(texts)) > 8
+    assert all(re.match(r"Plot of .* from .* to .*, between .* and ", text) for text in texts)
+    assert browser.run("return document.querySelector('img').naturalWidth") > 100
+    assert "signals" in browser.run("return document.querySelector('img').alt")
