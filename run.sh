@@ -10,6 +10,7 @@
 #   ./run.sh system                all variants of all systems in Ecos
 #   ./run.sh system NAME ...       these variants, or all of these systems; --list names both
 #   ./run.sh coupling              what the coupling of the closed loop costs
+#   ./run.sh playground            builds build/playground/index.html, the plant in a browser; --open opens it
 #   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
@@ -19,6 +20,23 @@ if [ "${1-}" = --help ] || [ "${1-}" = -h ]; then
   exit
 fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+
+if [ "${1-}" = playground ]; then
+  case "${*:2}" in
+    "" | --open) ;;
+    *) echo "usage: ./run.sh playground [--open]" >&2; exit 2 ;;
+  esac
+  "$root/setup.sh" --release
+  SECONDS=0
+  page="$root/build/playground/index.html"
+  log="$root/build/playground.log"
+  { cmake -S "$root" -B "$root/build" -DBUILD_TESTING=OFF && cmake --build "$root/build" --target playground; } >"$log" 2>&1 ||
+    { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
+  echo "$page: $(wc -c <"$page") bytes, built in $SECONDS s"
+  [ -z "${2-}" ] || PYTHONPATH="$root" "$root/build/venv/bin/python" -P -c \
+    "import pathlib, sys; from cosim.report import browser; browser.show(pathlib.Path(sys.argv[1]))" "$page"
+  exit
+fi
 
 "$root/setup.sh"
 python="$root/build/venv/bin/python"

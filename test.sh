@@ -56,8 +56,9 @@ step "gcc, optimized; all tests"
 build default
 if build/venv/bin/python -c 'import ziglang' 2>/dev/null; then
   cmake --build --preset default --target release >build/release.log 2>&1 || { cat build/release.log; exit 1; }
+  cmake --build --preset default --target playground >build/playground.log 2>&1 || { cat build/playground.log; exit 1; }
 else
-  echo "release: skipped, ./setup.sh --platforms installs what it needs"
+  echo "release and playground: skipped, ./setup.sh --platforms installs what it needs"
 fi
 ctest --preset default -j 2 "$@"
 

@@ -25,6 +25,16 @@ set(files
   __math_divzero __math_invalid __math_oflow __math_uflow __math_xflow
   sqrt sqrt_data
   ceil fabs floor fmax fmin remainder remquo)
+if(WASM)
+  # zig links its C library first: with other names its functions do not get in the way. Those left out are instructions.
+  list(REMOVE_ITEM files sqrt sqrt_data ceil fabs floor)
+  set(names "")
+  foreach(name IN ITEMS ${files} __exp_data __log_data __pow_log_data)
+    string(APPEND names "#define ${name} own_${name}\n")
+  endforeach()
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/musl/names.h CONTENT "${names}")
+  add_compile_options("SHELL:-include \"${PROJECT_BINARY_DIR}/musl/names.h\"")
+endif()
 list(TRANSFORM files PREPEND ${MUSL_SOURCE_DIR}/src/math/)
 list(TRANSFORM files APPEND .c)
 

@@ -4,10 +4,13 @@
 
 # PLATFORM: folder of the binary in an archive of FMI 3.0
 string(TOLOWER "${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR}" system)
-if(NOT system MATCHES "^(linux|windows|darwin)-(x86_64|amd64|aarch64|arm64)$")
+if(system STREQUAL "generic-wasm32")
+  set(WASM ON)
+  set(system wasi-wasm32)
+elseif(NOT system MATCHES "^(linux|windows|darwin)-(x86_64|amd64|aarch64|arm64)$")
   message(FATAL_ERROR "FMUs have no name for the platform ${CMAKE_SYSTEM_NAME} ${CMAKE_SYSTEM_PROCESSOR}")
 endif()
-set(PLATFORM ${CMAKE_MATCH_2}-${CMAKE_MATCH_1})
+string(REGEX REPLACE "(.*)-(.*)" "\\2-\\1" PLATFORM ${system})
 string(REPLACE amd64 x86_64 PLATFORM ${PLATFORM})
 string(REPLACE arm64 aarch64 PLATFORM ${PLATFORM})
 
@@ -26,6 +29,8 @@ if(WIN32)
   set(FMU_LIBRARY_SUFFIX .dll)
 elseif(APPLE)
   set(FMU_LIBRARY_SUFFIX .dylib)
+elseif(WASM)
+  set(FMU_LIBRARY_SUFFIX .wasm)
 else()
   set(FMU_LIBRARY_SUFFIX .so)
 endif()
@@ -70,6 +75,18 @@ elseif(APPLE)
   # clang would make one call of libSystem of them
   list(APPEND language_options -fno-builtin-sin -fno-builtin-cos)
   set(FMU_LINK_OPTIONS -Wl,-dead_strip $<$<CONFIG:Release>:-s>)
+elseif(WASM)
+  # a module that is loaded at no other address, with what its host calls besides FMI: memory for arguments,
+  # and the table that the host adds its logger to
+  set(CMAKE_POSITION_INDEPENDENT_CODE OFF)
+  set_property(GLOBAL PROPERTY TARGET_SUPPORTS_SHARED_LIBS ON)
+  set(CMAKE_SHARED_LIBRARY_C_FLAGS "")
+  set(CMAKE_SHARED_LIBRARY_CREATE_C_FLAGS -mexec-model=reactor)
+  list(APPEND warning_options -Wno-pass-failed) # no loop is vectorized
+  set(hardening_options)
+  set(FMU_LINK_OPTIONS
+    -Wl,--export-dynamic -Wl,--export=malloc -Wl,--export=free -Wl,--export-table -Wl,--growable-table
+    -Wl,-z,stack-size=1048576 $<$<CONFIG:Release>:-s>)
 else()
   set(FMU_LINK_OPTIONS
     -Wl,--gc-sections -Wl,--no-undefined -Wl,--as-needed -Wl,-z,relro,-z,now,-z,noexecstack

@@ -26,16 +26,21 @@ foreach(setting Python3_EXECUTABLE FMI_HEADERS_DIR SUNDIALS_SOURCE_DIR MUSL_SOUR
   list(APPEND same_settings -D${setting}=${${setting}})
 endforeach()
 
-set(platform_targets "")
-foreach(platform IN LISTS RELEASE_PLATFORMS)
+# add_platform(platform target ...): target platform_..., which builds these targets in build/platforms
+function(add_platform platform)
   set(folder ${PROJECT_BINARY_DIR}/platforms/${platform})
   add_custom_target(platform_${platform}
     COMMAND ${CMAKE_COMMAND} -S ${PROJECT_SOURCE_DIR} --preset ${platform} -B ${folder} ${same_settings}
             --log-level=WARNING
     COMMAND ${CMAKE_COMMAND} -E env --unset=MAKEFLAGS
-            ${CMAKE_COMMAND} --build ${folder} --target libraries --parallel 2
+            ${CMAKE_COMMAND} --build ${folder} --target ${ARGN} --parallel 2
     COMMENT "Building for ${platform}"
     VERBATIM)
+endfunction()
+
+set(platform_targets "")
+foreach(platform IN LISTS RELEASE_PLATFORMS)
+  add_platform(${platform} libraries)
   list(APPEND platform_targets platform_${platform})
 endforeach()
 

@@ -96,8 +96,9 @@ const char *codec_check(struct codec *codec, const char *guid, size_t length) {
     if (version != FORMAT_VERSION) {
         return "it has another version of the format, 2 is expected";
     }
-    if (guid_length != strlen(guid) || codec->size - codec->at < guid_length ||
-        memcmp(codec->from + codec->at, guid, guid_length) != 0) {
+    const size_t guid_size = strlen(guid);
+    if (guid_length != guid_size || codec->size - codec->at < guid_size ||
+        memcmp(codec->from + codec->at, guid, guid_size) != 0) {
         return "its GUID belongs to another model";
     }
     if (stated_length != codec->size || codec->size != length) {
@@ -111,7 +112,7 @@ const char *codec_check(struct codec *codec, const char *guid, size_t length) {
     if (stated_hash != hash(codec->from, codec->size - HASH_SIZE)) {
         return "it is damaged, its checksum does not fit";
     }
-    codec->at += guid_length;
+    codec->at += guid_size;
     return NULL;
 }
 

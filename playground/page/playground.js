@@ -1,0 +1,298 @@
+'use strict';
+
+/** The page: buttons, controls, drawings and the loop that runs the FMUs at real time. */
+class Playground {
+  static BACK = 0.2; // s, of the button
+  static LONGEST = 0.1; // s of wall time that one frame makes up for at most
+  static BUDGET = 25; // ms of computing in one frame
+  static REFRESH = 100; // ms between two updates of the numbers
+
+  /** @param {Fmu} plant @param {Fmu} controller */
+  constructor(plant, controller) {
+    this.simulation = new Simulation(plant, controller);
+    this.speed = 1;
+    this.saved = null;
+    this.debt = 0; // s, simulated time that is due
+    this.message = document.getElementById('message');
+    for (const fmu of [plant, controller]) {
+      fmu.onWarning = text => this.say(`${fmu.description.name}: ${text}`);
+    }
+    this.#addScenes();
+    this.simulation.start(this.#scene());
+    this.controls = new Controls(this.simulation, (...change) => this.change(...change));
+    this.#addControls();
+    this.numbers = new Numbers(document.getElementById('numbers'), plant);
+    this.stage = new Stage(document.getElementById('stage'), this.simulation);
+    this.chart = new EnergyChart(document.getElementById('energy'), plant);
+    this.#addLegend();
+    this.#addButtons();
+    this.#addHistory();
+    this.#addKeys();
+    this.play(!matchMedia('(prefers-reduced-motion: reduce)').matches);
+    this.show();
+    requestAnimationFrame(now => this.#frame(now, now, 0));
+  }
+
+  // ---- parts of the page
+
+  #addScenes() {
+    const choice = document.getElementById('setting');
+    for (const name of Object.keys(Settings.scenes)) choice.append(new Option(name));
+    choice.addEventListener('change', () => this.reset());
+  }
+
+  #scene() {
+    const {plant, controller} = Settings.scenes[document.getElementById('setting').value];
+    const {common} = Settings;
+    return {
+      plant: {...common.plant, ...plant}, controller: {...common.controller, ...controller},
+    };
+  }
+
+  #addControls() {
+    const {simulation, controls} = this;
+    const own = (id, variable, range, values, i) => controls.addSlider(document.getElementById(id),
+      `${id}-${variable.name}`, variable, range, () => values()[i], value => { values()[i] = value; });
+    const find = (fmu, name) => simulation.fmus[fmu].description.find(name);
+    own('efforts', find('plant', 'tau1'), [-40, 40, 0.5], () => simulation.efforts, 0);
+    own('efforts', find('plant', 'f2'), [-60, 60, 0.5], () => simulation.efforts, 1);
+    own('set-point', find('controller', 'q1_ref'), [-3.14, 3.14, 0.01], () => simulation.reference, 0);
+    own('set-point', find('controller', 'q2_ref'), [-0.5, 0.5, 0.01], () => simulation.reference, 1);
+    controls.addVariable(document.getElementById('solver'), 'plant', 'solver_method', []);
+    controls.addGroups(document.getElementById('groups'));
+    this.#addLaw();
+    this.#addPayload();
+    controls.refresh();
+  }
+
+  /** The controller's mode, with one more: off. */
+  #addLaw() {
+    const {simulation} = this;
+    const choice = document.getElementById('law');
+    const mode = simulation.fmus.controller.description.find('mode');
+    choice.append(new Option('off', 0));
+    for (const {name, value} of mode.items) choice.append(new Option(name, value));
+    choice.addEventListener('change', () => {
+      simulation.isControlled = Number(choice.value) > 0;
+      if (simulation.isControlled) this.change('controller', mode, Number(choice.value));
+      else this.show();
+    });
+    this.controls.refreshers.push(() => {
+      choice.value = simulation.isControlled ? simulation.fmus.controller.get('mode') : 0;
+    });
+  }
+
+  #addPayload() {
+    const box = document.getElementById('payload');
+    const {plant} = this.simulation.fmus;
+    box.addEventListener('change', () => {
+      this.change('plant', plant.description.find('payload_attached'), Number(box.checked));
+    });
+    this.controls.refreshers.push(() => { box.checked = plant.get('payload_attached') === 1; });
+  }
+
+  #addLegend() {
+    for (const [name, colour] of EnergyChart.CURVES) {
+      const item = document.createElement('li');
+      const swatch = document.createElement('span');
+      swatch.className = 'swatch';
+      swatch.style.color = `var(${colour})`;
+      if (name === 'total') swatch.style.borderTopStyle = 'dashed';
+      item.append(swatch, name);
+      document.getElementById('legend').append(item);
+    }
+  }
+
+  #addButtons() {
+    const on = (id, act) => document.getElementById(id).addEventListener('click', act);
+    on('play', () => this.play(!this.isRunning));
+    on('reset', () => this.reset());
+    on('back', () => this.#stepBack());
+    on('save', () => this.save());
+    on('restore', () => this.restore());
+    on('measure', () => {
+      const {factor, step} = this.benchmark();
+      document.getElementById('factor').textContent =
+        `${factor.toFixed(0)} times real time: ${(1e6 * step).toFixed(1)} µs for a step of 1 ms`;
+    });
+    document.getElementById('speed').addEventListener('change', event => {
+      this.speed = Number(event.target.value);
+    });
+  }
+
+  /** The slider of the history goes over the states that are kept. */
+  #addHistory() {
+    this.history = document.getElementById('history');
+    this.history.addEventListener('input', () => {
+      this.play(false);
+      this.goBack(this.history.valueAsNumber);
+    });
+  }
+
+  /** Keys of the drawing, besides those that push the arm. */
+  #addKeys() {
+    const acts = {' ': () => this.play(!this.isRunning), Backspace: () => this.#stepBack()};
+    this.stage.canvas.addEventListener('keydown', event => {
+      if (!(event.key in acts)) return;
+      event.preventDefault();
+      acts[event.key]();
+    });
+  }
+
+  // ---- what the user does
+
+  play(isRunning) {
+    this.isRunning = isRunning;
+    document.getElementById('play').textContent = isRunning ? 'Pause' : 'Play';
+  }
+
+  /** Start the chosen scene again at time 0. */
+  reset() {
+    this.simulation.efforts = [0, 0];
+    this.simulation.start(this.#scene());
+    this.chart.clear();
+    this.#arrive();
+  }
+
+  /** Set a variable of an FMU; where that is refused, show what the FMU says. */
+  change(name, variable, value) {
+    const fmu = this.simulation.fmus[name];
+    try {
+      this.simulation.change(name, variable.name, value);
+      this.message.hidden = true;
+    } catch (error) {
+      if (!(error instanceof FmuError)) throw error;
+      const shown = variable.items.find(item => item.value === value)?.name ?? value;
+      this.say(`${fmu.description.name} refuses ${variable.name} = ${shown}:\n${error.message}`);
+    }
+    this.stage.fit();
+    this.show();
+  }
+
+  save() {
+    if (this.saved) this.simulation.free(this.saved);
+    this.saved = this.simulation.save();
+    document.getElementById('restore').disabled = false;
+  }
+
+  restore() {
+    this.simulation.restore(this.saved);
+    this.#arrive();
+  }
+
+  /** @param {number} time in s */
+  goBack(time) {
+    if (this.simulation.goBack(time)) this.#arrive();
+  }
+
+  #stepBack() {
+    this.goBack(this.simulation.time - Playground.BACK);
+  }
+
+  /** Show the state that the simulation has jumped to. */
+  #arrive() {
+    this.message.hidden = true;
+    this.stage.path.length = 0;
+    this.controls.refresh();
+    this.stage.fit();
+    this.show();
+  }
+
+  /** @param {string} text */
+  say(text) {
+    this.message.textContent = text;
+    this.message.hidden = false;
+  }
+
+  // ---- running
+
+  /** @param {number} now ms @param {number} before ms @param {number} shown ms, of the numbers */
+  #frame(now, before, shown) {
+    if (this.isRunning) this.#run((now - before) / 1e3);
+    this.stage.draw();
+    const isDue = now - shown >= Playground.REFRESH;
+    if (isDue) this.show();
+    requestAnimationFrame(next => this.#frame(next, now, isDue ? now : shown));
+  }
+
+  /** Steps for `passed` seconds of wall time, but no more than fit into a frame. */
+  #run(passed) {
+    const end = performance.now() + Playground.BUDGET;
+    this.debt += this.speed * Math.min(passed, Playground.LONGEST);
+    try {
+      while (this.debt >= Simulation.STEP) {
+        if (performance.now() > end) {
+          this.debt = 0;
+          break;
+        }
+        this.#step();
+        this.debt -= Simulation.STEP;
+      }
+    } catch (error) {
+      if (!(error instanceof FmuError)) throw error;
+      this.#recover(error);
+    }
+  }
+
+  #step() {
+    this.simulation.step();
+    if (this.simulation.steps % 10 === 0) {
+      this.stage.follow();
+      this.chart.add(this.simulation.time);
+    }
+  }
+
+  /** A step failed: stop at the last state that is kept, and say why. */
+  #recover(error) {
+    this.debt = 0;
+    this.play(false);
+    this.goBack(this.simulation.time);
+    this.say(error.message);
+  }
+
+  /** Numbers, history and energies as they are now. */
+  show() {
+    const {snapshots, time} = this.simulation;
+    this.numbers.refresh();
+    this.history.min = snapshots[0] ? snapshots[0].steps * Simulation.STEP : 0;
+    this.history.max = Math.max(time, (snapshots.at(-1)?.steps ?? 0) * Simulation.STEP);
+    this.history.value = time;
+    document.getElementById('time').textContent = `${time.toFixed(2)} s`;
+    this.chart.draw();
+  }
+
+  /**
+   * How fast it runs without drawing, from where it is: afterwards it is there again.
+   * @param {number} steps
+   * @param {number} repetitions from the same state; the fastest counts
+   * @returns {{factor: number, step: number}} times real time; s for a step
+   */
+  benchmark(steps = 2000, repetitions = 5) {
+    const here = this.simulation.save();
+    let fastest = Infinity;
+    for (let repetition = 0; repetition < repetitions; repetition++) {
+      const start = performance.now();
+      for (let i = 0; i < steps; i++) this.simulation.advance();
+      fastest = Math.min(fastest, (performance.now() - start) / 1e3);
+      this.simulation.restore(here);
+    }
+    this.simulation.free(here);
+    return {factor: steps * Simulation.STEP / fastest, step: fastest / steps};
+  }
+}
+
+/** An FMU that the page holds: its description as XML, its module in base64. */
+async function loadFmu(name) {
+  const text = kind => document.getElementById(`${name}-${kind}`).textContent;
+  const bytes = Uint8Array.from(atob(text('module')), character => character.charCodeAt(0));
+  return Fmu.load(bytes, new ModelDescription(text('description')));
+}
+
+/** @type {Promise<Playground>} */
+const playground = Promise.all(['RPPlant', 'RPController'].map(loadFmu))
+  .then(([plant, controller]) => new Playground(plant, controller));
+playground.catch(error => {
+  const message = document.getElementById('message');
+  message.textContent = `The playground does not start: ${error.message}`;
+  message.hidden = false;
+});

@@ -1,0 +1,160 @@
+'use strict';
+
+/** The drawing of the arm: the hand that pulls at it, its path, and the colours of the page. */
+class Stage {
+  static PUSH = 20; // N, of an arrow key
+  static PATH = 300; // points
+  static GRIP = 70; // px from the end effector within which it can be taken
+  static KEYS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
+
+  /** @param {HTMLCanvasElement} canvas @param {Simulation} simulation */
+  constructor(canvas, simulation) {
+    this.canvas = canvas;
+    this.simulation = simulation;
+    this.path = [];
+    this.pressed = new Set();
+    this.colours = Stage.readColours();
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.fit());
+    new ResizeObserver(() => this.fit()).observe(canvas);
+    this.#listenToPointer();
+    this.#listenToKeys();
+    this.fit();
+  }
+
+  static readColours() {
+    const style = getComputedStyle(document.documentElement);
+    const names = ['ink', 'paper', 'grid', 'accent', 'reference', 'effort', 'stop', 'good', 'bad'];
+    return Object.fromEntries(names.map(name => [name, style.getPropertyValue(`--${name}`).trim()]));
+  }
+
+  // ---- what is drawn
+
+  /** Geometry of the arm by the plant's parameters, as Arm takes it. */
+  arm() {
+    const plant = this.simulation.fmus.plant;
+    const value = name => plant.get(name);
+    const stops = i => (value(`stops${i}`) === 1 ? null : [value(`lower${i}`), value(`upper${i}`)]);
+    return {
+      a: value('a'), l1: value('l1'), lc1: value('lc1'), g: value('g'),
+      stops: {q1: stops(1), q2: stops(2)}, wall: null,
+      payload: {x: value('payload_x'), z: value('payload_z')},
+    };
+  }
+
+  /** Choose the scale: after the window or a parameter has changed. */
+  fit() {
+    const ratio = window.devicePixelRatio || 1;
+    const {clientWidth: width, clientHeight: height} = this.canvas;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round(height * ratio);
+    this.colours = Stage.readColours();
+    this.geometry = this.arm();
+    const {a, l1, g, stops} = this.geometry;
+    const slide = stops.q2 ?? [-0.5, 0.5];
+    const reach = Math.hypot(l1 + Math.max(...slide.map(Math.abs)), a);
+    this.view = Arm.fit({
+      left: -reach, right: reach, bottom: -reach, top: reach, slide, torque: 40, force: 80, contact: 80,
+      gravity: g, ghost: this.simulation.isControlled, modes: true,
+      stops: stops.q1 !== null || stops.q2 !== null, trace: true,
+    }, width, height, this.colours);
+    this.draw();
+  }
+
+  scene() {
+    const {simulation, geometry} = this;
+    const {plant} = simulation.fmus;
+    const [q1, q2] = simulation.motion.get();
+    const [tau1, f2, ee_fx, ee_fy] = simulation.inputs.get();
+    const [g1, g2] = simulation.reference;
+    return {
+      arm: geometry, q1, q2, tau1, f2, ee_fx, ee_fy,
+      ghost: simulation.isControlled ? {q1: g1, q2: g2} : null,
+      payload_attached: plant.get('payload_attached') === 1,
+      mode1: plant.get('mode1'), mode2: plant.get('mode2'), trace: this.path,
+    };
+  }
+
+  /** Remember where the end effector is. */
+  follow() {
+    const [x, y] = this.simulation.tip.get();
+    this.path.push([x, y]);
+    if (this.path.length > Stage.PATH) this.path.shift();
+  }
+
+  draw() {
+    const context = this.canvas.getContext('2d');
+    const ratio = window.devicePixelRatio || 1;
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, this.view.width, this.view.height);
+    Arm.draw(context, this.view, this.scene());
+    const {target} = this.simulation.hand;
+    if (target) this.#drawHand(context, target);
+  }
+
+  #drawHand(context, target) {
+    const [x, y] = this.simulation.tip.get();
+    context.strokeStyle = this.colours.accent;
+    context.lineWidth = 1.5;
+    context.setLineDash([5, 4]);
+    context.beginPath();
+    context.moveTo(...Arm.toPixel(this.view, [x, y]));
+    context.lineTo(...Arm.toPixel(this.view, target));
+    context.stroke();
+    context.setLineDash([]);
+  }
+
+  // ---- the hand
+
+  /** Place of a pointer. @returns {[number, number]} px on the canvas */
+  #place(event) {
+    const box = this.canvas.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  /** Whether the end effector can be taken there. @param {[number, number]} place px */
+  #isInReach([x, y]) {
+    const tip = this.simulation.tip.get();
+    const [tipX, tipY] = Arm.toPixel(this.view, [tip[0], tip[1]]);
+    return Math.hypot(x - tipX, y - tipY) <= Stage.GRIP;
+  }
+
+  #listenToPointer() {
+    const {canvas, simulation} = this;
+    const pull = event => { simulation.hand.target = Arm.toMetres(this.view, this.#place(event)); };
+    canvas.addEventListener('pointerdown', event => {
+      if (!this.#isInReach(this.#place(event))) return;
+      canvas.setPointerCapture(event.pointerId);
+      pull(event);
+    });
+    canvas.addEventListener('pointermove', event => {
+      if (canvas.hasPointerCapture(event.pointerId)) pull(event);
+    });
+    canvas.addEventListener('lostpointercapture', () => { simulation.hand.target = null; });
+    // a finger that starts elsewhere scrolls the page
+    canvas.addEventListener('touchstart', event => {
+      if (this.#isInReach(this.#place(event.touches[0]))) event.preventDefault();
+    }, {passive: false});
+  }
+
+  #listenToKeys() {
+    const push = () => {
+      const sums = [0, 1].map(axis =>
+        [...this.pressed].reduce((sum, key) => sum + Stage.KEYS[key][axis], 0));
+      this.simulation.hand.push = sums.map(sum => Stage.PUSH * sum);
+    };
+    this.canvas.addEventListener('keydown', event => {
+      if (!(event.key in Stage.KEYS)) return;
+      event.preventDefault();
+      this.pressed.add(event.key);
+      push();
+    });
+    this.canvas.addEventListener('keyup', event => {
+      this.pressed.delete(event.key);
+      push();
+    });
+    this.canvas.addEventListener('blur', () => {
+      this.pressed.clear();
+      push();
+    });
+  }
+}

@@ -1,0 +1,53 @@
+"""The playground as tests drive it."""
+
+import base64
+from pathlib import Path
+from typing import Any
+
+from tests.support.browser import Browser
+
+# what scripts of the tests use: doubles as text that keeps their bits
+PRELUDE = """
+const {simulation} = window.tested;
+const {plant, controller} = simulation.fmus;
+const encoded = numbers => {
+  const bytes = new Uint8Array(Float64Array.from(numbers).buffer);
+  let text = '';
+  for (const byte of bytes) text += String.fromCharCode(byte);
+  return btoa(text);
+};
+"""
+
+
+class OpenedPage:
+    """The page in a browser; its Playground is window.tested."""
+
+    def __init__(self, browser: Browser, path: Path, **view: Any) -> None:
+        self.browser = browser
+        browser.open(path, **view)
+        begun = browser.driver.execute_async_script("""
+            const done = arguments[0];
+            playground.then(it => {
+              window.tested = it;
+              const {isRunning} = it;
+              it.play(false);
+              done({isRunning});
+            }, error => done({failure: String(error.stack)}));
+        """)
+        assert "failure" not in begun, begun["failure"]
+        self.was_running = begun["isRunning"]
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Value of the body of a function that knows simulation, plant and controller."""
+        return self.browser.run(PRELUDE + script, *arguments)
+
+    def doubles(self, script: str, *arguments: Any) -> bytes:
+        """Bytes of the doubles in the array that the script returns by `return encoded(array)`."""
+        return base64.b64decode(self.run(script, *arguments))
+
+    def value(self, name: str) -> float:
+        """Value of a variable of the plant."""
+        return self.run("return plant.get(arguments[0])", name)
+
+    def text(self, selector: str) -> str:
+        return self.browser.run("return document.querySelector(arguments[0]).textContent", selector)
