@@ -1,0 +1,224 @@
+"""Hands the blocks of a campaign to workers of Dask, and keeps what comes back.
+
+A worker gets the FMUs and the job once, as a plugin, also if it starts later or again. A block is
+one task. Few are under way at a time, so that the scheduler's memory does not grow with the
+campaign. Only this process writes results: workers need no common disk.
+"""
+
+import asyncio
+import logging
+import os
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import dask
+import numpy as np
+from distributed import (
+    Client,
+    Future,
+    LocalCluster,
+    Worker,
+    WorkerPlugin,
+    as_completed,
+    get_worker,
+)
+from distributed.scheduler import KilledWorker
+
+from cosim.campaign.campaign_file import Campaign
+from cosim.campaign.job import Job
+from cosim.campaign.points import Points
+from cosim.campaign.results import Results
+from cosim.campaign.runs import Rows, Workshop
+from cosim.errors import UserError, one_line
+
+PLUGIN = "cosim-campaign"
+AHEAD = 3  # blocks under way for each thread of a worker
+KILLS = 20  # so many workers may die over a task
+WAIT = 60  # s, for the first worker
+DIED = "the worker died in this run"
+GOES_ON = "the same command goes on from what is there"
+
+SETTINGS = {
+    "distributed.scheduler.allowed-failures": KILLS,
+    "distributed.logging.distributed": "critical",
+    "distributed.comm.timeouts.connect": "20s",
+    "distributed.worker.memory.terminate": False,  # the system decides when memory is short
+}
+
+
+class _Plugin(WorkerPlugin):
+    """FMUs and job on a worker."""
+
+    name = PLUGIN
+
+    def __init__(self, job: Job, archives: Mapping[str, bytes]) -> None:
+        self._job, self._archives = job, archives
+        self.workshop: Workshop | None = None
+
+    def setup(self, worker: Worker) -> None:
+        self.workshop = Workshop(self._job, self._archives, Path(worker.local_directory))
+
+    def teardown(self, worker: Worker) -> None:  # noqa: ARG002
+        if self.workshop is not None:
+            self.workshop.close()
+
+    def __getstate__(self) -> tuple[Job, Mapping[str, bytes]]:
+        return self._job, self._archives
+
+    def __setstate__(self, state: tuple[Job, Mapping[str, bytes]]) -> None:
+        self.__init__(*state)
+
+
+def _run_block(numbers: Sequence[int], points: np.ndarray) -> Rows:
+    """Make runs, on a worker."""
+    return get_worker().plugins[PLUGIN].workshop.rows(numbers, points)
+
+
+@contextmanager
+def local_cluster(workers: int | None, within: Path) -> Iterator[Client]:
+    """A cluster on this machine, one process a core; its files are in the folder `within`."""
+    count = workers or cores()
+    with TemporaryDirectory(prefix=".workers-", dir=within, ignore_cleanup_errors=True) as folder:
+        with (
+            LocalCluster(
+                n_workers=count,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=":0",
+                local_directory=folder,
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            Client(cluster) as client,
+        ):
+            yield client
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Client]:
+    """The cluster of a scheduler that runs elsewhere; UserError if it cannot be reached."""
+    try:
+        client = Client(address, timeout=20)
+    except (OSError, ValueError, asyncio.TimeoutError) as error:
+        raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
+    with client:
+        yield client
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Engine:
+    """Runs blocks on the workers of a client."""
+
+    def __init__(
+        self,
+        client: Client,
+        campaign: Campaign,
+        job: Job,
+        archives: Mapping[str, bytes],
+        points: Points,
+        results: Results,
+    ) -> None:
+        self._client, self._campaign, self._job = client, campaign, job
+        self._points, self._results = points, results
+        self._begin(archives)
+
+    def _begin(self, archives: Mapping[str, bytes]) -> None:
+        try:
+            self._client.wait_for_workers(1, timeout=WAIT)
+        except (TimeoutError, asyncio.TimeoutError):
+            raise UserError(f"{self._client.scheduler.address}: has no workers") from None
+        replies = self._client.register_plugin(_Plugin(self._job, archives))
+        for address, reply in (replies or {}).items():
+            if isinstance(reply, dict) and reply.get("status") == "error":
+                error = pickle.loads(reply["exception"].data) if "exception" in reply else reply
+                raise UserError(f"{address}: the worker cannot run this: {one_line(error)}")
+
+    @property
+    def _threads(self) -> int:
+        return sum(self._client.nthreads().values())
+
+    def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
+        """Run blocks and keep their results; `done` is called with the number of runs of each.
+
+        Raises
+        ------
+        UserError
+            If the cluster is lost or the results cannot be written.
+        """
+        waiting = iter(blocks)
+        tasks = as_completed()
+        blocks_of: dict[str, int] = {}
+
+        def submit() -> None:
+            block = next(waiting, None)
+            if block is not None:
+                future = self._submit(block)
+                blocks_of[future.key] = block
+                tasks.add(future)
+
+        for _ in range(AHEAD * max(self._threads, 1)):
+            submit()
+        for future in tasks:
+            block = blocks_of.pop(future.key)
+            self._keep(block, self._rows(future, block))
+            future.release()
+            done(len(self._campaign.block_range(block)))
+            submit()
+
+    def _submit(self, block: int) -> Future:
+        runs = self._campaign.block_range(block)
+        points = self._points.targets(self._points.of(runs), self._job)
+        return self._client.submit(_run_block, list(runs), points, pure=False)
+
+    def _keep(self, block: int, rows: Rows) -> None:
+        self._results.write(block, self._points.of(self._campaign.block_range(block)), rows)
+
+    def _rows(self, future: Future, block: int) -> Rows:
+        """Results of a task; run by run if workers died over it again and again."""
+        if future.status == "finished":
+            return future.result()
+        error = self._error(future)
+        if not isinstance(error, KilledWorker):
+            raise UserError(f"block {block}: {one_line(error)}; {GOES_ON}")
+        runs = self._campaign.block_range(block)
+        points = self._points.targets(self._points.of(runs), self._job)
+        return _joined([self._alone(run, points[i : i + 1]) for i, run in enumerate(runs)])
+
+    def _alone(self, run: int, point: np.ndarray) -> Rows:
+        """One run as a task; a failed row if workers die over it."""
+        future = self._client.submit(_run_block, [run], point, pure=False)
+        try:
+            return future.result()
+        except KilledWorker:
+            nothing = np.full((1, len(self._job.measures)), np.nan)
+            return Rows(np.array([run], np.int64), nothing, [DIED], {})
+
+    def _error(self, future: Future) -> BaseException:
+        if future.status in ("cancelled", "lost") or self._client.status != "running":
+            raise UserError(f"the scheduler is gone; {GOES_ON}")
+        return future.exception()
+
+
+def _joined(parts: Sequence[Rows]) -> Rows:
+    return Rows(
+        np.concatenate([part.runs for part in parts]),
+        np.concatenate([part.measures for part in parts]),
+        [failure for part in parts for failure in part.failures],
+        {run: record for part in parts for run, record in part.trajectories.items()},
+    )
+
+
+@contextmanager
+def cluster(scheduler: str | None, workers: int | None, within: Path) -> Iterator[Client]:
+    """A scheduler that runs elsewhere, or a cluster on this machine."""
+    with dask.config.set(SETTINGS):
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        start = connected(scheduler) if scheduler else local_cluster(workers, within)
+        with start as client:
+            yield client

@@ -1,0 +1,63 @@
+"""`campaign`: run a scenario or a system many times, over parameters."""
+
+import argparse
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+from cosim import project
+from cosim.errors import UserError
+from cosim.output_files import from_here
+from cosim.progress import Progress
+
+NEEDED = ("SALib", "distributed", "numba", "pyarrow", "scipy")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run what is missing of the campaign; 0 if every run has succeeded."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
+    # imported here: what a campaign needs may not be installed
+    from cosim.campaign import bases, campaign_file, planning
+    from cosim.campaign.points import Points
+    from cosim.campaign.results import Results
+
+    campaign = campaign_file.read(options.file)
+    with bases.opened(campaign, options.fmu) as base:
+        job = planning.plan(campaign, base, options.file)
+        points = Points(campaign, planning.constants(campaign, base))
+        folder = _folder(options, campaign)
+        text = Path(options.file).read_text(encoding="utf-8")
+        results = Results(folder, campaign, job, text)
+        results.begin()
+        missing_blocks = results.missing()
+        if missing_blocks:
+            _run(options, campaign, base, job, points, results, missing_blocks)
+    print(f"table: {results.digest()}")
+    print(f"results: {from_here(folder)}")
+    return 0
+
+
+def _folder(options: argparse.Namespace, campaign) -> Path:
+    if options.output is not None:
+        return options.output
+    if campaign.output is not None:
+        return options.file.parent / campaign.output
+    return project.ROOT / "build" / "campaigns" / options.file.stem
+
+
+def _run(options, campaign, base, job, points, results, blocks) -> None:
+    from cosim.campaign import engine
+
+    ahead = sum(len(campaign.block_range(block)) for block in blocks)
+    if ahead < campaign.count:
+        print(f"goes on: {campaign.count - ahead} of {campaign.count} runs are there")
+    with engine.cluster(options.scheduler, options.workers, results.folder) as client:
+        print(f"dashboard: {client.dashboard_link}", flush=True)
+        maker = engine.Engine(client, campaign, job, base.archives, points, results)
+        begin = time.perf_counter()
+        with Progress(campaign.title, ahead, "runs") as progress:
+            maker.run(blocks, progress)
+        seconds = time.perf_counter() - begin
+        print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")
