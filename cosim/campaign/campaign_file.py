@@ -220,8 +220,8 @@ class Campaign(_Table):
                     raise ValueError(f"[parameters.{name}] points: goes with a grid only")
         if self.sampling == "indices" and self.runs & (self.runs - 1):
             raise ValueError(
-                f"runs: expected a power of 2 for indices, which make runs x (parameters + 2) runs, "
-                f"got {self.runs}"
+                "runs: expected a power of 2 for indices, which make runs x (parameters + 2) of "
+                f"them, got {self.runs}"
             )
         most = MAX_WHOLE if self.sampling in WHOLE else MAX_RUNS
         if self.count > most:

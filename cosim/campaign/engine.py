@@ -5,14 +5,12 @@ one task. Few are under way at a time, so that the scheduler's memory does not g
 campaign. Only this process writes results: workers need no common disk.
 """
 
-import asyncio
 import logging
 import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import dask
 import numpy as np
@@ -43,7 +41,6 @@ GOES_ON = "the same command goes on from what is there"
 
 SETTINGS = {
     "distributed.scheduler.allowed-failures": KILLS,
-    "distributed.logging.distributed": "critical",
     "distributed.comm.timeouts.connect": "20s",
     "distributed.worker.memory.terminate": False,  # the system decides when memory is short
 }
@@ -78,22 +75,20 @@ def _run_block(numbers: Sequence[int], points: np.ndarray) -> Rows:
 
 
 @contextmanager
-def local_cluster(workers: int | None, within: Path) -> Iterator[Client]:
-    """A cluster on this machine, one process a core; its files are in the folder `within`."""
-    count = workers or cores()
-    with TemporaryDirectory(prefix=".workers-", dir=within, ignore_cleanup_errors=True) as folder:
-        with (
-            LocalCluster(
-                n_workers=count,
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address=":0",
-                local_directory=folder,
-                silence_logs=logging.CRITICAL,
-            ) as cluster,
-            Client(cluster) as client,
-        ):
-            yield client
+def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
+    """A cluster on this machine, one process a core, whose files are in `folder`."""
+    with (
+        LocalCluster(
+            n_workers=workers or cores(),
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=":0",
+            local_directory=str(folder),
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
 
 
 @contextmanager
@@ -101,7 +96,7 @@ def connected(address: str) -> Iterator[Client]:
     """The cluster of a scheduler that runs elsewhere; UserError if it cannot be reached."""
     try:
         client = Client(address, timeout=20)
-    except (OSError, ValueError, asyncio.TimeoutError) as error:
+    except (TimeoutError, OSError, ValueError) as error:
         raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
     with client:
         yield client
@@ -131,7 +126,7 @@ class Engine:
     def _begin(self, archives: Mapping[str, bytes]) -> None:
         try:
             self._client.wait_for_workers(1, timeout=WAIT)
-        except (TimeoutError, asyncio.TimeoutError):
+        except TimeoutError:
             raise UserError(f"{self._client.scheduler.address}: has no workers") from None
         replies = self._client.register_plugin(_Plugin(self._job, archives))
         for address, reply in (replies or {}).items():
@@ -215,10 +210,13 @@ def _joined(parts: Sequence[Rows]) -> Rows:
 
 
 @contextmanager
-def cluster(scheduler: str | None, workers: int | None, within: Path) -> Iterator[Client]:
-    """A scheduler that runs elsewhere, or a cluster on this machine."""
-    with dask.config.set(SETTINGS):
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
-        start = connected(scheduler) if scheduler else local_cluster(workers, within)
-        with start as client:
-            yield client
+def cluster(scheduler: str | None, workers: int | None, folder: Path) -> Iterator[Client]:
+    """A scheduler that runs elsewhere, or a cluster on this machine with files in `folder`."""
+    logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
+    try:
+        with dask.config.set(SETTINGS):
+            start = connected(scheduler) if scheduler else local_cluster(workers, folder)
+            with start as client:
+                yield client
+    finally:
+        logging.disable(logging.NOTSET)

@@ -8,11 +8,13 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -25,6 +27,7 @@ from cosim.output_files import whole
 
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
+WORKERS = ".{}.workers"  # with the number of the process
 ROOM = 1.1  # of the room that is needed: what Parquet adds
 ROW_TEXT = 8  # bytes of a row besides its numbers
 
@@ -56,13 +59,32 @@ class Results:
         try:
             for name in (BLOCKS, TRAJECTORIES):
                 (self.folder / name).mkdir(parents=True, exist_ok=True)
-                for left in (self.folder / name).glob(".*"):  # of a process that was killed
-                    left.unlink()
+            self._remove_left()
             if not path.exists():
                 with whole(path) as temporary:
                     temporary.write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
         except OSError as error:
             raise self._unwritable(error) from error
+
+    @contextmanager
+    def workers_folder(self) -> Iterator[Path]:
+        """Folder for the files of workers on this machine, which is removed at the end."""
+        folder = self.folder / WORKERS.format(os.getpid())
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def _remove_left(self) -> None:
+        """Remove temporary files and folders of processes that were killed."""
+        for left in [*self.folder.glob(".*"), *self.folder.glob("*/.*")]:
+            number = left.name.split(".")[1]
+            if not number.isdecimal() or psutil.pid_exists(int(number)):
+                continue
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
 
     def _manifest(self) -> dict[str, object]:
         return {
@@ -151,11 +173,10 @@ class Results:
         return self.folder / TRAJECTORIES / f"run_{run:010d}.parquet"
 
     def _write(self, path: Path, table: pa.Table) -> None:
-        with whole(path) as temporary:
-            with temporary.open("wb") as file:
-                pq.write_table(table, file, compression="zstd")
-                file.flush()
-                os.fsync(file.fileno())
+        with whole(path) as temporary, temporary.open("wb") as file:
+            pq.write_table(table, file, compression="zstd")
+            file.flush()
+            os.fsync(file.fileno())
 
     def _unwritable(self, error: Exception) -> UserError:
         return UserError(

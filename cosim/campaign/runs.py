@@ -1,4 +1,4 @@
-"""Makes runs of a job on a worker: a runner per thread, with instances that are reset between runs."""
+"""Makes runs of a job on a worker: a runner per thread, whose instances are reset between runs."""
 
 import threading
 from collections.abc import Mapping, Sequence

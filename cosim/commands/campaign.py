@@ -1,6 +1,7 @@
 """`campaign`: run a scenario or a system many times, over parameters."""
 
 import argparse
+import sys
 import time
 from importlib.util import find_spec
 from pathlib import Path
@@ -53,11 +54,18 @@ def _run(options, campaign, base, job, points, results, blocks) -> None:
     ahead = sum(len(campaign.block_range(block)) for block in blocks)
     if ahead < campaign.count:
         print(f"goes on: {campaign.count - ahead} of {campaign.count} runs are there")
-    with engine.cluster(options.scheduler, options.workers, results.folder) as client:
-        print(f"dashboard: {client.dashboard_link}", flush=True)
-        maker = engine.Engine(client, campaign, job, base.archives, points, results)
-        begin = time.perf_counter()
-        with Progress(campaign.title, ahead, "runs") as progress:
-            maker.run(blocks, progress)
-        seconds = time.perf_counter() - begin
-        print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")
+    try:
+        with (
+            results.workers_folder() as files,
+            engine.cluster(options.scheduler, options.workers, files) as client,
+        ):
+            print(f"dashboard: {client.dashboard_link}", flush=True)
+            maker = engine.Engine(client, campaign, job, base.archives, points, results)
+            begin = time.perf_counter()
+            with Progress(campaign.title, ahead, "runs") as progress:
+                maker.run(blocks, progress)
+            seconds = time.perf_counter() - begin
+    except (KeyboardInterrupt, SystemExit):
+        print(f"stopped; {engine.GOES_ON}", file=sys.stderr)
+        raise
+    print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")
