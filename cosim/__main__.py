@@ -182,12 +182,24 @@ def _parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="folder for the results (default: that in the file, or in build/campaigns/)",
     )
+    campaign.add_argument(
+        "--replay",
+        type=_number,
+        metavar="N",
+        help="run only run N again, and write all its outputs and a picture",
+    )
     where = campaign.add_mutually_exclusive_group()
     where.add_argument("--scheduler", metavar="ADDRESS", help="a scheduler that runs elsewhere")
     where.add_argument(
         "--workers", type=_count, metavar="N", help="processes on this machine (default: a core)"
     )
     return parser
+
+
+def _number(text: str) -> int:
+    if not text.isdecimal() or len(text) > 12:
+        raise argparse.ArgumentTypeError(f"expected the number of a run, got {text!r}")
+    return int(text)
 
 
 def _count(text: str) -> int:

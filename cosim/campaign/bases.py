@@ -49,6 +49,10 @@ class Base(ABC):
     ) -> list[Component]:
         """The components, which read Real variables `read` and start from values `fixed`."""
 
+    @abstractmethod
+    def real_outputs(self) -> list[str]:
+        """Names of all Real outputs."""
+
     @property
     @abstractmethod
     def held(self) -> tuple[Held, Held]:
@@ -96,6 +100,9 @@ class ScenarioBase(Base):
 
     def start_values(self) -> dict[str, Value]:
         return self._scenario.start_values
+
+    def real_outputs(self) -> list[str]:
+        return self._model.real_outputs
 
     def hold(self, name: str, value: float) -> int:
         """Column of a held input, which is `value` throughout from now on."""
@@ -212,6 +219,9 @@ class SystemBase(Base):
                 Component(name, self._hashes[name], values, parts["Real"], parts["Boolean"])
             )
         return result
+
+    def real_outputs(self) -> list[str]:
+        return [f"{c}.{name}" for c in self._names for name in self._ssp.models[c].real_outputs]
 
     def _started(self, component: str) -> dict[str, Value]:
         with Fmu(self._ssp.fmu(component)) as fmu:

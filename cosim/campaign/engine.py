@@ -14,25 +14,17 @@ from pathlib import Path
 
 import dask
 import numpy as np
-from distributed import (
-    Client,
-    Future,
-    LocalCluster,
-    Worker,
-    WorkerPlugin,
-    as_completed,
-    get_worker,
-)
+from distributed import Client, Future, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
 
 from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Job
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
-from cosim.campaign.runs import Rows, Workshop
+from cosim.campaign.runs import Rows
+from cosim.campaign.worker import Plugin, run_block
 from cosim.errors import UserError, one_line
 
-PLUGIN = "cosim-campaign"
 AHEAD = 3  # blocks under way for each thread of a worker
 KILLS = 20  # so many workers may die over a task
 WAIT = 60  # s, for the first worker
@@ -44,34 +36,6 @@ SETTINGS = {
     "distributed.comm.timeouts.connect": "20s",
     "distributed.worker.memory.terminate": False,  # the system decides when memory is short
 }
-
-
-class _Plugin(WorkerPlugin):
-    """FMUs and job on a worker."""
-
-    name = PLUGIN
-
-    def __init__(self, job: Job, archives: Mapping[str, bytes]) -> None:
-        self._job, self._archives = job, archives
-        self.workshop: Workshop | None = None
-
-    def setup(self, worker: Worker) -> None:
-        self.workshop = Workshop(self._job, self._archives, Path(worker.local_directory))
-
-    def teardown(self, worker: Worker) -> None:  # noqa: ARG002
-        if self.workshop is not None:
-            self.workshop.close()
-
-    def __getstate__(self) -> tuple[Job, Mapping[str, bytes]]:
-        return self._job, self._archives
-
-    def __setstate__(self, state: tuple[Job, Mapping[str, bytes]]) -> None:
-        self.__init__(*state)
-
-
-def _run_block(numbers: Sequence[int], points: np.ndarray) -> Rows:
-    """Make runs, on a worker."""
-    return get_worker().plugins[PLUGIN].workshop.rows(numbers, points)
 
 
 @contextmanager
@@ -128,7 +92,7 @@ class Engine:
             self._client.wait_for_workers(1, timeout=WAIT)
         except TimeoutError:
             raise UserError(f"{self._client.scheduler.address}: has no workers") from None
-        replies = self._client.register_plugin(_Plugin(self._job, archives))
+        replies = self._client.register_plugin(Plugin(self._job, archives))
         for address, reply in (replies or {}).items():
             if isinstance(reply, dict) and reply.get("status") == "error":
                 error = pickle.loads(reply["exception"].data) if "exception" in reply else reply
@@ -169,7 +133,7 @@ class Engine:
     def _submit(self, block: int) -> Future:
         runs = self._campaign.block_range(block)
         points = self._points.targets(self._points.of(runs), self._job)
-        return self._client.submit(_run_block, list(runs), points, pure=False)
+        return self._client.submit(run_block, list(runs), points, pure=False)
 
     def _keep(self, block: int, rows: Rows) -> None:
         self._results.write(block, self._points.of(self._campaign.block_range(block)), rows)
@@ -187,7 +151,7 @@ class Engine:
 
     def _alone(self, run: int, point: np.ndarray) -> Rows:
         """One run as a task; a failed row if workers die over it."""
-        future = self._client.submit(_run_block, [run], point, pure=False)
+        future = self._client.submit(run_block, [run], point, pure=False)
         try:
             return future.result()
         except KilledWorker:

@@ -17,9 +17,15 @@ RUN, FAILURE = "run", "failure"  # columns of every table
 MAX_RECORDED = 100_000_000  # numbers that a run records
 
 
-def plan(campaign: Campaign, base: Base, where: object) -> Job:
-    """The job of a campaign; UserError, which begins with `where`, for its first mistake."""
-    return _Planner(campaign, base, where).job()
+def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
+    """The job of a campaign, which records the variables `also`, too.
+
+    Raises
+    ------
+    UserError
+        For the first mistake, beginning with `where`.
+    """
+    return _Planner(campaign, base, where).job(also)
 
 
 class _Planner:
@@ -29,12 +35,13 @@ class _Planner:
     def fail(self, place: str, message: object) -> NoReturn:
         raise UserError(f"{self.where}: {place}: {message}")
 
-    def job(self) -> Job:
+    def job(self, also: Sequence[str]) -> Job:
         campaign, base = self.campaign, self.base
         targets = self.targets()
         fixed = self.fixed()
         measures = self.measures()
-        watched = tuple(dict.fromkeys(v for measure in measures for v in measure.variables))
+        measured = (v for measure in measures for v in measure.variables)
+        watched = tuple(dict.fromkeys([*measured, *also]))
         tangent = self.tangent()
         if len(watched) * len(base.times) > MAX_RECORDED:
             self.fail("keep", f"{len(watched)} variables at {len(base.times)} times are too many")

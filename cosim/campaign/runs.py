@@ -1,8 +1,8 @@
 """Makes runs of a job on a worker: a runner per thread, whose instances are reset between runs."""
 
 import threading
-from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -183,18 +183,26 @@ class Runner:
             raise self._instances[component].failure(error, when)
 
 
+@contextmanager
+def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str, Fmu]]:
+    """FMUs by their hash, unpacked in a folder."""
+    with ExitStack() as stack:
+        fmus = {}
+        for digest, content in archives.items():
+            path = folder / f"{digest}.fmu"
+            path.write_bytes(content)
+            fmus[digest] = stack.enter_context(Fmu(path, folder))
+        yield fmus
+
+
 class Workshop:
     """The FMUs of a job, unpacked on a worker, and a runner for each of its threads."""
 
     def __init__(self, job: Job, archives: Mapping[str, bytes], within: Path | None) -> None:
         self._job, self._local = job, threading.local()
         self._stack = ExitStack()
-        folder = Path(self._stack.enter_context(TemporaryDirectory(prefix="cosim-", dir=within)))
-        self._fmus = {}
-        for digest, content in archives.items():
-            path = folder / f"{digest}.fmu"
-            path.write_bytes(content)
-            self._fmus[digest] = self._stack.enter_context(Fmu(path, folder))
+        folder = self._stack.enter_context(TemporaryDirectory(prefix="cosim-", dir=within))
+        self._fmus = self._stack.enter_context(open_fmus(archives, Path(folder)))
 
     def close(self) -> None:
         """Remove the unpacked FMUs; runners end with the process."""

@@ -1,6 +1,7 @@
 """`campaign`: run a scenario or a system many times, over parameters."""
 
 import argparse
+import shlex
 import sys
 import time
 from importlib.util import find_spec
@@ -8,7 +9,7 @@ from pathlib import Path
 
 from cosim import project
 from cosim.errors import UserError
-from cosim.output_files import from_here
+from cosim.output_files import from_here, written
 from cosim.progress import Progress
 
 NEEDED = ("SALib", "distributed", "numba", "pyarrow", "scipy")
@@ -20,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     if missing:
         raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
     # imported here: what a campaign needs may not be installed
-    from cosim.campaign import bases, campaign_file, planning
+    from cosim.campaign import bases, campaign_file, page, planning, replay
     from cosim.campaign.points import Points
     from cosim.campaign.results import Results
 
@@ -29,15 +30,30 @@ def run(options: argparse.Namespace) -> int:
         job = planning.plan(campaign, base, options.file)
         points = Points(campaign, planning.constants(campaign, base))
         folder = _folder(options, campaign)
+        if options.replay is not None:
+            print(*replay.replay(campaign, base, points, options.replay, folder), sep="\n")
+            return 0
         text = Path(options.file).read_text(encoding="utf-8")
         results = Results(folder, campaign, job, text)
         results.begin()
         missing_blocks = results.missing()
         if missing_blocks:
             _run(options, campaign, base, job, points, results, missing_blocks)
-    print(f"table: {results.digest()}")
-    print(f"results: {from_here(folder)}")
+        digest = results.digest()
+        print(f"table: {digest}")
+        with written(folder):
+            index = page.write(campaign, job, results, _command(options), digest)
+    print(f"page: {from_here(index)}")
     return 0
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What to type for the campaign, in the present folder."""
+    parts = ["./run.sh", "campaign", str(from_here(options.file))]
+    for name in ("fmu", "output"):
+        value = getattr(options, name)
+        parts += [] if value is None else [f"--{name}", str(value)]
+    return shlex.join(parts)
 
 
 def _folder(options: argparse.Namespace, campaign) -> Path:
