@@ -7,6 +7,7 @@
 #   ./run.sh system                all variants of all systems in Ecos
 #   ./run.sh system NAME ...       these variants, or all of these systems; --list names both
 #   ./run.sh coupling              what the coupling of the closed loop costs
+#   ./run.sh campaign FILE.toml    many runs over parameters, on all cores: cosim/campaign/README.md
 #   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
@@ -17,7 +18,7 @@ if [ "${1-}" = --help ] || [ "${1-}" = -h ]; then
 fi
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
-"$root/setup.sh"
+if [ "${1-}" = campaign ]; then "$root/setup.sh" --campaign; else "$root/setup.sh"; fi
 python="$root/build/venv/bin/python"
 log="$root/build/build.log"
 
@@ -32,6 +33,6 @@ if [ "${1-}" = --list ]; then
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 case "${1-}" in
-  run | system | coupling) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
+  run | system | coupling | campaign) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
   *) exec "$python" -P -m cosim run "$@" ;;
 esac

@@ -1,4 +1,4 @@
-"""Values that follow from others, as a campaign's file writes them: "sqrt(2 * energy / m1)"."""
+"""Values that follow from others, as a campaign's file writes them: "sqrt(2 * x / mass)"."""
 
 import ast
 import math
