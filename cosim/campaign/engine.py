@@ -26,7 +26,7 @@ from cosim.campaign.worker import Plugin, run_block
 from cosim.errors import UserError, one_line
 
 AHEAD = 3  # blocks under way for each thread of a worker
-KILLS = 20  # so many workers may die over a task
+KILLS = 5  # so many workers may die over a task
 WAIT = 60  # s, for the first worker
 DIED = "the worker died in this run"
 GOES_ON = "the same command goes on from what is there"
