@@ -29,7 +29,10 @@ MISTAKES = {
     "no parameter": ([("[parameters.m2]", "[parameters.ee_x]")], "is not a parameter"),
     "no runs": ([("runs = 40\n", "")], "missing key 'runs'"),
     "too many runs": ([("runs = 40", "runs = 2000000000")], "runs: makes 2e+09, expected at most"),
-    "block of nothing": ([("block = 8", "block = 0")], "block: expected greater than or equal to 1"),
+    "block of nothing": (
+        [("block = 8", "block = 0")],
+        "block: expected greater than or equal",
+    ),
     "points without a grid": ([("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3")], "goes with a grid only"),
     "empty grid": (
         [("sobol", "grid"), ("runs = 40\n", "")],
@@ -47,10 +50,16 @@ MISTAKES = {
     "unknown variable": ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
     "no Real variable": ([('"q1", "q2"', '"solver_steps"')], "'solver_steps' is not a Real"),
     "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
-    "unknown column": ([("seed = 3", 'worst = ["final(q3)"]')], "worst: no column 'final(q3)', did"),
+    "unknown column": (
+        [("seed = 3", 'worst = ["final(q3)"]')],
+        "worst: no column 'final(q3)'",
+    ),
     "unknown name": ([("[keep]", '[derived]\ndq1 = "2 * q9"\n[keep]')], "unknown name 'q9'"),
     "no expression": ([("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')], "[derived] dq1: is not an"),
-    "forbidden": ([("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')], "'open(1)': expected numbers"),
+    "forbidden": (
+        [("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')],
+        "'open(1)': expected",
+    ),
     "set twice": ([("[keep]", "[set]\nm2 = 1.0\n[keep]")], "[set] m2: is in [parameters]"),
     "set too low": ([("[keep]", "[set]\nm1 = -1.0\n[keep]")], "[set] m1: expected at least 0.0 kg"),
     "no time": ([("stop = 1.0", "stop = -1.0")], "[time] stop: expected a time after start"),

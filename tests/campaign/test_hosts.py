@@ -34,8 +34,3 @@ def test_two_hosts_make_the_same_table(file: Path, tmp_path: Path) -> None:
         assert "Traceback" not in err
     here = completed(file, tmp_path / "lost", "--workers", 1)
     assert table(out) == here
-
-
-def test_no_scheduler_is_the_users_mistake(file: Path, tmp_path: Path) -> None:
-    code, _, err = finish(start(file, tmp_path, "--scheduler", "tcp://127.0.0.1:9"))
-    assert code == 2 and "the scheduler cannot be reached" in err and "Traceback" not in err

@@ -99,8 +99,6 @@ def test_a_run_does_not_depend_on_those_before(tmp_path: Path) -> None:
     assert len(np.unique(within.measures, axis=0)) == 4
 
 
-
-
 def test_a_run_that_fails_says_why_and_harms_no_other(tmp_path: Path) -> None:
     # the mass of link 2 becomes negative in some runs, which the FMU refuses
     changes = [("normal = [-2.0, 0.2]", "uniform = [-3.0, 3.0]"), ("[keep]", "[derived]\nI1z = "
@@ -138,7 +136,9 @@ def test_an_input_can_be_a_parameter(tmp_path: Path) -> None:
         record = rows(runs, job, points, [3]).trajectories[3]
     scenario = load("hanging_swing")
     held = {"f2": np.full(len(scenario.times), -21.5)}
-    changed = dataclasses.replace(scenario, inputs=held, initial={'q1': -2.22, 'q2': 0.25}, reference_every=1)
+    changed = dataclasses.replace(
+        scenario, inputs=held, initial={"q1": -2.22, "q2": 0.25}, reference_every=1
+    )
     with Fmu(FMUS["rp_manipulator"]) as fmu:
         result = simulate(fmu, changed)
     q1 = result.values[: len(record), result.names.index("q1")]
