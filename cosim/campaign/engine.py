@@ -10,12 +10,14 @@ import os
 import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import dask
 import numpy as np
 from distributed import Client, Future, LocalCluster, as_completed
 from distributed.scheduler import KilledWorker
+from tornado.ioloop import PeriodicCallback
 
 from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Job
@@ -27,6 +29,7 @@ from cosim.errors import UserError, one_line
 
 AHEAD = 3  # blocks under way for each thread of a worker
 KILLS = 5  # so many workers may die over a task
+RESTART_EVERY = 2000  # ms
 WAIT = 60  # s, for the first worker
 DIED = "the worker died in this run"
 GOES_ON = "the same command goes on from what is there"
@@ -34,6 +37,9 @@ GOES_ON = "the same command goes on from what is there"
 SETTINGS = {
     "distributed.scheduler.allowed-failures": KILLS,
     "distributed.comm.timeouts.connect": "20s",
+    # what watches workers many times a second takes three per cent of a core, for nothing here
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
     "distributed.worker.memory.terminate": False,  # the system decides when memory is short
 }
 
@@ -41,9 +47,10 @@ SETTINGS = {
 @contextmanager
 def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
     """A cluster on this machine, one process a core, whose files are in `folder`."""
+    count = workers or cores()
     with (
         LocalCluster(
-            n_workers=workers or cores(),
+            n_workers=count,
             threads_per_worker=1,
             processes=True,
             dashboard_address=":0",
@@ -52,7 +59,13 @@ def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
         ) as cluster,
         Client(cluster) as client,
     ):
-        yield client
+        # a worker that dies while it starts is given up otherwise
+        keeper = PeriodicCallback(partial(cluster.scale, count), RESTART_EVERY)
+        cluster.loop.add_callback(keeper.start)
+        try:
+            yield client
+        finally:
+            cluster.loop.add_callback(keeper.stop)
 
 
 @contextmanager

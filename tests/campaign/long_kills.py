@@ -30,7 +30,7 @@ from tests.campaign.processes import (
 )
 
 RUNS, KILLS = 1200, 20
-PAUSE = 1.0  # s, between two kills
+PAUSE = 0.5  # s, between two kills
 DISK = 120_000  # bytes: room for some of the blocks
 STEPS = [("runs = 40", f"runs = {RUNS}"), ("block = 8", "block = 6")]
 STEPS += [("time = { stop = 1.0 }\n", "")]
