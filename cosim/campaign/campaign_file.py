@@ -1,7 +1,7 @@
 """Campaign files: what to run, over which parameters, and what to keep, read from TOML.
 
-models/README.md points to the page of the format. Here a file is checked by itself; what it says of
-a model or system is checked by `cosim.campaign.job`.
+README.md beside this module explains the format. Here a file is checked by itself; what it says of
+a model or system is checked by `cosim.campaign.planning`.
 """
 
 import math

@@ -6,16 +6,20 @@ campaign. Only this process writes results: workers need no common disk.
 """
 
 import logging
+import math
 import os
 import pickle
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from pathlib import Path
 
 import dask
 import numpy as np
 from distributed import Client, Future, LocalCluster, as_completed
+from distributed.client import FutureCancelledError
 from distributed.scheduler import KilledWorker
 from tornado.ioloop import PeriodicCallback
 
@@ -24,10 +28,11 @@ from cosim.campaign.job import Job
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
 from cosim.campaign.runs import Rows
-from cosim.campaign.worker import Plugin, run_block
+from cosim.campaign.worker import NAME, Plugin, run_block
 from cosim.errors import UserError, one_line
 
 AHEAD = 3  # blocks under way for each thread of a worker
+COUNT_EVERY = 5.0  # s, between two looks at how many threads there are
 KILLS = 5  # so many workers may die over a task
 RESTART_EVERY = 2000  # ms
 WAIT = 60  # s, for the first worker
@@ -98,6 +103,7 @@ class Engine:
     ) -> None:
         self._client, self._campaign, self._job = client, campaign, job
         self._points, self._results = points, results
+        self._counted, self._ahead = -math.inf, 0
         self._begin(archives)
 
     def _begin(self, archives: Mapping[str, bytes]) -> None:
@@ -111,10 +117,6 @@ class Engine:
                 error = pickle.loads(reply["exception"].data) if "exception" in reply else reply
                 raise UserError(f"{address}: the worker cannot run this: {one_line(error)}")
 
-    @property
-    def _threads(self) -> int:
-        return sum(self._client.nthreads().values())
-
     def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         """Run blocks and keep their results; `done` is called with the number of runs of each.
 
@@ -123,25 +125,36 @@ class Engine:
         UserError
             If the cluster is lost or the results cannot be written.
         """
+        try:
+            self._run(blocks, done)
+            self._client.unregister_worker_plugin(NAME)
+        except (OSError, FutureCancelledError):
+            raise UserError(f"the scheduler is gone; {GOES_ON}") from None
+
+    def _run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         waiting = iter(blocks)
         tasks = as_completed()
         blocks_of: dict[str, int] = {}
-
-        def submit() -> None:
-            block = next(waiting, None)
-            if block is not None:
-                future = self._submit(block)
-                blocks_of[future.key] = block
-                tasks.add(future)
-
-        for _ in range(AHEAD * max(self._threads, 1)):
-            submit()
+        self._fill(waiting, tasks, blocks_of)
         for future in tasks:
+            if future.status in ("lost", "pending"):  # a worker died with the result: made again
+                tasks.add(future)
+                continue
             block = blocks_of.pop(future.key)
             self._keep(block, self._rows(future, block))
             future.release()
             done(len(self._campaign.block_range(block)))
-            submit()
+            self._fill(waiting, tasks, blocks_of)
+
+    def _fill(self, waiting: Iterator[int], tasks: as_completed, blocks_of: dict[str, int]) -> None:
+        """Submit blocks until enough are under way, also for workers that have come later."""
+        if time.monotonic() >= self._counted + COUNT_EVERY:
+            self._counted = time.monotonic()
+            self._ahead = AHEAD * max(sum(self._client.nthreads().values()), 1)
+        for block in islice(waiting, max(self._ahead - len(blocks_of), 0)):
+            future = self._submit(block)
+            blocks_of[future.key] = block
+            tasks.add(future)
 
     def _submit(self, block: int) -> Future:
         runs = self._campaign.block_range(block)
@@ -172,7 +185,7 @@ class Engine:
             return Rows(np.array([run], np.int64), nothing, [DIED], {})
 
     def _error(self, future: Future) -> BaseException:
-        if future.status in ("cancelled", "lost") or self._client.status != "running":
+        if future.status == "cancelled" or self._client.status != "running":
             raise UserError(f"the scheduler is gone; {GOES_ON}")
         return future.exception()
 

@@ -200,16 +200,20 @@ class Workshop:
 
     def __init__(self, job: Job, archives: Mapping[str, bytes], within: Path | None) -> None:
         self._job, self._local = job, threading.local()
-        self._stack = ExitStack()
+        self._stack, self._runners = ExitStack(), []
         folder = self._stack.enter_context(TemporaryDirectory(prefix="cosim-", dir=within))
         self._fmus = self._stack.enter_context(open_fmus(archives, Path(folder)))
 
     def close(self) -> None:
-        """Remove the unpacked FMUs; runners end with the process."""
+        """Free the instances and remove the unpacked FMUs; nothing may run any more."""
+        for runner in self._runners:
+            with suppress(UserError):
+                runner.__exit__(None, None, None)
         self._stack.close()
 
     def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
         """Make runs in this thread."""
         if not hasattr(self._local, "runner"):
             self._local.runner = Runner(self._job, self._fmus)
+            self._runners.append(self._local.runner)
         return self._local.runner.rows(numbers, points)

@@ -10,7 +10,6 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim import __main__ as cli
-from cosim.trajectory_csv import read
 from tests.campaign.files import write
 from tests.campaign.processes import ENVIRONMENT, finish, start, table
 from tests.support.paths import ROOT
@@ -62,9 +61,12 @@ def test_a_replay_is_the_run_again(done: Path, capsys: pytest.CaptureFixture[str
     for name, value in printed.items():
         assert float(value) == row[name]
     kept = pq.read_table(output / "trajectories" / "run_0000000017.parquet")
-    trajectory = read(output / "replays" / "run_17.csv")
+    file = output / "replays" / "run_17.csv"
+    names = file.read_text().splitlines()[0].replace('"', "").split(",")
+    values = np.loadtxt(file, delimiter=",", skiprows=1)
+    assert len(names) == values.shape[1] > len(kept.column_names)
     for name in kept.column_names[1:]:
-        column = trajectory.values[:, list(trajectory.names).index(name)]
+        column = values[:, names.index(name)]
         assert np.array_equal(column, kept[name].to_numpy())
     assert (output / "replays" / "run_17.png").is_file()
     assert cli.main([*arguments[:-1], "32"]) == 2
