@@ -64,6 +64,13 @@ class Runner:
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)
 
+    def instantiate(self) -> None:
+        """Load the FMUs and make their instances; UserError if that fails."""
+        for component in self._job.components:
+            instance = self._fmus[component.archive].instance(component.name)
+            self._instances.append(self._stack.enter_context(instance))
+        self._calls = loop.component_calls(self._instances)
+
     def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
         """Make runs, with the values (runs, targets) of the job's targets."""
         job = self._job
@@ -106,10 +113,7 @@ class Runner:
             for instance in self._instances:
                 instance.reset()
         else:
-            for component in job.components:
-                instance = self._fmus[component.archive].instance(component.name)
-                self._instances.append(self._stack.enter_context(instance))
-            self._calls = loop.component_calls(self._instances)
+            self.instantiate()
         for instance, component in zip(self._instances, job.components, strict=True):
             instance.set_up(job.start, job.stop, job.tolerance)
             for name, value in component.values.items():
@@ -193,6 +197,16 @@ def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str,
             path.write_bytes(content)
             fmus[digest] = stack.enter_context(Fmu(path, folder))
         yield fmus
+
+
+def check(job: Job, archives: Mapping[str, bytes]) -> None:
+    """Load the FMUs of a job and make an instance of each; UserError if that fails."""
+    with (
+        TemporaryDirectory(prefix="cosim-") as folder,
+        open_fmus(archives, Path(folder)) as fmus,
+        Runner(job, fmus) as runner,
+    ):
+        runner.instantiate()
 
 
 class Workshop:

@@ -21,7 +21,7 @@ def run(options: argparse.Namespace) -> int:
     if missing:
         raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
     # imported here: what a campaign needs may not be installed
-    from cosim.campaign import bases, campaign_file, page, planning, replay
+    from cosim.campaign import bases, campaign_file, page, planning, replay, runs
     from cosim.campaign.points import Points
     from cosim.campaign.results import Results
 
@@ -35,6 +35,7 @@ def run(options: argparse.Namespace) -> int:
             return 0
         text = Path(options.file).read_text(encoding="utf-8")
         results = Results(folder, campaign, job, text)
+        runs.check(job, base.archives)
         results.begin()
         missing_blocks = results.missing()
         if missing_blocks:

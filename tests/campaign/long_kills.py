@@ -72,7 +72,7 @@ def kill_campaign(file: Path, output: Path, undisturbed: str) -> None:
 
 def stop_by_signals(file: Path, output: Path, undisturbed: str) -> None:
     """End it by the signals that end programs."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGTERM):
         process = start(file, output, "--workers", 2)
         goal = blocks(output) + 5
         wait_for(lambda goal=goal: blocks(output) >= goal)
