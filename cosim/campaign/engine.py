@@ -12,6 +12,7 @@ import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -89,6 +90,15 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+@dataclass(frozen=True)
+class _Block:
+    """A block that is under way."""
+
+    number: int
+    runs: range
+    points: np.ndarray  # (runs, parameters and derived values)
+
+
 class Engine:
     """Runs blocks on the workers of a client."""
 
@@ -134,52 +144,50 @@ class Engine:
     def _run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         waiting = iter(blocks)
         tasks = as_completed()
-        blocks_of: dict[str, int] = {}
-        self._fill(waiting, tasks, blocks_of)
+        under_way: dict[str, _Block] = {}
+        self._fill(waiting, tasks, under_way)
         for future in tasks:
             if future.status in ("lost", "pending"):  # a worker died with the result: made again
                 tasks.add(future)
                 continue
-            block = blocks_of.pop(future.key)
-            self._keep(block, self._rows(future, block))
+            block = under_way.pop(future.key)
+            self._results.write(block.number, block.points, self._rows(future, block))
             future.release()
-            done(len(self._campaign.block_range(block)))
-            self._fill(waiting, tasks, blocks_of)
+            done(len(block.runs))
+            self._fill(waiting, tasks, under_way)
 
-    def _fill(self, waiting: Iterator[int], tasks: as_completed, blocks_of: dict[str, int]) -> None:
+    def _fill(
+        self, waiting: Iterator[int], tasks: as_completed, under_way: dict[str, _Block]
+    ) -> None:
         """Submit blocks until enough are under way, also for workers that have come later."""
         if time.monotonic() >= self._counted + COUNT_EVERY:
             self._counted = time.monotonic()
             self._ahead = AHEAD * max(sum(self._client.nthreads().values()), 1)
-        for block in islice(waiting, max(self._ahead - len(blocks_of), 0)):
-            future = self._submit(block)
-            blocks_of[future.key] = block
+        for number in islice(waiting, max(self._ahead - len(under_way), 0)):
+            runs = self._campaign.block_range(number)
+            block = _Block(number, runs, self._points.of(runs))
+            future = self._submit(list(runs), block.points)
+            under_way[future.key] = block
             tasks.add(future)
 
-    def _submit(self, block: int) -> Future:
-        runs = self._campaign.block_range(block)
-        points = self._points.targets(self._points.of(runs), self._job)
-        return self._client.submit(run_block, list(runs), points, pure=False)
+    def _submit(self, runs: Sequence[int], points: np.ndarray) -> Future:
+        targets = self._points.targets(points, self._job)
+        return self._client.submit(run_block, runs, targets, pure=False)
 
-    def _keep(self, block: int, rows: Rows) -> None:
-        self._results.write(block, self._points.of(self._campaign.block_range(block)), rows)
-
-    def _rows(self, future: Future, block: int) -> Rows:
+    def _rows(self, future: Future, block: _Block) -> Rows:
         """Results of a task; run by run if workers died over it again and again."""
         if future.status == "finished":
             return future.result()
         error = self._error(future)
         if not isinstance(error, KilledWorker):
-            raise UserError(f"block {block}: {one_line(error)}; {GOES_ON}")
-        runs = self._campaign.block_range(block)
-        points = self._points.targets(self._points.of(runs), self._job)
-        return _joined([self._alone(run, points[i : i + 1]) for i, run in enumerate(runs)])
+            raise UserError(f"block {block.number}: {one_line(error)}; {GOES_ON}")
+        pairs = zip(block.runs, block.points, strict=True)
+        return _joined([self._alone(run, point[None]) for run, point in pairs])
 
     def _alone(self, run: int, point: np.ndarray) -> Rows:
         """One run as a task; a failed row if workers die over it."""
-        future = self._client.submit(run_block, [run], point, pure=False)
         try:
-            return future.result()
+            return self._submit([run], point).result()
         except KilledWorker:
             nothing = np.full((1, len(self._job.measures)), np.nan)
             return Rows(np.array([run], np.int64), nothing, [DIED], {})

@@ -46,12 +46,20 @@ class Sampler:
         if sampling == "random":
             generator = np.random.PCG64(seed).advance(runs.start * size)
             return np.random.Generator(generator).random((len(runs), size))
-        sequence = qmc.Sobol(size, scramble=True, rng=seed)
-        if runs.start:
-            sequence.fast_forward(runs.start)
+        sequence = self._sobol
+        if sequence.num_generated > runs.start:
+            sequence.reset()
+        if sequence.num_generated < runs.start:
+            sequence.fast_forward(runs.start - sequence.num_generated)
         with warnings.catch_warnings():  # that their number should be a power of 2
             warnings.simplefilter("ignore", UserWarning)
             return sequence.random(len(runs))
+
+    @cached_property
+    def _sobol(self) -> qmc.Sobol:
+        """The sequence, which goes on from the last point: blocks are asked for in their order."""
+        size = len(self._distributions)
+        return qmc.Sobol(size, scramble=True, rng=self._campaign.seed)
 
     @cached_property
     def _whole(self) -> np.ndarray:

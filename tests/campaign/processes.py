@@ -26,8 +26,14 @@ def python(*arguments: object, **options: object) -> subprocess.Popen:
         text=True,
         env=ENVIRONMENT,
         start_new_session=True,
+        preexec_fn=_heed_signals,
         **options,
     )
+
+
+def _heed_signals() -> None:
+    """Undo what shells do to programs in the background: they ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def start(file: Path, output: Path, *options: object) -> subprocess.Popen:

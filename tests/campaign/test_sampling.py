@@ -33,6 +33,9 @@ def test_points_do_not_depend_on_the_blocks(sampling: str, tmp_path: Path) -> No
             for i in range(0, given.count, size)
         ]
         assert np.array_equal(np.concatenate(parts), whole)
+    sampler = Sampler(given)  # in another order
+    for first in (40, 10, 12, 3, 60):
+        assert np.array_equal(sampler.points(range(first, first + 2)), whole[first : first + 2])
 
 
 @pytest.mark.parametrize("sampling", SAMPLINGS)
