@@ -181,7 +181,47 @@ def _parser() -> argparse.ArgumentParser:
         "0 as expected, 1 not, 2 wrong use.",
     )
     _add_report(coupling, "system")
+    campaign = commands.add_parser(
+        "campaign",
+        help="run a scenario or a system many times, over parameters",
+        description="Runs what is missing of a campaign, on a cluster of Dask, and writes tables "
+        "and a page. A campaign that was stopped goes on. Exit code: 0 all runs are there, "
+        "2 wrong use or stopped.",
+    )
+    campaign.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
+    campaign.add_argument(
+        "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
+    )
+    campaign.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for the results (default: that in the file, or in build/campaigns/)",
+    )
+    campaign.add_argument(
+        "--replay",
+        type=_number,
+        metavar="N",
+        help="run only run N again, and write all its outputs and a picture",
+    )
+    where = campaign.add_mutually_exclusive_group()
+    where.add_argument("--scheduler", metavar="ADDRESS", help="a scheduler that runs elsewhere")
+    where.add_argument(
+        "--workers", type=_count, metavar="N", help="processes on this machine (default: a core)"
+    )
     return parser
+
+
+def _number(text: str) -> int:
+    if not text.isdecimal() or len(text) > 12:
+        raise argparse.ArgumentTypeError(f"expected the number of a run, got {text!r}")
+    return int(text)
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 10_000:
+        raise argparse.ArgumentTypeError(f"expected a number from 1 to 10000, got {text!r}")
+    return int(text)
 
 
 def _add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:

@@ -196,6 +196,13 @@ class Instance(ABC):
             self.fmi.exitInitializationMode()
         self._initialized = True
 
+    def reset(self) -> None:
+        """Back to what it was when instantiated; its messages are forgotten."""
+        self.messages.clear()
+        with self.explained("before the next run"):
+            self.fmi.reset()
+        self._initialized = False
+
     # ---- Values ----------------------------------------------------------------------------------
 
     def set(self, name: str, value: Value) -> None:

@@ -27,17 +27,17 @@ class Fmu:
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 
     Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs
-    on this platform.
+    on this platform. The copy is made in the folder `within`, or where temporary files are.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, within: Path | None = None) -> None:
         self.path = Path(path)
         description, self.model, platform = _read(self.path)
         self.guid = description.guid  # in FMI 3.0, the instantiationToken
         self.log_categories = [category.name for category in description.logCategories]
         self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
         self._unpacked = ExitStack()
-        self.folder = self._unpacked.enter_context(temporary_folder())
+        self.folder = self._unpacked.enter_context(temporary_folder(within))
         try:
             fmpy.extract(self.path, self.folder)
         except OSError as error:

@@ -56,12 +56,12 @@ def uninterrupted() -> Iterator[None]:
 
 
 @contextmanager
-def temporary_folder() -> Iterator[Path]:
-    """A folder that is removed at the end, whatever the end is."""
+def temporary_folder(within: Path | None = None) -> Iterator[Path]:
+    """A folder in the folder `within`, or where temporary files are; removed in any end."""
     with uninterrupted():
         # Windows does not remove a library that is still loaded, as after a fatal error, nor files
         # that a program of a run that was interrupted still holds
-        folder = TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
+        folder = TemporaryDirectory(prefix="cosim-", dir=within, ignore_cleanup_errors=True)
     try:
         yield Path(folder.name)
     finally:

@@ -5,7 +5,7 @@ checked against the description of the model's FMU.
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
@@ -112,7 +112,7 @@ def folder_of(path: Path) -> Path:
         reader.fail(f"{MODEL}: {error}")
 
 
-def load(path: Path, model: Model) -> Scenario:
+def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
     """Read and check the scenario at `path`, of the project or of a user.
 
     Parameters
@@ -120,6 +120,8 @@ def load(path: Path, model: Model) -> Scenario:
     path : Path
     model : Model
         What the model's FMU declares.
+    times : mapping, optional
+        Values that replace those of section [time].
 
     Raises
     ------
@@ -143,7 +145,7 @@ def load(path: Path, model: Model) -> Scenario:
     if type(every) is not int or every < 1:
         reader.fail(f"reference_every: expected a whole number from 1 on, got {show(every)}")
 
-    start, stop, steps = reader.time(content["time"])
+    start, stop, steps = reader.time(reader.table(content["time"], "[time]") | dict(times or {}))
     times = reader.communication_points(start, stop, steps)
     parameters = reader.values(content, PARAMETERS, model)
     initial = reader.values(content, INITIAL, model)

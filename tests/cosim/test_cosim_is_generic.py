@@ -16,6 +16,7 @@ WORDS |= {"start_time", "position"}
 WORDS |= {"start_time"}
 WORDS |= {"delay"}  # an argument of tqdm
 WORDS |= {"start_time", "position", "delay"}
+WORDS |= {"seed"}  # of random numbers
 
 
 @pytest.fixture(scope="module")

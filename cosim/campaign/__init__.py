@@ -1,0 +1,17 @@
+"""Campaigns: thousands of runs of a scenario or a system, over parameters, on Dask.
+
+From what a user writes to the page, a module each; a module imports only from lines above its own
+(tests/campaign/test_layers.py):
+
+    expressions, campaign_file     the file, checked by itself
+    sampling                       parameters of each run, by scipy and SALib
+    fmi_calls, loop, measures      the compiled loop over a loaded FMU; what is kept of a run
+    job                            all that workers need, picklable
+    points                         parameters of a block, and what follows from them
+    bases, planning                the scenario or system; the file checked against it
+    runs, worker                   rows of a block, on a worker
+    results                        Parquet files and the manifest
+    engine                         hands blocks to workers of Dask
+    analysis, figures, page        what the table says
+    replay                         one run again
+"""

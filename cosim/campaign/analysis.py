@@ -1,0 +1,81 @@
+"""What a campaign's table says: quantiles, worst cases, failures, Sobol' indices."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from SALib.analyze import sobol
+
+from cosim.campaign.campaign_file import Campaign
+from cosim.campaign.sampling import problem
+
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
+WORST = 10  # runs that are listed
+RESAMPLES = 1000  # of the bootstrap
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A reason for which runs have failed."""
+
+    reason: str
+    count: int
+    run: int  # the first one
+
+
+@dataclass(frozen=True)
+class Index:
+    """Sobol' indices of a parameter, with half the width of their confidence intervals."""
+
+    parameter: str
+    first: float
+    first_confidence: float
+    total: float
+    total_confidence: float
+
+
+def quantiles(values: np.ndarray) -> list[float]:
+    """Quantiles of the numbers in `values`, (runs,); NaN if there are none."""
+    numbers = values[np.isfinite(values)]
+    return np.quantile(numbers, QUANTILES).tolist() if len(numbers) else [np.nan] * len(QUANTILES)
+
+
+def worst(values: np.ndarray) -> list[int]:
+    """Numbers of the runs with the largest of `values`, (runs,), the largest first."""
+    numbers = np.flatnonzero(np.isfinite(values))
+    order = np.argsort(-values[numbers], kind="stable")
+    return numbers[order[:WORST]].tolist()
+
+
+def failures(reasons: Sequence[str]) -> list[Failure]:
+    """Reasons of the runs that failed, the most frequent first."""
+    counts = Counter(reason for reason in reasons if reason)
+    return [Failure(reason, n, list(reasons).index(reason)) for reason, n in counts.most_common()]
+
+
+def groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
+    """Rows of runs (groups, parameters + 2) that belong together, without incomplete ones."""
+    rows = values.reshape(-1, len(campaign.parameters) + 2)
+    return rows[np.isfinite(rows).all(axis=1)]
+
+
+def indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
+    """Sobol' indices of `values`, (runs,); none if they do not vary or most runs have failed.
+
+    First-order and total indices with the confidence `CONFIDENCE`, by SALib.
+    """
+    rows = groups(campaign, values)
+    if len(rows) < 2 or np.ptp(rows) == 0:
+        return []
+    found: Mapping[str, np.ndarray] = sobol.analyze(
+        problem(campaign),
+        rows.ravel(),
+        calc_second_order=False,
+        num_resamples=RESAMPLES,
+        conf_level=CONFIDENCE,
+        seed=campaign.seed,
+    )
+    rows = np.column_stack([found[key] for key in ("S1", "S1_conf", "ST", "ST_conf")])
+    return [Index(name, *row) for name, row in zip(campaign.parameters, rows.tolist(), strict=True)]

@@ -1,0 +1,220 @@
+"""Hands the blocks of a campaign to workers of Dask, and keeps what comes back.
+
+A worker gets the FMUs and the job once, as a plugin, also if it starts later or again. A block is
+one task. Few are under way at a time, so that the scheduler's memory does not grow with the
+campaign. Only this process writes results: workers need no common disk.
+"""
+
+import logging
+import math
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+
+import dask
+import numpy as np
+from distributed import Client, Future, LocalCluster, as_completed
+from distributed.client import FutureCancelledError
+from distributed.scheduler import KilledWorker
+from tornado.ioloop import PeriodicCallback
+
+from cosim.campaign.campaign_file import Campaign
+from cosim.campaign.job import Job
+from cosim.campaign.points import Points
+from cosim.campaign.results import Results
+from cosim.campaign.runs import Rows
+from cosim.campaign.worker import NAME, Plugin, run_block
+from cosim.errors import UserError, one_line
+
+AHEAD = 3  # blocks under way for each thread of a worker
+COUNT_EVERY = 5.0  # s, between two looks at how many threads there are
+KILLS = 5  # so many workers may die over a task
+RESTART_EVERY = 2000  # ms
+WAIT = 60  # s, for the first worker
+DIED = "the worker died in this run"
+GOES_ON = "the same command goes on from what is there"
+
+SETTINGS = {
+    "distributed.scheduler.allowed-failures": KILLS,
+    "distributed.comm.timeouts.connect": "20s",
+    # what watches workers many times a second takes three per cent of a core, for nothing here
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.worker.memory.terminate": False,  # the system decides when memory is short
+}
+
+
+@contextmanager
+def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
+    """A cluster on this machine, one process a core, whose files are in `folder`."""
+    count = workers or cores()
+    with (
+        LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=":0",
+            local_directory=str(folder),
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        # a worker that dies while it starts is given up otherwise
+        keeper = PeriodicCallback(partial(cluster.scale, count), RESTART_EVERY)
+        cluster.loop.add_callback(keeper.start)
+        try:
+            yield client
+        finally:
+            cluster.loop.add_callback(keeper.stop)
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Client]:
+    """The cluster of a scheduler that runs elsewhere; UserError if it cannot be reached."""
+    try:
+        client = Client(address, timeout=20)
+    except (TimeoutError, OSError, ValueError) as error:
+        raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
+    with client:
+        yield client
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A block that is under way."""
+
+    number: int
+    runs: range
+    points: np.ndarray  # (runs, parameters and derived values)
+
+
+class Engine:
+    """Runs blocks on the workers of a client."""
+
+    def __init__(
+        self,
+        client: Client,
+        campaign: Campaign,
+        job: Job,
+        archives: Mapping[str, bytes],
+        points: Points,
+        results: Results,
+    ) -> None:
+        self._client, self._campaign, self._job = client, campaign, job
+        self._points, self._results = points, results
+        self._counted, self._ahead = -math.inf, 0
+        self._begin(archives)
+
+    def _begin(self, archives: Mapping[str, bytes]) -> None:
+        try:
+            self._client.wait_for_workers(1, timeout=WAIT)
+        except TimeoutError:
+            raise UserError(f"{self._client.scheduler.address}: has no workers") from None
+        replies = self._client.register_plugin(Plugin(self._job, archives))
+        for address, reply in (replies or {}).items():
+            if isinstance(reply, dict) and reply.get("status") == "error":
+                error = pickle.loads(reply["exception"].data) if "exception" in reply else reply
+                raise UserError(f"{address}: the worker cannot run this: {one_line(error)}")
+
+    def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
+        """Run blocks and keep their results; `done` is called with the number of runs of each.
+
+        Raises
+        ------
+        UserError
+            If the cluster is lost or the results cannot be written.
+        """
+        try:
+            self._run(blocks, done)
+            self._client.unregister_worker_plugin(NAME)
+        except (OSError, FutureCancelledError):
+            raise UserError(f"the scheduler is gone; {GOES_ON}") from None
+
+    def _run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
+        waiting = iter(blocks)
+        tasks = as_completed()
+        under_way: dict[str, _Block] = {}
+        self._fill(waiting, tasks, under_way)
+        for future in tasks:
+            if future.status in ("lost", "pending"):  # a worker died with the result: made again
+                tasks.add(future)
+                continue
+            block = under_way.pop(future.key)
+            self._results.write(block.number, block.points, self._rows(future, block))
+            future.release()
+            done(len(block.runs))
+            self._fill(waiting, tasks, under_way)
+
+    def _fill(
+        self, waiting: Iterator[int], tasks: as_completed, under_way: dict[str, _Block]
+    ) -> None:
+        """Submit blocks until enough are under way, also for workers that have come later."""
+        if time.monotonic() >= self._counted + COUNT_EVERY:
+            self._counted = time.monotonic()
+            self._ahead = AHEAD * max(sum(self._client.nthreads().values()), 1)
+        for number in islice(waiting, max(self._ahead - len(under_way), 0)):
+            runs = self._campaign.block_range(number)
+            block = _Block(number, runs, self._points.of(runs))
+            future = self._submit(list(runs), block.points)
+            under_way[future.key] = block
+            tasks.add(future)
+
+    def _submit(self, runs: Sequence[int], points: np.ndarray) -> Future:
+        targets = self._points.targets(points, self._job)
+        return self._client.submit(run_block, runs, targets, pure=False)
+
+    def _rows(self, future: Future, block: _Block) -> Rows:
+        """Results of a task; run by run if workers died over it again and again."""
+        if future.status == "finished":
+            return future.result()
+        error = self._error(future)
+        if not isinstance(error, KilledWorker):
+            raise UserError(f"block {block.number}: {one_line(error)}; {GOES_ON}")
+        pairs = zip(block.runs, block.points, strict=True)
+        return _joined([self._alone(run, point[None]) for run, point in pairs])
+
+    def _alone(self, run: int, point: np.ndarray) -> Rows:
+        """One run as a task; a failed row if workers die over it."""
+        try:
+            return self._submit([run], point).result()
+        except KilledWorker:
+            nothing = np.full((1, len(self._job.measures)), np.nan)
+            return Rows(np.array([run], np.int64), nothing, [DIED], {})
+
+    def _error(self, future: Future) -> BaseException:
+        if future.status == "cancelled" or self._client.status != "running":
+            raise UserError(f"the scheduler is gone; {GOES_ON}")
+        return future.exception()
+
+
+def _joined(parts: Sequence[Rows]) -> Rows:
+    return Rows(
+        np.concatenate([part.runs for part in parts]),
+        np.concatenate([part.measures for part in parts]),
+        [failure for part in parts for failure in part.failures],
+        {run: record for part in parts for run, record in part.trajectories.items()},
+    )
+
+
+@contextmanager
+def cluster(scheduler: str | None, workers: int | None, folder: Path) -> Iterator[Client]:
+    """A scheduler that runs elsewhere, or a cluster on this machine with files in `folder`."""
+    logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
+    try:
+        with dask.config.set(SETTINGS):
+            start = connected(scheduler) if scheduler else local_cluster(workers, folder)
+            with start as client:
+                yield client
+    finally:
+        logging.disable(logging.NOTSET)

@@ -1,0 +1,242 @@
+"""Checks what a campaign says of its scenario or system, and makes the job of it."""
+
+import math
+from collections.abc import Sequence
+from typing import NoReturn
+
+import numpy as np
+
+from cosim.campaign.bases import Base, ScenarioBase
+from cosim.campaign.campaign_file import Campaign, Distribution
+from cosim.campaign.job import Job, Target
+from cosim.campaign.measures import LYAPUNOV, PLAIN, Measure, plain
+from cosim.errors import UserError, did_you_mean
+from cosim.model import INPUTS, Value, Variable, WrongValueError
+
+RUN, FAILURE = "run", "failure"  # columns of every table
+MAX_RECORDED = 100_000_000  # numbers that a run records
+
+
+def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
+    """The job of a campaign, which records the variables `also`, too.
+
+    Raises
+    ------
+    UserError
+        For the first mistake, beginning with `where`.
+    """
+    return _Planner(campaign, base, where).job(also)
+
+
+class _Planner:
+    def __init__(self, campaign: Campaign, base: Base, where: object) -> None:
+        self.campaign, self.base, self.where = campaign, base, where
+
+    def fail(self, place: str, message: object) -> NoReturn:
+        raise UserError(f"{self.where}: {place}: {message}")
+
+    def job(self, also: Sequence[str]) -> Job:
+        campaign, base = self.campaign, self.base
+        targets = self.targets()
+        fixed = self.fixed()
+        measures = self.measures()
+        measured = (v for measure in measures for v in measure.variables)
+        watched = tuple(dict.fromkeys([*measured, *also]))
+        tangent = self.tangent()
+        if len(watched) * len(base.times) > MAX_RECORDED:
+            self.fail("keep", f"{len(watched)} variables at {len(base.times)} times are too many")
+        read = self.read(watched)
+        components = tuple(base.components(list(read), fixed))
+        reals, switches = base.held
+        first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
+        places = [
+            len(reals.names)
+            + first[component]
+            + components[component].reals.outputs.index(self.base.variable(name)[1].reference)
+            for name, component in ((name, base.variable(name)[0]) for name in watched)
+        ]
+        self.check_columns(measures)
+        return Job(
+            components=components,
+            start=float(base.times[0]),
+            stop=float(base.times[-1]),
+            tolerance=base.tolerance,
+            times=base.times,
+            reals=reals,
+            switches=switches,
+            propagates=len(components) > 1,
+            watched=watched,
+            places=np.array(places, np.int64),
+            tangent=tangent,
+            targets=tuple(targets.items()),
+            measures=tuple(measures),
+            trajectories=frozenset(campaign.keep.trajectories),
+            hashes=base.hashes,
+        )
+
+    # ---- Values that are set -----------------------------------------------------------------
+
+    def targets(self) -> dict[str, Target]:
+        """Where each parameter and derived value goes that is a variable."""
+        campaign = self.campaign
+        used = set().union(*(e.names for e in campaign.expressions.values()))
+        targets = {}
+        for name, distribution in campaign.parameters.items():
+            place = f"[parameters.{name}]"
+            found = self.settable(name, place, name in used)
+            if found is not None:
+                self.check_distribution(distribution, found[1], place)
+                targets[name] = self.target(name, *found)
+        known = set(campaign.parameters) | set(self.constants())
+        for name, expression in campaign.expressions.items():
+            place = f"[derived] {name}"
+            for other in expression.names - known:
+                self.fail(place, f"unknown name {other!r}{did_you_mean(other, known)}")
+            known.add(name)
+            found = self.settable(name, place, name in used)
+            if found is not None:
+                if found[1].type != "Real":
+                    self.fail(place, f"is of type {found[1].type}, expected Real")
+                targets[name] = self.target(name, *found)
+        return targets
+
+    def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
+        """The variable; None if it is none but `used` by an expression."""
+        try:
+            self.base.variable(name)
+        except WrongValueError as error:
+            if used:
+                return None
+            self.fail(place, f"{error}, and no derived value uses it")
+        try:
+            return self.base.settable(name)
+        except WrongValueError as error:
+            self.fail(place, error)
+
+    def target(self, name: str, component: int, variable: Variable) -> Target:
+        held = None
+        if variable.is_a(INPUTS) and isinstance(self.base, ScenarioBase):
+            held = self.base.hold(name, 0.0)
+        return Target(component, variable.name, held)
+
+    def check_distribution(
+        self, distribution: Distribution, variable: Variable, place: str
+    ) -> None:
+        numbers = distribution.numbers
+        try:
+            if variable.type == "Integer" and distribution.kind == "values":
+                for number in numbers:
+                    variable.checked(number)
+            elif variable.type != "Real":
+                self.fail(place, f"is of type {variable.type}, expected Real, or Integer by values")
+            elif distribution.kind != "normal":
+                variable.check_range(min(numbers), max(numbers))
+        except WrongValueError as error:
+            self.fail(f"{place} {distribution.kind}", error)
+
+    def constants(self) -> dict[str, float]:
+        """Numbers that expressions may name."""
+        return constants(self.campaign, self.base)
+
+    def fixed(self) -> dict[tuple[int, str], Value]:
+        """Section [set]."""
+        result: dict[tuple[int, str], Value] = {}
+        for name, given in self.campaign.set.items():
+            place = f"[set] {name}"
+            try:
+                component, variable = self.base.settable(name)
+                value = variable.checked(given)
+            except WrongValueError as error:
+                self.fail(place, error)
+            if variable.is_a(INPUTS) and isinstance(self.base, ScenarioBase):
+                self.base.hold(name, float(value))
+            else:
+                result[component, variable.name] = value
+        return result
+
+    # ---- What is kept ------------------------------------------------------------------------
+
+    def measures(self) -> list[Measure]:
+        keep = self.campaign.keep
+        found = []
+        for kind in PLAIN:
+            names = getattr(keep, kind)
+            for name in names:
+                self.readable(name, f"[keep] {kind}")
+            found += [plain(kind, name) for name in names]
+        for name, settling in keep.settling.items():
+            self.readable(settling.variable, f"[keep.settling.{name}]")
+            options = (settling.target, settling.band)
+            found.append(Measure(f"settling({name})", (settling.variable,), "settling", options))
+        for name, crossings in keep.crossings.items():
+            self.readable(crossings.variable, f"[keep.crossings.{name}]")
+            variables, options = (crossings.variable,), (crossings.level,)
+            found.append(Measure(f"crossings({name})", variables, "crossings", options))
+        for name, tracking in keep.tracking.items():
+            variables = tuple(variable for pair in tracking.of for variable in pair)
+            for variable in variables:
+                self.readable(variable, f"[keep.tracking.{name}]")
+            for kind in ("largest_distance", "rms_distance"):
+                found.append(Measure(f"{kind}({name})", variables, kind))
+        if keep.lyapunov:
+            found.append(Measure(LYAPUNOV, (), LYAPUNOV))
+        if not found:
+            self.fail("[keep]", "keeps nothing of a run")
+        return found
+
+    def readable(self, name: str, place: str) -> None:
+        try:
+            _, variable = self.base.variable(name)
+        except WrongValueError as error:
+            self.fail(place, error)
+        if variable.type != "Real" or variable.causality == "independent":
+            self.fail(place, f"{name!r} is not a Real variable")
+
+    def read(self, watched: Sequence[str]) -> dict[tuple[int, str], None]:
+        """Component and name of each watched variable."""
+        found = (self.base.variable(name) for name in watched)
+        return {(component, variable.name): None for component, variable in found}
+
+    def tangent(self) -> tuple[np.ndarray, np.ndarray] | None:
+        if not self.campaign.keep.lyapunov:
+            return None
+        if not isinstance(self.base, ScenarioBase):
+            self.fail("[keep] lyapunov", "goes with a scenario only")
+        try:
+            pairs = self.base.derivatives()
+        except WrongValueError as error:
+            self.fail("[keep] lyapunov", error)
+        if not pairs:
+            self.fail("[keep] lyapunov", "the model has no continuous states")
+        derivatives, states = zip(*pairs, strict=True)
+        return np.array(derivatives, np.uint32), np.array(states, np.uint32)
+
+    def check_columns(self, measures: Sequence[Measure]) -> None:
+        """Columns that the page asks for are there, and no name stands for two."""
+        columns = columns_of(self.campaign, measures)
+        for column in columns:
+            if columns.count(column) > 1:
+                self.fail("[keep]", f"column {column!r} is there twice")
+        asked = [("worst", name) for name in self.campaign.worst]
+        for i, drawn in enumerate(self.campaign.maps):
+            asked += [(f"maps[{i}]", name) for name in (drawn.x, drawn.y, drawn.colour)]
+        for place, name in asked:
+            if name not in columns:
+                guess = did_you_mean(name, columns)
+                known = ", ".join(columns)
+                self.fail(place, f"no column {name!r}{guess} (there are: {known})")
+
+
+def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:
+    """Columns of the table that hold numbers."""
+    return [*campaign.parameters, *campaign.derived, *(measure.column for measure in measures)]
+
+
+def constants(campaign: Campaign, base: Base) -> dict[str, float]:
+    """Numbers that a campaign's expressions may name: the start values of all its variables."""
+    known = base.start_values() | campaign.set
+    return {
+        name: float(value)
+        for name, value in known.items()
+        if isinstance(value, int | float) and math.isfinite(value)
+    }

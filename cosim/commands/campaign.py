@@ -1,0 +1,88 @@
+"""`campaign`: run a scenario or a system many times, over parameters."""
+
+import argparse
+import shlex
+import sys
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+from cosim import project
+from cosim.errors import UserError
+from cosim.output_files import from_here, written
+from cosim.progress import Progress
+
+NEEDED = ("SALib", "distributed", "numba", "pyarrow", "scipy")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run what is missing of the campaign; 0 if every run has succeeded."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
+    # imported here: what a campaign needs may not be installed
+    from cosim.campaign import bases, campaign_file, page, planning, replay, runs
+    from cosim.campaign.points import Points
+    from cosim.campaign.results import Results
+
+    campaign = campaign_file.read(options.file)
+    with bases.opened(campaign, options.fmu) as base:
+        job = planning.plan(campaign, base, options.file)
+        points = Points(campaign, planning.constants(campaign, base))
+        folder = _folder(options, campaign)
+        if options.replay is not None:
+            print(*replay.replay(campaign, base, points, options.replay, folder), sep="\n")
+            return 0
+        text = Path(options.file).read_text(encoding="utf-8")
+        results = Results(folder, campaign, job, text)
+        runs.check(job, base.archives)
+        results.begin()
+        missing_blocks = results.missing()
+        if missing_blocks:
+            _run(options, campaign, base, job, points, results, missing_blocks)
+        digest = results.digest()
+        print(f"table: {digest}")
+        with written(folder):
+            index = page.write(campaign, job, results, _command(options), digest)
+    print(f"page: {from_here(index)}")
+    return 0
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What to type for the campaign, in the present folder."""
+    parts = ["./run.sh", "campaign", str(from_here(options.file))]
+    for name in ("fmu", "output"):
+        value = getattr(options, name)
+        parts += [] if value is None else [f"--{name}", str(value)]
+    return shlex.join(parts)
+
+
+def _folder(options: argparse.Namespace, campaign) -> Path:
+    if options.output is not None:
+        return options.output
+    if campaign.output is not None:
+        return options.file.parent / campaign.output
+    return project.ROOT / "build" / "campaigns" / options.file.stem
+
+
+def _run(options, campaign, base, job, points, results, blocks) -> None:
+    from cosim.campaign import engine
+
+    ahead = sum(len(campaign.block_range(block)) for block in blocks)
+    if ahead < campaign.count:
+        print(f"goes on: {campaign.count - ahead} of {campaign.count} runs are there")
+    try:
+        with (
+            results.workers_folder() as files,
+            engine.cluster(options.scheduler, options.workers, files) as client,
+        ):
+            print(f"dashboard: {client.dashboard_link}", flush=True)
+            maker = engine.Engine(client, campaign, job, base.archives, points, results)
+            begin = time.perf_counter()
+            with Progress(campaign.title, ahead, "runs") as progress:
+                maker.run(blocks, progress)
+            seconds = time.perf_counter() - begin
+    except (KeyboardInterrupt, SystemExit):
+        print(f"stopped; {engine.GOES_ON}", file=sys.stderr)
+        raise
+    print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")

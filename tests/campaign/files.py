@@ -1,0 +1,48 @@
+"""Campaign files for the tests."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosim.campaign import campaign_file
+from cosim.campaign.campaign_file import Campaign
+
+HEAD = """title = "Test"
+description = "Of a test."
+"""
+ARM = (
+    HEAD
+    + """scenario = "hanging_swing"
+sampling = "sobol"
+seed = 3
+runs = 40
+block = 8
+time = { stop = 1.0 }
+
+[parameters.m2]
+uniform = [1.0, 3.0]
+
+[parameters.q1]
+normal = [-2.0, 0.2]
+
+[keep]
+final = ["q1", "q2"]
+maximum = ["dq1"]
+integral = ["actuator_power"]
+trajectories = [3, 17]
+"""
+)
+
+
+def write(folder: Path, text: str = ARM, changes: Sequence[tuple[str, str]] = ()) -> Path:
+    """A campaign file with changes, old text and new."""
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path = folder / "test.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def campaign(folder: Path, text: str = ARM, changes: Sequence[tuple[str, str]] = ()) -> Campaign:
+    """A campaign from its file."""
+    return campaign_file.read(write(folder, text, changes))

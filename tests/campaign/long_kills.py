@@ -1,0 +1,148 @@
+"""Kills workers at random, the scheduler and the campaign, and fills the disk: the same table.
+
+    build/venv/bin/python -m tests.campaign.long_kills
+
+Takes some minutes. ctest -C Long -R long_campaign_kills runs it.
+"""
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.campaign.files import write
+from tests.campaign.processes import (
+    blocks,
+    cluster,
+    completed,
+    finish,
+    kill_group,
+    start,
+    table,
+    wait_for,
+    workers,
+)
+
+RUNS, KILLS = 1200, 20
+PAUSE = 0.5  # s, between two kills
+DISK = 120_000  # bytes: room for some of the blocks
+STEPS = [("runs = 40", f"runs = {RUNS}"), ("block = 8", "block = 6")]
+STEPS += [("time = { stop = 1.0 }\n", "")]
+
+
+def kill_workers(file: Path, output: Path, undisturbed: str) -> None:
+    """Kill workers at random, without end of the campaign."""
+    process = start(file, output, "--workers", 2)
+    killed = 0
+    while killed < KILLS and process.poll() is None:
+        alive = workers(process)
+        if alive and blocks(output) > 0:
+            os.kill(random.choice(alive), signal.SIGKILL)
+            killed += 1
+        time.sleep(PAUSE)
+    code, out, err = finish(process)
+    assert killed == KILLS, f"only {killed} workers killed, the campaign is too short"
+    assert code == 0, err
+    assert table(out) == undisturbed
+
+
+def kill_campaign(file: Path, output: Path, undisturbed: str) -> None:
+    """Kill the campaign, its scheduler and its workers, again and again until it is done."""
+    killed = 0
+    while True:
+        process = start(file, output, "--workers", 2)
+        goal = blocks(output) + 50
+        wait_for(lambda goal=goal, process=process: process.poll() is not None
+                 or blocks(output) >= goal)  # fmt: skip
+        if process.poll() is not None:
+            break
+        kill_group(process)
+        process.communicate()
+        killed += 1
+    code, out, err = finish(process)
+    assert killed >= 3 and code == 0, err
+    assert table(out) == undisturbed
+
+
+def stop_by_signals(file: Path, output: Path, undisturbed: str) -> None:
+    """End it by the signals that end programs."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        process = start(file, output, "--workers", 2)
+        goal = blocks(output) + 5
+        wait_for(lambda goal=goal: blocks(output) >= goal)
+        os.kill(process.pid, number)
+        code, _, err = finish(process)
+        assert code == 128 + number and "stopped; the same command" in err, (code, err)
+    assert completed(file, output) == undisturbed
+
+
+def kill_scheduler(file: Path, output: Path, undisturbed: str) -> None:
+    """Kill a scheduler that runs elsewhere; another one goes on."""
+    with cluster(2) as (address, scheduler, _):
+        process = start(file, output, "--scheduler", address)
+        wait_for(lambda: blocks(output) >= 5)
+        os.kill(scheduler.pid, signal.SIGKILL)
+        code, _, err = finish(process)
+        assert code == 2 and "the scheduler is gone" in err, err
+    with cluster(1) as (address, *_):
+        assert completed(file, output, "--scheduler", address) == undisturbed
+    code, _, err = finish(start(file, output / "none", "--scheduler", "tcp://127.0.0.1:9"))
+    assert code == 2 and "the scheduler cannot be reached" in err, err
+
+
+def fill_disk(file: Path, output: Path, undisturbed: str) -> None:
+    """Write to a disk that gets full, then to one with more room."""
+    output.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", str(output)]
+    if subprocess.run(mount, check=False, capture_output=True).returncode:
+        print("  left out: no file system can be mounted here")
+        return
+    try:
+        code, _, err = finish(start(file, output, "--workers", 2))
+        assert code == 2 and "No space left on device; the same command goes on" in err, err
+        there = blocks(output)
+        assert 0 < there < RUNS // 6
+        subprocess.run(["mount", "-o", "remount,size=50m", str(output)], check=True)
+        code, out, err = finish(start(file, output, "--workers", 2))
+        assert code == 0, err
+        assert f"goes on: {there * 6} of {RUNS} runs" in out
+        assert table(out) == undisturbed
+    finally:
+        subprocess.run(["umount", "-l", str(output)], check=False)
+
+
+TRIALS: tuple[Callable[[Path, Path, str], None], ...] = (
+    kill_workers,
+    kill_campaign,
+    stop_by_signals,
+    kill_scheduler,
+    fill_disk,
+)
+
+
+def main() -> int:
+    """Make all trials; 0 if they pass."""
+    names = sys.argv[1:]
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        file = write(folder, changes=STEPS)
+        undisturbed = completed(file, folder / "undisturbed", "--workers", 1)
+        for trial in TRIALS:
+            if names and trial.__name__ not in names:
+                continue
+            begin = time.monotonic()
+            print(f"{trial.__name__}: {trial.__doc__.splitlines()[0]}", flush=True)
+            trial(file, folder / trial.__name__, undisturbed)
+            print(f"  the same table, {time.monotonic() - begin:.0f} s", flush=True)
+            shutil.rmtree(folder / trial.__name__, ignore_errors=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,129 @@
+"""Campaigns in processes of their own, to be killed; schedulers and workers apart."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from tests.support.paths import ROOT
+
+PATIENCE = 240  # s; a busy machine is slow
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+
+
+def python(*arguments: object, **options: object) -> subprocess.Popen:
+    """A Python program in a process group of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ENVIRONMENT,
+        start_new_session=True,
+        preexec_fn=_heed_signals,
+        **options,
+    )
+
+
+def _heed_signals() -> None:
+    """Undo what shells do to programs in the background: they ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def start(file: Path, output: Path, *options: object) -> subprocess.Popen:
+    """Begin a campaign."""
+    return python("cosim", "campaign", file, "--output", output, *options)
+
+
+def finish(process: subprocess.Popen) -> tuple[int, str, str]:
+    """Exit code and output of a program that ends by itself."""
+    try:
+        out, err = process.communicate(timeout=PATIENCE)
+    except subprocess.TimeoutExpired:
+        kill_group(process)
+        out, err = process.communicate()
+        raise AssertionError(f"did not end: {out}\n{err}") from None
+    return process.returncode, out, err
+
+
+def kill_group(process: subprocess.Popen) -> None:
+    """Kill a program and all that it started."""
+    os.killpg(process.pid, signal.SIGKILL)
+
+
+def table(out: str) -> str:
+    """Hash of the table that a campaign prints."""
+    return re.search(r"^table: ([0-9a-f]{64})$", out, re.MULTILINE)[1]
+
+
+def completed(file: Path, output: Path, *options: object) -> str:
+    """Run a campaign to its end; the hash of its table."""
+    code, out, err = finish(start(file, output, *options))
+    assert code == 0, err
+    return table(out)
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Wait until a condition holds."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.05)
+
+
+def blocks(output: Path) -> int:
+    """Blocks whose results are there."""
+    return len(list(output.glob("blocks/block_*.parquet")))
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process has started."""
+    try:
+        return [
+            int(child)
+            for task in Path(f"/proc/{pid}/task").iterdir()
+            for child in (task / "children").read_text().split()
+        ]
+    except OSError:
+        return []
+
+
+def workers(process: subprocess.Popen) -> list[int]:
+    """Workers of a local cluster."""
+    found = []
+    for child in children(process.pid):
+        try:
+            command = Path(f"/proc/{child}/cmdline").read_bytes()
+        except OSError:
+            continue
+        if b"spawn_main" in command:
+            found.append(child)
+    return found
+
+
+@contextmanager
+def cluster(count: int) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
+    """Address of a scheduler, its process and those of workers, a process group each."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    common = ("--no-dashboard",)
+    scheduler = python("dask", "scheduler", "--host", "127.0.0.1", "--port", port, *common)
+    arms = [
+        python("dask", "worker", address, "--nthreads", 1, "--no-nanny", *common)
+        for _ in range(count)
+    ]
+    try:
+        yield address, scheduler, arms
+    finally:
+        for process in (scheduler, *arms):
+            if process.poll() is None:
+                kill_group(process)
+            process.communicate()

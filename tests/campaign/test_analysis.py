@@ -1,0 +1,95 @@
+"""Sobol' indices of functions with known ones; quantiles, worst cases and failures."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.campaign import analysis
+from cosim.campaign.points import Points
+from tests.campaign.files import ARM, campaign
+from tests.campaign.runners import rows, runner
+
+A, B = 7.0, 0.1  # Ishigami's sin x + A sin^2 y + B z^4 sin x, in the literature's parameters
+PARAMETERS = "".join(
+    f"[parameters.{name}]\nuniform = [{-math.pi!r}, {math.pi!r}]\n" for name in "xyz"
+)
+TEXT = ARM[: ARM.index("[parameters.m2]")] + PARAMETERS + ARM[ARM.index("[keep]") :]
+
+
+def ishigami_indices() -> tuple[list[float], list[float]]:
+    """First-order and total indices, by integration."""
+    x = 0.5 * (1 + B * math.pi**4 / 5) ** 2
+    y = A**2 / 8
+    xz = B**2 * math.pi**8 * (1 / 18 - 1 / 50)
+    total = x + y + xz
+    return [x / total, y / total, 0.0], [(x + xz) / total, y / total, xz / total]
+
+
+@pytest.mark.parametrize("seed", [3, 8, 31])
+def test_indices_of_ishigami_are_within_their_confidence(seed: int, tmp_path: Path) -> None:
+    changes = [("sobol", "indices"), ("40", "2048"), ("seed = 3", f"seed = {seed}")]
+    given = campaign(tmp_path, TEXT, changes)
+    x, y, z = Points(given, {}).of(range(given.count)).T
+    found = analysis.indices(given, np.sin(x) + A * np.sin(y) ** 2 + B * z**4 * np.sin(x))
+    first, total = ishigami_indices()
+    assert [row.parameter for row in found] == ["x", "y", "z"]
+    for row, known_first, known_total in zip(found, first, total, strict=True):
+        assert abs(row.first - known_first) <= max(row.first_confidence, 2e-3)
+        assert abs(row.total - known_total) <= max(row.total_confidence, 2e-3)
+        assert row.first_confidence < 0.12 and row.total_confidence < 0.12
+
+
+def test_groups_with_a_failed_run_are_left_out(tmp_path: Path) -> None:
+    given = campaign(tmp_path, TEXT, [("sobol", "indices"), ("40", "512")])
+    x, y, _ = Points(given, {}).of(range(given.count)).T
+    values = 3 * x + 4 * y
+    values[[2, 700]] = np.nan
+    assert len(analysis.groups(given, values)) == 510
+    found = analysis.indices(given, values)
+    for row, known in zip(found, (9 / 25, 16 / 25, 0.0), strict=True):
+        assert abs(row.first - known) <= max(row.first_confidence, 2e-3)
+
+
+def test_what_does_not_vary_has_no_indices(tmp_path: Path) -> None:
+    given = campaign(tmp_path, TEXT, [("sobol", "indices"), ("40", "8")])
+    assert analysis.indices(given, np.full(given.count, 3.0)) == []
+    assert analysis.indices(given, np.full(given.count, np.nan)) == []
+
+
+def test_indices_of_the_arm_agree_with_a_regression(tmp_path: Path) -> None:
+    # a narrow box: the arm's response is nearly a quadric, whose indices follow from coefficients
+    text = ARM.replace("normal = [-2.0, 0.2]", "uniform = [-2.1, -1.9]")
+    text = text.replace("[1.0, 3.0]", "[1.9, 2.1]").replace("trajectories = [3, 17]\n", "")
+    given = campaign(tmp_path, text, [("sobol", "indices"), ("40", "64")])
+    with runner(given, tmp_path) as (runs, job, points):
+        values = rows(runs, job, points, range(given.count)).measures[:, 0]
+        unit = (points.of(range(given.count)) - [2.0, -2.0]) / 0.1
+    x, y = unit.T
+    # Legendre polynomials are orthogonal on the box
+    basis = [x, (3 * x**2 - 1) / 2, y, (3 * y**2 - 1) / 2, x * y]
+    columns = np.column_stack([np.ones_like(x), *basis])
+    coefficients, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    assert np.std(columns @ coefficients - values) < 0.02 * np.std(values)
+    parts = coefficients[1:] ** 2 * [1 / 3, 1 / 5, 1 / 3, 1 / 5, 1 / 9]
+    first = [parts[0] + parts[1], parts[2] + parts[3]] / parts.sum()
+    for row, other in zip(analysis.indices(given, values), first, strict=True):
+        assert abs(row.first - other) <= row.first_confidence + 1e-3
+
+
+def test_the_worst_runs_come_first() -> None:
+    values = np.array([3.0, np.nan, 9.0, 1.0, 9.0] + [0.0] * 20)
+    assert analysis.worst(values)[:4] == [2, 4, 0, 3]
+    assert len(analysis.worst(values)) == 10
+
+
+def test_quantiles_leave_out_failed_runs() -> None:
+    values = np.append(np.arange(101.0), [np.nan, np.inf])
+    assert analysis.quantiles(values) == [0, 5, 50, 95, 100]
+    assert np.isnan(analysis.quantiles(np.array([np.nan]))).all()
+
+
+def test_failures_are_counted_by_reason() -> None:
+    found = analysis.failures(["", "a", "b", "", "b"])
+    assert [(x.reason, x.count, x.run) for x in found] == [("b", 2, 2), ("a", 1, 1)]

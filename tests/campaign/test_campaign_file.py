@@ -1,0 +1,138 @@
+"""Campaign files: what they mean, and what is refused with its place and reason."""
+
+from pathlib import Path
+
+import pytest
+
+from cosim import __main__ as cli
+from cosim.campaign import bases, planning
+from cosim.errors import UserError
+from tests.campaign.files import ARM, HEAD, campaign, write
+from tests.support.cosim_project import assert_one_line
+
+MISTAKES = {
+    "no file of TOML": ([("seed = 3", "seed = ")], "not valid TOML"),
+    "unknown key": ([("seed = 3", "sead = 3")], "unknown key 'sead', did you mean 'seed'?"),
+    "unknown key below": ([("uniform", "unifrom")], "parameters.m2: unknown key 'unifrom', did"),
+    "missing key": ([('title = "Test"\n', "")], "missing key 'title'"),
+    "wrong type": ([("seed = 3", 'seed = "a"')], "seed: expected a valid integer, got 'a'"),
+    "no base": ([('scenario = "hanging_swing"\n', "")], "exactly one of scenario, system"),
+    "no such scenario": ([("hanging_swing", "hanging_swim")], "did you mean 'hanging_swing'?"),
+    "two distributions": ([("[1.0, 3.0]", "[1.0, 3.0]\nvalues = [1.0]")], "exactly one of"),
+    "no distribution": ([("uniform = [1.0, 3.0]", "")], "parameters.m2: expected exactly one of"),
+    "limits the wrong way": ([("[1.0, 3.0]", "[3.0, 1.0]")], "a lower and an upper limit"),
+    "not finite": ([("[1.0, 3.0]", "[1.0, inf]")], "parameters.m2.uniform[1]: expected a finite"),
+    "no deviation": ([("[-2.0, 0.2]", "[-2.0, 0.0]")], "a positive standard deviation, got 0.0"),
+    "negative logarithm": ([("uniform = [1.0", "log_uniform = [-1.0")], "expected positive limits"),
+    "unknown parameter": ([("[parameters.m2]", "[parameters.m4]")], "[parameters.m4]: the model"),
+    "out of range": ([("[1.0, 3.0]", "[-1.0, 3.0]")], "[parameters.m2] uniform: expected at least"),
+    "no parameter": ([("[parameters.m2]", "[parameters.ee_x]")], "is not a parameter"),
+    "no runs": ([("runs = 40\n", "")], "missing key 'runs'"),
+    "too many runs": ([("runs = 40", "runs = 2000000000")], "runs: makes 2e+09, expected at most"),
+    "block of nothing": (
+        [("block = 8", "block = 0")],
+        "block: expected greater than or equal",
+    ),
+    "points without a grid": ([("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3")], "goes with a grid only"),
+    "empty grid": (
+        [("sobol", "grid"), ("runs = 40\n", "")],
+        "[parameters.m2] points: is missing, for a grid",
+    ),
+    "grid of no points": (
+        [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 0")],
+        "parameters.m2.points: expected greater than 0, got 0",
+    ),
+    "no power of 2": ([("sobol", "indices")], "runs: expected a power of 2"),
+    "nothing kept": (
+        [(ARM[ARM.index("final") :], "")],
+        "[keep]: keeps nothing of a run",
+    ),
+    "unknown variable": ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
+    "no Real variable": ([('"q1", "q2"', '"solver_steps"')], "'solver_steps' is not a Real"),
+    "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
+    "unknown column": (
+        [("seed = 3", 'worst = ["final(q3)"]')],
+        "worst: no column 'final(q3)'",
+    ),
+    "unknown name": ([("[keep]", '[derived]\ndq1 = "2 * q9"\n[keep]')], "unknown name 'q9'"),
+    "no expression": ([("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')], "[derived] dq1: is not an"),
+    "forbidden": (
+        [("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')],
+        "'open(1)': expected",
+    ),
+    "set twice": ([("[keep]", "[set]\nm2 = 1.0\n[keep]")], "[set] m2: is in [parameters]"),
+    "set too low": ([("[keep]", "[set]\nm1 = -1.0\n[keep]")], "[set] m1: expected at least 0.0 kg"),
+    "no time": ([("stop = 1.0", "stop = -1.0")], "[time] stop: expected a time after start"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_refused(
+    mistake: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    changes, expected = MISTAKES[mistake]
+    path = write(tmp_path, changes=changes)
+    output = tmp_path / "output"
+    assert cli.main(["campaign", str(path), "--output", str(output)]) == 2
+    error = capsys.readouterr().err
+    assert_one_line(error)
+    assert expected in error
+    assert not output.exists()
+
+
+def test_the_file_that_the_mistakes_are_made_in_is_right(tmp_path: Path) -> None:
+    given = campaign(tmp_path)
+    with bases.opened(given, None) as base:
+        job = planning.plan(given, base, "test")
+    assert [name for name, _ in job.targets] == ["m2", "q1"]
+    assert job.steps == 200 and job.stop == 1.0
+    assert [m.column for m in job.measures][:2] == ["final(q1)", "final(q2)"]
+
+
+SYSTEM = (
+    HEAD
+    + """system = "closed_loop"
+variant = "nominal"
+sampling = "random"
+runs = 2
+[parameters."arm.m2"]
+uniform = [0.9, 1.1]
+[keep]
+final = ["arm.q1"]
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("closed_loop", "close_loop", "did you mean 'closed_loop'?"),
+        ("nominal", "nominell", "did you mean 'nominal'?"),
+        ('variant = "nominal"\n', "", "variant: goes with system"),
+        ("arm.m2", "arm.m3", "the system has no variable 'arm.m3'"),
+        ("arm.m2", "arm.tau1", "'arm.tau1' is not a parameter"),
+        ("arm.q1", "q1", "the system has no variable 'q1'"),
+        ("final", "lyapunov = true\nfinal", "lyapunov: goes with a scenario only"),
+    ],
+)
+def test_a_mistake_of_a_system_is_refused(
+    old: str, new: str, expected: str, tmp_path: Path
+) -> None:
+    with (
+        pytest.raises(UserError, match=expected.replace("?", r"\?")),
+        bases.opened(given := campaign(tmp_path, SYSTEM, [(old, new)]), None) as base,
+    ):
+        planning.plan(given, base, "test")
+
+
+def test_blocks_cover_all_runs(tmp_path: Path) -> None:
+    given = campaign(tmp_path, changes=[("runs = 40", "runs = 43")])
+    runs = [run for block in range(given.blocks) for run in given.block_range(block)]
+    assert runs == list(range(43))
+
+
+def test_a_run_is_counted_by_the_sampling(tmp_path: Path) -> None:
+    assert campaign(tmp_path, changes=[("sobol", "indices"), ("40", "32")]).count == 32 * 4
+    grid = [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 20")]
+    grid += [("normal = [-2.0, 0.2]", "values = [1.0, 2.0]")]
+    assert campaign(tmp_path, changes=grid).count == 40

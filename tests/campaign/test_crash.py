@@ -1,0 +1,77 @@
+"""A run that takes its worker down is a row that says so, and the others are as without it."""
+
+import subprocess
+from pathlib import Path
+from zipfile import ZipFile
+
+import fmpy
+import numpy as np
+import pytest
+
+from cosim.campaign import bases, campaign_file, engine, planning
+from cosim.campaign.points import Points
+from cosim.campaign.results import Results
+from tests.campaign.files import HEAD
+from tests.support.paths import ROOT
+
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Crashing" guid="0">
+  <CoSimulation modelIdentifier="Crashing" canHandleVariableCommunicationStepSize="true"/>
+  <ModelVariables>
+    <ScalarVariable name="x" valueReference="1" causality="parameter" variability="fixed">
+      <Real start="0"/></ScalarVariable>
+    <ScalarVariable name="y" valueReference="2" causality="output"><Real/></ScalarVariable>
+  </ModelVariables>
+  <ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>
+</fmiModelDescription>
+"""
+SCENARIO = 'title = "A"\ndescription = "B"\ntolerance = 1e-6\n'
+SCENARIO += "[time]\nstart = 0.0\nstop = 1.0\nstep = 0.1\n"
+CAMPAIGN = HEAD + (
+    'scenario = "toy"\nsampling = "grid"\nblock = 3\n'
+    "[parameters.x]\nvalues = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]\n[keep]\nfinal = ['y']\n"
+)
+
+
+@pytest.fixture
+def crashing(tmp_path: Path) -> Path:
+    """The FMU, compiled."""
+    library = tmp_path / "Crashing.so"
+    source = ROOT / "tests" / "campaign" / "crashing.c"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    flags = ["-std=c11", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-isystem", headers]
+    subprocess.run(["gcc", *map(str, flags), str(source), "-o", str(library)], check=True)
+    path = tmp_path / "Crashing.fmu"
+    with ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION)
+        archive.write(library, f"binaries/{fmpy.platform}/Crashing.so")
+    return path
+
+
+def test_a_run_that_takes_its_worker_down(
+    crashing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = tmp_path / "models" / "crashing" / "scenarios" / "toy.toml"
+    scenario.parent.mkdir(parents=True)
+    scenario.write_text(SCENARIO)
+    monkeypatch.setattr("cosim.project.ROOT", tmp_path)
+    monkeypatch.setitem(engine.SETTINGS, "distributed.scheduler.allowed-failures", 1)
+    file = tmp_path / "test.toml"
+    file.write_text(CAMPAIGN)
+    campaign = campaign_file.read(file)
+    with bases.opened(campaign, crashing) as base:
+        job = planning.plan(campaign, base, file)
+        points = Points(campaign, planning.constants(campaign, base))
+        results = Results(tmp_path / "output", campaign, job, "")
+        results.begin()
+        with (
+            results.workers_folder() as folder,
+            engine.cluster(None, 1, folder) as client,
+        ):
+            made = engine.Engine(client, campaign, job, base.archives, points, results)
+            made.run(range(campaign.blocks), lambda _: None)
+    table = results.table(["final(y)", "failure"])
+    assert table["failure"].tolist() == ["", "", "", engine.DIED, "", "", "", ""]
+    expected = np.arange(8.0)
+    expected[3] = np.nan
+    assert np.array_equal(table["final(y)"], expected, equal_nan=True)

@@ -1,0 +1,170 @@
+"""Runs by the compiled loop: those of cosim's own simulation and master, to the last bit."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.campaign.measures import LYAPUNOV
+from cosim.coupling.master import Master
+from cosim.fmu_file import Fmu
+from cosim.simulation import simulate
+from cosim.system import ssp
+from tests.campaign.files import ARM, HEAD, campaign
+from tests.campaign.runners import rows, runner
+from tests.support.cosim_project import BUILD, FMUS, load
+
+OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
+
+
+@pytest.mark.parametrize("name", ["hanging_swing", "sine_efforts", "irregular_steps"])
+def test_a_run_has_the_bits_of_a_simulation(name: str, tmp_path: Path) -> None:
+    changes = [("hanging_swing", name), ("time = { stop = 1.0 }\n", "")]
+    with runner(campaign(tmp_path, changes=changes), tmp_path, OUTPUTS) as (runs, job, points):
+        record = rows(runs, job, points, [17]).trajectories[17]
+        m2, q1 = points.of(range(17, 18))[0]
+    scenario = load(name)
+    changed = dataclasses.replace(
+        scenario,
+        parameters=scenario.parameters | {"m2": m2},
+        initial=scenario.initial | {"q1": q1},
+        reference_every=1,
+    )
+    with Fmu(FMUS["rp_manipulator"]) as fmu:
+        result = simulate(fmu, changed)
+    for output in OUTPUTS:
+        expected = result.values[:, result.names.index(output)]
+        assert np.array_equal(record[:, job.watched.index(output)], expected)
+
+
+def test_boolean_inputs_are_those_of_a_simulation(tmp_path: Path) -> None:
+    text = HEAD + (
+        'scenario = "grasp_at_rest"\nsampling = "random"\nruns = 1\n[parameters.damping1]\n'
+        "values = [0.0]\n[keep]\nfinal = ['q1']\nmaximum = ['q2']\ntrajectories = [0]\n"
+    )
+    scenario = load("grasp_at_rest")
+    assert any(values.dtype == bool for values in scenario.inputs.values())
+    with runner(campaign(tmp_path, text), tmp_path) as (runs, job, points):
+        record = rows(runs, job, points, [0]).trajectories[0]
+    changed = dataclasses.replace(
+        scenario, parameters=scenario.parameters | {"damping1": 0.0}, reference_every=1
+    )
+    with Fmu(FMUS["rp_plant"]) as fmu:
+        result = simulate(fmu, changed)
+    for i, name in enumerate(job.watched):
+        assert np.array_equal(record[:, i], result.values[:, result.names.index(name)])
+
+
+SYSTEM = HEAD + (
+    'system = "closed_loop"\nvariant = "heavy_payload"\nsampling = "random"\nruns = 3\n'
+    "time = { stop = 1.0 }\n[set]\n'arm.relative_tolerance' = 1e-9\n"
+    "[parameters.'arm.m2']\nuniform = [0.9, 1.4]\n[keep]\nfinal = ['arm.q1', 'controller.tau1']\n"
+    "trajectories = [1]\n[keep.tracking.tip]\n"
+    "of = [['arm.ee_x', 'trajectory.ee_x_ref'], ['arm.ee_y', 'trajectory.ee_y_ref']]\n"
+)
+
+
+def test_a_run_of_a_system_has_the_bits_of_the_master(tmp_path: Path) -> None:
+    with runner(campaign(tmp_path, SYSTEM), tmp_path) as (runs, job, points):
+        found = rows(runs, job, points, [0, 1])
+        m2 = points.of(range(1, 2))[0, 0]
+    with ssp.unpacked(BUILD / "ClosedLoop.ssp") as opened:
+        parameters = opened.system.parameter_sets["heavy_payload"]
+        parameters["arm"] |= {"relative_tolerance": 1e-9, "m2": m2}
+        names = [component.name for component in opened.system.components]
+        fmus = {name: Fmu(opened.fmu(name)) for name in names}
+        real = [c for c in opened.system.connections if c.start_connector != "payload_attached"]
+        with Master(fmus, real) as master:
+            master.initialize(0.0, 1.0, parameters)
+            expected = master.run(job.times)
+        for fmu in fmus.values():
+            fmu.close()
+    columns = [master.names.index(name) for name in job.watched]
+    assert np.array_equal(found.trajectories[1], expected[:, columns])
+    tip = expected[:, [master.names.index(f"arm.ee_{x}") for x in "xy"]]
+    tip -= expected[:, [master.names.index(f"trajectory.ee_{x}_ref") for x in "xy"]]
+    largest = np.max(np.hypot(*tip.T))
+    assert found.measures[1, 2] == pytest.approx(largest, rel=1e-12)
+
+
+def test_a_run_does_not_depend_on_those_before(tmp_path: Path) -> None:
+    given = campaign(tmp_path)
+    with runner(given, tmp_path) as (runs, job, points):
+        alone = rows(runs, job, points, [5])
+        within = rows(runs, job, points, [9, 2, 5, 7])
+        again = rows(runs, job, points, [5])
+    assert np.array_equal(alone.measures[0], within.measures[2])
+    assert np.array_equal(alone.measures, again.measures)
+    assert len(np.unique(within.measures, axis=0)) == 4
+
+
+def test_a_run_that_fails_says_why_and_harms_no_other(tmp_path: Path) -> None:
+    # the mass of link 2 becomes negative in some runs, which the FMU refuses
+    changes = [("normal = [-2.0, 0.2]", "uniform = [-3.0, 3.0]"), ("[keep]", "[derived]\nI1z = "
+               "\"q1\"\n[keep]")]  # fmt: skip
+    given = campaign(tmp_path, changes=changes)
+    with runner(given, tmp_path) as (runs, job, points):
+        numbers = list(range(given.count))
+        found = rows(runs, job, points, numbers)
+        values = points.of(range(given.count))
+        failed = values[:, points.names.index("I1z")] < 0
+        good = [n for n in numbers if not failed[n]]
+        alone = rows(runs, job, points, good)
+    assert 5 < np.count_nonzero(failed) < 35
+    assert [bool(text) for text in found.failures] == failed.tolist()
+    assert all("I1z" in text for text in found.failures if text)
+    assert np.isnan(found.measures[failed]).all()
+    assert np.array_equal(found.measures[~failed], alone.measures)
+    assert not any(alone.failures)
+
+
+def test_a_value_that_is_not_defined_is_a_failed_run(tmp_path: Path) -> None:
+    given = campaign(tmp_path, changes=[("[keep]", '[derived]\ndq1 = "sqrt(q1 + 2)"\n[keep]')])
+    with runner(given, tmp_path) as (runs, job, points):
+        found = rows(runs, job, points, range(8))
+        undefined = points.of(range(8))[:, 1] < -2
+    assert 0 < np.count_nonzero(undefined) < 8
+    expected = ["dq1: its value is not defined" if x else "" for x in undefined]
+    assert found.failures == expected
+
+
+def test_an_input_can_be_a_parameter(tmp_path: Path) -> None:
+    changes = [("[parameters.m2]\nuniform = [1.0, 3.0]", "[parameters.f2]\nvalues = [-21.5]"),
+               ("normal = [-2.0, 0.2]", "values = [-2.22]")]  # fmt: skip
+    with runner(campaign(tmp_path, changes=changes), tmp_path) as (runs, job, points):
+        record = rows(runs, job, points, [3]).trajectories[3]
+    scenario = load("hanging_swing")
+    held = {"f2": np.full(len(scenario.times), -21.5)}
+    changed = dataclasses.replace(
+        scenario, inputs=held, initial={"q1": -2.22, "q2": 0.25}, reference_every=1
+    )
+    with Fmu(FMUS["rp_manipulator"]) as fmu:
+        result = simulate(fmu, changed)
+    q1 = result.values[: len(record), result.names.index("q1")]
+    assert np.allclose(record[:, 0], q1, rtol=0, atol=1e-9)
+
+
+def test_the_exponent_is_the_growth_of_a_small_deviation(tmp_path: Path) -> None:
+    text = ARM[: ARM.index("[parameters.m2]")] + (
+        "[set]\nrelative_tolerance = 1e-13\n[parameters.q1]\nvalues = [-1.0]\n"
+        "[keep]\nlyapunov = true\nfinal = ['q1', 'q2', 'dq1', 'dq2']\n"
+    )
+    changes = [("stop = 1.0", "stop = 2.0, step = 0.001"), ("runs = 40", "runs = 1"),
+               ('"sobol"', '"random"')]  # fmt: skip
+    given = campaign(tmp_path, text, changes)
+    size = 1e-6
+    with runner(given, tmp_path) as (runs, job, points):
+        found = rows(runs, job, points, [0])
+        assert job.measures[-1].column == LYAPUNOV
+    ends = []
+    for sign in (-1, 1):
+        start = {"q1": -1.0, "q2": 0.25, "dq1": 0.0, "dq2": 0.0}
+        moved = {name: value + sign * size / 2 for name, value in start.items()}
+        lines = "".join(f"{n} = {v!r}\n" for n, v in moved.items() if n != "q1")
+        shifted = text.replace("[set]\n", f"[set]\n{lines}")
+        shifted = shifted.replace("values = [-1.0]", f"values = [{moved['q1']!r}]")
+        with runner(campaign(tmp_path, shifted, changes), tmp_path) as (runs, job, points):
+            ends.append(rows(runs, job, points, [0]).measures[0, :4])
+    growth = np.linalg.norm(ends[1] - ends[0]) / (2 * size)  # of a deviation of length 2 size
+    assert found.measures[0, -1] == pytest.approx(np.log(growth) / 2.0, abs=1e-5)
