@@ -24,7 +24,6 @@ ROOT = Path(__file__).resolve().parents[1]
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that cosim.system.study describes
-FEDERATED = "closed_loop"  # the system that is run as a federation
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 

@@ -15,7 +15,7 @@ from cosim.federation.federation import Record
 from cosim.federation.parts import parts, real_connections
 from cosim.fmu_file import Fmu
 from cosim.progress import Progress
-from cosim.system import comparison, ecos, ssp
+from cosim.system import comparison, ecos, ssp, study
 from cosim.system.ssp import Ssp
 
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
@@ -23,9 +23,10 @@ BOUND = 1e-12  # on the largest difference to the master, relative to the variab
 
 def run(options: argparse.Namespace) -> int:
     """Run the variants; compare each with the master that steps all in one process."""
-    path = options.ssp or project.built(
-        project.systems()[project.FEDERATED], ".ssp", "--ssp", options.fmi
-    )
+    path = options.ssp
+    if path is None:
+        folder, _ = study.of_coupling()
+        path = project.built(folder, ".ssp", "--ssp", options.fmi)
     address = options.listen or federation.free_address()
     with ssp.unpacked(path) as system:
         _check_names(system, options)
