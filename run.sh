@@ -12,6 +12,7 @@
 #   ./run.sh coupling              what the coupling of the closed loop costs
 #   ./run.sh playground            builds build/playground/index.html, the plant in a browser; --open opens it
 #   ./run.sh campaign FILE.toml    many runs over parameters, on all cores: cosim/campaign/README.md
+#   ./run.sh federation            the closed loop with each FMU in its own process: models/closed_loop/federation.md
 #   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
@@ -39,7 +40,11 @@ if [ "${1-}" = playground ]; then
   exit
 fi
 
-if [ "${1-}" = campaign ]; then "$root/setup.sh" --campaign; else "$root/setup.sh"; fi
+case "${1-}" in
+  campaign) "$root/setup.sh" --campaign ;;
+  federation) "$root/setup.sh" --federation ;;
+  *) "$root/setup.sh" ;;
+esac
 python="$root/build/venv/bin/python"
 log="$root/build/build.log"
 
@@ -54,6 +59,6 @@ if [ "${1-}" = --list ]; then
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 case "${1-}" in
-  run | new | system | coupling | campaign) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
+  run | new | system | coupling | campaign | federation) exec "$python" -P -m cosim "$@" ;;  # -P: no modules from the current folder
   *) exec "$python" -P -m cosim run "$@" ;;
 esac

@@ -4,21 +4,23 @@
 #
 #   ./setup.sh              for building and ./run.sh
 #   ./setup.sh --campaign   for ./run.sh campaign too
+#   ./setup.sh --federation for ./run.sh federation too
 #   ./setup.sh --release    for ./release.sh too
 #   ./setup.sh --dev        for ./test.sh too
 #   ./setup.sh --platforms  all of it, and what runs FMUs of other platforms and pages in ./test.sh
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-usage() { echo "usage: ./setup.sh [--campaign | --release | --dev | --platforms]" >&2; exit 2; }
+usage() { echo "usage: ./setup.sh [--campaign | --federation | --release | --dev | --platforms]" >&2; exit 2; }
 [ "$#" -le 1 ] || usage
-campaign=no release=no dev=no platforms=no
+campaign=no federation=no release=no dev=no platforms=no
 case "${1-}" in
   "") ;;
   --campaign) campaign=yes ;;
+  --federation) federation=yes ;;
   --release) release=yes ;;
-  --dev) campaign=yes dev=yes ;;
-  --platforms) campaign=yes release=yes dev=yes platforms=yes ;;
+  --dev) campaign=yes federation=yes dev=yes ;;
+  --platforms) campaign=yes federation=yes release=yes dev=yes platforms=yes ;;
   --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; exit ;;
   *) usage ;;
 esac
@@ -107,6 +109,7 @@ for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxy
   [ -x "$program" ] || chmod +x "$program"
 done
 [ "$campaign" = no ] || install_requirements requirements-campaign.txt
+[ "$federation" = no ] || install_requirements requirements-federation.txt
 [ "$release" = no ] || install_requirements requirements-release.txt
 [ "$dev" = no ] || install_requirements requirements-dev.txt
 

@@ -181,6 +181,12 @@ def _parser() -> argparse.ArgumentParser:
         "0 as expected, 1 not, 2 wrong use.",
     )
     _add_report(coupling, "system")
+    _add_campaign(commands)
+    _add_federation(commands)
+    return parser
+
+
+def _add_campaign(commands: argparse._SubParsersAction) -> None:
     campaign = commands.add_parser(
         "campaign",
         help="run a scenario or a system many times, over parameters",
@@ -209,7 +215,6 @@ def _parser() -> argparse.ArgumentParser:
     where.add_argument(
         "--workers", type=_count, metavar="N", help="processes on this machine (default: a core)"
     )
-    return parser
 
 
 def _number(text: str) -> int:
@@ -222,6 +227,47 @@ def _count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 10_000:
         raise argparse.ArgumentTypeError(f"expected a number from 1 to 10000, got {text!r}")
     return int(text)
+
+
+def _add_federation(commands: argparse._SubParsersAction) -> None:
+    federation = commands.add_parser(
+        "federation",
+        help="run a system with each FMU in its own process, coupled by HELICS",
+        description="Runs variants of the closed loop with each FMU in its own process, coupled by "
+        "HELICS, and compares every value with that of the master that steps all in one process in "
+        "Jacobi order. The processes may be on several machines. Exit code: 0 all within the "
+        "bound, 1 not, 2 wrong use or a process that fails.",
+    )
+    choice = federation.add_mutually_exclusive_group()
+    choice.add_argument(
+        "--ssp", type=Path, metavar="PATH", help="the system (default: the closed loop in build/)"
+    )
+    _add_fmi(choice, VERSIONS[0], "the system in build/ with FMUs of this version of FMI")
+    federation.add_argument(
+        "--listen",
+        metavar="ADDRESS",
+        help="where processes of other machines find the federation, as tcp://192.168.0.1:23404 "
+        "(default: a free port that only this machine sees)",
+    )
+    federation.add_argument(
+        "--elsewhere",
+        nargs="+",
+        default=[],
+        metavar="COMPONENT",
+        help="components that are not started here: prints the command that steps each",
+    )
+    federation.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
+    federate = commands.add_parser(
+        "federate",
+        help="step one component in a federation of another machine",
+        description="Steps one component of a system until the federation has come to the end.",
+    )
+    federate.add_argument("ssp", type=Path, metavar="SSP", help="the system")
+    federate.add_argument("variant", metavar="VARIANT")
+    federate.add_argument("component", metavar="COMPONENT")
+    federate.add_argument(
+        "--broker", required=True, metavar="ADDRESS", help="of the federation, as --listen there"
+    )
 
 
 def _add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:

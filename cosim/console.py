@@ -72,6 +72,31 @@ class SweepTable:
                 print(f"{sweep.scenario.name}: {text}")
 
 
+class FederationTable:
+    """Variants as federations, against the master in one process; times of a step of each."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._width = max(map(len, ("variant", *names)))
+        columns = "  steps  difference    bound    HELICS      Ecos    master  result"
+        head(f"{'us a step':>{self._width + 61}}", f"{'variant':<{self._width}}{columns}")
+
+    def row(
+        self,
+        name: str,
+        steps: int,
+        difference: float,
+        bound: float,
+        times: Sequence[float],
+        passed: bool,
+    ) -> None:
+        shown = " ".join(f"{us:>9.1f}" for us in times)
+        print(
+            f"{name:<{self._width}} {steps:>6} {difference:>11.2e} {bound:>8.0e} {shown}  "
+            f"{verdict(passed)}",
+            flush=True,
+        )
+
+
 class VariantTable:
     """Runs of a system's variants, with the measures of the system."""
 

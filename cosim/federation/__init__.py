@@ -1,0 +1,1 @@
+"""One co-simulation as several processes, on one machine or on many, coupled by HELICS."""

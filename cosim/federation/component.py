@@ -1,0 +1,104 @@
+"""The process of one component: steps its FMU between the exchanges of the federation."""
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from cosim.coupling.connected_instance import start_value
+from cosim.errors import UserError
+from cosim.federation.network import Federate
+from cosim.federation.parts import Part
+from cosim.fmi_instance import Instance, Reals
+from cosim.fmu_file import Fmu
+
+
+def run(part: Part, fmu: Fmu, address: str) -> None:
+    """Step a component from the first to the last communication point.
+
+    Raises
+    ------
+    UserError
+        If the FMU fails, the federation ends, or an output changes that must not.
+    """
+    federate = Federate(part.component, address, sorted({s.component for s in part.sources}))
+    try:
+        with fmu.instance(part.component) as instance:
+            _Stepper(part, instance, federate).run()
+        federate.leave()
+    except UserError as error:
+        federate.fail(str(error))
+        raise
+
+
+class _Stepper:
+    def __init__(self, part: Part, instance: Instance, federate: Federate) -> None:
+        self._part, self._instance, self._federate = part, instance, federate
+        self._outputs = instance.reals(part.published)
+        self._inputs = instance.reals(part.inputs)
+
+    def run(self) -> None:
+        self._initialize()
+        constant = self._constants()
+        times = self._part.times.tolist()
+        for point, (start, end) in enumerate(zip(times[:-1], times[1:], strict=True), start=1):
+            with self._instance.explained(f"in the step from t = {start!r} s"):
+                self._take()
+                self._instance.do_step(start, end - start)
+            with self._instance.explained(f"at t = {end!r} s"):
+                self._give(f"at t = {end!r} s")
+            if constant and self._constants() != constant:
+                names = ", ".join(self._part.constant)
+                raise UserError(
+                    f"{self._part.component}: {names} changed by t = {end!r} s; only Real values "
+                    "are exchanged in the steps"
+                )
+            self._federate.go_to(point)
+
+    def _initialize(self) -> None:
+        part, instance = self._part, self._instance
+        instance.set_up(part.times[0], part.times[-1])
+        for name, value in part.parameters.items():
+            instance.set(name, start_value(instance.fmu, part.component, name, value))
+        instance.enter_initialization()
+        self._federate.enter_initialization()
+        self._give_early()
+        for _ in range(part.rounds):
+            before = self._outputs.view.copy()
+            self._federate.exchange()
+            with instance.explained("in initialization"):
+                self._take()
+            self._give_early()
+        if not np.array_equal(before, self._outputs.view):
+            raise UserError(f"{part.component}: the connections form an algebraic loop")
+        self._federate.begin()
+        instance.exit_initialization()
+
+    def _take(self) -> None:
+        """Set the inputs to what their sources have published."""
+        if self._part.inputs:
+            values = self._federate.read()
+            self._inputs.view[:] = [values[s.component][s.index] for s in self._part.sources]
+            self._inputs.set()
+
+    def _give_early(self) -> None:
+        """Publish in initialization mode; at its end FMUs explain which parameters are wrong."""
+        try:
+            self._give("in initialization")
+        except FMICallException as error:
+            self._instance.exit_initialization()
+            raise self._instance.failure(error, "in initialization") from error
+
+    def _give(self, when: str) -> None:
+        """Read the outputs and publish them."""
+        self._outputs.get()
+        _check_finite(self._part, self._outputs, when)
+        self._federate.publish(self._outputs.view)
+
+    def _constants(self) -> list[object]:
+        return [self._instance.discrete(name) for name in self._part.constant]
+
+
+def _check_finite(part: Part, outputs: Reals, when: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(outputs.view))
+    if len(bad):
+        name = f"{part.component}.{outputs.names[bad[0]]}"
+        raise UserError(f"{name} is {outputs.view[bad[0]]} {when}: a finite value is expected")

@@ -1,0 +1,135 @@
+"""The closed loop as a federation: each FMU in its own process, coupled by HELICS."""
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.__main__ import main
+from cosim.coupling.master import Master
+from cosim.errors import UserError
+from cosim.federation import federation
+from cosim.federation.parts import parts, real_connections
+from cosim.fmu_file import Fmu
+from cosim.system import ssp
+from cosim.system.ssp import Ssp
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP, edited, replace
+
+STRUCTURE = "SystemStructure.ssd"
+SHORT = replace('stopTime="6"', 'stopTime="1"')
+ARM = "resources/arm_nominal.ssv"
+TOLERANCE = (
+    '<ssv:Parameter name="relative_tolerance"><ssv:Real value="1e-11" unit="1"/></ssv:Parameter>'
+)
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ssp]:
+    """The closed loop, of 1 s."""
+    path = edited(SSP, tmp_path_factory.mktemp("ssp") / "Short.ssp", {STRUCTURE: SHORT})
+    with ssp.unpacked(path) as opened:
+        yield opened
+
+
+def by_the_master(system: Ssp, variant: str) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and values at all communication points of the Jacobi master, in this process."""
+    fmus = {c.name: Fmu(system.fmu(c.name)) for c in system.system.components}
+    try:
+        times = next(iter(parts(system, variant).values())).times
+        with Master(fmus, real_connections(system)) as master:
+            master.initialize(times[0], times[-1], system.system.parameter_sets[variant])
+            return master.names, master.run(times)
+    finally:
+        for fmu in fmus.values():
+            fmu.close()
+
+
+@pytest.mark.parametrize("variant", ["nominal", "heavy_payload_integral"])
+def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
+    record = federation.run(short, variant, federation.free_address())
+    names, rows = by_the_master(short, variant)
+    assert set(record.names) == set(names)
+    expected = rows[:, [names.index(name) for name in record.names]]
+    scale = np.maximum(np.abs(expected).max(axis=0), 1e-300)
+    assert record.values.shape == (1001, len(names))
+    assert np.abs((record.values - expected) / scale).max() <= 1e-12
+    assert np.abs(rows[-1] - rows[0]).max() > 1e-3, "nothing has moved"
+
+
+def test_a_component_may_be_stepped_elsewhere(short: Ssp) -> None:
+    """By a command of its own, as on another machine."""
+    address = federation.free_address()
+    arguments = federation.command(short.path, "nominal", "arm", address)
+    other = subprocess.Popen([sys.executable, *arguments], cwd=ROOT)
+    try:
+        record = federation.run(short, "nominal", address, elsewhere=["arm"])
+        assert other.wait(timeout=30) == 0
+    finally:
+        other.kill()
+    together = federation.run(short, "nominal", federation.free_address())
+    assert np.array_equal(record.values, together.values)
+
+
+def test_a_process_that_is_killed_ends_the_federation(tmp_path: Path) -> None:
+    with ssp.unpacked(SSP) as system:
+        killed = threading.Thread(target=kill_soon, args=("controller",))
+        killed.start()
+        with pytest.raises(UserError, match="controller: its process was ended by signal 9"):
+            federation.run(system, "nominal", federation.free_address())
+        killed.join()
+    assert not list(processes_of("")), "a process is left"
+
+
+def processes_of(component: str) -> Iterator[int]:
+    """Processes of this test that step the component."""
+    for status in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = status.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if b"federate" in words and component.encode() in b" ".join(words):
+            yield int(status.parent.name)
+
+
+def kill_soon(component: str) -> None:
+    """Kill the process of a component when it has run for a while."""
+    for _ in range(600):
+        time.sleep(0.05)
+        found = list(processes_of(f"nominal {component}"))
+        if found:
+            time.sleep(1.0)
+            subprocess.run(["kill", "-9", *map(str, found)], check=True)
+            return
+
+
+# Each value may be 0, all of them together may not: only the FMU knows.
+def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
+    none = TOLERANCE.replace("relative_tolerance", "I1z").replace("1e-11", "0")
+    none += TOLERANCE.replace("relative_tolerance", "I2z").replace("1e-11", "0")
+    none += TOLERANCE.replace("relative_tolerance", "m1").replace("1e-11", "0")
+    none = none.replace('unit="1"', 'unit="kg.m2"', 2).replace('unit="1"', 'unit="kg"')
+    changes = {STRUCTURE: SHORT, ARM: replace(TOLERANCE, none)}
+    path = edited(SSP, tmp_path / "NoInertia.ssp", changes)
+    with ssp.unpacked(path) as system, pytest.raises(UserError, match="arm: .* I1z"):
+        federation.run(system, "nominal", federation.free_address())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nominall"], "no variant 'nominall', did you mean 'nominal'?"),
+        (["nominal", "--elsewhere", "arn"], "no component 'arn', did you mean 'arm'?"),
+        (["nominal", "--listen", "tcp://192.0.2.1:23404"], "nothing can listen there"),
+    ],
+)
+def test_wrong_use(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["federation", "--ssp", str(SSP), *arguments]) == 2
+    text = capsys.readouterr().err.strip()
+    assert words in text
+    assert text.startswith("error: ")
