@@ -170,6 +170,18 @@ static void test_a_limit_that_passes_the_joint(void) {
     assert_modes(RP_PLANT_STUCK, RP_PLANT_BACKWARD);
 }
 
+/* An importer that handles events moves the stop that the slide has just reached. */
+static void test_a_stop_that_is_moved_away_at_the_event_is_not_met(void) {
+    set_falling_slide(0.5, 0.5);
+    const double before = v.dq[1];
+    const double q2 = v.q[1];
+    v.parameters.lower[1] = -1.0;
+    plant_test_update(&v, LOWER2);
+    ASSERT_SAME(q2, v.q[1]);
+    ASSERT_SAME(before, v.dq[1]);
+    ASSERT_SAME(0.0, v.sums.impact_loss);
+}
+
 /* The same impact twice: twice the impulse and the loss, m2 v (1 + e) and m2 v^2 (1 - e^2) / 2. */
 static void test_impulses_and_losses_add_up(void) {
     const double e = 0.5;
