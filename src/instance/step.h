@@ -46,6 +46,10 @@ NONNULL void instance_place_inputs(struct instance *instance, double elapsed);
 /* Sets the inputs of the step to polynomials through the values that the importer gives. */
 MUST_CHECK NONNULL enum status instance_ask_inputs(const struct step *step, double t, double h);
 
+/* STATUS_NOT_FINITE, with a message, where an input that moves ends the step with no finite value:
+ * a model without states would not notice. */
+MUST_CHECK NONNULL enum status instance_check_inputs(const struct step *step);
+
 /* From now on the last value of an input is the one that was set for the end of the step; where the
  * step ended earlier, the value that the input has there. */
 NONNULL void instance_hold_last_nodes(const struct step *step);

@@ -32,16 +32,37 @@ void instance_hold_last_nodes(const struct step *step) {
     }
 }
 
+static bool is_finite(const struct polynomial *polynomial) {
+    bool found = true;
+    for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
+        found &= isfinite(polynomial->d[k]) != 0;
+    }
+    return found;
+}
+
+enum status instance_check_inputs(const struct step *step) {
+    const struct instance *instance = step->instance;
+    const double h = clock_difference(step->end, step->begin);
+    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
+        const struct polynomial *input = &instance->memory.pending[i];
+        if (polynomial_moves(input)) {
+            const struct polynomial at_end = polynomial_shifted(input, h);
+            if (!is_finite(&at_end)) {
+                return instance_not_finite(instance, "an input at the end of the step");
+            }
+        }
+    }
+    return STATUS_OK;
+}
+
 static enum status set_polynomials(struct instance *instance, double h) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         const struct polynomial input =
             polynomial_through(instance->nodes + i * POLYNOMIAL_NODES, h);
-        for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
-            if (!isfinite(input.d[k])) {
-                return instance_not_finite(instance, "a derivative of an input");
-            }
+        if (!is_finite(&input)) {
+            return instance_not_finite(instance, "a derivative of an input");
         }
         memory->pending[i] = input;
         memory->current[i] = input;

@@ -200,6 +200,15 @@ def test_inputs_are_interpolated_within_a_step(loaded: LoadedFmu) -> None:
         assert instance.get("penetration", "wall_force") == pytest.approx([0.025, 30.0], abs=1e-12)
 
 
+def test_an_input_that_leaves_all_numbers_ends_no_step(loaded: LoadedFmu) -> None:
+    """The instance would else be in a state that it cannot read again."""
+    with running(loaded, {"ee_x": 0.1}) as instance:
+        instance.set_input_derivatives(ee_x=[1e200])
+        assert status_of(instance.fmi.doStep, 0.0, 1e200) == DISCARD
+        assert "an input at the end of the step" in instance.messages[-2].text
+        assert instance.get("time", "ee_x") == [0.0, 0.1]
+
+
 # ---- With the plant ------------------------------------------------------------------------------
 
 

@@ -217,5 +217,5 @@ def test_references_made_again_are_the_same(tmp_path: Path) -> None:
 
 def test_scenarios_cover_the_parameters() -> None:
     found = [load(name).start_values for name in SCENARIOS]
-    for name in start_values():
+    for name in set(start_values()) - {"max_internal_steps"}:
         assert len({values[name] for values in found}) > 1, name
