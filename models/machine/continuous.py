@@ -111,10 +111,17 @@ def run(
 
 
 def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tuple[Columns, float]:
-    """Values for a step that goes to 0, and by how much they enlarge the errors of the runs.
+    """Values for a step that goes to 0, and by which factor rounding of the runs grows at most.
 
-    The errors are a polynomial in the step that begins with `power` and has as many terms as it
-    takes for all runs but one.
+    Parameters
+    ----------
+    runs : sequence of dict
+        Columns of runs that differ by their step.
+    per_second : sequence of int
+        Steps of each run.
+    power : int
+        Errors are taken for a polynomial in the step that begins with this power and has as many
+        terms as there are runs but one.
     """
     steps = per_second[0] / np.array(per_second)
     terms = steps[:, None] ** np.array([0, *range(power, power + len(runs) - 1)])
@@ -186,14 +193,13 @@ def main() -> None:
             for method in METHODS:
                 runs = [run(opened, fmus, method, variant, n) for n in method.per_second]
                 errors = [error(columns, expected)[0] for columns in runs]
-                left, enlarged = limit(runs, method.per_second, method.power)
-                measured[variant, method.name] = errors, error(left, expected)[0]
+                at_zero, enlarged = limit(runs, method.per_second, method.power)
+                left, worst = error(at_zero, expected)
+                measured[variant, method.name] = errors, left
                 print(
-                    f"  {method.name}: "
-                    + ", ".join(f"{x:.3g}" for x in errors)
-                    + f"; limit: {error(left, expected)[0]:.3g} ({error(left, expected)[1]}), "
-                    f"rounding times {enlarged:.3g}, "
-                    f"tracking error {1e3 * tracking_error(left):.8g} mm",
+                    f"  {method.name}: {', '.join(f'{x:.3g}' for x in errors)}; limit: {left:.3g} "
+                    f"({worst}), rounding times {enlarged:.3g}, tracking error "
+                    f"{1e3 * tracking_error(at_zero):.8g} mm",
                     flush=True,
                 )
     save(draw(measured), FOLDER / "continuous.png")

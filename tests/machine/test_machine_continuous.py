@@ -46,6 +46,21 @@ def runs(opened: Ssp, fmus: dict[str, Fmu]) -> dict[tuple[str, str], list[Column
     }
 
 
+@pytest.mark.parametrize("power", [1, 2])
+def test_the_limit_of_a_polynomial_is_its_constant_term(power: int) -> None:
+    per_second = (40, 60, 80)
+    steps = [40 / n for n in per_second]
+    runs = [
+        {"x": np.array([3.0 - 2.0 * h**power, 5.0 + h**power + 7.0 * h ** (power + 1)])}
+        for h in steps
+    ]
+    found, enlarged = continuous.limit(runs, per_second, power)
+    np.testing.assert_allclose(found["x"], [3.0, 5.0], rtol=0, atol=1e-13)
+    # rounding of the runs, with the signs that add up
+    spread = [{"x": np.array([s])} for s in (1.0, -1.0, 1.0)]
+    assert abs(continuous.limit(spread, per_second, power)[0]["x"][0]) == pytest.approx(enlarged)
+
+
 @pytest.mark.parametrize("method", SHORT_METHODS, ids=lambda method: method.name)
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_errors_fall_by_the_order_and_vanish_in_the_limit(
