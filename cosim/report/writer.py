@@ -6,7 +6,7 @@ from pathlib import Path
 from cosim.comparison import Run
 from cosim.convergence import Convergence
 from cosim.output_files import from_here
-from cosim.report import overview, scenario_page, studies_page
+from cosim.report import assets, overview, scenario_page, studies_page
 from cosim.report.overview import FILES, SCENARIOS, STUDIES
 from cosim.tolerance_sweep import Sweep
 
@@ -19,11 +19,8 @@ class ReportWriter:
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
 
     def check(self) -> None:
-        """Fail now, not after all runs, if the folder cannot be made or written to."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        probe = self.folder / ".probe"
-        probe.touch()
-        probe.unlink()
+        """Fail now, not after all runs, if the folder cannot be written to or has no room."""
+        assets.write(self.folder)
 
     def forget(self) -> None:
         """Take what an earlier run found out of the overview."""
