@@ -9,7 +9,7 @@ from pathlib import Path
 from cosim import console, project
 from cosim.errors import UserError, did_you_mean
 from cosim.output_files import from_here, written
-from cosim.report import assets, overview
+from cosim.report import overview
 from cosim.report.browser import show
 from cosim.report.overview import Entry
 from cosim.system import comparison, report, ssp, study
@@ -62,8 +62,6 @@ def run(options: argparse.Namespace) -> int:
             for system, names in chosen:
                 report.remove(options.report, system.folder.name, names)
         plans = [_planned(system, names) for system, names in chosen]
-        with written(options.report):
-            assets.write(options.report)  # so that a missing room is noticed before anything runs
         return _run(plans, options)
 
 
