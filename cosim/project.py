@@ -12,7 +12,7 @@ models/*/animation.py                   what of a run the report animates
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
-build/report/                           what the commands write
+build/report/                           what the commands write: index.html, folders of its parts
 """
 
 from pathlib import Path

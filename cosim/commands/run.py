@@ -36,8 +36,9 @@ def run(options: argparse.Namespace) -> int:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
         check_writable(options.report)
         writer = ReportWriter(options.report)
-        if chosen:
-            with written(options.report):
+        with written(options.report):
+            writer.begin()
+            if chosen:
                 writer.forget()
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []

@@ -4,6 +4,7 @@ import base64
 import functools
 import gzip
 import re
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,17 +17,29 @@ TEMPLATE = "unpack.js"  # becomes PLOTLY
 
 
 def write(report: Path) -> None:
-    """Write all assets into the folder of a report, unless they are there as they must be."""
+    """Write all assets into the folder of a report, unless they are there as they must be.
+
+    If one cannot be written, those that this call has written are removed.
+    """
     folder = report / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    for source in sorted(SOURCES.iterdir()):
-        name, content = source.name, source.read_bytes()
-        if name == TEMPLATE:
-            name, content = PLOTLY, _plotly()
-        target = folder / name
-        if not target.is_file() or target.read_bytes() != content:
-            with whole(target) as path:
-                path.write_bytes(content)
+    made: list[Path] = []
+    try:
+        for source in sorted(SOURCES.iterdir()):
+            name, content = source.name, source.read_bytes()
+            if name == TEMPLATE:
+                name, content = PLOTLY, _plotly()
+            target = folder / name
+            if not target.is_file() or target.read_bytes() != content:
+                with whole(target) as path:
+                    path.write_bytes(content)
+                made.append(target)
+    except OSError:
+        for target in made:
+            target.unlink(missing_ok=True)
+        with suppress(OSError):  # there is something in it
+            folder.rmdir()
+        raise
 
 
 @functools.cache

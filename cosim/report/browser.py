@@ -8,7 +8,7 @@ from pathlib import Path
 def show(page: Path) -> None:
     """Open a page; where there is no browser, say which file to open."""
     try:
-        opened = webbrowser.open(page.absolute().as_uri())
+        opened = webbrowser.open_new_tab(page.absolute().as_uri())
     except webbrowser.Error:
         opened = False
     if not opened:

@@ -54,7 +54,7 @@ class RunPage:
 
 def write_run(path: Path, page: RunPage) -> Path:
     """Write a page of a section of the report; return its path."""
-    return write_page(path, "run.html", root="../", page=page, text=page.data.json())
+    return write_page(path, "run.html", root="../", page=page, data=page.data.json())
 
 
 def write_page(path: Path, template: str, **values: object) -> Path:

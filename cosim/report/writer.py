@@ -6,7 +6,7 @@ from pathlib import Path
 from cosim.comparison import Run
 from cosim.convergence import Convergence
 from cosim.output_files import from_here
-from cosim.report import overview, scenario_page, studies_page
+from cosim.report import assets, overview, scenario_page, studies_page
 from cosim.report.overview import FILES, SCENARIOS, STUDIES
 from cosim.tolerance_sweep import Sweep
 
@@ -17,6 +17,10 @@ class ReportWriter:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.files: dict[str, Path] = {}  # pages of users' own files that were written, by name
+
+    def begin(self) -> None:
+        """Write what all pages share: fails now, not after all runs, if there is no room."""
+        assets.write(self.folder)
 
     def forget(self) -> None:
         """Take what an earlier run found out of the overview."""

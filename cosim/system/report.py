@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim import project, trajectory_csv
 from cosim.output_files import whole
-from cosim.report import motion, overview, pages
+from cosim.report import assets, motion, overview, pages
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData
@@ -56,6 +56,7 @@ def remove(report: Path, system: str, variants: Sequence[str]) -> None:
 
 def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
+    assets.write(report)
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
     run, csv = outcome.run, f"{outcome.variant}.csv"

@@ -174,6 +174,8 @@ def test_report_shows_every_scenario(runs: Runs, sweeps: dict[str, Sweep], tmp_p
         page = (index.parent / "scenarios" / f"{name}.html").read_text(encoding="utf-8")
         assert f'href="{name}.csv"' in page
     assert 'href="studies/accuracy.html"' in overview
+    # with nine variants of systems (tests/report) the whole report stays below 15 MB
+    assert sum(path.stat().st_size for path in index.parent.rglob("*.*")) < 10.4e6
     written = np.loadtxt(index.parent / "scenarios" / f"{LONG}.csv", delimiter=",", skiprows=1)
     result = runs.run(load(LONG), 1e-8).result
     assert np.array_equal(written[:, 1 : 1 + len(result.names)], result.values)

@@ -198,3 +198,9 @@ def test_every_plot_and_picture_has_a_text(browser: Browser, report: Path) -> No
     assert all(re.match(r"Plot of .* from .* to .*, between .* and ", text) for text in texts)
     assert browser.run("return document.querySelector('img').naturalWidth") > 100
     assert "signals" in browser.run("return document.querySelector('img').alt")
+
+
+def test_a_variant_takes_its_share_of_the_report(report: Path) -> None:
+    """With nine of them, and the scenarios (tests/cosim/test_accuracy.py), it stays below 15 MB."""
+    sizes = [path.stat().st_size for path in (report / "system").glob(f"{VARIANT}.*")]
+    assert len(sizes) == 2 and sum(sizes) < 510e3
