@@ -128,11 +128,16 @@ class Runs:
             self._runs[scenario.name, tolerance] = run
         return run
 
-    def estimated(self, scenario: Scenario, progress: Callable[[int], object] | None = None) -> Run:
+    def estimated(
+        self,
+        scenario: Scenario,
+        tolerance: float,
+        progress: Callable[[int], object] | None = None,
+    ) -> Run:
         """`scenario`, which has no reference, compared with itself at a tighter tolerance."""
-        fmu, tight = self._fmus[scenario.model], tighter(scenario.tolerance)
-        result = simulation.simulate(fmu, scenario, None, progress)
-        exact = simulation.simulate(fmu, scenario, tight, progress)
+        fmu = self._fmus[scenario.model]
+        result = simulation.simulate(fmu, scenario, tolerance, progress)
+        exact = simulation.simulate(fmu, scenario, tighter(tolerance), progress)
         summed = reference.read_summed(project.models()[scenario.model])
         expected = Reference(scenario.path, exact.times, exact.names, exact.values, summed)
         errors = reference.errors(result, expected)

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
             done = _runs(runs, chosen, bool(twins), None, TIGHTEST)
             sweeps = _sweeps(runs, _quick(done) if options.names else chosen)
             studies = [] if options.names else _convergence(fmus, twins)
-        estimated = _estimated(runs, own)
+        estimated = _estimated(runs, own, options.tolerance)
         groups = writer.grouped([*done, *estimated])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
             page = writer.write(groups, sweeps, studies, progress)
@@ -152,15 +152,15 @@ def _runs(
     return done
 
 
-def _estimated(runs: Runs, own: Sequence[Scenario]) -> list[Run]:
-    """Run scenarios of users, which have no references."""
+def _estimated(runs: Runs, own: Sequence[Scenario], tolerance: float | None) -> list[Run]:
+    """Run scenarios of users, which have no references; None: at their own tolerances."""
     if not own:
         return []
     table = console.RunTable(scenario.name for scenario in own)
     done = []
     for scenario in own:
         with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
-            run = runs.estimated(scenario, progress)
+            run = runs.estimated(scenario, tolerance or scenario.tolerance, progress)
         table.row(run)
         console.messages(f"{scenario.name}: the FMU says", run.result.messages)
         done.append(run)

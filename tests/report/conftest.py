@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from cosim.__main__ import main
+from tests.support.browser import Browser
 
 SCENARIOS = ("thrown_against_stop", "actuator_torque_steps", "constant_effort_single_step")
 VARIANT = "wall_contact"
@@ -43,3 +44,10 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["system", VARIANT, *arguments]) == 0
     assert main(["run", str(file), *arguments]) == 0
     return folder
+
+
+def show(browser: Browser, page: Path, **view) -> None:
+    """Open a page and wait for its plots."""
+    browser.open(page, **view)
+    if page.name != "index.html":
+        browser.wait("document.documentElement.dataset.ready === 'yes'", 60)

@@ -1,0 +1,86 @@
+"""The cursor of a page: it shows the values that the page links, in all plots and the player."""
+
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from selenium.webdriver.common.keys import Keys
+
+from cosim import trajectory_csv
+from tests.report.conftest import SCENARIOS, STRANGE, VARIANT, show
+from tests.support.browser import Browser
+
+
+def read_csv(path: Path) -> dict[str, np.ndarray]:
+    names, table = trajectory_csv.read(path, lambda message, _: AssertionError(message))
+    return dict(zip(names, table.T, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("name", "curves"),
+    [
+        (f"scenarios/{SCENARIOS[0]}", {"q1", "q2", "dq1", "dq2", "mode1"}),
+        (f"scenarios/{SCENARIOS[1]}", {"current1", "tau1_cmd"}),
+        (f"system/{VARIANT}", {"plant.q1", "environment.wall_force", "plant.mode1"}),
+        (f"files/{STRANGE}", {"q1", "ee_x", "ee_y", "tau1", "f2"}),
+    ],
+)
+def test_the_cursor_shows_rows_of_the_values(
+    browser: Browser, report: Path, name: str, curves: set[str]
+) -> None:
+    show(browser, report / f"{name}.html")
+    href = browser.run("return document.querySelector('.facts a').getAttribute('href')")
+    assert href == quote(f"{Path(name).name}.csv")
+    values = read_csv(report / f"{name}.csv")
+    rows = browser.run("return page.x.length")
+    last = len(values["time"]) - 1
+    for row in (0, rows // 3, rows - 1):
+        time, shown = browser.run(
+            "page.seek(arguments[0]);"
+            "const shown = [...document.querySelectorAll('[data-curve]')];"
+            "return [page.x[page.row], shown.map(x => [x.dataset.curve, x.innerText])]",
+            row,
+        )
+        found = np.flatnonzero(values["time"] == time)
+        assert len(found) == 1 and (row < rows - 1 or found[0] == last)
+        seen = {curve: text.split()[0] for curve, text in shown if curve in values}
+        assert curves <= set(seen)
+        for curve, text in seen.items():
+            assert float(text) == float(f"{values[curve][found[0]]:.9g}"), curve
+
+
+def test_cursor_player_and_plots_are_in_step(browser: Browser, report: Path) -> None:
+    show(browser, report / f"scenarios/{SCENARIOS[0]}.html", width=1400)
+    state = "return [page.row, Number(page.bar.value), page.player.time, page.x[page.row]]"
+    browser.keys("#cursor", Keys.END, Keys.ARROW_LEFT)
+    row, bar, time, x = browser.run(state)
+    assert row == bar == browser.run("return page.x.length") - 2 and time == x
+    browser.run("page.player.seek(0.5)")
+    row, bar, time, x = browser.run(state)
+    assert row == bar and time == x == 0.5
+    lines = browser.run(
+        "return page.plots.map(plot => [plot.line.hidden, parseFloat(plot.line.style.left)"
+        " - plot.drawing._fullLayout.xaxis._offset, plot.drawing._fullLayout.xaxis._length])"
+    )
+    for hidden, place, length in lines:
+        assert not hidden and place / length == pytest.approx(0.5 / 2.0, abs=0.01)
+    # a click at three quarters of a plot
+    browser.run(
+        "const {drawing} = page.plots[2], {xaxis} = drawing._fullLayout;"
+        "const left = drawing.getBoundingClientRect().left + xaxis._offset;"
+        "drawing.dispatchEvent(new MouseEvent('click', {clientX: left + 0.75 * xaxis._length}))"
+    )
+    assert browser.run(state)[2] == pytest.approx(1.5, abs=0.02)
+    browser.check_quiet()
+
+
+def test_a_zoom_is_that_of_all_plots(browser: Browser, report: Path) -> None:
+    show(browser, report / f"system/{VARIANT}.html")
+    ranges = "page.plots.map(plot => plot.drawing._fullLayout.xaxis.range.join())"
+    browser.run("Plotly.relayout(page.plots[1].drawing, {'xaxis.range': [1, 2]})")
+    browser.wait(f"new Set({ranges}).size === 1 && {ranges}[0] === '1,2'")
+    browser.run("page.seek(0)")
+    assert browser.run("return page.plots.every(plot => plot.line.hidden)")
+    browser.run("Plotly.relayout(page.plots[0].drawing, {'xaxis.autorange': true})")
+    browser.wait(f"new Set({ranges}).size === 1 && {ranges}[0] === '0,4'")
