@@ -29,6 +29,7 @@ MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
 WORKERS = ".{}.workers"  # with the number of the process
 ROOM = 1.1  # of the room that is needed: what Parquet adds
+FILE, COLUMN = 4000, 400  # bytes of a file, and of each of its columns, besides the rows
 ROW_TEXT = 8  # bytes of a row besides its numbers
 
 
@@ -117,7 +118,8 @@ class Results:
             there = there.parent
         rows = self._campaign.count * (8 * (len(self.columns) + 1) + ROW_TEXT)
         recorded = 8 * len(self._job.times) * (len(self._job.watched) + 1)
-        needed = ROOM * (rows + recorded * len(self._job.trajectories))
+        files = self._campaign.blocks * (FILE + COLUMN * len(self._schema))
+        needed = ROOM * (rows + files + recorded * len(self._job.trajectories))
         free = shutil.disk_usage(there).free
         if needed > free:
             raise UserError(
