@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from cosim.campaign.campaign_file import Campaign
@@ -198,6 +199,11 @@ class Results:
         parts = [pq.read_table(path, columns=list(columns)) for path in files]
         whole_table = pa.concat_tables(parts)
         return {name: whole_table[name].to_numpy() for name in columns}
+
+    def failed(self) -> int:
+        """Number of runs that failed."""
+        reasons = (self.block(block)[FAILURE] for block in range(self._campaign.blocks))
+        return sum(pc.sum(pc.not_equal(texts, "")).as_py() for texts in reasons)
 
     def digest(self) -> str:
         """SHA-256 of all numbers and texts of the table, block by block."""
