@@ -13,6 +13,7 @@ from cosim.campaign.results import MANIFEST, Results
 from cosim.report.pages import write_page
 from cosim.report.style import save
 
+MOST = 10**7  # runs, whose table is held in memory
 DISTRIBUTIONS, INDICES, MAP = "distributions", "indices", "map_{}"
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from cosim.campaign.campaign_file import Campaign
@@ -29,6 +30,7 @@ MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
 WORKERS = ".{}.workers"  # with the number of the process
 ROOM = 1.1  # of the room that is needed: what Parquet adds
+FILE, COLUMN = 4000, 400  # bytes of a file, and of each of its columns, besides the rows
 ROW_TEXT = 8  # bytes of a row besides its numbers
 
 
@@ -117,7 +119,8 @@ class Results:
             there = there.parent
         rows = self._campaign.count * (8 * (len(self.columns) + 1) + ROW_TEXT)
         recorded = 8 * len(self._job.times) * (len(self._job.watched) + 1)
-        needed = ROOM * (rows + recorded * len(self._job.trajectories))
+        files = self._campaign.blocks * (FILE + COLUMN * len(self._schema))
+        needed = ROOM * (rows + files + recorded * len(self._job.trajectories))
         free = shutil.disk_usage(there).free
         if needed > free:
             raise UserError(
@@ -196,6 +199,11 @@ class Results:
         parts = [pq.read_table(path, columns=list(columns)) for path in files]
         whole_table = pa.concat_tables(parts)
         return {name: whole_table[name].to_numpy() for name in columns}
+
+    def failed(self) -> int:
+        """Number of runs that failed."""
+        reasons = (self.block(block)[FAILURE] for block in range(self._campaign.blocks))
+        return sum(pc.sum(pc.not_equal(texts, "")).as_py() for texts in reasons)
 
     def digest(self) -> str:
         """SHA-256 of all numbers and texts of the table, block by block."""

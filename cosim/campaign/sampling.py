@@ -1,6 +1,6 @@
 """Parameters of each run: points of the unit cube, by scipy and SALib, through distributions.
 
-The points of a run depend on the campaign's text alone, so that each block can be made by itself.
+The points of a run depend only on the campaign's text, so that each block can be made by itself.
 """
 
 import warnings

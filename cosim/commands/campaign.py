@@ -4,19 +4,28 @@ import argparse
 import shlex
 import sys
 import time
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cosim import project
 from cosim.errors import UserError
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 
+if TYPE_CHECKING:
+    from cosim.campaign.bases import Base
+    from cosim.campaign.campaign_file import Campaign
+    from cosim.campaign.job import Job
+    from cosim.campaign.points import Points
+    from cosim.campaign.results import Results
+
 NEEDED = ("SALib", "distributed", "numba", "pyarrow", "scipy")
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run what is missing of the campaign; 0 if every run has succeeded."""
+    """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
@@ -37,11 +46,15 @@ def run(options: argparse.Namespace) -> int:
         results = Results(folder, campaign, job, text)
         runs.check(job, base.archives)
         results.begin()
-        missing_blocks = results.missing()
-        if missing_blocks:
-            _run(options, campaign, base, job, points, results, missing_blocks)
+        _run_missing(options, _Plan(campaign, base, job, points, results))
+        failed = results.failed()
+        if failed:
+            print(f"failed: {failed} of {campaign.count} runs")
         digest = results.digest()
         print(f"table: {digest}")
+        if campaign.count > page.MOST:
+            print(f"results: {from_here(folder)}, no page of more than {page.MOST} runs")
+            return 0
         with written(folder):
             index = page.write(campaign, job, results, _command(options), digest)
     print(f"page: {from_here(index)}")
@@ -57,7 +70,7 @@ def _command(options: argparse.Namespace) -> str:
     return shlex.join(parts)
 
 
-def _folder(options: argparse.Namespace, campaign) -> Path:
+def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:
     if options.output is not None:
         return options.output
     if campaign.output is not None:
@@ -65,22 +78,40 @@ def _folder(options: argparse.Namespace, campaign) -> Path:
     return project.ROOT / "build" / "campaigns" / options.file.stem
 
 
-def _run(options, campaign, base, job, points, results, blocks) -> None:
-    from cosim.campaign import engine
+@dataclass(frozen=True)
+class _Plan:
+    """A campaign that is ready to run."""
 
-    ahead = sum(len(campaign.block_range(block)) for block in blocks)
-    if ahead < campaign.count:
-        print(f"goes on: {campaign.count - ahead} of {campaign.count} runs are there")
+    campaign: "Campaign"
+    base: "Base"
+    job: "Job"
+    points: "Points"
+    results: "Results"
+
+
+def _run_missing(options: argparse.Namespace, plan: _Plan) -> None:
+    """Run the blocks whose results are not there."""
+    blocks = plan.results.missing()
+    if not blocks:
+        return
+    from cosim.campaign import engine  # takes long
+
+    count = plan.campaign.count
+    ahead = sum(len(plan.campaign.block_range(block)) for block in blocks)
+    if ahead < count:
+        print(f"goes on: {count - ahead} of {count} runs are there")
     try:
         with (
-            results.workers_folder() as files,
+            plan.results.workers_folder() as files,
             engine.cluster(options.scheduler, options.workers, files) as client,
         ):
             print(f"dashboard: {client.dashboard_link}", flush=True)
-            maker = engine.Engine(client, campaign, job, base.archives, points, results)
+            made = engine.Engine(
+                client, plan.campaign, plan.job, plan.base.archives, plan.points, plan.results
+            )
             begin = time.perf_counter()
-            with Progress(campaign.title, ahead, "runs") as progress:
-                maker.run(blocks, progress)
+            with Progress(plan.campaign.title, ahead, "runs") as progress:
+                made.run(blocks, progress)
             seconds = time.perf_counter() - begin
     except (KeyboardInterrupt, SystemExit):
         print(f"stopped; {engine.GOES_ON}", file=sys.stderr)

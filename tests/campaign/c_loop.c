@@ -1,6 +1,6 @@
-/* The runs of rate.toml by a plain loop in C: what a campaign's rate is compared with.
+/* The runs of rate.py by a plain loop in C: what a campaign's rate is compared with.
  *
- * c_loop LIBRARY GUID RUNS THREADS: each thread loads nothing of its own, has one instance, and
+ * c_loop LIBRARY GUID RUNS THREADS: each thread has one instance and
  * resets it between runs. Prints seconds of wall time and of processor time, and a sum of results.
  */
 #define _POSIX_C_SOURCE 200809L
@@ -91,7 +91,7 @@ static void *work_through(void *argument) {
         return NULL;
     }
     for (unsigned i = 0; i < work->runs && !work->failed; i++) {
-        /* all over the box of rate.toml, in the order of the golden ratio */
+        /* all over the box of rate.py, in the order of the golden ratio */
         const double u = fmod(0.61803398874989485 * (work->first + i), 1.0);
         double largest;
         work->failed = run(instance, 0.8 + 0.4 * u, -1.6 + 0.2 * u, &largest) != 0;

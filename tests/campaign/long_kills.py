@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -31,7 +32,7 @@ from tests.campaign.processes import (
 
 RUNS, KILLS = 1200, 20
 PAUSE = 0.5  # s, between two kills
-DISK = 120_000  # bytes: room for some of the blocks
+DISK = 8_000_000  # bytes: room for all, until something else takes it
 STEPS = [("runs = 40", f"runs = {RUNS}"), ("block = 8", "block = 6")]
 STEPS += [("time = { stop = 1.0 }\n", "")]
 
@@ -97,18 +98,24 @@ def kill_scheduler(file: Path, output: Path, undisturbed: str) -> None:
 
 
 def fill_disk(file: Path, output: Path, undisturbed: str) -> None:
-    """Write to a disk that gets full, then to one with more room."""
+    """Write to a disk that something else fills, then to one with room again."""
     output.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={DISK}", "tmpfs", str(output)]
     if subprocess.run(mount, check=False, capture_output=True).returncode:
         print("  left out: no file system can be mounted here")
         return
     try:
-        code, _, err = finish(start(file, output, "--workers", 2))
+        process = start(file, output, "--workers", 2)
+        wait_for(lambda: blocks(output) >= 5)
+        filler = output / "filler"
+        with suppress(OSError), filler.open("wb", buffering=0) as other:
+            while True:
+                other.write(bytes(4096))
+        code, _, err = finish(process)
         assert code == 2 and "No space left on device; the same command goes on" in err, err
         there = blocks(output)
         assert 0 < there < RUNS // 6
-        subprocess.run(["mount", "-o", "remount,size=50m", str(output)], check=True)
+        filler.unlink()
         code, out, err = finish(start(file, output, "--workers", 2))
         assert code == 0, err
         assert f"goes on: {there * 6} of {RUNS} runs" in out

@@ -18,7 +18,7 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
 def python(*arguments: object, **options: object) -> subprocess.Popen:
-    """A Python program in a process group of its own."""
+    """A Python program in another process group."""
     return subprocess.Popen(
         [sys.executable, "-P", "-m", *map(str, arguments)],
         stdout=subprocess.PIPE,

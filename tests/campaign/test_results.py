@@ -50,6 +50,7 @@ def test_a_table_is_in_the_order_of_the_runs(folder: Folder) -> None:
     assert np.array_equal(found["final(q2)"], np.arange(40) + 1.0)
     assert np.array_equal(found["m2"], folder.points.of(range(40))[:, 0])
     assert [i for i, text in enumerate(found["failure"]) if text] == [5]
+    assert folder.results.failed() == 1
     kept = pq.read_table(folder.results.trajectory_path(17))
     assert kept.column_names == ["time", "q1", "q2", "dq1", "actuator_power"]
     assert np.array_equal(kept["q2"].to_numpy(), np.full(201, 17.0))
