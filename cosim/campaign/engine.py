@@ -7,7 +7,6 @@ campaign. Only this process writes results: workers need no common disk.
 
 import logging
 import math
-import os
 import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,6 +18,7 @@ from pathlib import Path
 
 import dask
 import numpy as np
+from dask.system import CPU_COUNT
 from distributed import Client, Future, LocalCluster, as_completed
 from distributed.client import FutureCancelledError
 from distributed.scheduler import KilledWorker
@@ -53,7 +53,7 @@ SETTINGS = {
 @contextmanager
 def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
     """A cluster on this machine, one process a core, whose files are in `folder`."""
-    count = workers or cores()
+    count = workers or CPU_COUNT
     with (
         LocalCluster(
             n_workers=count,
@@ -83,11 +83,6 @@ def connected(address: str) -> Iterator[Client]:
         raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
     with client:
         yield client
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,8 @@ class Results:
             self._remove_left()
             if not path.exists():
                 with whole(path) as temporary:
-                    temporary.write_text(json.dumps(wanted, indent=1) + "\n", encoding="utf-8")
+                    text = json.dumps(wanted, indent=1) + "\n"
+                    temporary.write_text(text, encoding="utf-8", newline="\n")
         except OSError as error:
             raise self._unwritable(error) from error
 
