@@ -58,11 +58,12 @@ def draw(axes: Axes, times: np.ndarray, values: np.ndarray, label: str, color: s
     axes.set_ylabel(label)
 
 
-def draw_limit(axes: Axes, values: np.ndarray, limit: float, share: float = REACHED) -> None:
-    """A limit of both signs, where `values` reach this share of it."""
-    for sign in (1, -1):
-        if (sign * values).max() >= share * limit:
-            axes.axhline(sign * limit, color=MUTED, linestyle=DASHED, linewidth=1.0)
+def draw_limit(axes: Axes, values: np.ndarray, limit: float, share: float = REACHED) -> bool:
+    """Draw a limit of both signs, where `values` reach this share of it; whether they do."""
+    reached = [sign for sign in (1, -1) if (sign * values).max() >= share * limit]
+    for sign in reached:
+        axes.axhline(sign * limit, color=MUTED, linestyle=DASHED, linewidth=1.0)
+    return bool(reached)
 
 
 def _draw_path(axes: Axes, outcome: Outcome, arm: str) -> None:

@@ -22,16 +22,17 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
             [["q1", "q2", "path"], ["q1_error", "q2_error", "path"], ["tau1", "f2", "distance"]],
             width_ratios=[1, 1, 1.25],
         )
+        is_limited = False
         controller = ssp.system.parameter_sets[outcome.variant]["controller"]
         for effort, unit in EFFORTS:
             values = outcome.column(f"controller.{effort}")
             draw(axes[effort], outcome.run.times, values, f"{effort} ({unit})")
             limit = controller.get(f"{effort}_max")
             if limit is not None:
-                draw_limit(axes[effort], values, limit)
+                is_limited |= draw_limit(axes[effort], values, limit)
         system_figure.draw_motion(axes, outcome, ARM)
         for name in ("tau1", "f2", "distance"):
             axes[name].set_xlabel("time (s)")
-        entry = system_figure.limit_entry("limit of the effort")
-        system_figure.finish(picture, "Closed loop", outcome, ARM, [entry])
+        more = [system_figure.limit_entry("limit of the effort")] if is_limited else []
+        system_figure.finish(picture, "Closed loop", outcome, ARM, more)
     return picture

@@ -41,8 +41,9 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
         times = outcome.run.times
         for effort, unit in EFFORTS:
             draw(axes[effort], times, outcome.column(f"actuator.{effort}"), f"{effort} ({unit})")
+        is_limited = False
         for joint in (1, 2):
-            _draw_motor(axes, ssp, outcome, joint)
+            is_limited |= _draw_motor(axes, ssp, outcome, joint)
             _draw_mode(axes[f"mode{joint}"], times, outcome.column(f"plant.mode{joint}"), joint)
         force = outcome.column("environment.wall_force")
         draw(axes["wall"], times, force, "force of the wall (N)", ERRORS[1])
@@ -56,18 +57,18 @@ def figure(ssp: Ssp, outcome: Outcome) -> Figure:
                 _shade(panel, times, attached)
         for name in ("mode1", "mode2", "wall"):
             axes[name].set_xlabel("time (s)")
-        more: list[Line2D | Patch] = [
-            Line2D([], [], color=ERRORS[1], linewidth=1.3, label="wall"),
-            system_figure.limit_entry("limit of the motor"),
-        ]
+        more: list[Line2D | Patch] = [Line2D([], [], color=ERRORS[1], linewidth=1.3, label="wall")]
+        if is_limited:
+            more.append(system_figure.limit_entry("limit of the motor"))
         if attached.any():
             more.append(Patch(color=CARRIED, label="payload attached"))
         system_figure.finish(picture, "Machine", outcome, ARM, more)
     return picture
 
 
-def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -> None:
-    """Current and voltage of a motor, with their limits."""
+def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -> bool:
+    """Current and voltage of a motor; whether one of them is near its limit."""
+    is_limited = False
     values = ssp.models["actuator"].start_values
     values = values | ssp.system.parameter_sets[outcome.variant]["actuator"]
     for kind, unit in MOTORS:
@@ -75,8 +76,9 @@ def _draw_motor(axes: dict[str, Axes], ssp: Ssp, outcome: Outcome, joint: int) -
         shown = outcome.column(f"actuator.{name}")
         draw(axes[name], outcome.run.times, shown, f"{name} ({unit})")
         limit = float(values[f"{kind}_max{joint}"])
-        draw_limit(axes[name], shown, limit, NEAR)
+        is_limited |= draw_limit(axes[name], shown, limit, NEAR)
         axes[name].set_title(f"limit: ±{limit:g} {unit}", loc="left", fontsize=11)
+    return is_limited
 
 
 def _shade(axes: Axes, times: np.ndarray, attached: np.ndarray) -> None:
