@@ -1,5 +1,6 @@
 """HTML pages, made from the templates beside this file."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from cosim.output_files import whole
 from cosim.report.run_data import RunData
 
 INDEX = "index.html"
+NUMERIC = re.compile(r"-?\d[\d.]*(e[+-]?\d+)?( m?s)?|nan|–")  # of cells aligned to the right
 
 _templates = Environment(
     loader=FileSystemLoader(Path(__file__).parent / "templates"),
@@ -21,6 +23,7 @@ _templates = Environment(
     lstrip_blocks=True,
 )
 _templates.filters |= {"address": quote, "number": texts.number, "short": texts.short}
+_templates.tests["numeric"] = lambda cell: NUMERIC.fullmatch(str(cell)) is not None
 
 
 @dataclass(frozen=True)

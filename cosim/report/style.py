@@ -10,12 +10,6 @@ from cosim.output_files import whole
 INK, MUTED, GRID = "#22303c", "#6b7885", "#e3e8ec"
 REFERENCE, RUN = "#a9c5de", "#1d4e79"
 ERRORS = ("#d1793a", "#2f8f83", "#7a5195", "#8a8d3f")
-LINES = (
-    ("#1d4e79", "#a9c5de"),
-    ("#d1793a", "#f0cfb4"),
-    ("#2f8f83", "#b5dad5"),
-    ("#7a5195", "#d5c3df"),
-)
 DASHED = (0, (5, 3))
 
 STYLE = {

@@ -8,6 +8,7 @@ from cosim.__main__ import main
 from tests.support.browser import Browser
 
 SCENARIOS = ("thrown_against_stop", "actuator_torque_steps", "constant_effort_single_step")
+LATE = "late_start"  # at 1e6 s
 VARIANT = "wall_contact"
 # what may stand in a file name and in a title, and means something in HTML or in an address
 STRANGE = "Bögen & <b>50%<b> #1?"
@@ -40,7 +41,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("user") / f"{STRANGE}.toml"
     file.write_text(CONTENT, encoding="utf-8")
     arguments = ["--report", str(folder)]
-    assert main(["run", *SCENARIOS, *arguments]) == 0
+    assert main(["run", *SCENARIOS, LATE, *arguments]) == 0
     assert main(["system", VARIANT, *arguments]) == 0
     assert main(["run", str(file), *arguments]) == 0
     return folder

@@ -8,7 +8,7 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 
 from cosim import trajectory_csv
-from tests.report.conftest import SCENARIOS, STRANGE, VARIANT, show
+from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 
 
@@ -84,3 +84,15 @@ def test_a_zoom_is_that_of_all_plots(browser: Browser, report: Path) -> None:
     assert browser.run("return page.plots.every(plot => plot.line.hidden)")
     browser.run("Plotly.relayout(page.plots[0].drawing, {'xaxis.autorange': true})")
     browser.wait(f"new Set({ranges}).size === 1 && {ranges}[0] === '0,4'")
+
+
+def test_a_late_time_keeps_its_digits(browser: Browser, report: Path) -> None:
+    show(browser, report / f"scenarios/{LATE}.html")
+    values = read_csv(report / f"scenarios/{LATE}.csv")
+    browser.run("page.seek(arguments[0])", 123)
+    text = browser.run("return page.output.textContent")
+    assert text == f"time {values['time'][123]:.12g} s" and text.startswith("time 1000001.")
+    labels = browser.run(
+        "return [...document.querySelectorAll('.xtick text')].map(tick => tick.textContent)"
+    )
+    assert labels and all(float(label.replace("\u202f", "")) >= 1e6 for label in labels)

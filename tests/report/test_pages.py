@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 import pytest
 
-from tests.report.conftest import SCENARIOS, STRANGE, VARIANT, show
+from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 
 PAGES = (
@@ -14,6 +14,7 @@ PAGES = (
     f"scenarios/{SCENARIOS[0]}.html",  # with motion
     f"scenarios/{SCENARIOS[1]}.html",  # without
     f"scenarios/{SCENARIOS[2]}.html",  # of two rows
+    f"scenarios/{LATE}.html",
     "studies/accuracy.html",
     f"system/{VARIANT}.html",
     f"files/{STRANGE}.html",

@@ -36,10 +36,10 @@ const Plots = (() => {
     return Math.abs(sorted[high] - x) < Math.abs(x - sorted[low]) ? high : low;
   }
 
-  /** At most nine digits, as short as they get. */
-  function shown(number) {
+  /** At most so many digits, as short as they get. */
+  function shown(number, digits = 9) {
     if (!Number.isFinite(number)) return '–';
-    const rounded = Number(number.toPrecision(9));
+    const rounded = Number(number.toPrecision(digits));
     const tiny = rounded !== 0 && Math.abs(rounded) < 1e-4;
     return tiny ? rounded.toExponential() : String(rounded);
   }
@@ -92,6 +92,7 @@ const Plots = (() => {
       margin: { l: 62, r: 12, t: 26, b: 38 },
       showlegend: false,
       hovermode: false,
+      separators: '.\u202f', // decimal point, and a narrow space between thousands
       // on a touch screen a finger on a plot scrolls the page
       dragmode: matchMedia('(pointer: coarse)').matches ? false : 'zoom',
       font: { color: palette.ink, size: 12 },
@@ -103,7 +104,7 @@ const Plots = (() => {
         title: { text: axis.unit ? `${axis.title} (${axis.unit})` : axis.title, standoff: 4 },
         type: axis.log ? 'log' : 'linear',
         autorange: axis.reversed ? 'reversed' : true,
-        exponentformat: 'power',
+        exponentformat: axis.log ? 'power' : 'none', // a late time keeps its digits
       },
       yaxis: { ...lines, type: plot.log ? 'log' : 'linear', exponentformat: 'power', nticks: 6 },
     };
@@ -230,7 +231,7 @@ const Plots = (() => {
       if (row === this.row) return;
       this.row = row;
       const { title, unit } = this.data.axis;
-      const text = `${title} ${shown(this.x[row])}${unit ? ` ${unit}` : ''}`;
+      const text = `${title} ${shown(this.x[row], 12)}${unit ? ` ${unit}` : ''}`;
       this.bar.value = row;
       this.bar.setAttribute('aria-valuetext', text);
       this.output.textContent = text;
