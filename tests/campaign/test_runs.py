@@ -14,6 +14,7 @@ from cosim.system import ssp
 from tests.campaign.files import ARM, HEAD, campaign
 from tests.campaign.runners import rows, runner
 from tests.support.cosim_project import BUILD, FMUS, load
+from tests.support.paths import ROOT
 
 OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
 
@@ -86,6 +87,25 @@ def test_a_run_of_a_system_has_the_bits_of_the_master(tmp_path: Path) -> None:
     tip -= expected[:, [master.names.index(f"trajectory.ee_{x}_ref") for x in "xy"]]
     largest = np.max(np.hypot(*tip.T))
     assert found.measures[1, 2] == pytest.approx(largest, rel=1e-12)
+
+
+def test_booleans_go_through_a_system(tmp_path: Path) -> None:
+    # the gripper's signal makes controller and plant carry the payload
+    text = HEAD + (
+        'system = "machine"\nvariant = "pick_and_place"\nsampling = "random"\nruns = 1\n'
+        "[parameters.'plant.payload_mass']\nvalues = [1.0]\n[keep]\n"
+        "final = ['plant.q1', 'plant.q2', 'plant.dq1', 'plant.dq2']\ntrajectories = [0]\n"
+    )
+    with runner(campaign(tmp_path, text), tmp_path) as (runs, job, points):
+        record = rows(runs, job, points, [0]).trajectories[0]
+    path = ROOT / "models" / "machine" / "references" / "pick_and_place" / "ecos.csv"
+    names = path.read_text(encoding="utf-8").splitlines()[0].replace('"', "").split(",")
+    reference = np.loadtxt(path, delimiter=",", skiprows=1)
+    steps = np.rint(reference[:, 0] / 1e-3).astype(int)
+    assert steps[-1] == job.steps == 4000
+    for i, name in enumerate(job.watched):
+        expected = reference[:, names.index(name)]
+        assert np.max(np.abs(record[steps, i] - expected)) < 1e-7 * np.max(np.abs(expected))
 
 
 def test_a_run_does_not_depend_on_those_before(tmp_path: Path) -> None:
