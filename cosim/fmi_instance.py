@@ -221,14 +221,6 @@ class Instance(ABC):
         with self.explained(f"({name})"):
             return self._integer(variable.reference)
 
-    def discrete(self, name: str) -> int:
-        """Value of a Boolean (0 or 1), Integer or Enumeration variable."""
-        variable = self.fmu.model.variables[name]
-        with self.explained(f"({name})"):
-            if variable.type == "Boolean":
-                return int(self.fmi.getBoolean([variable.reference])[0])
-            return self._integer(variable.reference)
-
     @abstractmethod
     def _integer(self, reference: int) -> int: ...
 
