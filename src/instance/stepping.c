@@ -11,14 +11,19 @@
 #include <math.h>
 #include <string.h>
 
+/* s: integrators go beyond the end of a step, by up to 1e4 times its length. With times that then
+ * overflow cvode_bdf would try the same step without end. */
+static const double latest_time = 1e300;
+
 static enum status refuse_times(const struct instance *instance, double t, double h) {
     const struct instance_experiment *experiment = &instance->state.experiment;
     const struct clock_time now = instance->state.time;
-    if (!(h > 0.0) || !isfinite(t + h)) {
-        message_write(&instance->sink, STATUS_INVALID_TIME,
-                      "a step of %g s from t = %.17g is refused: a finite time and a step above 0 "
-                      "are expected",
-                      h, t);
+    if (!(h > 0.0 && h <= latest_time && fabs(t) <= latest_time)) {
+        message_write(
+            &instance->sink, STATUS_INVALID_TIME,
+            "a step of %g s from t = %.17g is refused: a time up to %g s and a step above "
+            "0 are expected",
+            h, t, latest_time);
         return STATUS_INVALID_TIME;
     }
     if (t + h == t) {
@@ -210,7 +215,10 @@ static enum status integrate(struct step *step) {
 
 /* The same for a model without states. */
 static enum status pass_time(struct step *step) {
-    enum status status = STATUS_OK;
+    enum status status = instance_check_inputs(step);
+    if (status != STATUS_OK) {
+        return status;
+    }
     if (step->instance->model->events != NULL) {
         keep(step);
         status = instance_move_over_events(step, CONTINUE_AFTER_CHANGE);

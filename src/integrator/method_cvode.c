@@ -31,6 +31,10 @@ static const double first_step_fraction_after_event = 0.003;
 static const double growth_after_event = 10.0;
 static const double usual_growth = 1e4; // CVODE's own
 
+/* s: the square of a length underflows in shorter first steps, and their number then depends on who
+ * watches them. */
+static const double shortest_first_advance = 1e-150;
+
 struct cvode {
     struct sundials base; /* first */
     void *solver;
@@ -408,6 +412,11 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     struct cvode *cvode = memory;
     (void)begin_x; // CVODE has it
     bool is_cut_short = false;
+    if (cvode->base.problem->reached == 0.0 && t < shortest_first_advance) {
+        *stopped_at = 0.0;
+        sundials_get_state(&cvode->base, x);
+        return status_of_flag(cvode->base.problem, CV_TOO_CLOSE);
+    }
     const int flag = integrate(cvode, t, max_steps, stopped_at, x, &is_cut_short);
     measure_work(cvode, work);
     work->is_cut_short = is_cut_short;

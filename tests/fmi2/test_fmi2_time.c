@@ -130,14 +130,15 @@ static void test_steps_that_are_refused(void) {
         double point, length;
         const char *words[2]; /* of the message */
     } cases[] = {
-        {start, 0.0, {"above 0", "1.75"}},   {start, -0.0, {"above 0", "1.75"}},
-        {start, -0.5, {"-0.5", "1.75"}},     {start, NAN, {"nan", "1.75"}},
-        {start, INFINITY, {"inf", "1.75"}},  {start, -INFINITY, {"inf", "1.75"}},
-        {NAN, 0.5, {"nan", "0.5"}},          {INFINITY, 0.5, {"inf", "0.5"}},
-        {DBL_MAX, DBL_MAX, {"refused", ""}}, {start, 1e-20, {"1e-20", "1.75"}},
-        {1.5, 0.25, {"1.5", "1.75"}},        // backwards
-        {1.8125, 0.625, {"1.8125", "1.75"}}, // a tenth of a step late
-        {1.6875, 0.625, {"1.6875", "1.75"}}, // and early
+        {start, 0.0, {"above 0", "1.75"}},    {start, -0.0, {"above 0", "1.75"}},
+        {start, -0.5, {"-0.5", "1.75"}},      {start, NAN, {"nan", "1.75"}},
+        {start, INFINITY, {"inf", "1.75"}},   {start, -INFINITY, {"inf", "1.75"}},
+        {NAN, 0.5, {"nan", "0.5"}},           {INFINITY, 0.5, {"inf", "0.5"}},
+        {DBL_MAX, DBL_MAX, {"refused", ""}},  {start, 1e-20, {"1e-20", "1.75"}},
+        {start, 1.1e300, {"1e+300", "1.75"}}, // an integrator would overflow
+        {1.5, 0.25, {"1.5", "1.75"}},         // backwards
+        {1.8125, 0.625, {"1.8125", "1.75"}},  // a tenth of a step late
+        {1.6875, 0.625, {"1.6875", "1.75"}},  // and early
         {0.0, 0.625, {"t = 0", "1.75"}},
     };
     for (size_t i = 0; i < FMU_COUNT(cases); i++) {
