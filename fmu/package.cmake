@@ -53,6 +53,7 @@ function(add_fmu name)
   if(NOT ARG_VERSIONS)
     set(ARG_VERSIONS ${FMI_VERSIONS})
   endif()
+  set_property(DIRECTORY APPEND PROPERTY FMUS ${name})
   set(folder ${PROJECT_SOURCE_DIR}/${ARG_FOLDER})
   set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
   set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/terminalsAndIcons.xml

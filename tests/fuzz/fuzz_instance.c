@@ -1,7 +1,5 @@
 #include "fuzz_instance.h"
 
-#include "model_description.h"
-
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +7,7 @@
 
 struct fmu_functions fuzz_fmu;
 void (*fuzz_choose_variety)(unsigned variety);
+fmi2Status (*fuzz_do_step)(struct fuzz_instance *instance, double length);
 
 static const char instance_name[] = "fuzzed";
 
@@ -74,7 +73,7 @@ struct fuzz_instance *fuzz_instance_create_variety(fmi2Type kind, unsigned varie
     instance->tells_refusals = has_logger;
     choose(variety);
     instance->component =
-        FUZZ_CALL(fuzz_fmu.Instantiate(instance_name, kind, FMU_NAME(GUID), NULL, callbacks,
+        FUZZ_CALL(fuzz_fmu.Instantiate(instance_name, kind, model_description.guid, NULL, callbacks,
                                        fmi2False, logging_on ? fmi2True : fmi2False));
     choose(0);
     free(callbacks); // valid during the call only
@@ -152,13 +151,14 @@ fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, boo
 }
 
 void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit) {
-    const fmi2ValueReference reference = FMU_NAME(max_internal_steps);
-    if (FUZZ_CHECKED(instance, SetInteger, &reference, 1, &limit) != fmi2OK) {
+    const struct variable *variable = fuzz_find("max_internal_steps");
+    if (variable != NULL &&
+        FUZZ_CHECKED(instance, SetInteger, &variable->reference, 1, &limit) != fmi2OK) {
         fuzz_fail("max_internal_steps of a new instance cannot be set");
     }
 }
 
-static void reset(struct fuzz_instance *instance) {
+void fuzz_reset_plain(struct fuzz_instance *instance) {
     if (FUZZ_CHECKED_PLAIN(instance, Reset) != fmi2OK) {
         fuzz_fail("fmi2Reset fails");
     }
@@ -167,7 +167,7 @@ static void reset(struct fuzz_instance *instance) {
 }
 
 void fuzz_reset(struct fuzz_instance *instance) {
-    reset(instance);
+    fuzz_reset_plain(instance);
     fuzz_limit_steps(instance, FUZZ_MAX_INTERNAL_STEPS);
 }
 
@@ -182,6 +182,9 @@ fmi2Status fuzz_initialize(struct fuzz_instance *instance, double tolerance, dou
 }
 
 fmi2Status fuzz_step(struct fuzz_instance *instance, double length) {
+    if (fuzz_do_step != NULL) {
+        return fuzz_do_step(instance, length);
+    }
     const fmi2Status status = FUZZ_CHECKED(instance, DoStep, instance->time, length, fmi2True);
     if (status == fmi2OK) {
         instance->time += length;
@@ -190,6 +193,24 @@ fmi2Status fuzz_step(struct fuzz_instance *instance, double length) {
 }
 
 /* ---- Values ---------------------------------------------------------------------------------- */
+
+const struct variable *fuzz_find(const char *name) {
+    for (size_t i = 0; i < model_description.variable_count; i++) {
+        if (strcmp(model_description.variables[i].name, name) == 0) {
+            return &model_description.variables[i];
+        }
+    }
+    return NULL;
+}
+
+size_t fuzz_state_count(void) {
+    return model_description.model->states.size / sizeof(double);
+}
+
+bool fuzz_is_smooth_input(const struct variable *variable) {
+    return variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64 &&
+           variable->variability == VARIABILITY_CONTINUOUS;
+}
 
 void fuzz_assert_written(fmi2Status status, const double values[], size_t count, const char *what) {
     if (status != fmi2OK) {
@@ -235,8 +256,9 @@ void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values) {
     size_t count = 0;
     memset(values, 0, sizeof *values);
     values->status = fmi2OK;
-    if (model_description.variable_count > FUZZ_VARIABLE_CAPACITY) {
-        fuzz_fail("more variables than FUZZ_VARIABLE_CAPACITY");
+    if (model_description.variable_count > FUZZ_VARIABLE_CAPACITY ||
+        fuzz_state_count() > FUZZ_STATE_CAPACITY) {
+        fuzz_fail("more variables or states than this program can hold");
     }
     for (size_t i = 0; i < model_description.variable_count; i++) {
         if (model_description.variables[i].type == VARIABLE_FLOAT64) {
@@ -293,119 +315,4 @@ fmi2Integer fuzz_method(unsigned selector) {
     const unsigned count =
         model_description.model->series != NULL ? FUZZ_METHODS : FUZZ_METHODS - 1;
     return 1 + (fmi2Integer)(selector % count);
-}
-
-/* ---- After an error -------------------------------------------------------------------------- */
-
-enum { RUN_STEPS = 6, BYTES_CAPACITY = 4096 };
-
-/* A short simulation, and the serialized state before it. */
-struct run {
-    bool is_known;
-    size_t byte_count;
-    fmi2Byte bytes[BYTES_CAPACITY];
-    struct fuzz_values after[RUN_STEPS];
-};
-
-static void require(fmi2Status status, const char *what) {
-    if (status != fmi2OK) {
-        fuzz_fail("%s in a run of a new or reset instance has the status %d", what, (int)status);
-    }
-}
-
-static void serialize(struct fuzz_instance *instance, struct run *run) {
-    fmi2FMUstate state = NULL;
-    require(FUZZ_CHECKED(instance, GetFMUstate, &state), "fmi2GetFMUstate");
-    require(FUZZ_CHECKED(instance, SerializedFMUstateSize, state, &run->byte_count),
-            "fmi2SerializedFMUstateSize");
-    if (run->byte_count > BYTES_CAPACITY) {
-        fuzz_fail("%zu bytes of a state are more than BYTES_CAPACITY", run->byte_count);
-    }
-    require(FUZZ_CHECKED(instance, SerializeFMUstate, state, run->bytes, run->byte_count),
-            "fmi2SerializeFMUstate");
-    require(FUZZ_CHECKED(instance, FreeFMUstate, &state), "fmi2FreeFMUstate");
-}
-
-static void run_co_simulation(struct fuzz_instance *instance, struct run *run) {
-    static const double lengths[RUN_STEPS] = {1.0 / 64, 1.0 / 64, 0.25, 1e-3, 1e-3, 0.5};
-    const fmi2ValueReference inputs[] = {FMU_NAME(tau1), FMU_NAME(f2)};
-    const fmi2Integer orders[] = {1, 2};
-    for (int i = 0; i < RUN_STEPS; i++) {
-        const double efforts[] = {0.5 * i, 9.81 - i};
-        if (i != 1 && i != 2) {
-            require(FUZZ_CHECKED(instance, SetReal, inputs, 2, efforts), "fmi2SetReal");
-        }
-        if (i == 4) {
-            require(FUZZ_CHECKED(instance, SetRealInputDerivatives, inputs, 2, orders, efforts),
-                    "fmi2SetRealInputDerivatives");
-        }
-        require(fuzz_step(instance, lengths[i]), "fmi2DoStep");
-        fuzz_read(instance, &run->after[i]);
-    }
-}
-
-static void run_model_exchange(struct fuzz_instance *instance, struct run *run) {
-    double x[4];
-    double dx[4];
-    require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode), "fmi2EnterContinuousTimeMode");
-    require(FUZZ_CHECKED(instance, GetContinuousStates, x, 4), "fmi2GetContinuousStates");
-    for (int i = 0; i < RUN_STEPS; i++) {
-        require(FUZZ_CHECKED(instance, GetDerivatives, dx, 4), "fmi2GetDerivatives");
-        for (int k = 0; k < 4; k++) {
-            x[k] += 0.01 * dx[k];
-        }
-        instance->time += 0.01;
-        require(FUZZ_CHECKED(instance, SetTime, instance->time), "fmi2SetTime");
-        require(FUZZ_CHECKED(instance, SetContinuousStates, x, 4), "fmi2SetContinuousStates");
-        fuzz_read(instance, &run->after[i]);
-    }
-}
-
-/* From an instance that was just made or reset. */
-static void make_run(struct fuzz_instance *instance, unsigned variant, struct run *run) {
-    const fmi2ValueReference starts[] = {FMU_NAME(q1), FMU_NAME(dq2), FMU_NAME(m2)};
-    const double values[] = {-1.0, 0.25, 1.5};
-    const fmi2ValueReference method = FMU_NAME(solver_method);
-    const fmi2Integer method_value = fuzz_method(variant);
-    serialize(instance, run);
-    if (variant < FUZZ_METHODS) {
-        require(FUZZ_CHECKED(instance, SetReal, starts, FUZZ_COUNT(starts), values), "fmi2SetReal");
-    }
-    require(FUZZ_CHECKED(instance, SetInteger, &method, 1, &method_value), "fmi2SetInteger");
-    require(fuzz_initialize(instance, variant < FUZZ_METHODS ? 0.0 : 1e-6,
-                            variant < FUZZ_METHODS ? 0.0 : 1000.0),
-            "the initialization");
-    if (instance->kind == fmi2CoSimulation) {
-        run_co_simulation(instance, run);
-    } else {
-        run_model_exchange(instance, run);
-    }
-}
-
-static const struct run *run_of_fresh(fmi2Type kind, unsigned variety, unsigned variant) {
-    static struct run runs[2][FUZZ_VARIETIES][FUZZ_RUN_VARIANTS];
-    struct run *run = &runs[kind == fmi2CoSimulation][variety][variant];
-    if (!run->is_known) {
-        struct fuzz_instance *fresh = fuzz_instance_create_variety(kind, variety, false, false);
-        make_run(fresh, variant, run);
-        fuzz_instance_free(fresh);
-        run->is_known = true;
-    }
-    return run;
-}
-
-void fuzz_assert_as_new(struct fuzz_instance *instance, unsigned variant) {
-    static struct run run;
-    variant %= FUZZ_RUN_VARIANTS;
-    const struct run *expected = run_of_fresh(instance->kind, instance->variety, variant);
-    reset(instance);
-    make_run(instance, variant, &run);
-    if (run.byte_count != expected->byte_count ||
-        memcmp(run.bytes, expected->bytes, run.byte_count) != 0) {
-        fuzz_fail("the serialized state after fmi2Reset is not that of a new instance");
-    }
-    for (int i = 0; i < RUN_STEPS; i++) {
-        fuzz_assert_same(&expected->after[i], &run.after[i], "a run after fmi2Reset");
-    }
-    fuzz_reset(instance);
 }

@@ -3,9 +3,9 @@
 #ifndef FUZZ_INSTANCE_H
 #define FUZZ_INSTANCE_H
 
-#include "fmu_model.h"
 #include "fmu_version.h"
 #include "fuzz.h"
+#include "model_description.h"
 
 /* Internal steps that one communication step may take here, so that executions are quick. */
 enum { FUZZ_MAX_INTERNAL_STEPS = 300 };
@@ -63,18 +63,33 @@ fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, boo
 /* fmi2Reset, and max_internal_steps as above. */
 void fuzz_reset(struct fuzz_instance *instance);
 
-/* Limits max_internal_steps of an instance that was just made or reset. */
+/* fmi2Reset. */
+void fuzz_reset_plain(struct fuzz_instance *instance);
+
+/* Limits max_internal_steps, if the model has it, of an instance that was just made or reset. */
 void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit);
 
 /* SetupExperiment to ExitInitializationMode; the first status that is not fmi2OK. */
 fmi2Status fuzz_initialize(struct fuzz_instance *instance, double tolerance, double start);
+
+/* In place of fmi2DoStep, where a step may end at an event. NULL: no step can. */
+extern fmi2Status (*fuzz_do_step)(struct fuzz_instance *instance, double length);
 
 /* From where the instance is; keeps time. */
 fmi2Status fuzz_step(struct fuzz_instance *instance, double length);
 
 /* ---- Values ---------------------------------------------------------------------------------- */
 
-enum { FUZZ_VARIABLE_CAPACITY = 160 };
+enum { FUZZ_VARIABLE_CAPACITY = 160, FUZZ_STATE_CAPACITY = 8 };
+
+/* NULL where the model has no variable of this name. */
+const struct variable *fuzz_find(const char *name);
+
+/* Continuous states of the model. */
+size_t fuzz_state_count(void);
+
+/* A continuous input: it may have derivatives. */
+bool fuzz_is_smooth_input(const struct variable *variable);
 
 /* All variables, in the order of the table; what is not of the type, or cannot be computed,
  * is 0. */

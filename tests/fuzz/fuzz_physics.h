@@ -3,6 +3,7 @@
 #define FUZZ_PHYSICS_H
 
 #include "fuzz_instance.h"
+#include "value_references.h"
 
 /* The loads that drive the joints are the same by Newton-Euler and by Euler-Lagrange (the left side
  * of (13) in the notes), but for the rounding of the terms of both; where the inputs were held they

@@ -1,6 +1,7 @@
 /* RPPlant with friction, stops and payload: random valid parameters that change while it runs, all
  * inputs, saved and serialized states, in Co-Simulation and Model Exchange. README.md says how an
  * input is decoded. */
+#include "fuzz_bytes.h"
 #include "fuzz_plant_checks.h"
 #include "fuzz_plant_settings.h"
 
@@ -10,7 +11,7 @@
 
 const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 
-enum { MAX_OPERATIONS = 20, MAX_INTERNAL_STEPS = 200, BYTES_CAPACITY = 4096 };
+enum { MAX_OPERATIONS = 20, MAX_INTERNAL_STEPS = 200 };
 
 struct plant {
     struct fuzz_input *input;
@@ -174,37 +175,6 @@ static void step(struct plant *plant) {
 
 /* ---- Serialized states ----------------------------------------------------------------------- */
 
-struct bytes {
-    size_t size;
-    unsigned char data[BYTES_CAPACITY];
-};
-
-/* src/instance/serialization.h: magic, version, lengths, GUID, fields of 8 bytes, FNV-1a of it. */
-static void forge(struct fuzz_input *input, struct bytes *bytes) {
-    enum { FIELD = 8 };
-    const size_t begin = 20 + sizeof RP_PLANT_GUID - 1;
-    const size_t count = (bytes->size - begin - FIELD) / FIELD;
-    const unsigned changes = 1 + fuzz_below(input, 3);
-    for (unsigned i = 0; i < changes; i++) {
-        const size_t field = (fuzz_byte(input) | (size_t)fuzz_byte(input) << 8) % count;
-        const double real = fuzz_real(input);
-        uint64_t bits = (uint64_t)(int64_t)fuzz_integer(input);
-        if (fuzz_below(input, 2) == 0) {
-            memcpy(&bits, &real, sizeof bits);
-        }
-        for (int k = 0; k < FIELD; k++) {
-            bytes->data[begin + FIELD * field + (size_t)k] = (unsigned char)(bits >> 8 * k);
-        }
-    }
-    uint64_t hash = 0xcbf29ce484222325u;
-    for (size_t i = 0; i + FIELD < bytes->size; i++) {
-        hash = (hash ^ bytes->data[i]) * 0x100000001b3u;
-    }
-    for (int k = 0; k < FIELD; k++) {
-        bytes->data[bytes->size - FIELD + (size_t)k] = (unsigned char)(hash >> 8 * k);
-    }
-}
-
 /* A forged state that was taken does no harm: a step can be tried, and all values are finite. */
 static void use_forged(struct plant *plant, struct fuzz_instance *other, fmi2FMUstate state) {
     struct fuzz_values values;
@@ -251,24 +221,16 @@ static void use_same(struct plant *plant, struct fuzz_instance *other, fmi2FMUst
 }
 
 static void move_state(struct plant *plant) {
-    static struct bytes bytes;
+    static struct fuzz_bytes bytes;
     const bool is_forged = fuzz_below(plant->input, 2) == 0;
     struct fuzz_instance *other = fuzz_instance_create(fmi2CoSimulation, true, false);
-    fmi2FMUstate state = save(plant);
-    require(FUZZ_CHECKED(plant->instance, SerializedFMUstateSize, state, &bytes.size), plant,
-            "fmi2SerializedFMUstateSize");
-    if (bytes.size > BYTES_CAPACITY) {
-        fuzz_fail("%zu bytes of a state are too many for BYTES_CAPACITY", bytes.size);
-    }
-    require(
-        FUZZ_CHECKED(plant->instance, SerializeFMUstate, state, (fmi2Byte *)bytes.data, bytes.size),
-        plant, "fmi2SerializeFMUstate");
-    forget(plant, &state);
+    fmi2FMUstate state = NULL;
+    fuzz_serialize(plant->instance, &bytes);
     if (is_forged) {
-        forge(plant->input, &bytes);
+        fuzz_forge(plant->input, &bytes);
     }
     const fmi2Status status =
-        FUZZ_CHECKED(other, DeSerializeFMUstate, (fmi2Byte *)bytes.data, bytes.size, &state);
+        FUZZ_CHECKED(other, DeSerializeFMUstate, bytes.data, bytes.size, &state);
     if (!is_forged && status != fmi2OK) {
         fuzz_fail("a serialized state is refused: %s", other->text);
     }

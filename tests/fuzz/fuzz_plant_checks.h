@@ -3,6 +3,7 @@
 #define FUZZ_PLANT_CHECKS_H
 
 #include "fuzz_instance.h"
+#include "value_references.h"
 
 /* After a step that succeeded: joints are within their stops, held ones stand still, friction and
  * stops are no stronger than they can be and do not drive. */

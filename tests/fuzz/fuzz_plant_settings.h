@@ -3,6 +3,7 @@
 #define FUZZ_PLANT_SETTINGS_H
 
 #include "fuzz_instance.h"
+#include "value_references.h"
 
 enum { FUZZ_PLANT_INDICATORS = 10 };
 

@@ -4,6 +4,7 @@
 #define FUZZ_SESSION_H
 
 #include "fuzz_instance.h"
+#include "value_references.h"
 
 enum { FUZZ_INSTANCES = 3, FUZZ_STATES = 5, FUZZ_SERIALIZED = 3 };
 

@@ -1,6 +1,7 @@
 /* Deserialization of mutated states, and what an instance does that goes on from one that was
  * taken. README.md says how an input is decoded. */
 #include "fuzz_instance.h"
+#include "value_references.h"
 
 #include <math.h>
 #include <stdlib.h>
