@@ -239,10 +239,7 @@ static enum status do_step(struct step *step, double communication_point, double
             return status;
         }
     }
-    status = instance_check_inputs(step);
-    if (status == STATUS_OK) {
-        status = instance->integrator == NULL ? pass_time(step) : integrate(step);
-    }
+    status = instance->integrator == NULL ? pass_time(step) : integrate(step);
     if (status == STATUS_TOO_MANY_EVENTS) {
         return status; // the message has been sent
     }
