@@ -208,7 +208,7 @@ def _add_campaign(commands: argparse._SubParsersAction) -> None:
         "--replay",
         type=_number,
         metavar="N",
-        help="run only run N again, and write all its outputs and a picture",
+        help="run only run N again; writes all its Real outputs and a page",
     )
     where = campaign.add_mutually_exclusive_group()
     where.add_argument("--scheduler", metavar="ADDRESS", help="a scheduler that runs elsewhere")

@@ -31,6 +31,7 @@ class Base(ABC):
     """A scenario or system, opened."""
 
     path: Path  # FMU or SSP
+    folder: str  # of the model or system, below models/
     archives: dict[str, bytes]  # FMUs by their hash
     times: np.ndarray  # (n + 1,) communication points in s
     tolerance: float | None
@@ -52,6 +53,10 @@ class Base(ABC):
     @abstractmethod
     def real_outputs(self) -> list[str]:
         """Names of all Real outputs."""
+
+    @abstractmethod
+    def states(self) -> list[str]:
+        """Names of the continuous states that are outputs."""
 
     @property
     @abstractmethod
@@ -78,7 +83,7 @@ class ScenarioBase(Base):
     def __init__(self, path: Path, given: Scenario, model: Model) -> None:
         content = path.read_bytes()
         digest = hashlib.sha256(content).hexdigest()
-        self.path, self.archives = path, {digest: content}
+        self.path, self.folder, self.archives = path, given.model, {digest: content}
         self._hash, self._scenario, self._model = digest, given, model
         self.times, self.tolerance = given.times, given.tolerance
         kinds = {name: values.dtype == bool for name, values in given.inputs.items()}
@@ -103,6 +108,9 @@ class ScenarioBase(Base):
 
     def real_outputs(self) -> list[str]:
         return self._model.real_outputs
+
+    def states(self) -> list[str]:
+        return [name for name in self._model.states if name in self.real_outputs()]
 
     def hold(self, name: str, value: float) -> int:
         """Column of a held input, which is `value` throughout from now on."""
@@ -156,8 +164,8 @@ class ScenarioBase(Base):
 class SystemBase(Base):
     """A variant of a system; names are ``component.variable``."""
 
-    def __init__(self, opened: Ssp, variant: str, times: np.ndarray) -> None:
-        self.path, self.times, self.tolerance = opened.path, times, None
+    def __init__(self, folder: str, opened: Ssp, variant: str, times: np.ndarray) -> None:
+        self.path, self.folder, self.times, self.tolerance = opened.path, folder, times, None
         self._ssp, self._system = opened, opened.system
         self._names = [component.name for component in self._system.components]
         self._parameters = self._system.parameter_sets[variant]
@@ -223,6 +231,10 @@ class SystemBase(Base):
     def real_outputs(self) -> list[str]:
         return [f"{c}.{name}" for c in self._names for name in self._ssp.models[c].real_outputs]
 
+    def states(self) -> list[str]:
+        found = [f"{c}.{name}" for c in self._names for name in self._ssp.models[c].states]
+        return [name for name in found if name in self.real_outputs()]
+
     def _started(self, component: str) -> dict[str, Value]:
         with Fmu(self._ssp.fmu(component)) as fmu:
             return {
@@ -272,7 +284,8 @@ def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
             guess = did_you_mean(campaign.variant, variants)
             known = ", ".join(variants)
             raise UserError(f"variant: no variant {campaign.variant!r}{guess} (known: {known})")
-        yield SystemBase(system, campaign.variant, _system_times(system, times))
+        given_times = _system_times(system, times)
+        yield SystemBase(campaign.system, system, campaign.variant, given_times)
 
 
 def _check_version(path: Path, model: Model) -> None:

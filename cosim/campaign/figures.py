@@ -78,19 +78,3 @@ def heat_map(drawn: Map, x: np.ndarray, y: np.ndarray, colour: np.ndarray) -> Fi
         axes.set_ylabel(drawn.y)
         figure.colorbar(shown, ax=axes, label=drawn.colour)
         return figure
-
-
-def trajectories(times: np.ndarray, names: Sequence[str], values: np.ndarray) -> Figure:
-    """Variables (n + 1, names) of one run over time."""
-    rows = math.ceil(len(names) / COLUMNS)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11, 2.4 * rows), layout="constrained")
-        axes = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True).ravel()
-        for i, place in enumerate(axes):
-            place.set_visible(i < len(names))
-            if i < len(names):
-                place.plot(times, values[:, i], color=RUN, linewidth=1.2)
-                place.set_title(names[i], fontsize=9)
-        for place in axes[max(0, len(names) - COLUMNS) : len(names)]:
-            place.set_xlabel("time in s")
-        return figure

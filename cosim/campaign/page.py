@@ -10,7 +10,8 @@ from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Job
 from cosim.campaign.planning import FAILURE
 from cosim.campaign.results import MANIFEST, Results
-from cosim.report.pages import write_page
+from cosim.report import assets
+from cosim.report.pages import INDEX, write_page
 from cosim.report.style import save
 
 MOST = 10**7  # runs, whose table is held in memory
@@ -31,9 +32,11 @@ def write(campaign: Campaign, job: Job, results: Results, command: str, digest: 
         save(figures.heat_map(drawn, *columns), folder / f"{MAP.format(i)}.png")
     names = [*campaign.parameters]
     reasons = table[FAILURE].tolist()
+    assets.write(folder)
     return write_page(
-        folder,
+        folder / INDEX,
         "campaign.html",
+        root="",
         title=campaign.title,
         campaign=campaign,
         digest=digest,

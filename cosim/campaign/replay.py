@@ -1,14 +1,12 @@
-"""Runs one run of a campaign again, and writes all its Real outputs and a picture."""
+"""Runs one run of a campaign again, and writes all its Real outputs and a page with its motion."""
 
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from cosim import trajectory_csv
-from cosim.campaign import figures
 from cosim.campaign.bases import Base
 from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Job
@@ -16,13 +14,19 @@ from cosim.campaign.planning import plan
 from cosim.campaign.points import Points
 from cosim.campaign.runs import Runner, open_fmus
 from cosim.errors import UserError
-from cosim.report.style import save
+from cosim.report import assets, motion, pages
+from cosim.report.motion import Recorded
+from cosim.report.overview import RAN
+from cosim.report.pages import RunPage, Table
+from cosim.report.run_data import Curve, Plot, RunData, thinned
 
 FOLDER = "replays"
 
 
-def replay(campaign: Campaign, base: Base, points: Points, run: int, folder: Path) -> list[str]:
-    """Run again; lines that say what came out, files among them.
+def replay(
+    campaign: Campaign, base: Base, points: Points, run: int, folder: Path, command: str
+) -> list[str]:
+    """Run again; lines that say what came out, files among them. `command` does it again.
 
     Raises
     ------
@@ -40,21 +44,71 @@ def replay(campaign: Campaign, base: Base, points: Points, run: int, folder: Pat
         Runner(job, fmus) as runner,
     ):
         rows = runner.rows([run], points.targets(values, job))
-    lines = _named(points.names, values[0])
+    given = dict(zip(points.names, values[0].tolist(), strict=True))
     if rows.failures[0]:
-        return [*lines, f"failed: {rows.failures[0]}"]
-    lines += _named([measure.column for measure in job.measures], rows.measures[0])
-    return [*lines, *_write(job, rows.trajectories[run], folder / FOLDER, run)]
-
-
-def _named(names: Sequence[str], values: np.ndarray) -> list[str]:
-    return [f"{name} = {value!r}" for name, value in zip(names, values.tolist(), strict=True)]
-
-
-def _write(job: Job, record: np.ndarray, folder: Path, run: int) -> list[str]:
-    """Write what is recorded, (n + 1, watched); paths of the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    table, picture = folder / f"run_{run}.csv", folder / f"run_{run}.png"
+        return [*_lines(given), f"failed: {rows.failures[0]}"]
+    columns = [measure.column for measure in job.measures]
+    kept = dict(zip(columns, rows.measures[0].tolist(), strict=True))
+    record = rows.trajectories[run]
+    table = folder / FOLDER / f"run_{run}.csv"
+    table.parent.mkdir(parents=True, exist_ok=True)
     trajectory_csv.write(table, job.times, job.watched, record)
-    save(figures.trajectories(job.times, job.watched, record), picture)
-    return [str(table), str(picture)]
+    assets.write(folder)
+    page = RunPage(
+        title=f"{campaign.title}: run {run}",
+        description="One run of a campaign, made again.",
+        status=RAN,
+        facts=[("runs of the campaign", str(campaign.count)), ("steps", str(job.steps))],
+        data=_data(base, job, given, record),
+        tables=[
+            Table("Parameters of this run", ("parameter", "value"), list(given.items())),
+            Table("Kept of it", ("measure", "value"), list(kept.items())),
+        ],
+        csv=table.name,
+        csv_note="It has all Real outputs.",
+        again=command,
+    )
+    written = pages.write_run(table.with_suffix(".html"), page)
+    return [*_lines(given), *_lines(kept), str(table), str(written)]
+
+
+def _lines(named: dict[str, float]) -> list[str]:
+    return [f"{name} = {value!r}" for name, value in named.items()]
+
+
+def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> RunData:
+    """Plots of the states, and the motion; record: (n + 1, watched)."""
+    rows = thinned(len(job.times))
+    outputs = dict(zip(job.watched, record.T, strict=True))
+    shown = base.states() or list(outputs)
+    plots = [
+        Plot(name, base.variable(name)[1].unit or "", [Curve(name, outputs[name][rows])])
+        for name in shown
+    ]
+    moving = motion.of_recorded(base.folder, _recorded(base, job, given, outputs), rows)
+    return RunData("run", "", job.times[rows], plots, motion=moving)
+
+
+def _recorded(
+    base: Base, job: Job, given: dict[str, float], outputs: dict[str, np.ndarray]
+) -> Recorded:
+    """Outputs and held inputs of each row: those of the step that ends there."""
+    held = np.maximum(np.arange(len(job.times)) - 1, 0)
+    inputs = {
+        name: values[held]
+        for group in (job.reals, job.switches)
+        for name, values in zip(group.names, group.values.T, strict=True)
+    }
+    varied = {name: np.full(len(job.times), given[name]) for name in given if name in inputs}
+    return Recorded(job.times, outputs | inputs | varied, {}, _values(base, job, given))
+
+
+def _values(base: Base, job: Job, given: dict[str, float]) -> dict[str, object]:
+    """Start values of all variables in this run."""
+    is_system = len(job.components) > 1
+    fixed = {
+        f"{component.name}.{name}" if is_system else name: value
+        for component in job.components
+        for name, value in component.values.items()
+    }
+    return base.start_values() | fixed | given

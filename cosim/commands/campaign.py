@@ -40,7 +40,9 @@ def run(options: argparse.Namespace) -> int:
         points = Points(campaign, planning.constants(campaign, base))
         folder = _folder(options, campaign)
         if options.replay is not None:
-            print(*replay.replay(campaign, base, points, options.replay, folder), sep="\n")
+            again = f"{_command(options)} --replay {options.replay}"
+            lines = replay.replay(campaign, base, points, options.replay, folder, again)
+            print(*lines, sep="\n")
             return 0
         text = Path(options.file).read_text(encoding="utf-8")
         results = Results(folder, campaign, job, text)

@@ -65,7 +65,7 @@ def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> 
     recorded = Recorded(
         result.times, inputs | outputs | result.integers, references, scenario.start_values
     )
-    return _data(scenario.model, recorded, rows)
+    return of_recorded(scenario.model, recorded, rows)
 
 
 def of_outcome(
@@ -92,13 +92,13 @@ def of_outcome(
         for name, value in (model.start_values | given.get(component, {})).items()
     }
     columns = dict(zip(outcome.run.names, outcome.run.values.T, strict=True))
-    return _data(system, Recorded(outcome.run.times, columns, {}, values), rows)
+    return of_recorded(system, Recorded(outcome.run.times, columns, {}, values), rows)
 
 
-def _data(
-    folder: str, recorded: Recorded, rows: Sequence[int] | np.ndarray | slice
+def of_recorded(
+    folder: str, recorded: Recorded, rows: Sequence[int] | np.ndarray | slice = slice(None)
 ) -> dict[str, Any] | None:
-    """What goes into the page as JSON."""
+    """Data of the player for a folder below models/; None: nothing to animate."""
     animate = _animate(folder)
     if animate is None:
         return None

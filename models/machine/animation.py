@@ -14,6 +14,7 @@ def animation(recorded: Recorded) -> Animation:
     columns = joints(plant) | plant_columns(plant)
     columns |= {name: acting(actuator, name) for name in EFFORTS}
     columns |= {name: acting(wall, name) for name in FORCES}
-    columns["payload_attached"] = trajectory["payload_attached"].astype(bool)
+    attached = trajectory.get("payload_attached")  # campaigns record Reals only
+    columns["payload_attached"] = None if attached is None else attached.astype(bool)
     arm = geometry(plant.values) | {"wall": {name: wall.values[name] for name in WALL}}
     return Animation(columns, {name: trajectory[f"{name}_ref"] for name in JOINTS}, arm)

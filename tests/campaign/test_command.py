@@ -1,5 +1,6 @@
 """The command: pages, replays, and what others do not import."""
 
+import json
 import re
 import subprocess
 import sys
@@ -36,10 +37,10 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_page_shows_it_all(done: Path) -> None:
     page = (done / "output" / "index.html").read_text(encoding="utf-8")
-    for name in re.findall(r'<img src="([^"]+)"', page):
+    for name in re.findall(r'<img class="diagram" src="([^"]+)"', page):
         assert (done / "output" / name).read_bytes().startswith(b"\x89PNG")
     assert {"distributions.png", "indices.png", "map_0.png"} == set(
-        re.findall(r'<img src="([^"]+)"', page)
+        re.findall(r'<img class="diagram" src="([^"]+)"', page)
     )
     assert (done / "hash").read_text() in page
     found = pq.read_table(done / "output" / "blocks")
@@ -68,7 +69,13 @@ def test_a_replay_is_the_run_again(done: Path, capsys: pytest.CaptureFixture[str
     for name in kept.column_names[1:]:
         column = values[:, names.index(name)]
         assert np.array_equal(column, kept[name].to_numpy())
-    assert (output / "replays" / "run_17.png").is_file()
+    page = (output / "replays" / "run_17.html").read_text(encoding="utf-8")
+    assert 'src="../assets/player.js"' in page
+    moving = json.loads(
+        re.search(r'<script type="application/json" id="run">(.*?)</script>', page)[1]
+    )
+    assert moving["motion"]["arm"]["l1"] > 0
+    assert (output / "assets" / "player.js").is_file()
     assert cli.main([*arguments[:-1], "32"]) == 2
     assert "the campaign has runs 0 to 31" in capsys.readouterr().err
 
