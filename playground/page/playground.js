@@ -148,7 +148,6 @@ class Playground {
 
   /** Start the chosen scene again at time 0. */
   reset() {
-    this.simulation.efforts = [0, 0];
     this.simulation.start(this.#scene());
     this.chart.clear();
     this.#arrive();

@@ -36,13 +36,16 @@ class Simulation {
   // ---- start
 
   /**
-   * Start at time 0.
+   * Start at time 0, without efforts, the controller off.
    * @param {{plant: Object<string, number>, controller: Object<string, number>}} values what
    *   differs from the start values of the FMUs
    */
   start(values) {
     this.forget();
     this.steps = 0;
+    this.efforts = [0, 0];
+    this.reference = [0, 0];
+    this.isControlled = false;
     this.#initialize(values);
   }
 

@@ -97,6 +97,35 @@ def test_play_pause_and_reset(opened: OpenedPage) -> None:
     assert (opened.value("g"), opened.value("dq1")) == (0, 3)
 
 
+SETTINGS = ("law", "plant-solver_method", "plant-m1", "controller-Kp1")
+INPUTS = ("efforts-tau1", "efforts-f2", "set-point-q1_ref", "set-point-q2_ref")
+
+
+def shown(opened: OpenedPage) -> list[str]:
+    """What the controls show."""
+    return opened.browser.run(
+        "return arguments[0].map(id => document.getElementById(id).value)", SETTINGS + INPUTS
+    )
+
+
+def test_reset_brings_all_back(opened: OpenedPage) -> None:
+    """Controller, set point, efforts and parameters."""
+    numbers = "return [...simulation.motion.get(), ...simulation.inputs.get()]"
+    motion = "for (let n = 0; n < 50; n++) simulation.step();" + numbers
+    click(opened, "#reset")
+    at_first, moved = shown(opened), opened.run(motion)
+    choose(opened, "#law", "pd")
+    choose(opened, "#plant-solver_method", "taylor")
+    for identifier in (*INPUTS, "plant-m1", "controller-Kp1"):
+        type_number(opened, identifier, "0.3")
+    opened.run(motion)
+    assert all(early != late for early, late in zip(at_first, shown(opened), strict=True))
+    click(opened, "#reset")
+    assert shown(opened) == at_first
+    assert opened.run("return controller.get('mode')") == 3  # its start value
+    assert opened.run(motion) == moved
+
+
 def test_benchmark(opened: OpenedPage, capsys: pytest.CaptureFixture[str]) -> None:
     """It measures, and leaves everything as it was; the figure is printed."""
     lines = []
