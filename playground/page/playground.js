@@ -18,7 +18,7 @@ class Playground {
       fmu.onWarning = text => this.say(`${fmu.description.name}: ${text}`);
     }
     this.#addScenes();
-    this.simulation.start(this.#scene());
+    this.#start();
     this.controls = new Controls(this.simulation, (...change) => this.change(...change));
     this.#addControls();
     this.numbers = new Numbers(document.getElementById('numbers'), plant);
@@ -41,12 +41,14 @@ class Playground {
     choice.addEventListener('change', () => this.reset());
   }
 
-  #scene() {
-    const {plant, controller} = Settings.scenes[document.getElementById('setting').value];
+  /** Start the chosen scene at time 0. */
+  #start() {
+    const scene = document.getElementById('setting').value;
+    const {plant, controller} = Settings.scenes[scene];
     const {common} = Settings;
-    return {
+    this.simulation.start({
       plant: {...common.plant, ...plant}, controller: {...common.controller, ...controller},
-    };
+    }, scene);
   }
 
   #addControls() {
@@ -62,6 +64,9 @@ class Playground {
     controls.addGroups(document.getElementById('groups'));
     this.#addLaw();
     this.#addPayload();
+    controls.refreshers.push(() => {
+      document.getElementById('setting').value = simulation.scene;
+    });
     controls.refresh();
   }
 
@@ -148,7 +153,7 @@ class Playground {
 
   /** Start the chosen scene again at time 0. */
   reset() {
-    this.simulation.start(this.#scene());
+    this.#start();
     this.chart.clear();
     this.#arrive();
   }

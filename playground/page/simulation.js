@@ -14,6 +14,7 @@ class Simulation {
   /** @param {Fmu} plant @param {Fmu} controller */
   constructor(plant, controller) {
     this.fmus = {plant, controller};
+    this.scene = ''; // name of what it was started with
     this.motion = plant.reals(['q1', 'q2', 'dq1', 'dq2']);
     this.tip = plant.reals(['ee_x', 'ee_y', 'ee_vx', 'ee_vy']);
     this.inputs = plant.reals(['tau1', 'f2', 'ee_fx', 'ee_fy']);
@@ -39,9 +40,11 @@ class Simulation {
    * Start at time 0, without efforts, the controller off.
    * @param {{plant: Object<string, number>, controller: Object<string, number>}} values what
    *   differs from the start values of the FMUs
+   * @param {string} scene name of these values
    */
-  start(values) {
+  start(values, scene = this.scene) {
     this.forget();
+    this.scene = scene;
     this.steps = 0;
     this.efforts = [0, 0];
     this.reference = [0, 0];
@@ -148,12 +151,13 @@ class Simulation {
   save() {
     const states = Object.fromEntries(
       Object.entries(this.fmus).map(([name, fmu]) => [name, fmu.saveState()]));
-    const {steps, efforts, reference, isControlled} = this;
-    return {states, steps, efforts: [...efforts], reference: [...reference], isControlled};
+    const {scene, steps, efforts, reference, isControlled} = this;
+    return {states, scene, steps, efforts: [...efforts], reference: [...reference], isControlled};
   }
 
   restore(saved) {
     for (const [name, fmu] of Object.entries(this.fmus)) fmu.restoreState(saved.states[name]);
+    this.scene = saved.scene;
     this.steps = saved.steps;
     this.efforts = [...saved.efforts];
     this.reference = [...saved.reference];

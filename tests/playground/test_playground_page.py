@@ -225,6 +225,19 @@ def test_save_and_restore(opened: OpenedPage) -> None:
     assert values == ["2.5", "2"]
 
 
+def test_a_state_knows_its_scene(opened: OpenedPage) -> None:
+    """Reset starts the scene of the state that was restored."""
+    choose(opened, "#setting", "Horizontal plane")
+    click(opened, "#save")
+    choose(opened, "#setting", "Without friction")
+    assert opened.value("g") > 9
+    click(opened, "#restore")
+    assert find(opened, "#setting").get_property("value") == "Horizontal plane"
+    opened.run("for (let n = 0; n < 50; n++) simulation.step()")
+    click(opened, "#reset")
+    assert (opened.value("g"), opened.value("dq1")) == (0, 3)
+
+
 def test_history(opened: OpenedPage) -> None:
     opened.run("""
         window.tested.reset();
