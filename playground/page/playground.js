@@ -115,11 +115,7 @@ class Playground {
     on('back', () => this.#stepBack());
     on('save', () => this.save());
     on('restore', () => this.restore());
-    on('measure', () => {
-      const {factor, step} = this.benchmark();
-      document.getElementById('factor').textContent =
-        `${factor.toFixed(0)} times real time: ${(1e6 * step).toFixed(1)} µs for a step of 1 ms`;
-    });
+    on('measure', () => this.#measure());
     document.getElementById('speed').addEventListener('change', event => {
       this.speed = Number(event.target.value);
     });
@@ -265,8 +261,22 @@ class Playground {
     this.chart.draw();
   }
 
+  #measure() {
+    const output = document.getElementById('factor');
+    output.textContent = '';
+    try {
+      const {factor, step} = this.benchmark();
+      output.textContent =
+        `${factor.toFixed(0)} times real time: ${(1e6 * step).toFixed(1)} µs for a step of 1 ms`;
+    } catch (error) {
+      if (!(error instanceof FmuError)) throw error;
+      this.say(`The speed cannot be measured from here:\n${error.message}`);
+    }
+  }
+
   /**
-   * How fast it runs without drawing, from where it is: afterwards it is there again.
+   * How fast it runs without drawing, from where it is: afterwards it is there again, also where a
+   * step fails, with an FmuError.
    * @param {number} steps
    * @param {number} repetitions from the same state; the fastest counts
    * @returns {{factor: number, step: number}} times real time; s for a step
@@ -274,13 +284,17 @@ class Playground {
   benchmark(steps = 2000, repetitions = 5) {
     const here = this.simulation.save();
     let fastest = Infinity;
-    for (let repetition = 0; repetition < repetitions; repetition++) {
-      const start = performance.now();
-      for (let i = 0; i < steps; i++) this.simulation.advance();
-      fastest = Math.min(fastest, (performance.now() - start) / 1e3);
+    try {
+      for (let repetition = 0; repetition < repetitions; repetition++) {
+        this.simulation.restore(here);
+        const start = performance.now();
+        for (let i = 0; i < steps; i++) this.simulation.advance();
+        fastest = Math.min(fastest, (performance.now() - start) / 1e3);
+      }
+    } finally {
       this.simulation.restore(here);
+      this.simulation.free(here);
     }
-    this.simulation.free(here);
     return {factor: steps * Simulation.STEP / fastest, step: fastest / steps};
   }
 }

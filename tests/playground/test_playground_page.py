@@ -145,6 +145,32 @@ def test_benchmark(opened: OpenedPage, capsys: pytest.CaptureFixture[str]) -> No
     assert "times real time" in opened.text("#factor")
 
 
+def test_a_benchmark_that_fails(opened: OpenedPage) -> None:
+    """Some steps on, the force is too large: all is as before, and nothing leaks."""
+    click(opened, "#reset")
+    state = "return [simulation.steps, ...simulation.motion.get(), simulation.efforts[0]]"
+    before = opened.run(state)
+    result = opened.run("""
+        const {advance, save, free} = simulation, end = simulation.steps + 100;
+        let count = 0;
+        simulation.save = () => { count++; return save.call(simulation); };
+        simulation.free = saved => { count--; free.call(simulation, saved); };
+        simulation.advance = () => {
+          if (simulation.steps === end) simulation.efforts[0] = 1e300;
+          advance.call(simulation);
+        };
+        document.getElementById('measure').click();
+        Object.assign(simulation, {advance, save, free});
+        return count;
+    """)
+    assert result == 0
+    assert opened.run(state) == before
+    head, said = opened.text("#message").split("\n", 1)
+    assert head == "The speed cannot be measured from here:"
+    assert said
+    assert opened.text("#factor") == ""
+
+
 # ---- Values
 
 
