@@ -54,7 +54,8 @@ class Playground {
   #addControls() {
     const {simulation, controls} = this;
     const own = (id, variable, range, values, i) => controls.addSlider(document.getElementById(id),
-      `${id}-${variable.name}`, variable, range, () => values()[i], value => { values()[i] = value; });
+      `${id}-${variable.name}`, variable, range, () => values()[i],
+      value => this.#attempt(variable, value, () => simulation.attempt(() => { values()[i] = value; })));
     const find = (fmu, name) => simulation.fmus[fmu].description.find(name);
     own('efforts', find('plant', 'tau1'), [-40, 40, 0.5], () => simulation.efforts, 0);
     own('efforts', find('plant', 'f2'), [-60, 60, 0.5], () => simulation.efforts, 1);
@@ -77,23 +78,26 @@ class Playground {
     const mode = simulation.fmus.controller.description.find('mode');
     choice.append(new Option('off', 0));
     for (const {name, value} of mode.items) choice.append(new Option(name, value));
-    choice.addEventListener('change', () => {
-      simulation.isControlled = Number(choice.value) > 0;
-      if (simulation.isControlled) this.change('controller', mode, Number(choice.value));
-      else this.show();
-    });
-    this.controls.refreshers.push(() => {
+    const show = () => {
       choice.value = simulation.isControlled ? simulation.fmus.controller.get('mode') : 0;
+    };
+    choice.addEventListener('change', () => {
+      const value = Number(choice.value);
+      this.#attempt(mode, value, () => simulation.control(value));
+      show();
     });
+    this.controls.refreshers.push(show);
   }
 
   #addPayload() {
     const box = document.getElementById('payload');
     const {plant} = this.simulation.fmus;
+    const show = () => { box.checked = plant.get('payload_attached') === 1; };
     box.addEventListener('change', () => {
       this.change('plant', plant.description.find('payload_attached'), Number(box.checked));
+      show();
     });
-    this.controls.refreshers.push(() => { box.checked = plant.get('payload_attached') === 1; });
+    this.controls.refreshers.push(show);
   }
 
   #addLegend() {
@@ -156,14 +160,18 @@ class Playground {
 
   /** Set a variable of an FMU; where that is refused, show what the FMU says. */
   change(name, variable, value) {
-    const fmu = this.simulation.fmus[name];
+    this.#attempt(variable, value, () => this.simulation.change(name, variable.name, value));
+  }
+
+  /** Do what gives a variable this value; where an FMU refuses it, show what the FMU says. */
+  #attempt(variable, value, act) {
     try {
-      this.simulation.change(name, variable.name, value);
+      act();
       this.message.hidden = true;
     } catch (error) {
       if (!(error instanceof FmuError)) throw error;
       const shown = variable.items.find(item => item.value === value)?.name ?? value;
-      this.say(`${fmu.description.name} refuses ${variable.name} = ${shown}:\n${error.message}`);
+      this.say(`${error.fmu} refuses ${variable.name} = ${shown}:\n${error.message}`);
     }
     this.stage.fit();
     this.show();

@@ -114,17 +114,38 @@ class Simulation {
    * @param {'plant'|'controller'} name of the FMU
    */
   change(name, variable, value) {
+    this.attempt(() => this.#set(name, variable, value));
+  }
+
+  #set(name, variable, value) {
+    const fmu = this.fmus[name];
+    if (fmu.description.find(variable).variability === 'fixed') {
+      const {plant, controller} = this.fmus;
+      const values = {plant: this.#present(plant), controller: this.#present(controller)};
+      values[name][variable] = value;
+      this.#initialize(values);
+    } else {
+      fmu.set(variable, value);
+    }
+  }
+
+  /** Turn the controller on, with the law of this number, or off by 0; refused as by `change`. */
+  control(mode) {
+    this.attempt(() => {
+      this.isControlled = mode > 0;
+      if (this.isControlled) this.#set('controller', 'mode', mode);
+    });
+  }
+
+  /**
+   * Change something between two steps. Where an FMU refuses it, or the next step, nothing is
+   * changed: throws an FmuError.
+   * @param {() => void} act
+   */
+  attempt(act) {
     const before = this.save();
     try {
-      const fmu = this.fmus[name];
-      if (fmu.description.find(variable).variability === 'fixed') {
-        const {plant, controller} = this.fmus;
-        const values = {plant: this.#present(plant), controller: this.#present(controller)};
-        values[name][variable] = value;
-        this.#initialize(values);
-      } else {
-        fmu.set(variable, value);
-      }
+      act();
       this.#tryStep();
     } catch (error) {
       this.restore(before);
@@ -134,11 +155,11 @@ class Simulation {
     }
   }
 
-  /** Values that do not fit each other are refused by the next step. */
+  /** Efforts that are too large, and values that do not fit each other, are refused by the step. */
   #tryStep() {
     const here = this.save();
     try {
-      for (const fmu of Object.values(this.fmus)) fmu.doStep(this.time, Simulation.STEP);
+      this.advance();
       this.restore(here);
     } finally {
       this.free(here);

@@ -202,6 +202,44 @@ def test_a_refused_choice_goes_back(opened: OpenedPage, plant: Native) -> None:
     assert find(opened, "#plant-stops1").get_property("value") == "1"
 
 
+def refused(opened: OpenedPage, variable: str) -> bool:
+    """Whether the message names the variable and has what the FMU says."""
+    head, _, said = opened.text("#message").partition("\n")
+    return head.startswith(f"RPPlant refuses {variable} = 1e+300:") and "step from t = " in said
+
+
+def test_an_effort_that_is_too_large_is_refused(opened: OpenedPage) -> None:
+    """As soon as it is typed: nothing changes, and the arm moves on."""
+    numbers = "return [simulation.steps, plant.get('q1'), plant.get('solver_steps')]"
+    for name in ("tau1", "f2"):
+        before = opened.run(numbers)
+        type_number(opened, f"efforts-{name}", "1e300")
+        assert refused(opened, name)
+        assert find(opened, f"#efforts-{name} + input").get_property("value") == "0"
+        assert opened.run(numbers) == before
+        type_number(opened, f"efforts-{name}", "2")
+        assert find(opened, "#message").get_property("hidden")
+        assert opened.run("return simulation.efforts")[name == "f2"] == 2
+    opened.run("for (let n = 0; n < 50; n++) simulation.step()")
+    assert opened.value("tau1") == 2
+
+
+def test_a_set_point_that_is_too_far_is_refused(opened: OpenedPage) -> None:
+    """Where the controller has no limits; while it is off, by turning it on, and it stays off."""
+    opened.run("simulation.change('controller', 'tau1_max', 1e300)")
+    choose(opened, "#law", "pd")
+    type_number(opened, "set-point-q1_ref", "1e300")
+    assert refused(opened, "q1_ref")
+    assert opened.run("return simulation.reference") == [0, 0]
+    choose(opened, "#law", "off")
+    assert find(opened, "#message").get_property("hidden")
+    type_number(opened, "set-point-q1_ref", "1e300")
+    choose(opened, "#law", "pd")
+    assert opened.text("#message").startswith("RPPlant refuses mode = pd:\n")
+    assert find(opened, "#law").get_property("value") == "0"
+    assert not opened.run("return simulation.isControlled")
+
+
 def test_a_step_that_fails_says_so(opened: OpenedPage) -> None:
     """The page goes back to the last state that it kept, and stops."""
     opened.run("for (let n = 0; n < 120; n++) simulation.step();"
