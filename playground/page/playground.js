@@ -19,7 +19,8 @@ class Playground {
     }
     this.#addScenes();
     this.#start();
-    this.controls = new Controls(this.simulation, (...change) => this.change(...change));
+    this.controls = new Controls(
+      this.simulation, (...change) => this.change(...change), text => this.say(text));
     this.#addControls();
     this.numbers = new Numbers(document.getElementById('numbers'), plant);
     this.stage = new Stage(document.getElementById('stage'), this.simulation);
@@ -148,6 +149,7 @@ class Playground {
 
   play(isRunning) {
     this.isRunning = isRunning;
+    if (isRunning) this.message.hidden = true;
     document.getElementById('play').textContent = isRunning ? 'Pause' : 'Play';
   }
 

@@ -202,6 +202,20 @@ def test_a_refused_choice_goes_back(opened: OpenedPage, plant: Native) -> None:
     assert find(opened, "#plant-stops1").get_property("value") == "1"
 
 
+@pytest.mark.parametrize(
+    ("identifier", "value"), [("plant-m1", "2"), ("plant-damping1", "0.1"), ("efforts-tau1", "0")]
+)
+def test_an_emptied_field_has_its_value_again(
+    opened: OpenedPage, identifier: str, value: str
+) -> None:
+    type_number(opened, identifier, Keys.BACKSPACE)
+    assert find(opened, f"#{identifier} + input").get_property("value") == value
+    name = identifier.partition("-")[2]
+    assert opened.text("#message") == f"{name} must be a number: it is still {value}"
+    type_number(opened, identifier, "3")
+    assert find(opened, "#message").get_property("hidden")
+
+
 def refused(opened: OpenedPage, variable: str) -> bool:
     """Whether the message names the variable and has what the FMU says."""
     head, _, said = opened.text("#message").partition("\n")
@@ -247,6 +261,10 @@ def test_a_step_that_fails_says_so(opened: OpenedPage) -> None:
     opened.browser.wait("!document.getElementById('message').hidden")
     assert not opened.run("return window.tested.isRunning")
     assert math.isfinite(opened.value("q1"))
+    opened.run("simulation.efforts[0] = 0")
+    click(opened, "#play")
+    opened.browser.wait("window.tested.simulation.steps > 150")
+    assert find(opened, "#message").get_property("hidden")
 
 
 def test_method_and_controller(opened: OpenedPage) -> None:
