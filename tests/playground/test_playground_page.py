@@ -379,6 +379,59 @@ def touch(opened: OpenedPage, kind: str, *points: tuple[float, float]) -> None:
     )
 
 
+def is_seen(opened: OpenedPage, x: float, y: float, bars: float = 0) -> bool:
+    """Whether a point (m), and what is `bars` widths of link 1 around it, is in the drawing."""
+    return opened.run(
+        "const {view} = window.tested.stage, [x, y] = Arm.toPixel(view, arguments);"
+        "const around = arguments[2] * view.bar, bottom = view.height - view.strip;"
+        "return [[x, view.width], [y, bottom]].every(([at, end]) => at >= around && at <= end - around)",
+        x,
+        y,
+        bars,
+    )
+
+
+def test_the_view_follows_the_arm(opened: OpenedPage) -> None:
+    """Without stops, joint 2 goes as far as it likes; the end effector can be taken there, too."""
+    choose(opened, "#setting", "Horizontal plane")
+    scale = opened.run("return window.tested.stage.view.scale")
+    choose(opened, "#plant-stops2", "none")
+    for force in ("40", "-40"):
+        type_number(opened, "efforts-f2", force)
+        opened.run("for (let n = 0; n < 5000; n++) simulation.step(); window.tested.stage.draw()")
+        assert abs(opened.value("q2")) > 20
+        assert is_seen(opened, opened.value("ee_x"), opened.value("ee_y"))
+    x, y = (round(number) for number in drag_place(opened))
+    mouse = ActionChains(opened.browser.driver, duration=0).w3c_actions
+    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(x - 30, y)
+    mouse.perform()
+    opened.run("for (let n = 0; n < 10; n++) simulation.step(); window.tested.stage.draw()")
+    assert opened.value("ee_fx") < -1
+    held = opened.run(
+        "const box = document.getElementById('stage').getBoundingClientRect();"
+        "return Arm.toPixel(window.tested.stage.view, simulation.hand.target)"
+        ".map((at, i) => at + [box.left, box.top][i])"
+    )
+    assert held == pytest.approx([x - 30, y])
+    opened.browser.driver.execute_cdp_cmd(
+        "Input.dispatchMouseEvent",
+        {"type": "mouseReleased", "x": x - 30, "y": y, "button": "left", "clickCount": 1},
+    )
+    mouse.clear_actions()
+    click(opened, "#reset")
+    assert opened.run("return window.tested.stage.view.scale") == scale
+
+
+def test_the_ends_of_link_2_are_in_the_view(opened: OpenedPage) -> None:
+    """It is as long as joint 2 has room, from the collar of one stop to that of the other."""
+    for scene in ("Friction and stops", "Horizontal plane"):
+        choose(opened, "#setting", scene)
+        l1, lower, upper = (opened.value(name) for name in ("l1", "lower2", "upper2"))
+        far = l1 + upper - lower
+        for x, y in ((far, 0), (-far, 0), (0, far), (0, -far)):
+            assert is_seen(opened, x, y, bars=1.75)  # half a sleeve and a collar
+
+
 def test_drag_by_touch(opened: OpenedPage) -> None:
     x, y = drag_place(opened)
     touch(opened, "touchStart", (x, y))
