@@ -499,6 +499,48 @@ def test_readable(browser: Browser, page: Path, width: int, dark: bool) -> None:
     browser.check_quiet()
 
 
+# boxes of the texts that the chart draws, ends and middle of its height; points of its curves; px
+CHART = """
+const texts = [], points = [], {prototype} = CanvasRenderingContext2D;
+const {fillText, lineTo} = prototype;
+prototype.fillText = function(text, x, y) {
+  const {actualBoundingBoxLeft: left, actualBoundingBoxRight: right,
+    actualBoundingBoxAscent: up, actualBoundingBoxDescent: down} = this.measureText(text);
+  texts.push([text, x - left, x + right, y - up, y + down]);
+};
+prototype.lineTo = function(x, y) { if (this.lineWidth === 2) points.push([x, y]); };
+window.tested.chart.draw();
+Object.assign(prototype, {fillText, lineTo});
+return [texts, points, window.tested.chart.canvas.clientWidth];
+"""
+
+
+@pytest.mark.parametrize("steps", [3000, 13000])
+def test_the_chart_has_axes(browser: Browser, page: Path, steps: int) -> None:
+    """The curves do not run through the numbers; those at the axis of time are where it is."""
+    opened = OpenedPage(browser, page, width=400)
+    opened.run(
+        "window.tested.reset();"
+        "for (let n = 1; n <= arguments[0]; n++) {"
+        "  simulation.step();"
+        "  if (n % 20 === 0) window.tested.chart.add(simulation.time);"
+        "}",
+        steps,
+    )
+    texts, points, width = opened.run(CHART)
+    for _, left, right, top, bottom in texts:
+        assert 0 <= left and right <= width
+        assert not any(left <= x <= right and top <= y <= bottom for x, y in points)
+    middles = {text: (left + right) / 2 for text, left, right, *_ in texts}
+    times = [float(text[:-2]) for text in middles if text.endswith(" s")]
+    assert len(times) >= 5 and max(times) <= max(10, steps / 1000)
+    second = (middles[f"{times[-1]:g} s"] - middles[f"{times[0]:g} s"]) / (times[-1] - times[0])
+    newest = middles[f"{times[0]:g} s"] + second * (steps / 1000 - times[0])
+    assert max(x for x, _ in points) == pytest.approx(newest, abs=2)
+    assert sum(text.endswith(" J") for text in middles) >= 2
+    browser.check_quiet()
+
+
 def test_the_drawing_follows(opened: OpenedPage) -> None:
     """The picture of the arm and the chart change while it runs, and have more than one colour."""
     picture = "return ['stage', 'energy'].map(id => document.getElementById(id).toDataURL())"
