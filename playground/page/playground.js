@@ -186,6 +186,7 @@ class Playground {
   }
 
   restore() {
+    if (this.saved.run !== this.simulation.run) this.chart.clear();
     this.simulation.restore(this.saved);
     this.#arrive();
   }

@@ -15,6 +15,7 @@ class Simulation {
   constructor(plant, controller) {
     this.fmus = {plant, controller};
     this.scene = ''; // name of what it was started with
+    this.run = Symbol(); // another one after each start
     this.motion = plant.reals(['q1', 'q2', 'dq1', 'dq2']);
     this.tip = plant.reals(['ee_x', 'ee_y', 'ee_vx', 'ee_vy']);
     this.inputs = plant.reals(['tau1', 'f2', 'ee_fx', 'ee_fy']);
@@ -45,6 +46,7 @@ class Simulation {
   start(values, scene = this.scene) {
     this.forget();
     this.scene = scene;
+    this.run = Symbol();
     this.steps = 0;
     this.efforts = [0, 0];
     this.reference = [0, 0];
@@ -172,13 +174,18 @@ class Simulation {
   save() {
     const states = Object.fromEntries(
       Object.entries(this.fmus).map(([name, fmu]) => [name, fmu.saveState()]));
-    const {scene, steps, efforts, reference, isControlled} = this;
-    return {states, scene, steps, efforts: [...efforts], reference: [...reference], isControlled};
+    const {scene, run, steps, efforts, reference, isControlled} = this;
+    return {
+      states, scene, run, steps, efforts: [...efforts], reference: [...reference], isControlled,
+    };
   }
 
+  /** Back to a state that was saved; the history of another start is dropped. */
   restore(saved) {
+    if (saved.run !== this.run) this.forget();
     for (const [name, fmu] of Object.entries(this.fmus)) fmu.restoreState(saved.states[name]);
     this.scene = saved.scene;
+    this.run = saved.run;
     this.steps = saved.steps;
     this.efforts = [...saved.efforts];
     this.reference = [...saved.reference];

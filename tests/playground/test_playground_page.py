@@ -159,14 +159,20 @@ def test_save_and_restore(opened: OpenedPage) -> None:
 
 
 def test_a_state_knows_its_scene(opened: OpenedPage) -> None:
-    """Reset starts the scene of the state that was restored."""
+    """After it is restored, Back stays in its scene, and Reset starts this."""
+    steps = "for (let n = 0; n < 300; n++) simulation.step()"
     choose(opened, "#setting", "Horizontal plane")
+    opened.run(steps)
     click(opened, "#save")
     choose(opened, "#setting", "Without friction")
+    opened.run(steps)
     assert opened.value("g") > 9
     click(opened, "#restore")
-    assert find(opened, "#setting").get_property("value") == "Horizontal plane"
-    opened.run("for (let n = 0; n < 50; n++) simulation.step()")
+    opened.run(steps)
+    for back in (400, 300, 300):
+        assert find(opened, "#setting").get_property("value") == "Horizontal plane"
+        click(opened, "#back")
+        assert (opened.run("return simulation.steps"), opened.value("g")) == (back, 0)
     click(opened, "#reset")
     assert (opened.value("g"), opened.value("dq1")) == (0, 3)
 
