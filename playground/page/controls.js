@@ -6,10 +6,12 @@ class Controls {
    * @param {Simulation} simulation
    * @param {(fmu: string, variable: Variable, value: number) => void} change
    *   sets a variable, or says why not
+   * @param {(text: string) => void} say shows a message
    */
-  constructor(simulation, change) {
+  constructor(simulation, change, say) {
     this.simulation = simulation;
     this.change = change;
+    this.say = say;
     this.refreshers = [];
   }
 
@@ -62,17 +64,25 @@ class Controls {
     row.append(slider, field);
     const show = () => {
       const value = read();
-      if (document.activeElement !== field || Number(field.value) !== value) {
+      // what was typed has more digits than are shown
+      if (document.activeElement !== field || field.valueAsNumber !== value) {
         field.value = String(Number(value.toPrecision(6)));
       }
       slider.value = value;
     };
     const set = value => {
-      if (Number.isFinite(value)) write(value);
+      write(value);
       show();
     };
     slider.addEventListener('input', () => set(slider.valueAsNumber));
-    field.addEventListener('change', () => set(field.valueAsNumber));
+    field.addEventListener('change', () => {
+      if (Number.isFinite(field.valueAsNumber)) {
+        set(field.valueAsNumber);
+      } else {
+        show();
+        this.say(`${variable.name} must be a number: it is still ${field.value}`);
+      }
+    });
     this.refreshers.push(show);
   }
 

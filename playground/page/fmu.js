@@ -1,7 +1,13 @@
 'use strict';
 
 /** A call that an FMU refused; the message is the FMU's. */
-class FmuError extends Error {}
+class FmuError extends Error {
+  /** @param {string} fmu its name @param {string} message */
+  constructor(fmu, message) {
+    super(message);
+    this.fmu = fmu;
+  }
+}
 
 /** An FMU of FMI 2.0 in WebAssembly, with one instance of it for Co-Simulation. */
 class Fmu {
@@ -70,7 +76,7 @@ class Fmu {
   /** Address of `size` bytes, for as long as the page is open. */
   allocate(size) {
     const address = this.#exports.malloc(size);
-    if (!address) throw new FmuError(`no memory for ${size} bytes`);
+    if (!address) throw new FmuError(this.description.name, `no memory for ${size} bytes`);
     return address;
   }
 
@@ -101,7 +107,7 @@ class Fmu {
   #failure(name) {
     const text = this.#messages.join('\n') || `${name} failed`;
     this.#messages.length = 0;
-    return new FmuError(text);
+    return new FmuError(this.description.name, text);
   }
 
   /** Call a function of FMI with this instance; throws an FmuError where it fails. */

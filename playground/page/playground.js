@@ -18,8 +18,9 @@ class Playground {
       fmu.onWarning = text => this.say(`${fmu.description.name}: ${text}`);
     }
     this.#addScenes();
-    this.simulation.start(this.#scene());
-    this.controls = new Controls(this.simulation, (...change) => this.change(...change));
+    this.#start();
+    this.controls = new Controls(
+      this.simulation, (...change) => this.change(...change), text => this.say(text));
     this.#addControls();
     this.numbers = new Numbers(document.getElementById('numbers'), plant);
     this.stage = new Stage(document.getElementById('stage'), this.simulation);
@@ -41,18 +42,21 @@ class Playground {
     choice.addEventListener('change', () => this.reset());
   }
 
-  #scene() {
-    const {plant, controller} = Settings.scenes[document.getElementById('setting').value];
+  /** Start the chosen scene at time 0. */
+  #start() {
+    const scene = document.getElementById('setting').value;
+    const {plant, controller} = Settings.scenes[scene];
     const {common} = Settings;
-    return {
+    this.simulation.start({
       plant: {...common.plant, ...plant}, controller: {...common.controller, ...controller},
-    };
+    }, scene);
   }
 
   #addControls() {
     const {simulation, controls} = this;
     const own = (id, variable, range, values, i) => controls.addSlider(document.getElementById(id),
-      `${id}-${variable.name}`, variable, range, () => values()[i], value => { values()[i] = value; });
+      `${id}-${variable.name}`, variable, range, () => values()[i],
+      value => this.#attempt(variable, value, () => simulation.attempt(() => { values()[i] = value; })));
     const find = (fmu, name) => simulation.fmus[fmu].description.find(name);
     own('efforts', find('plant', 'tau1'), [-40, 40, 0.5], () => simulation.efforts, 0);
     own('efforts', find('plant', 'f2'), [-60, 60, 0.5], () => simulation.efforts, 1);
@@ -62,6 +66,9 @@ class Playground {
     controls.addGroups(document.getElementById('groups'));
     this.#addLaw();
     this.#addPayload();
+    controls.refreshers.push(() => {
+      document.getElementById('setting').value = simulation.scene;
+    });
     controls.refresh();
   }
 
@@ -72,23 +79,26 @@ class Playground {
     const mode = simulation.fmus.controller.description.find('mode');
     choice.append(new Option('off', 0));
     for (const {name, value} of mode.items) choice.append(new Option(name, value));
-    choice.addEventListener('change', () => {
-      simulation.isControlled = Number(choice.value) > 0;
-      if (simulation.isControlled) this.change('controller', mode, Number(choice.value));
-      else this.show();
-    });
-    this.controls.refreshers.push(() => {
+    const show = () => {
       choice.value = simulation.isControlled ? simulation.fmus.controller.get('mode') : 0;
+    };
+    choice.addEventListener('change', () => {
+      const value = Number(choice.value);
+      this.#attempt(mode, value, () => simulation.control(value));
+      show();
     });
+    this.controls.refreshers.push(show);
   }
 
   #addPayload() {
     const box = document.getElementById('payload');
     const {plant} = this.simulation.fmus;
+    const show = () => { box.checked = plant.get('payload_attached') === 1; };
     box.addEventListener('change', () => {
       this.change('plant', plant.description.find('payload_attached'), Number(box.checked));
+      show();
     });
-    this.controls.refreshers.push(() => { box.checked = plant.get('payload_attached') === 1; });
+    this.controls.refreshers.push(show);
   }
 
   #addLegend() {
@@ -110,11 +120,7 @@ class Playground {
     on('back', () => this.#stepBack());
     on('save', () => this.save());
     on('restore', () => this.restore());
-    on('measure', () => {
-      const {factor, step} = this.benchmark();
-      document.getElementById('factor').textContent =
-        `${factor.toFixed(0)} times real time: ${(1e6 * step).toFixed(1)} µs for a step of 1 ms`;
-    });
+    on('measure', () => this.#measure());
     document.getElementById('speed').addEventListener('change', event => {
       this.speed = Number(event.target.value);
     });
@@ -143,27 +149,31 @@ class Playground {
 
   play(isRunning) {
     this.isRunning = isRunning;
+    if (isRunning) this.message.hidden = true;
     document.getElementById('play').textContent = isRunning ? 'Pause' : 'Play';
   }
 
   /** Start the chosen scene again at time 0. */
   reset() {
-    this.simulation.efforts = [0, 0];
-    this.simulation.start(this.#scene());
+    this.#start();
     this.chart.clear();
     this.#arrive();
   }
 
   /** Set a variable of an FMU; where that is refused, show what the FMU says. */
   change(name, variable, value) {
-    const fmu = this.simulation.fmus[name];
+    this.#attempt(variable, value, () => this.simulation.change(name, variable.name, value));
+  }
+
+  /** Do what gives a variable this value; where an FMU refuses it, show what the FMU says. */
+  #attempt(variable, value, act) {
     try {
-      this.simulation.change(name, variable.name, value);
+      act();
       this.message.hidden = true;
     } catch (error) {
       if (!(error instanceof FmuError)) throw error;
       const shown = variable.items.find(item => item.value === value)?.name ?? value;
-      this.say(`${fmu.description.name} refuses ${variable.name} = ${shown}:\n${error.message}`);
+      this.say(`${error.fmu} refuses ${variable.name} = ${shown}:\n${error.message}`);
     }
     this.stage.fit();
     this.show();
@@ -176,6 +186,7 @@ class Playground {
   }
 
   restore() {
+    if (this.saved.run !== this.simulation.run) this.chart.clear();
     this.simulation.restore(this.saved);
     this.#arrive();
   }
@@ -261,8 +272,22 @@ class Playground {
     this.chart.draw();
   }
 
+  #measure() {
+    const output = document.getElementById('factor');
+    output.textContent = '';
+    try {
+      const {factor, step} = this.benchmark();
+      output.textContent =
+        `${factor.toFixed(0)} times real time: ${(1e6 * step).toFixed(1)} µs for a step of 1 ms`;
+    } catch (error) {
+      if (!(error instanceof FmuError)) throw error;
+      this.say(`The speed cannot be measured from here:\n${error.message}`);
+    }
+  }
+
   /**
-   * How fast it runs without drawing, from where it is: afterwards it is there again.
+   * How fast it runs without drawing, from where it is: afterwards it is there again, also where a
+   * step fails, with an FmuError.
    * @param {number} steps
    * @param {number} repetitions from the same state; the fastest counts
    * @returns {{factor: number, step: number}} times real time; s for a step
@@ -270,13 +295,17 @@ class Playground {
   benchmark(steps = 2000, repetitions = 5) {
     const here = this.simulation.save();
     let fastest = Infinity;
-    for (let repetition = 0; repetition < repetitions; repetition++) {
-      const start = performance.now();
-      for (let i = 0; i < steps; i++) this.simulation.advance();
-      fastest = Math.min(fastest, (performance.now() - start) / 1e3);
+    try {
+      for (let repetition = 0; repetition < repetitions; repetition++) {
+        this.simulation.restore(here);
+        const start = performance.now();
+        for (let i = 0; i < steps; i++) this.simulation.advance();
+        fastest = Math.min(fastest, (performance.now() - start) / 1e3);
+      }
+    } finally {
       this.simulation.restore(here);
+      this.simulation.free(here);
     }
-    this.simulation.free(here);
     return {factor: steps * Simulation.STEP / fastest, step: fastest / steps};
   }
 }

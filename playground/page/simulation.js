@@ -14,6 +14,8 @@ class Simulation {
   /** @param {Fmu} plant @param {Fmu} controller */
   constructor(plant, controller) {
     this.fmus = {plant, controller};
+    this.scene = ''; // name of what it was started with
+    this.run = Symbol(); // another one after each start
     this.motion = plant.reals(['q1', 'q2', 'dq1', 'dq2']);
     this.tip = plant.reals(['ee_x', 'ee_y', 'ee_vx', 'ee_vy']);
     this.inputs = plant.reals(['tau1', 'f2', 'ee_fx', 'ee_fy']);
@@ -36,13 +38,19 @@ class Simulation {
   // ---- start
 
   /**
-   * Start at time 0.
+   * Start at time 0, without efforts, the controller off.
    * @param {{plant: Object<string, number>, controller: Object<string, number>}} values what
    *   differs from the start values of the FMUs
+   * @param {string} scene name of these values
    */
-  start(values) {
+  start(values, scene = this.scene) {
     this.forget();
+    this.scene = scene;
+    this.run = Symbol();
     this.steps = 0;
+    this.efforts = [0, 0];
+    this.reference = [0, 0];
+    this.isControlled = false;
     this.#initialize(values);
   }
 
@@ -108,17 +116,38 @@ class Simulation {
    * @param {'plant'|'controller'} name of the FMU
    */
   change(name, variable, value) {
+    this.attempt(() => this.#set(name, variable, value));
+  }
+
+  #set(name, variable, value) {
+    const fmu = this.fmus[name];
+    if (fmu.description.find(variable).variability === 'fixed') {
+      const {plant, controller} = this.fmus;
+      const values = {plant: this.#present(plant), controller: this.#present(controller)};
+      values[name][variable] = value;
+      this.#initialize(values);
+    } else {
+      fmu.set(variable, value);
+    }
+  }
+
+  /** Turn the controller on, with the law of this number, or off by 0; refused as by `change`. */
+  control(mode) {
+    this.attempt(() => {
+      this.isControlled = mode > 0;
+      if (this.isControlled) this.#set('controller', 'mode', mode);
+    });
+  }
+
+  /**
+   * Change something between two steps. Where an FMU refuses it, or the next step, nothing is
+   * changed: throws an FmuError.
+   * @param {() => void} act
+   */
+  attempt(act) {
     const before = this.save();
     try {
-      const fmu = this.fmus[name];
-      if (fmu.description.find(variable).variability === 'fixed') {
-        const {plant, controller} = this.fmus;
-        const values = {plant: this.#present(plant), controller: this.#present(controller)};
-        values[name][variable] = value;
-        this.#initialize(values);
-      } else {
-        fmu.set(variable, value);
-      }
+      act();
       this.#tryStep();
     } catch (error) {
       this.restore(before);
@@ -128,11 +157,11 @@ class Simulation {
     }
   }
 
-  /** Values that do not fit each other are refused by the next step. */
+  /** Efforts that are too large, and values that do not fit each other, are refused by the step. */
   #tryStep() {
     const here = this.save();
     try {
-      for (const fmu of Object.values(this.fmus)) fmu.doStep(this.time, Simulation.STEP);
+      this.advance();
       this.restore(here);
     } finally {
       this.free(here);
@@ -145,12 +174,18 @@ class Simulation {
   save() {
     const states = Object.fromEntries(
       Object.entries(this.fmus).map(([name, fmu]) => [name, fmu.saveState()]));
-    const {steps, efforts, reference, isControlled} = this;
-    return {states, steps, efforts: [...efforts], reference: [...reference], isControlled};
+    const {scene, run, steps, efforts, reference, isControlled} = this;
+    return {
+      states, scene, run, steps, efforts: [...efforts], reference: [...reference], isControlled,
+    };
   }
 
+  /** Back to a state that was saved; the history of another start is dropped. */
   restore(saved) {
+    if (saved.run !== this.run) this.forget();
     for (const [name, fmu] of Object.entries(this.fmus)) fmu.restoreState(saved.states[name]);
+    this.scene = saved.scene;
+    this.run = saved.run;
     this.steps = saved.steps;
     this.efforts = [...saved.efforts];
     this.reference = [...saved.reference];

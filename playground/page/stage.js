@@ -5,6 +5,7 @@ class Stage {
   static PUSH = 20; // N, of an arrow key
   static PATH = 300; // points
   static GRIP = 70; // px from the end effector within which it can be taken
+  static SLIDE = [-0.5, 0.5]; // m, what is seen at least where joint 2 has no stops
   static KEYS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
 
   /** @param {HTMLCanvasElement} canvas @param {Simulation} simulation */
@@ -13,6 +14,8 @@ class Stage {
     this.simulation = simulation;
     this.path = [];
     this.pressed = new Set();
+    /** Where a pointer holds the end effector, px. @type {?[number, number]} */
+    this.held = null;
     this.colours = Stage.readColours();
     matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.fit());
     new ResizeObserver(() => this.fit()).observe(canvas);
@@ -41,23 +44,38 @@ class Stage {
     };
   }
 
-  /** Choose the scale: after the window or a parameter has changed. */
+  /** Take over the size of the canvas, the colours and the parameters. */
   fit() {
     const ratio = window.devicePixelRatio || 1;
-    const {clientWidth: width, clientHeight: height} = this.canvas;
-    this.canvas.width = Math.round(width * ratio);
-    this.canvas.height = Math.round(height * ratio);
+    this.canvas.width = Math.round(this.canvas.clientWidth * ratio);
+    this.canvas.height = Math.round(this.canvas.clientHeight * ratio);
     this.colours = Stage.readColours();
     this.geometry = this.arm();
-    const {a, l1, g, stops} = this.geometry;
-    const slide = stops.q2 ?? [-0.5, 0.5];
-    const reach = Math.hypot(l1 + Math.max(...slide.map(Math.abs)), a);
-    this.view = Arm.fit({
-      left: -reach, right: reach, bottom: -reach, top: reach, slide, torque: 40, force: 80, contact: 80,
-      gravity: g, ghost: this.simulation.isControlled, modes: true,
-      stops: stops.q1 !== null || stops.q2 !== null, trace: true,
-    }, width, height, this.colours);
+    this.#choose(this.#reach());
     this.draw();
+  }
+
+  /** Distance from joint 1, m, within which the whole arm is now and between its stops. */
+  #reach() {
+    const {a, l1, stops} = this.geometry;
+    const [low, high] = stops.q2 ?? Stage.SLIDE;
+    const [, q2] = this.simulation.motion.get();
+    // link 2 is so long that it is in its sleeve wherever it is: it ends `low` before the end
+    // effector and `high` behind it
+    const along = [l1 + Math.max(high, q2) - low, l1 + Math.min(low, q2) - high];
+    return Math.hypot(Math.max(...along.map(Math.abs)), a);
+  }
+
+  /** Choose the view for a reach in m; what the pointer holds stays below it. */
+  #choose(reach) {
+    const {g, stops} = this.geometry;
+    this.reach = reach;
+    this.view = Arm.fit({
+      left: -reach, right: reach, bottom: -reach, top: reach, slide: stops.q2 ?? Stage.SLIDE,
+      torque: 40, force: 80, contact: 80, gravity: g, ghost: this.simulation.isControlled, modes: true,
+      stops: stops.q1 !== null || stops.q2 !== null, trace: true,
+    }, this.canvas.clientWidth, this.canvas.clientHeight, this.colours);
+    if (this.held) this.#pull();
   }
 
   scene() {
@@ -81,7 +99,10 @@ class Stage {
     if (this.path.length > Stage.PATH) this.path.shift();
   }
 
+  /** The arm as it is now; where it leaves the view, this follows. */
   draw() {
+    const reach = this.#reach();
+    if (reach !== this.reach) this.#choose(reach);
     const context = this.canvas.getContext('2d');
     const ratio = window.devicePixelRatio || 1;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -118,9 +139,16 @@ class Stage {
     return Math.hypot(x - tipX, y - tipY) <= Stage.GRIP;
   }
 
+  #pull() {
+    this.simulation.hand.target = Arm.toMetres(this.view, this.held);
+  }
+
   #listenToPointer() {
     const {canvas, simulation} = this;
-    const pull = event => { simulation.hand.target = Arm.toMetres(this.view, this.#place(event)); };
+    const pull = event => {
+      this.held = this.#place(event);
+      this.#pull();
+    };
     canvas.addEventListener('pointerdown', event => {
       if (!this.#isInReach(this.#place(event))) return;
       canvas.setPointerCapture(event.pointerId);
@@ -129,7 +157,10 @@ class Stage {
     canvas.addEventListener('pointermove', event => {
       if (canvas.hasPointerCapture(event.pointerId)) pull(event);
     });
-    canvas.addEventListener('lostpointercapture', () => { simulation.hand.target = null; });
+    canvas.addEventListener('lostpointercapture', () => {
+      this.held = null;
+      simulation.hand.target = null;
+    });
     // a finger that starts elsewhere scrolls the page
     canvas.addEventListener('touchstart', event => {
       if (this.#isInReach(this.#place(event.touches[0]))) event.preventDefault();

@@ -1,48 +1,14 @@
-"""The page of the playground: what it shows and how it is used."""
+"""The page of the playground: how it runs, starts again and goes back in time."""
 
 import math
 from pathlib import Path
 
 import pytest
-from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.by import By
-from selenium.webdriver.common.keys import Keys
 
-from tests.playground.native import Native
+from tests.playground.controls import choose, click, find, type_number
 from tests.playground.opened_page import OpenedPage
-from tests.support.browser import Browser
 
 LARGEST = 1_500_000  # bytes
-
-# as the page's first scene has it
-FRICTION = {"coulomb_friction1": 0.4, "breakaway_friction1": 0.8, "stribeck_velocity1": 0.1}
-
-
-def find(opened: OpenedPage, selector: str):
-    return opened.browser.driver.find_element(By.CSS_SELECTOR, selector)
-
-
-def click(opened: OpenedPage, selector: str) -> None:
-    opened.browser.run("document.querySelector(arguments[0]).click()", selector)
-
-
-def choose(opened: OpenedPage, selector: str, text: str) -> None:
-    opened.browser.run(
-        "const box = document.querySelector(arguments[0]);"
-        "box.value = [...box.options].find(option => option.text === arguments[1]).value;"
-        "box.dispatchEvent(new Event('change'))",
-        selector,
-        text,
-    )
-
-
-def type_number(opened: OpenedPage, identifier: str, text: str) -> None:
-    """Type a value into the number field beside a slider."""
-    opened.browser.run("document.querySelectorAll('details').forEach(it => { it.open = true; })")
-    field = find(opened, f"#{identifier} + input")
-    field.send_keys(Keys.CONTROL + "a")
-    field.send_keys(text, Keys.ENTER)
-
 
 # ---- Running
 
@@ -97,6 +63,35 @@ def test_play_pause_and_reset(opened: OpenedPage) -> None:
     assert (opened.value("g"), opened.value("dq1")) == (0, 3)
 
 
+SETTINGS = ("law", "plant-solver_method", "plant-m1", "controller-Kp1")
+INPUTS = ("efforts-tau1", "efforts-f2", "set-point-q1_ref", "set-point-q2_ref")
+
+
+def shown(opened: OpenedPage) -> list[str]:
+    """What the controls show."""
+    return opened.browser.run(
+        "return arguments[0].map(id => document.getElementById(id).value)", SETTINGS + INPUTS
+    )
+
+
+def test_reset_brings_all_back(opened: OpenedPage) -> None:
+    """Controller, set point, efforts and parameters."""
+    numbers = "return [...simulation.motion.get(), ...simulation.inputs.get()]"
+    motion = "for (let n = 0; n < 50; n++) simulation.step();" + numbers
+    click(opened, "#reset")
+    at_first, moved = shown(opened), opened.run(motion)
+    choose(opened, "#law", "pd")
+    choose(opened, "#plant-solver_method", "taylor")
+    for identifier in (*INPUTS, "plant-m1", "controller-Kp1"):
+        type_number(opened, identifier, "0.3")
+    opened.run(motion)
+    assert all(early != late for early, late in zip(at_first, shown(opened), strict=True))
+    click(opened, "#reset")
+    assert shown(opened) == at_first
+    assert opened.run("return controller.get('mode')") == 3  # its start value
+    assert opened.run(motion) == moved
+
+
 def test_benchmark(opened: OpenedPage, capsys: pytest.CaptureFixture[str]) -> None:
     """It measures, and leaves everything as it was; the figure is printed."""
     lines = []
@@ -116,63 +111,30 @@ def test_benchmark(opened: OpenedPage, capsys: pytest.CaptureFixture[str]) -> No
     assert "times real time" in opened.text("#factor")
 
 
-# ---- Values
-
-
-def test_a_refused_value_shows_the_message(opened: OpenedPage, plant: Native) -> None:
-    type_number(opened, "plant-m2", "-1")
-    said = plant.refusal({}, "m2", -1.0)
-    assert "m2 = -1" in said
-    assert opened.text("#message") == f"RPPlant refuses m2 = -1:\n{said}"
-    assert opened.value("m2") == 1
-    assert find(opened, "#plant-m2 + input").get_property("value") == "1"
-    steps = opened.run("simulation.step(); return simulation.steps")
-    assert steps > 0
-    type_number(opened, "plant-m2", "3")
-    assert find(opened, "#message").get_property("hidden")
-    assert opened.value("m2") == 3
-
-
-def test_values_that_do_not_fit_are_refused(opened: OpenedPage, plant: Native) -> None:
-    type_number(opened, "plant-coulomb_friction1", "5")
-    said = plant.refusal(FRICTION, "coulomb_friction1", 5.0)
-    assert opened.text("#message").endswith(f"\n{said}")
-    assert opened.value("coulomb_friction1") == 0.4
-
-
-def test_a_refused_choice_goes_back(opened: OpenedPage, plant: Native) -> None:
-    choose(opened, "#plant-stops1", "compliant")
-    said = plant.refusal({}, "stops1", 3)
-    assert opened.text("#message") == f"RPPlant refuses stops1 = compliant:\n{said}"
-    assert find(opened, "#plant-stops1").get_property("value") == "1"
-
-
-def test_a_step_that_fails_says_so(opened: OpenedPage) -> None:
-    """The page goes back to the last state that it kept, and stops."""
-    opened.run("for (let n = 0; n < 120; n++) simulation.step();"
-               "simulation.efforts[0] = 1e300; window.tested.play(true)")  # fmt: skip
-    opened.browser.wait("!document.getElementById('message').hidden")
-    assert not opened.run("return window.tested.isRunning")
-    assert math.isfinite(opened.value("q1"))
-
-
-def test_method_and_controller(opened: OpenedPage) -> None:
-    for name, value in (("cvode_bdf", 2), ("erk", 3), ("taylor", 4), ("cvode_adams", 1)):
-        opened.run("for (let n = 0; n < 20; n++) simulation.step()")
-        before = opened.run("return [simulation.time, plant.get('q1'), plant.get('dq2')]")
-        choose(opened, "#plant-solver_method", name)
-        assert opened.value("solver_method") == value
-        assert opened.run("return [simulation.time, plant.get('q1'), plant.get('dq2')]") == before
-    choose(opened, "#law", "computed_torque")
-    type_number(opened, "set-point-q1_ref", "0.5")
-    type_number(opened, "set-point-q2_ref", "0.1")
-    opened.run("for (let n = 0; n < 3000; n++) simulation.step()")
-    # friction, of which the controller knows nothing, keeps it off
-    assert abs(opened.value("q1") - 0.5) < 0.05
-    assert abs(opened.value("q2") - 0.1) < 0.05
-    choose(opened, "#law", "off")
-    opened.run("for (let n = 0; n < 3000; n++) simulation.step()")
-    assert opened.value("q1") < -1
+def test_a_benchmark_that_fails(opened: OpenedPage) -> None:
+    """Some steps on, the force is too large: all is as before, and nothing leaks."""
+    click(opened, "#reset")
+    state = "return [simulation.steps, ...simulation.motion.get(), simulation.efforts[0]]"
+    before = opened.run(state)
+    result = opened.run("""
+        const {advance, save, free} = simulation, end = simulation.steps + 100;
+        let count = 0;
+        simulation.save = () => { count++; return save.call(simulation); };
+        simulation.free = saved => { count--; free.call(simulation, saved); };
+        simulation.advance = () => {
+          if (simulation.steps === end) simulation.efforts[0] = 1e300;
+          advance.call(simulation);
+        };
+        document.getElementById('measure').click();
+        Object.assign(simulation, {advance, save, free});
+        return count;
+    """)
+    assert result == 0
+    assert opened.run(state) == before
+    head, said = opened.text("#message").split("\n", 1)
+    assert head == "The speed cannot be measured from here:"
+    assert said
+    assert opened.text("#factor") == ""
 
 
 # ---- Back in time
@@ -196,6 +158,25 @@ def test_save_and_restore(opened: OpenedPage) -> None:
     assert values == ["2.5", "2"]
 
 
+def test_a_state_knows_its_scene(opened: OpenedPage) -> None:
+    """After it is restored, Back stays in its scene, and Reset starts this."""
+    steps = "for (let n = 0; n < 300; n++) simulation.step()"
+    choose(opened, "#setting", "Horizontal plane")
+    opened.run(steps)
+    click(opened, "#save")
+    choose(opened, "#setting", "Without friction")
+    opened.run(steps)
+    assert opened.value("g") > 9
+    click(opened, "#restore")
+    opened.run(steps)
+    for back in (400, 300, 300):
+        assert find(opened, "#setting").get_property("value") == "Horizontal plane"
+        click(opened, "#back")
+        assert (opened.run("return simulation.steps"), opened.value("g")) == (back, 0)
+    click(opened, "#reset")
+    assert (opened.value("g"), opened.value("dq1")) == (0, 3)
+
+
 def test_history(opened: OpenedPage) -> None:
     opened.run("""
         window.tested.reset();
@@ -215,128 +196,3 @@ def test_history(opened: OpenedPage) -> None:
     click(opened, "#back")
     assert opened.run("return simulation.steps") == 300
     assert opened.value("q1") == opened.run("return window.q1[300]")
-
-
-# ---- Hands
-
-
-def drag_place(opened: OpenedPage) -> tuple[float, float]:
-    """Where the end effector is in the view, px."""
-    return tuple(opened.run(
-        "const canvas = document.getElementById('stage');"
-        "canvas.scrollIntoView();"
-        "const box = canvas.getBoundingClientRect(), [x, y] = simulation.tip.get();"
-        "const at = Arm.toPixel(window.tested.stage.view, [x, y]);"
-        "return [box.left + at[0], box.top + at[1]]"
-    ))  # fmt: skip
-
-
-def test_drag_by_mouse(opened: OpenedPage) -> None:
-    x, y = (round(number) for number in drag_place(opened))
-    mouse = ActionChains(opened.browser.driver, duration=0).w3c_actions
-    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(x - 40, y + 60)
-    mouse.perform()
-    opened.run("simulation.step()")
-    fx, fy = opened.value("ee_fx"), opened.value("ee_fy")
-    assert fx < -1 and fy < -1
-    opened.browser.driver.execute_cdp_cmd(
-        "Input.dispatchMouseEvent",
-        {"type": "mouseReleased", "x": x - 40, "y": y + 60, "button": "left", "clickCount": 1},
-    )
-    mouse.clear_actions()
-    opened.run("simulation.step()")
-    assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
-
-
-def touch(opened: OpenedPage, kind: str, *points: tuple[float, float]) -> None:
-    opened.browser.driver.execute_cdp_cmd(
-        "Input.dispatchTouchEvent",
-        {"type": kind, "touchPoints": [{"x": px, "y": py} for px, py in points]},
-    )
-
-
-def test_drag_by_touch(opened: OpenedPage) -> None:
-    x, y = drag_place(opened)
-    touch(opened, "touchStart", (x, y))
-    for way in range(10, 60, 10):  # far enough for a page to scroll
-        touch(opened, "touchMove", (x + way, y - way))
-    opened.run("simulation.step()")
-    assert opened.value("ee_fx") > 1 and opened.value("ee_fy") > 1
-    touch(opened, "touchEnd")
-    opened.run("simulation.step()")
-    assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
-
-
-def test_a_finger_elsewhere_scrolls(opened: OpenedPage) -> None:
-    x, y = drag_place(opened)
-    before = opened.browser.run("return scrollY")
-    for kind, way in (("touchStart", 0), ("touchMove", 30), ("touchMove", 60), ("touchMove", 120)):
-        touch(opened, kind, (x - 150, y + 150 - way))
-    touch(opened, "touchEnd")
-    opened.browser.wait(f"scrollY > {before}")
-    opened.run("simulation.step()")
-    assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
-
-
-def test_push_by_keys(opened: OpenedPage) -> None:
-    opened.browser.run("document.getElementById('stage').focus()")
-    driver = opened.browser.driver
-    ActionChains(driver).key_down(Keys.ARROW_UP).key_down(Keys.ARROW_LEFT).perform()
-    opened.run("simulation.step()")
-    assert (opened.value("ee_fx"), opened.value("ee_fy")) == (-20, 20)
-    ActionChains(driver).key_up(Keys.ARROW_UP).key_up(Keys.ARROW_LEFT).perform()
-    opened.run("simulation.step()")
-    assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
-
-
-def test_keys_of_the_drawing(opened: OpenedPage) -> None:
-    opened.run("for (let n = 0; n < 400; n++) simulation.step()")
-    before = opened.run("return simulation.steps")
-    opened.browser.keys("#stage", Keys.BACKSPACE)
-    assert before - 250 <= opened.run("return simulation.steps") <= before - 200
-    opened.browser.keys("#stage", " ")
-    assert opened.text("#play") == "Pause"
-    opened.browser.keys("#stage", " ")
-    assert opened.text("#play") == "Play"
-
-
-# ---- Looks
-
-
-@pytest.mark.parametrize("reduced", [False, True])
-def test_it_runs_at_once_unless_motion_is_unwanted(
-    browser: Browser, page: Path, reduced: bool
-) -> None:
-    assert OpenedPage(browser, page, reduced_motion=reduced).was_running != reduced
-
-
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-@pytest.mark.parametrize("width", [400, 1200])
-def test_readable(browser: Browser, page: Path, width: int, dark: bool) -> None:
-    """No overflow and nothing that axe-core finds, with all groups open and a message shown."""
-    opened = OpenedPage(browser, page, width=width, dark=dark)
-    opened.run("document.querySelectorAll('details').forEach(it => { it.open = true; });"
-               "window.tested.say('a message '.repeat(30))")  # fmt: skip
-    assert browser.overflow() == 0
-    assert browser.violations() == []
-    browser.check_quiet()
-
-
-def test_the_drawing_follows(opened: OpenedPage) -> None:
-    """The picture of the arm and the chart change while it runs, and have more than one colour."""
-    picture = "return ['stage', 'energy'].map(id => document.getElementById(id).toDataURL())"
-    opened.run("for (let n = 0; n < 50; n++) simulation.step(); window.tested.stage.draw()")
-    first = opened.run(picture)
-    choose(opened, "#speed", "4")
-    click(opened, "#play")
-    opened.browser.wait("window.tested.simulation.time > 1.5")
-    second = opened.run(picture)
-    assert all(early != late for early, late in zip(first, second, strict=True))
-    colours = opened.run(
-        "const canvas = document.getElementById('stage');"
-        "const data = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;"
-        "const found = new Set();"
-        "for (let i = 0; i < data.length; i += 4) found.add(data.slice(i, i + 4).join());"
-        "return found.size"
-    )
-    assert colours > 20
