@@ -73,7 +73,7 @@ static bool is_settable(const struct subject *subject, const struct variable *va
     return variable_is_settable(variable, subject->phase) || is_free_state(subject, variable);
 }
 
-static bool is_allowed(const struct subject *subject, const struct variable *variable,
+static bool may_be_set(const struct subject *subject, const struct variable *variable,
                        double value) {
     return is_settable(subject, variable) && isfinite(value) && value >= variable->min &&
            value <= variable->max;
@@ -152,7 +152,7 @@ void fuzz_model_set_any(struct subject *subject) {
     const struct variable *variable = choose_variable(subject);
     bool is_usual = true;
     const double value = any_value(subject->input, variable, &is_usual);
-    if (!is_allowed(subject, variable, value)) {
+    if (!may_be_set(subject, variable, value)) {
         set_refused(subject, variable, value);
         return;
     }
