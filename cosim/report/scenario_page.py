@@ -13,8 +13,9 @@ from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData, thinned
 from cosim.report.sparkline import path as sparkline
 from cosim.signals import Constant, Signal, Sines, Switches
-from cosim.texts import bits, milliseconds, number, short
+from cosim.texts import bits, milliseconds, number, ordinal, short
 
+DIGITS = 12  # of values; the references of the project have more, users' files have none
 FLOOR = 1e-18  # errors below it, 0 among them, are drawn here; no double is that good
 
 
@@ -35,7 +36,8 @@ def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
     columns = recorded(first)
     csv = f"{scenario.name}.csv"
     values = np.column_stack([column.astype(float) for column in columns.values()])
-    trajectory_csv.write(folder / csv, first.result.times, list(columns), values)
+    digits = DIGITS if first.compared else None
+    trajectory_csv.write_short(folder / csv, first.result.times, list(columns), values, digits)
     rows = thinned(len(first.result.times))
     plots = _plots(runs, columns, rows)
     data = RunData(
@@ -174,7 +176,9 @@ def _csv_note(run: Run, rows: np.ndarray) -> str:
     every = run.scenario.reference_every
     texts = []
     if every > 1:
-        texts.append(f"The file has every {every}th communication point.")
+        texts.append(f"The file has every {ordinal(every)} communication point.")
+    if run.compared:
+        texts.append(f"Its values have {DIGITS} digits.")
     if len(rows) < count:
         texts.append(f"The plots show {len(rows)} of its {count} rows.")
     return " ".join(texts)

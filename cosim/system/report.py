@@ -19,7 +19,8 @@ from cosim.system.ssp import Ssp
 from cosim.system.study import Diagram, Study
 from cosim.texts import milliseconds, short
 
-MOST_ROWS = 600  # of a file of values, which has many columns
+MOST_ROWS = 400  # of a file of values, which has many columns
+DIGITS = 12  # there; errors have a bound of 1e-7
 
 
 @dataclass(frozen=True)
@@ -60,13 +61,13 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     folder = report / SYSTEM
     folder.mkdir(parents=True, exist_ok=True)
     run, csv = outcome.run, f"{outcome.variant}.csv"
-    every = _every(len(run.times))
-    rows = np.arange(0, len(run.times), every)
-    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows])
+    rows = kept_rows(len(run.times))
+    values = run.values[rows]
+    trajectory_csv.write_short(folder / csv, run.times[rows], run.names, values, DIGITS)
     with whole(folder / f"{section.name}.svg") as path:
         path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
     plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
-    step = milliseconds(every * section.ssp.system.step)
+    step = milliseconds(run.times[rows[1]] - run.times[0])
     moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
     page = RunPage(
         title=f"{section.ssp.path.stem}: {outcome.variant}",
@@ -78,7 +79,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
         failures=[*_failures(outcome), *run.messages],
         csv=csv,
-        csv_note=f"The file has a row every {step}.",
+        csv_note=f"The file has a row every {step}, with {DIGITS} digits.",
         diagram=(
             f"{section.name}.svg",
             f"Components of {section.ssp.path.stem} and the signals between them",
@@ -100,14 +101,13 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     )
 
 
-def _every(rows: int) -> int:
-    """Least of 1, 2, 5, 10, ... such that every such row makes `MOST_ROWS` steps at most."""
-    size = 1
-    while True:
-        for factor in (1, 2, 5):
-            if (rows - 1) / (factor * size) <= MOST_ROWS:
-                return factor * size
+def kept_rows(count: int) -> np.ndarray:
+    """Rows of `count` that the file of values has: every 1, 2, 5, 10, ...th and the last one."""
+    size, every = 1, 0
+    while not every:
+        every = next((x * size for x in (1, 2, 5) if (count - 1) / (x * size) <= MOST_ROWS), 0)
         size *= 10
+    return np.unique(np.append(np.arange(0, count, every), count - 1))
 
 
 def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram, rows: np.ndarray) -> Plot:
