@@ -13,9 +13,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,14 @@ MESSAGE = re.compile(
     r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
 )
 BAD = ("Discard", "Error", "Fatal")
+# what FMUs with a solver say of it at the end of a run, with its meaning in a table
+STATISTICS = {
+    "solver_steps": "solver steps",
+    "solver_rhs_evaluations": "evaluations",
+    "solver_restarts": "restarts",
+    "solver_failed_steps": "failed steps",
+    "effective_relative_tolerance": "effective tolerance",
+}
 READERS = {"Real": "get_real", "Integer": "get_integer", "Boolean": "get_bool"}  # of Ecos, by type
 
 
@@ -47,6 +55,8 @@ class Run:
     values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
     wall_time: float  # s, of the steps with the reading
     messages: tuple[str, ...]  # warnings of the components
+    # by component.variable, of those in STATISTICS that there are
+    statistics: Mapping[str, float] = field(default_factory=dict)
 
 
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
@@ -70,12 +80,18 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
     _check_parameters(ssp, variant)
+    statistics = [
+        f"{component}.{name}"
+        for component, model in ssp.models.items()
+        for name in STATISTICS
+        if name in model.variables
+    ]
     with temporary_folder() as folder:
         plan = {
             "ssp": str(ssp.path.resolve()),
             "variant": variant,
-            "names": [f"{c}::{v}" for c, _, v in (name.partition(".") for name in names)],
-            "readers": [READERS[ssp.variable(name).type] for name in names],
+            "variables": _to_read(ssp, names),
+            "statistics": _to_read(ssp, statistics),
             "start": system.start,
             "step": system.step,
             "steps": system.steps,
@@ -99,7 +115,19 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     if len(values) != system.steps + 1:
         raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
     texts = [f"{_sender(ssp, m)}: {m['text']}" for m in messages]
-    return Run(tuple(names), times, values, done["wall_time"], tuple(dict.fromkeys(texts)))
+    return Run(
+        tuple(names),
+        times,
+        values,
+        done["wall_time"],
+        tuple(dict.fromkeys(texts)),
+        dict(zip(statistics, done["statistics"], strict=True)),
+    )
+
+
+def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:
+    """Names of variables as Ecos has them, each after the name of its reader."""
+    return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
 
 
 def _check_parameters(ssp: "Ssp", variant: str) -> None:
@@ -199,9 +227,9 @@ def _child(folder: Path) -> None:
         )
 
     plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
-    names, steps = plan["names"], plan["steps"]
+    steps = plan["steps"]
     EcosLib.set_log_level("debug")
-    rows = np.empty((steps + 1, len(names)))
+    rows = np.empty((steps + 1, len(plan["variables"])))
     flush = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush
     seen = 0
 
@@ -219,18 +247,17 @@ def _child(folder: Path) -> None:
     with EcosSimulation(step_size=plan["step"], ssp_path=plan["ssp"]) as simulation:
         if not simulation.init(start_time=plan["start"], parameter_set=plan["variant"]):
             raise RuntimeError(EcosLib.get_last_error())
-        readers = [
-            (getattr(simulation, reader), name)
-            for reader, name in zip(plan["readers"], names, strict=True)
-        ]
+        readers = [(getattr(simulation, reader), name) for reader, name in plan["variables"]]
         row, begin = 0, time.perf_counter()
         while go_on(row) and row < steps:
             simulation.step()
             row += 1
         wall_time = time.perf_counter() - begin
+        statistics = [getattr(simulation, reader)(name) for reader, name in plan["statistics"]]
         simulation.terminate()
     np.save(folder / ROWS, rows[: row + 1])
-    (folder / DONE).write_text(json.dumps({"wall_time": wall_time}), encoding="utf-8", newline="\n")
+    done = json.dumps({"wall_time": wall_time, "statistics": statistics})
+    (folder / DONE).write_text(done, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

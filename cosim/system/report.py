@@ -8,14 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from cosim import project, trajectory_csv
+from cosim.model import KINDS, Value, Variable
 from cosim.output_files import whole
 from cosim.report import assets, motion, overview, pages
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData
 from cosim.report.sparkline import path as sparkline
+from cosim.system import ecos
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
+from cosim.system.structure import System
 from cosim.system.study import Diagram, Study
 from cosim.texts import milliseconds, short
 
@@ -71,11 +74,15 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
     page = RunPage(
         title=f"{section.ssp.path.stem}: {outcome.variant}",
-        description=f"Run by Ecos with steps of {milliseconds(section.ssp.system.step)}.",
+        description=_description(section.ssp.system, outcome.variant),
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
         data=RunData(outcome.variant, "", run.times[rows], plots, motion=moving),
-        tables=[*_parameters(section.ssp, outcome.variant), _errors(section.ssp, outcome)],
+        tables=[
+            *_parameters(section.ssp, outcome.variant),
+            *_solvers(section.ssp, run),
+            _errors(section.ssp, outcome),
+        ],
         notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
         failures=[*_failures(outcome), *run.messages],
         csv=csv,
@@ -148,18 +155,53 @@ def _failures(outcome: Outcome) -> list[str]:
     return [f"the error of {outcome.worst}, {outcome.error:.1e}, is above its bound {short(BOUND)}"]
 
 
+def _description(system: System, variant: str) -> str:
+    """What the variant is, and how it is run."""
+    said = system.descriptions.get(variant, "").rstrip(".")
+    how = f"Run by Ecos with steps of {milliseconds(system.step)}."
+    return f"{said}. {how}" if said else how
+
+
 def _parameters(ssp: Ssp, variant: str) -> list[Table]:
-    """What the variant sets, component by component."""
-    rows = []
-    for component, values in ssp.system.parameter_sets[variant].items():
-        for name, value in values.items():
-            known = ssp.models[component].variables[name]
-            shown = known.written(value)
-            text = str(shown).lower() if isinstance(shown, bool) else shown
-            rows.append((component, name, text, known.unit or "", known.description))
+    """What the variant sets, then per component what has its start value."""
+    given = ssp.system.parameter_sets[variant]
+    connected = {(x.end_component, x.end_connector) for x in ssp.system.connections}
+    rows: list[Sequence[object]] = []
+    others = []
+    for component, model in ssp.models.items():
+        values = given.get(component, {})
+        rows += [(component, *_cells(model.variables[name], values[name])) for name in values]
+        rest = [
+            _cells(variable, value)
+            for name, value in model.start_values.items()
+            if name not in values and (component, name) not in connected
+            for variable in [model.variables[name]]
+            if any(variable.is_a(kind) for kind in KINDS)
+        ]
+        if rest:
+            title = f"All other start values of {component}"
+            others.append(Table(title, ("name", "value", "unit", "meaning"), rest, folded=True))
     head = ("component", "name", "value", "unit", "meaning")
-    note = "What is not here has its start value in the FMU."
-    return [Table("Parameters of this variant", head, rows, note=note)] if rows else []
+    own = [Table("Parameters of this variant", head, rows)] if rows else []
+    return own + others
+
+
+def _cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
+    shown = variable.written(value)
+    text = str(shown).lower() if isinstance(shown, bool) else shown
+    return variable.name, text, variable.unit or "", variable.description
+
+
+def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
+    """Statistics of the components that integrate."""
+    rows = []
+    for component in ssp.models:
+        values = [run.statistics.get(f"{component}.{name}") for name in ecos.STATISTICS]
+        if any(value is not None for value in values):
+            cells = ("–" if x is None else short(x) if isinstance(x, float) else x for x in values)
+            rows.append((component, *cells))
+    note = "Of components with a solver, from the start to the end of the run."
+    return [Table("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
 
 
 def _errors(ssp: Ssp, outcome: Outcome) -> Table:

@@ -109,6 +109,31 @@ def test_the_page_says_what_ran(browser: Browser, report: Path) -> None:
         assert part in text, part
 
 
+def test_the_page_of_a_variant_says_what_it_is_and_how_it_was_solved(
+    browser: Browser, report: Path
+) -> None:
+    show(browser, report / f"system/{VARIANT}.html")
+    assert "The path leads through a hard wall. Run by Ecos" in browser.run(
+        "return document.querySelector('main > p').innerText"
+    )
+    titles = browser.run("return [...document.querySelectorAll('summary')].map(x => x.innerText)")
+    for component in ("trajectory", "controller", "actuator", "plant", "sensor", "environment"):
+        assert f"All other start values of {component}" in titles
+    browser.run("document.querySelectorAll('details').forEach(x => { x.open = true; })")
+    text = browser.run("return document.body.innerText")
+    assert re.search(r"stribeck_velocity1\s+\S+\s+rad/s", text) and "solver_method\t" in text
+    rows = browser.run(
+        "const table = document.querySelector('[aria-label=Solvers] tbody');"
+        "return [...table.rows].map(row => [...row.cells].map(cell => cell.innerText))"
+    )
+    found = {component: numbers for component, *numbers in rows}
+    assert set(found) >= {"controller", "actuator", "plant"} and "environment" not in found
+    steps, evaluations, restarts, failed = map(int, found["plant"][:4])
+    # its inputs change at most of the 4000 communication points
+    assert 3000 < restarts <= steps < evaluations and 0 <= failed < steps
+    assert 0 < float(found["plant"][4]) < 1e-8
+
+
 def test_every_plot_and_picture_has_a_text(browser: Browser, report: Path) -> None:
     show(browser, report / f"system/{VARIANT}.html")
     texts = browser.run(
