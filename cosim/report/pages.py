@@ -45,7 +45,7 @@ class RunPage:
     description: str
     status: str
     facts: Sequence[tuple[str, str]]
-    data: RunData
+    data: RunData | None  # None: nothing was recorded
     tables: Sequence[Table]
     notes: Sequence[str] = ()
     failures: Sequence[str] = ()
@@ -57,7 +57,7 @@ class RunPage:
 
 def write_run(path: Path, page: RunPage) -> Path:
     """Write a page of a section of the report; return its path."""
-    return write_page(path, "run.html", root="../", page=page, data=page.data.json())
+    return write_page(path, "run.html", root="../", page=page, data=page.data and page.data.json())
 
 
 def write_page(path: Path, template: str, **values: object) -> Path:

@@ -15,7 +15,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -59,6 +59,14 @@ class Run:
     statistics: Mapping[str, float] = field(default_factory=dict)
 
 
+class StoppedError(UserError):
+    """A run that a component did not finish; `run` has its rows up to there, if there are any."""
+
+    def __init__(self, text: str, run: Run | None = None) -> None:
+        super().__init__(text)
+        self.run = run
+
+
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     """Run a system from its start to its stop time with one of its parameter sets.
 
@@ -74,7 +82,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     ------
     UserError
         If a component fails or gives a value that is not finite (the text names component,
-        variable and time), or if Ecos itself fails.
+        variable and time), or if Ecos itself fails. After the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:
@@ -105,24 +113,36 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
         values = np.load(folder / ROWS)
         done = json.loads((folder / DONE).read_text(encoding="utf-8"))
     times = system.start + system.step * np.arange(len(values))
-    _check_values(ssp, variant, names, times, values)
     messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
-    for match in messages:
-        if match["status"] in BAD:
-            where = f"{variant}: component {_sender(ssp, match)}"
-            when = "in initialization" if len(values) == 1 else f"by t = {times[-1]:.6g} s"
-            raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
-    if len(values) != system.steps + 1:
-        raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
-    texts = [f"{_sender(ssp, m)}: {m['text']}" for m in messages]
-    return Run(
+    warnings = [f"{_sender(ssp, m)}: {m['text']}" for m in messages if m["status"] not in BAD]
+    result = Run(
         tuple(names),
         times,
         values,
         done["wall_time"],
-        tuple(dict.fromkeys(texts)),
+        tuple(dict.fromkeys(warnings)),
         dict(zip(statistics, done["statistics"], strict=True)),
     )
+    try:
+        _check_values(ssp, variant, names, times, values)
+        _check_messages(ssp, variant, times, messages)
+    except UserError as error:  # what was read after the last step is not to be trusted
+        before = replace(result, times=times[:-1], values=values[:-1], statistics={})
+        raise StoppedError(str(error), before if len(times) > 1 else None) from None
+    return result
+
+
+def _check_messages(
+    ssp: "Ssp", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
+) -> None:
+    """Refuse a run in which a component has failed, or that Ecos has stopped."""
+    for match in messages:
+        if match["status"] in BAD:
+            where = f"{variant}: component {_sender(ssp, match)}"
+            when = "in initialization" if len(times) == 1 else f"by t = {times[-1]:.6g} s"
+            raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
+    if len(times) != ssp.system.steps + 1:
+        raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
 
 
 def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:

@@ -4,10 +4,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim import project, trajectory_csv
+from cosim.errors import UserError
 from cosim.model import KINDS, Value, Variable
 from cosim.output_files import whole
 from cosim.report import assets, motion, overview, pages
@@ -60,24 +62,12 @@ def remove(report: Path, system: str, variants: Sequence[str]) -> None:
 
 def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
-    assets.write(report)
-    folder = report / SYSTEM
-    folder.mkdir(parents=True, exist_ok=True)
-    run, csv = outcome.run, f"{outcome.variant}.csv"
-    rows = kept_rows(len(run.times))
-    values = run.values[rows]
-    trajectory_csv.write_short(folder / csv, run.times[rows], run.names, values, DIGITS)
-    with whole(folder / f"{section.name}.svg") as path:
-        path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
-    plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
-    step = milliseconds(run.times[rows[1]] - run.times[0])
-    moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    run, folder = outcome.run, _folder(report, section)
+    data = _data(section, outcome)
     page = RunPage(
-        title=f"{section.ssp.path.stem}: {outcome.variant}",
-        description=_description(section.ssp.system, outcome.variant),
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
-        data=RunData(outcome.variant, "", run.times[rows], plots, motion=moving),
+        data=data,
         tables=[
             *_parameters(section.ssp, outcome.variant),
             *_solvers(section.ssp, run),
@@ -85,13 +75,8 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         ],
         notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
         failures=[*_failures(outcome), *run.messages],
-        csv=csv,
-        csv_note=f"The file has a row every {step}, with {DIGITS} digits.",
-        diagram=(
-            f"{section.name}.svg",
-            f"Components of {section.ssp.path.stem} and the signals between them",
-        ),
-        again=f"./run.sh system {outcome.variant}",
+        **_values(folder, outcome),
+        **_texts(section, outcome.variant),
     )
     pages.write_run(folder / f"{outcome.variant}.html", page)
     return Entry(
@@ -103,9 +88,74 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         error=float(outcome.error) if np.isfinite(outcome.error) else None,
         bound=BOUND,
         detail=f"worst variable: {outcome.worst}",
-        line=sparkline(page.data.x, plots[0].curves[0].values),
-        line_text=plots[0].text,
+        line=sparkline(data.x, data.plots[0].curves[0].values),
+        line_text=data.plots[0].text,
     )
+
+
+def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
+    """Write the page of a variant that did not run to its end: what there is of it."""
+    folder, system = _folder(report, section), section.ssp.system
+    run = error.run if isinstance(error, ecos.StoppedError) else None
+    facts = [("system", section.title), ("time", f"{system.start:g} to {system.stop:g} s")]
+    data, values, line, text = None, {}, "", ""
+    if run is not None:
+        outcome = Outcome(variant, len(run.times) - 1, run, {})
+        data, values = _data(section, outcome), _values(folder, outcome)
+        line, text = sparkline(data.x, data.plots[0].curves[0].values), data.plots[0].text
+        facts.append(("results until", f"{run.times[-1]:g} s"))
+    page = RunPage(
+        status=FAILED,
+        facts=facts,
+        data=data,
+        tables=_parameters(section.ssp, variant),
+        failures=[str(error)],
+        **values,
+        **_texts(section, variant),
+    )
+    pages.write_run(folder / f"{variant}.html", page)
+    name = f"{variant}.html"
+    return Entry(variant, "", section.title, name, FAILED, None, None, str(error), line, text)
+
+
+def _folder(report: Path, section: Section) -> Path:
+    """Folder of the pages, with what they share."""
+    assets.write(report)
+    folder = report / SYSTEM
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole(folder / f"{section.name}.svg") as path:
+        path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
+    return folder
+
+
+def _texts(section: Section, variant: str) -> dict[str, Any]:
+    """What a page says of a variant, however its run ended."""
+    stem = section.ssp.path.stem
+    return {
+        "title": f"{stem}: {variant}",
+        "description": _description(section.ssp.system, variant),
+        "diagram": (f"{section.name}.svg", f"Components of {stem} and the signals between them"),
+        "again": f"./run.sh system {variant}",
+    }
+
+
+def _data(section: Section, outcome: Outcome) -> RunData:
+    """Plots and motion, at the rows that the file of values has."""
+    times = outcome.run.times
+    rows = kept_rows(len(times))
+    plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
+    moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    return RunData(outcome.variant, "", times[rows], plots, motion=moving)
+
+
+def _values(folder: Path, outcome: Outcome) -> dict[str, str]:
+    """Write the file of values; what the page says of it."""
+    run, csv = outcome.run, f"{outcome.variant}.csv"
+    rows = kept_rows(len(run.times))
+    trajectory_csv.write_short(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS)
+    every = np.diff(run.times[rows])[:1].sum()
+    note = f"The file has a row every {milliseconds(every)}, with {DIGITS} digits."
+    return {"csv": csv, "csv_note": note}
 
 
 def kept_rows(count: int) -> np.ndarray:

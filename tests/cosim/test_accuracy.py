@@ -16,8 +16,8 @@ from cosim.reference import Reference
 from cosim.report import scenario_page
 from cosim.report.writer import ReportWriter
 from cosim.tolerance_sweep import Sweep
-from tests.support.all_fmus import FOLDERS
 from tests.report.sizes import OF_SCENARIOS
+from tests.support.all_fmus import FOLDERS
 from tests.support.cosim_project import (
     LONG,
     NAMES,
