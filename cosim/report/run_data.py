@@ -32,6 +32,7 @@ class Plot:
     curves: Sequence[Curve]
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
+    floor: float | None = None  # smaller values, 0 among them, are drawn here
 
     @property
     def text(self) -> str:
@@ -113,6 +114,7 @@ def narrow(values: np.ndarray) -> np.ndarray:
 
 def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content: dict[str, Any] = {"title": plot.title, "unit": plot.unit, "log": plot.log}
+    content["floor"] = plot.floor
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:

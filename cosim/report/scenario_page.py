@@ -66,7 +66,8 @@ def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Fail
             *(describe_failure(failure) for failure in failures),
         ],
         csv=csv,
-        csv_note=_csv_note(first, rows),
+        csv_note=_csv_note(first),
+        warning=pages.thinned(len(rows), len(scenario.times)),
         again=again,
     )
     pages.write_run(folder / f"{scenario.name}.html", page)
@@ -201,10 +202,10 @@ def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
         expected = np.column_stack([run.reference.column(name) for name in run.result.names])
         errors = np.max(np.abs(run.result.values - expected) / scales, axis=1)[rows]
         name = f"tolerance {short(run.result.tolerance)}"
-        curves.append(Curve(name, np.maximum(errors, FLOOR).astype(np.float32)))
+        curves.append(Curve(name, errors))
         if run.compared:
             levels.append((f"bound {short(run.bound)}", run.bound))
-    return Plot("largest relative error of all outputs", "", curves, log=True, levels=levels)
+    return Plot("largest relative error of all outputs", "", curves, True, levels, FLOOR)
 
 
 def _facts(run: Run) -> list[tuple[str, str]]:
@@ -244,16 +245,13 @@ def _notes(runs: Sequence[Run]) -> list[str]:
     return texts
 
 
-def _csv_note(run: Run, rows: np.ndarray) -> str:
-    count = len(run.result.times)
+def _csv_note(run: Run) -> str:
     every = run.scenario.reference_every
     texts = []
     if every > 1:
         texts.append(f"The file has every {ordinal(every)} communication point.")
     if run.compared:
         texts.append(f"Its values have {DIGITS} digits.")
-    if len(rows) < count:
-        texts.append(f"The plots show {len(rows)} of its {count} rows.")
     return " ".join(texts)
 
 

@@ -155,7 +155,7 @@ def _values(folder: Path, outcome: Outcome) -> dict[str, str]:
     trajectory_csv.write_short(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS)
     every = np.diff(run.times[rows])[:1].sum()
     note = f"The file has a row every {milliseconds(every)}, with {DIGITS} digits."
-    return {"csv": csv, "csv_note": note}
+    return {"csv": csv, "csv_note": note, "warning": pages.thinned(len(rows), len(run.times))}
 
 
 def kept_rows(count: int) -> np.ndarray:

@@ -134,6 +134,64 @@ def test_the_page_of_a_variant_says_what_it_is_and_how_it_was_solved(
     assert 0 < float(found["plant"][4]) < 1e-8
 
 
+def test_an_error_and_its_bound_stay_in_one_line(browser: Browser, report: Path) -> None:
+    for width in (400, 1400):
+        browser.open(report / "index.html", width=width)
+        cells = browser.run(
+            "return [...document.querySelectorAll('.result .nowrap')].map(x => ["
+            "x.innerText.replace(/\u00a0/g, ' '), x.getClientRects().length,"
+            "x.getBoundingClientRect().right - x.closest('td').getBoundingClientRect().right])"
+        )
+        assert any(re.fullmatch(r"\S+ of \S+", text) for text, _, _ in cells)
+        assert all(lines == 1 and beyond <= 0 for _, lines, beyond in cells), cells
+
+
+def test_each_swatch_is_that_of_its_curve(browser: Browser, report: Path) -> None:
+    """Of more curves than there are colours, some are dashed."""
+    show(browser, report / "studies/accuracy.html")
+    pairs = browser.run(
+        "const plot = page.plots[0], [main] = [plot.plot];"
+        "const many = {...main, curves: Array.from({length: 13}, (_, i) =>"
+        " ({...main.curves[0], name: `curve ${i}`}))};"
+        "plot.plot = many; plot.restyle(); return plot.draw(Plotly).then(() => {"
+        " const swatches = [...plot.figure.querySelectorAll('.swatch path')];"
+        " return plot.drawing.data.map((trace, i) => [trace.line.color, trace.line.dash,"
+        "  swatches[i].getAttribute('stroke'), swatches[i].getAttribute('stroke-dasharray')]);})"
+    )
+    assert len({tuple(pair[:2]) for pair in pairs}) == 13
+    for colour, dash, stroke, dashes in pairs:
+        assert stroke == colour
+        assert dashes == ("" if dash == "solid" else dash.replace("px", "").replace(",", " "))
+
+
+def test_the_cursor_shows_zero_where_the_axis_has_none(browser: Browser, report: Path) -> None:
+    show(browser, report / f"files/{STRANGE}.html")  # its start is exact
+    browser.run("page.seek(0)")
+    text = browser.run("return [...document.querySelectorAll('.plot')].at(-1).innerText")
+    assert "tolerance 1e-8 0\n" in text.replace("\u2212", "-"), text
+
+
+def test_a_page_of_few_rows_says_so(browser: Browser, report: Path) -> None:
+    shown = {f"scenarios/{SCENARIOS[0]}": "501 of the run's 2001 communication points"}
+    shown[f"system/{VARIANT}"] = "401 of the run's 4001 communication points"
+    for name, text in shown.items():
+        show(browser, report / f"{name}.html")
+        found = browser.run("return document.querySelector('.stage .warning').innerText")
+        assert text in found and browser.run("return page.x.length") == int(text.split()[0])
+    show(browser, report / f"scenarios/{SCENARIOS[1]}.html")
+    assert browser.run("return document.querySelector('.warning') === null")
+
+
+def test_the_diagram_is_below_the_player_and_scrolls(browser: Browser, report: Path) -> None:
+    show(browser, report / f"system/{VARIANT}.html", width=400)
+    player, box, wide, seen = browser.run(
+        "const box = document.querySelector('.diagram');"
+        "return [document.getElementById('player').getBoundingClientRect().bottom,"
+        "box.getBoundingClientRect().top, box.scrollWidth, box.clientWidth]"
+    )
+    assert box >= player + 16 and wide >= 700 > seen and browser.overflow() == 0
+
+
 def test_every_plot_and_picture_has_a_text(browser: Browser, report: Path) -> None:
     show(browser, report / f"system/{VARIANT}.html")
     texts = browser.run(
