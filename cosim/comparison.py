@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosim import project, reference, simulation
+from cosim.errors import UserError
 from cosim.fmu_file import Fmu
 from cosim.reference import Reference
 from cosim.scenario import Scenario
-from cosim.simulation import Result
+from cosim.simulation import Result, StoppedError
 
 ESTIMATE_TOLERANCE = 1e-11
 
@@ -64,6 +65,17 @@ class Run:
         if self.error <= self.bound and self.twin and self.twin.differing:
             return f"FMI {self.twin.fmi_version}: {self.twin.differing[0]}"
         return self.worst
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """A run that an FMU did not finish."""
+
+    scenario: Scenario
+    fmu: Fmu
+    tolerance: float
+    text: str  # with the FMU's own message
+    result: Result | None  # up to the failure, if it has rows
 
 
 class Runs:
@@ -127,6 +139,12 @@ class Runs:
             run = replace(run, twin=found)
             self._runs[scenario.name, tolerance] = run
         return run
+
+    def failure(self, scenario: Scenario, tolerance: float, error: UserError) -> Failure:
+        """What is known of a run that ended with `error`."""
+        result = error.result if isinstance(error, StoppedError) else None
+        rows = result if result is not None and len(result.times) else None
+        return Failure(scenario, self._fmus[scenario.model], tolerance, str(error), rows)
 
     def estimated(
         self,

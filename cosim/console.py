@@ -51,6 +51,12 @@ class RunTable:
             flush=True,
         )
 
+    def failed(self, name: str, tolerance: float) -> None:
+        """A run that an FMU did not finish."""
+        print(
+            f"{name:<{self._width}}  {tolerance:>9.0e}  FAILED: did not run to its end", flush=True
+        )
+
 
 class SweepTable:
     """Errors of scenarios over the tolerances."""
@@ -115,6 +121,10 @@ class VariantTable:
             cells.append(f" {text:>{len(measure.name) + 1}}")
         text = "passed" if outcome.passed else f"FAILED ({outcome.worst})"
         print("".join(cells) + f" {outcome.run.wall_time:>8.3f} s  {text}", flush=True)
+
+    def failed(self, name: str) -> None:
+        """A variant that a component did not finish."""
+        print(f"{name:<{self._width}}  FAILED: did not run to its end", flush=True)
 
 
 def convergence(study: Convergence) -> None:

@@ -1,7 +1,7 @@
 """Errors whose text is meant for the user, and functions that form such texts."""
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class UserError(Exception):
@@ -9,6 +9,11 @@ class UserError(Exception):
 
     Its text is one line: the file, the key, what was wrong and what was expected.
     """
+
+
+def together(errors: Sequence[UserError]) -> UserError:
+    """One error for all of a command's."""
+    return UserError("; ".join(dict.fromkeys(map(str, errors))))
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

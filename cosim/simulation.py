@@ -32,6 +32,14 @@ class Result:
     integers: dict[str, np.ndarray] = field(default_factory=dict)  # (rows,): those to be drawn
 
 
+class StoppedError(UserError):
+    """A run that failed in a step; `result` has its rows up to there."""
+
+    def __init__(self, text: str, result: Result) -> None:
+        super().__init__(text)
+        self.result = result
+
+
 def simulate(
     fmu: Fmu,
     scenario: Scenario,
@@ -54,7 +62,7 @@ def simulate(
     ------
     UserError
         If the FMU has no Real outputs, or if one of its functions fails; the text holds the FMU's
-        own message.
+        own message. In a step it is a `StoppedError`.
     """
     tolerance = scenario.tolerance if tolerance is None else tolerance
     if not fmu.model.real_outputs:
@@ -66,19 +74,23 @@ def simulate(
             for name in dict.fromkeys(chain.from_iterable(scenario.panels))
             if fmu.model.variables[name].type == "Integer"
         ]
-        values, integers, wall_time = _step_through(instance, scenario, drawn, progress)
-        return Result(
+        values, integers, wall_time, failure = _step_through(instance, scenario, drawn, progress)
+        ended = failure is None
+        result = Result(
             tolerance=tolerance,
-            times=scenario.times[scenario.reference_rows],
+            times=scenario.times[scenario.reference_rows][: len(values)],
             names=tuple(fmu.model.real_outputs),
             values=values,
             steps=len(scenario.times) - 1,
             wall_time=wall_time,
-            solver_steps=instance.integer("solver_steps"),
-            solver_rhs_evaluations=instance.integer("solver_rhs_evaluations"),
+            solver_steps=instance.integer("solver_steps") if ended else None,
+            solver_rhs_evaluations=instance.integer("solver_rhs_evaluations") if ended else None,
             messages=tuple(instance.messages),
             integers=dict(zip(drawn, integers.T, strict=True)),
         )
+        if failure is not None:
+            raise StoppedError(str(failure), result) from failure
+        return result
 
 
 def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None:
@@ -97,8 +109,11 @@ def _step_through(
     scenario: Scenario,
     drawn: Sequence[str],
     progress: Callable[[int], object] | None,
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """All steps: recorded outputs (rows, outputs), Integers (rows, drawn), seconds of the loop."""
+) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
+    """All steps, or those before one that fails.
+
+    Recorded outputs (rows, outputs), Integers (rows, drawn), seconds of the loop, and the failure.
+    """
     switches = {name: values for name, values in scenario.inputs.items() if values.dtype == bool}
     inputs = instance.reals([name for name in scenario.inputs if name not in switches])
     outputs = instance.reals(instance.fmu.model.real_outputs)
@@ -110,13 +125,14 @@ def _step_through(
     rows = scenario.reference_rows
     values = np.empty((len(rows), len(outputs.names)))
     integers = np.empty((len(rows), len(drawn)), int)
-    recorded, reported, i = 0, 0, -1
+    recorded, reported, i = -1, 0, -1
     begin = time.perf_counter()
     due = begin + PROGRESS_EVERY
     try:
         outputs.get()
         values[0] = outputs.view
         integers[0] = [instance.integer(name) for name in drawn]
+        recorded = 0
         for i, length in enumerate(lengths):
             if held is not None:
                 inputs.view[:] = held[i]
@@ -135,11 +151,13 @@ def _step_through(
                 due = time.perf_counter() + PROGRESS_EVERY
     except FMICallException as error:
         when = f"in the step from t = {float(times[max(i, 0)])!r} s"
-        raise instance.failure(error, when) from error
+        failure = instance.failure(error, when)
+        rows_before = slice(recorded + 1)
+        return values[rows_before], integers[rows_before], time.perf_counter() - begin, failure
     wall_time = time.perf_counter() - begin
     if progress is not None:
         progress(len(lengths) - reported)
-    return values, integers, wall_time
+    return values, integers, wall_time, None
 
 
 def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:

@@ -14,6 +14,12 @@ def milliseconds(seconds: float) -> str:
     return f"{1e3 * seconds:.6g} ms"
 
 
+def ordinal(number: int) -> str:
+    """2nd, 3rd, 10th."""
+    teen = number // 10 % 10 == 1
+    return f"{number}{'th' if teen else {1: 'st', 2: 'nd', 3: 'rd'}.get(number % 10, 'th')}"
+
+
 def counted(things: Sized, name: str) -> str:
     """1 scenario, 2 scenarios."""
     return f"{len(things)} {name}" + ("s" if len(things) != 1 else "")

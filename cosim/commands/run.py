@@ -10,9 +10,9 @@ from pathlib import Path
 
 from cosim import console, convergence, project
 from cosim import scenario as scenarios
-from cosim.comparison import Run, Runs
+from cosim.comparison import Failure, Run, Runs
 from cosim.convergence import Convergence
-from cosim.errors import UserError
+from cosim.errors import UserError, together
 from cosim.fmu_file import Fmu
 from cosim.model import VERSIONS
 from cosim.output_files import check_writable, from_here, written
@@ -42,21 +42,24 @@ def run(options: argparse.Namespace) -> int:
                 writer.forget()
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []
+        failures: list[Failure] = []
         if options.tolerance is not None:
-            done = _runs(runs, chosen, bool(twins), options.tolerance)
+            done = _runs(runs, chosen, bool(twins), failures, options.tolerance)
         else:
-            done = _runs(runs, chosen, bool(twins), None, TIGHTEST)
-            sweeps = _sweeps(runs, _quick(done) if options.names else chosen)
+            done = _runs(runs, chosen, bool(twins), failures, None, TIGHTEST)
+            sweeps = _sweeps(runs, _ended(_quick(done) if options.names else chosen, failures))
             studies = [] if options.names else _convergence(fmus, twins)
-        estimated = _estimated(runs, own, options.tolerance)
+        estimated = _estimated(runs, own, failures, options.tolerance)
         groups = writer.grouped([*done, *estimated])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
-            page = writer.write(groups, sweeps, studies, progress)
+            page = writer.write(groups, sweeps, studies, progress, failures)
     for name, file in writer.files.items():
         print(f"\n{name}: {from_here(file)}", end="")
     print(f"\nreport: {from_here(options.report / pages.INDEX)}")
     if options.open:
         show(page)
+    if failures:
+        raise together([UserError(failure.text) for failure in failures])
     failed = (x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
     if not chosen:  # files of users are not compared with anything
         return 0
@@ -132,9 +135,16 @@ def _built(
 
 
 def _runs(
-    runs: Runs, chosen: Sequence[Scenario], with_twins: bool, *tolerances: float | None
+    runs: Runs,
+    chosen: Sequence[Scenario],
+    with_twins: bool,
+    failures: list[Failure],
+    *tolerances: float | None,
 ) -> list[Run]:
-    """Run `chosen` at `tolerances`; None: at the tolerance of the scenario."""
+    """Run `chosen` at `tolerances`; None: at the tolerance of the scenario.
+
+    A run that an FMU does not finish is added to `failures`.
+    """
     if not chosen:
         return []
     names = (scenario.name for scenario in chosen)
@@ -144,23 +154,45 @@ def _runs(
         for tolerance in dict.fromkeys(t or scenario.tolerance for t in tolerances):
             label = f"{scenario.name} at {tolerance:g}"
             ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
-            with Progress(label, ahead) as progress:
-                run = runs.compared(scenario, tolerance, progress)
+            try:
+                with Progress(label, ahead) as progress:
+                    run = runs.compared(scenario, tolerance, progress)
+            except UserError as error:
+                failures.append(runs.failure(scenario, tolerance, error))
+                table.failed(scenario.name, tolerance)
+                continue
             table.row(run)
             console.messages(f"{label}: the FMU says", run.result.messages)
             done.append(run)
     return done
 
 
-def _estimated(runs: Runs, own: Sequence[Scenario], tolerance: float | None) -> list[Run]:
-    """Run scenarios of users, which have no references; None: at their own tolerances."""
+def _ended(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
+    """Those of `chosen` that did not fail."""
+    failed = {failure.scenario.path for failure in failures}
+    return [scenario for scenario in chosen if scenario.path not in failed]
+
+
+def _estimated(
+    runs: Runs, own: Sequence[Scenario], failures: list[Failure], tolerance: float | None
+) -> list[Run]:
+    """Run scenarios of users, which have no references; None: at their own tolerances.
+
+    A run that an FMU does not finish is added to `failures`.
+    """
     if not own:
         return []
     table = console.RunTable(scenario.name for scenario in own)
     done = []
     for scenario in own:
-        with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
-            run = runs.estimated(scenario, tolerance or scenario.tolerance, progress)
+        used = tolerance or scenario.tolerance
+        try:
+            with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
+                run = runs.estimated(scenario, used, progress)
+        except UserError as error:
+            failures.append(runs.failure(scenario, used, error))
+            table.failed(scenario.name, used)
+            continue
         table.row(run)
         console.messages(f"{scenario.name}: the FMU says", run.result.messages)
         done.append(run)

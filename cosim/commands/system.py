@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim import console, project
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, did_you_mean, together
 from cosim.output_files import check_writable, from_here, written
 from cosim.report import overview
 from cosim.report.browser import show
@@ -131,12 +131,20 @@ def _planned(system: _System, names: Sequence[str]) -> _Plan:
 def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> int:
     """Run the plans; a row appears as a variant ends, and its files are written then."""
     outcomes: list[Outcome] = []
+    failures: list[UserError] = []
     entries: list[Entry] = []
     for plan in plans:
         section = Section(plan.system.folder, plan.system.ssp, plan.study)
         table = console.VariantTable(plan.references, plan.study.MEASURES)
         for name, reference in plan.references.items():
-            outcome = comparison.simulate(section.ssp, name, reference)
+            try:
+                outcome = comparison.simulate(section.ssp, name, reference)
+            except UserError as error:
+                failures.append(error)
+                table.failed(name)
+                with written(options.report):
+                    entries.append(report.write_failed(options.report, section, name, error))
+                continue
             table.row(outcome)
             console.messages(name, outcome.run.messages)
             with written(options.report):
@@ -151,6 +159,8 @@ def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> int:
     print(f"report: {from_here(index)}")
     if options.open:
         show(index)
+    if failures:
+        raise together(failures)
     failed = (outcome.variant for outcome in outcomes if not outcome.passed)
     return console.summary(failed, outcomes, "variant")
 

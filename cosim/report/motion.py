@@ -15,6 +15,8 @@ import numpy as np
 from cosim import project
 from cosim.comparison import Run
 from cosim.model import Value
+from cosim.scenario import Scenario
+from cosim.simulation import Result
 from cosim.system.comparison import Outcome
 from cosim.system.ssp import Ssp
 
@@ -56,12 +58,21 @@ def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> 
     rows : sequence of int or slice, optional
         Those of the recorded rows that the page holds.
     """
-    scenario, result = run.scenario, run.result
+    references = {name: run.reference.column(name) for name in run.result.names}
+    return of_result(run.scenario, run.result, references, rows)
+
+
+def of_result(
+    scenario: Scenario,
+    result: Result,
+    references: Mapping[str, np.ndarray],
+    rows: Sequence[int] | np.ndarray | slice = slice(None),
+) -> dict | None:
+    """The same of a run that may have stopped early, with the references that there are."""
     # a row holds the outputs at the end of a step, so the inputs too are those of this step
-    held = np.maximum(scenario.reference_rows - 1, 0)
+    held = np.maximum(scenario.reference_rows[: len(result.times)] - 1, 0)
     inputs = {name: values[held] for name, values in scenario.inputs.items()}
     outputs = dict(zip(result.names, result.values.T, strict=True))
-    references = {name: run.reference.column(name) for name in result.names}
     recorded = Recorded(
         result.times, inputs | outputs | result.integers, references, scenario.start_values
     )

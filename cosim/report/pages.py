@@ -45,19 +45,30 @@ class RunPage:
     description: str
     status: str
     facts: Sequence[tuple[str, str]]
-    data: RunData
+    data: RunData | None  # None: nothing was recorded
     tables: Sequence[Table]
     notes: Sequence[str] = ()
     failures: Sequence[str] = ()
     csv: str = ""  # file name beside the page, if there is one
     csv_note: str = ""
+    warning: str = ""  # what plots and animation do not show
     diagram: tuple[str, str] | None = None  # file name beside the page, and what it shows
     again: str = ""  # the command that runs it again
 
 
+def thinned(shown: int, count: int) -> str:
+    """Warning beside plots and animation that do not show all of `count` communication points."""
+    if shown >= count:
+        return ""
+    return (
+        f"This page shows {shown} of the run's {count} communication points. What happens between "
+        "them is not seen: a fast oscillation may look like a slow one, a short peak may be missing."
+    )
+
+
 def write_run(path: Path, page: RunPage) -> Path:
     """Write a page of a section of the report; return its path."""
-    return write_page(path, "run.html", root="../", page=page, data=page.data.json())
+    return write_page(path, "run.html", root="../", page=page, data=page.data and page.data.json())
 
 
 def write_page(path: Path, template: str, **values: object) -> Path:

@@ -32,6 +32,7 @@ class Plot:
     curves: Sequence[Curve]
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
+    floor: float | None = None  # smaller values, 0 among them, are drawn here
 
     @property
     def text(self) -> str:
@@ -88,8 +89,13 @@ class RunData:
         if self.motion is None:
             return None
         reference = self.motion["reference"]
-        ghost = reference and {name: np.array(x, np.float32) for name, x in reference.items()}
-        return packer.packed(self.motion | {"reference": ghost})
+        ghost = reference and {name: narrow(np.array(x)) for name, x in reference.items()}
+        columns = {
+            name: narrow(np.array(column))
+            for name, column in self.motion.items()
+            if name != "time" and isinstance(column, list) and type(column[0]) is float
+        }
+        return packer.packed(self.motion | columns | {"reference": ghost})
 
 
 def thinned(count: int, most: int = MOST_ROWS) -> np.ndarray:
@@ -98,16 +104,28 @@ def thinned(count: int, most: int = MOST_ROWS) -> np.ndarray:
     return np.unique(np.append(np.arange(0, count, every), count - 1))
 
 
+def narrow(values: np.ndarray) -> np.ndarray:
+    """Floats for doubles, unless one of them is too large or too small for seven digits."""
+    with np.errstate(over="ignore", under="ignore"):
+        floats = values.astype(np.float32)
+    digits = np.isfinite(floats) & (np.abs(floats) >= np.finfo(np.float32).tiny)
+    return floats if (digits | (values == 0) | ~np.isfinite(values)).all() else values
+
+
 def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content: dict[str, Any] = {"title": plot.title, "unit": plot.unit, "log": plot.log}
+    content["floor"] = plot.floor
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:
-        item = {"name": curve.name, "values": packer.packed(curve.values), "steps": curve.steps}
+        item = {
+            "name": curve.name,
+            "values": packer.packed(narrow(curve.values)),
+            "steps": curve.steps,
+        }
         item["limit"] = curve.limit
         if curve.reference is not None:
-            # only looked at: seven digits
-            item["reference"] = packer.packed(curve.reference.astype(np.float32))
+            item["reference"] = packer.packed(narrow(curve.reference))
         curves.append(item)
     return content
 

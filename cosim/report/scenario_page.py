@@ -1,24 +1,29 @@
 """The page of a scenario, and its line in the overview."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from cosim import trajectory_csv
-from cosim.comparison import Run, tighter
+from cosim.comparison import Failure, Run, tighter
+from cosim.model import Model
 from cosim.report import motion, pages
 from cosim.report.overview import FAILED, PASSED, RAN, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData, thinned
 from cosim.report.sparkline import path as sparkline
+from cosim.scenario import Scenario
 from cosim.signals import Constant, Signal, Sines, Switches
-from cosim.texts import bits, milliseconds, number, short
+from cosim.simulation import Result
+from cosim.texts import bits, milliseconds, number, ordinal, short
 
+DIGITS = 12  # of values; the references of the project have more, users' files have none
 FLOOR = 1e-18  # errors below it, 0 among them, are drawn here; no double is that good
 
 
-def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
+def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()) -> Entry:
     """Write the page and the values of a scenario; its line in the overview.
 
     Parameters
@@ -29,13 +34,16 @@ def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
         Of one scenario; the first one is drawn.
     again : str
         Command that runs it again.
+    failures : sequence of Failure, optional
+        Of other runs of the scenario.
     """
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
-    columns = recorded(first)
+    columns = recorded(scenario, first.fmu.model, first.result)
     csv = f"{scenario.name}.csv"
     values = np.column_stack([column.astype(float) for column in columns.values()])
-    trajectory_csv.write(folder / csv, first.result.times, list(columns), values)
+    digits = DIGITS if first.compared else None
+    trajectory_csv.write_short(folder / csv, first.result.times, list(columns), values, digits)
     rows = thinned(len(first.result.times))
     plots = _plots(runs, columns, rows)
     data = RunData(
@@ -48,31 +56,86 @@ def write(folder: Path, runs: Sequence[Run], again: str) -> Entry:
     page = RunPage(
         title=scenario.title,
         description=scenario.description,
-        status=status(first) if all(run.passed for run in runs) else FAILED,
+        status=FAILED if failures or not all(run.passed for run in runs) else status(first),
         facts=_facts(first),
         data=data,
         tables=_tables(runs),
         notes=_notes(runs),
-        failures=[text for run in runs if (text := _failure(run))],
+        failures=[
+            *(text for run in runs if (text := _failure(run))),
+            *(describe_failure(failure) for failure in failures),
+        ],
         csv=csv,
-        csv_note=_csv_note(first, rows),
+        csv_note=_csv_note(first),
+        warning=pages.thinned(len(rows), len(scenario.times)),
         again=again,
     )
     pages.write_run(folder / f"{scenario.name}.html", page)
     return _entry(page, runs, plots[0])
 
 
-def recorded(run: Run) -> dict[str, np.ndarray]:
+def write_failed(folder: Path, failure: Failure, again: str) -> Entry:
+    """Write the page of a scenario that did not run to its end: what there is of it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    scenario, model, result = failure.scenario, failure.fmu.model, failure.result
+    csv, data, line, text = f"{scenario.name}.csv", None, "", ""
+    (folder / csv).unlink(missing_ok=True)  # of an earlier run
+    facts = [
+        ("model", f"{model.name} (FMI {model.fmi_version})"),
+        ("time", f"{number(scenario.start)} to {number(scenario.stop)} s"),
+        ("tolerance", short(failure.tolerance)),
+    ]
+    if result is not None:
+        columns = recorded(scenario, model, result)
+        values = np.column_stack([column.astype(float) for column in columns.values()])
+        trajectory_csv.write_short(folder / csv, result.times, list(columns), values)
+        rows = thinned(len(result.times))
+        plots = _value_plots(scenario, model, columns, rows)
+        moving = motion.of_result(scenario, result, {}, rows)
+        data = RunData(scenario.name, scenario.title, result.times[rows], plots, motion=moving)
+        line, text = sparkline(data.x, plots[0].curves[0].values), plots[0].text
+        facts.insert(2, ("results until", f"{number(result.times[-1])} s"))
+    page = RunPage(
+        title=scenario.title,
+        description=scenario.description,
+        status=FAILED,
+        facts=facts,
+        data=data,
+        tables=_start_tables(scenario, model),
+        failures=[describe_failure(failure)],
+        csv=csv if data else "",
+        again=again,
+    )
+    pages.write_run(folder / f"{scenario.name}.html", page)
+    return Entry(
+        name=scenario.name,
+        title=page.title,
+        group=f"{model.name} (FMI {model.fmi_version})",
+        page=f"{scenario.name}.html",
+        status=FAILED,
+        error=None,
+        bound=None,
+        detail=failure.text,
+        line=line,
+        line_text=text,
+    )
+
+
+def describe_failure(failure: Failure) -> str:
+    """Which run failed, and why."""
+    return f"Tolerance {short(failure.tolerance)}: {failure.text}"
+
+
+def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.ndarray]:
     """All columns of the values, (rows,) each: Real outputs, Integers to draw, and given inputs.
 
     A row holds what an importer reads after a step, so it holds the inputs of that step too.
     """
-    result, scenario = run.result, run.scenario
-    held = np.maximum(scenario.reference_rows - 1, 0)
+    held = np.maximum(scenario.reference_rows[: len(result.times)] - 1, 0)
     drawn = {name for panel in scenario.panels for name in panel}
     inputs = [
         name
-        for name, variable in run.fmu.model.variables.items()
+        for name, variable in model.variables.items()
         if variable.causality == "input" and (name in scenario.inputs or name in drawn)
     ]
     return {
@@ -91,10 +154,24 @@ def status(run: Run) -> str:
 
 def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray], rows: np.ndarray) -> list[Plot]:
     """States over their references, inputs, what the scenario asks for, and errors."""
-    run = runs[0]
-    scenario, variables = run.scenario, run.fmu.model.variables
-    states = [name for name in run.fmu.model.states if name in columns]
-    panels = [(name,) for name in states or run.result.names]
+    run, references = runs[0], {}
+    if run.compared:
+        references = {name: run.reference.column(name) for name in run.result.names}
+    values = _value_plots(run.scenario, run.fmu.model, columns, rows, references)
+    return [*values, _error_plot(runs, rows)]
+
+
+def _value_plots(
+    scenario: Scenario,
+    model: Model,
+    columns: dict[str, np.ndarray],
+    rows: np.ndarray,
+    references: Mapping[str, np.ndarray] = MappingProxyType({}),
+) -> list[Plot]:
+    """States, inputs and what the scenario asks for, over the references that there are."""
+    variables = model.variables
+    states = [name for name in model.states if name in columns]
+    panels = [(name,) for name in states or model.real_outputs]
     shown = {name for panel in scenario.panels for name in panel}
     units: dict[str | None, list[str]] = {}
     for name in scenario.inputs:
@@ -103,19 +180,18 @@ def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray], rows: np.ndarray
     panels += [*map(tuple, units.values()), *scenario.panels]
 
     def curve(name: str) -> Curve:
-        real = name in run.result.names
+        wanted = references.get(name)
         return Curve(
             name,
             columns[name][rows].astype(float),
-            run.reference.column(name)[rows] if real and run.compared else None,
-            steps=not real,
+            None if wanted is None else wanted[rows],
+            steps=name not in model.real_outputs,
         )
 
-    plots = [
+    return [
         Plot(", ".join(names), variables[names[0]].unit or "", [curve(name) for name in names])
         for names in panels
     ]
-    return [*plots, _error_plot(runs, rows)]
 
 
 def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
@@ -126,10 +202,10 @@ def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
         expected = np.column_stack([run.reference.column(name) for name in run.result.names])
         errors = np.max(np.abs(run.result.values - expected) / scales, axis=1)[rows]
         name = f"tolerance {short(run.result.tolerance)}"
-        curves.append(Curve(name, np.maximum(errors, FLOOR).astype(np.float32)))
+        curves.append(Curve(name, errors))
         if run.compared:
             levels.append((f"bound {short(run.bound)}", run.bound))
-    return Plot("largest relative error of all outputs", "", curves, log=True, levels=levels)
+    return Plot("largest relative error of all outputs", "", curves, True, levels, FLOOR)
 
 
 def _facts(run: Run) -> list[tuple[str, str]]:
@@ -169,24 +245,27 @@ def _notes(runs: Sequence[Run]) -> list[str]:
     return texts
 
 
-def _csv_note(run: Run, rows: np.ndarray) -> str:
-    count = len(run.result.times)
+def _csv_note(run: Run) -> str:
     every = run.scenario.reference_every
     texts = []
     if every > 1:
-        texts.append(f"The file has every {every}th communication point.")
-    if len(rows) < count:
-        texts.append(f"The plots show {len(rows)} of its {count} rows.")
+        texts.append(f"The file has every {ordinal(every)} communication point.")
+    if run.compared:
+        texts.append(f"Its values have {DIGITS} digits.")
     return " ".join(texts)
 
 
 def _tables(runs: Sequence[Run]) -> list[Table]:
     run = runs[0]
-    scenario, model = run.scenario, run.fmu.model
+    return [*_start_tables(run.scenario, run.fmu.model), _solver(runs), _errors(runs)]
+
+
+def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
+    """Parameters, initial state and inputs."""
     given = scenario.parameters | scenario.initial
     tables = []
     if given:
-        tables.append(_values("Parameters and initial state of this run", run, given))
+        tables.append(_values("Parameters and initial state of this run", model, given))
     if scenario.signals:
         tables.append(
             Table(
@@ -208,13 +287,12 @@ def _tables(runs: Sequence[Run]) -> list[Table]:
         and any(model.variables[name].is_a(kind) for kind in ("parameters", "initial", "inputs"))
     }
     if rest:
-        tables.append(_values("All other start values", run, rest, folded=True))
-    tables += [_solver(runs), _errors(runs)]
+        tables.append(_values("All other start values", model, rest, folded=True))
     return tables
 
 
-def _values(title: str, run: Run, values: dict, folded: bool = False) -> Table:
-    variables = run.fmu.model.variables
+def _values(title: str, model: Model, values: dict, folded: bool = False) -> Table:
+    variables = model.variables
     rows = [
         (name, _cell(known.written(value)), known.unit or "", known.description)
         for name, value in values.items()

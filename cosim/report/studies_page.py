@@ -40,8 +40,9 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
         Plot(
             f"largest error, scenarios of {model}",
             "",
-            [*(Curve(sweep.scenario.name, _drawn(sweep.errors)) for sweep in own), limit],
+            [*(Curve(sweep.scenario.name, np.asarray(sweep.errors)) for sweep in own), limit],
             log=True,
+            floor=FLOOR,
         )
         for model, own in models.items()
     ]
@@ -72,12 +73,12 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
     """Write the page of errors over the communication step; its line in the overview."""
     scenario, steps = study.scenario, np.asarray(study.problem.steps, float)
     model = project.model_folder(scenario.path).name
-    curves = [Curve(row.name, _drawn(row.errors)) for row in study.rows]
+    curves = [Curve(row.name, np.asarray(row.errors)) for row in study.rows]
     data = RunData(
         scenario.name,
         "",
         1e3 * steps,
-        [Plot("error of the final state", "", curves, log=True)],
+        [Plot("error of the final state", "", curves, log=True, floor=FLOOR)],
         Axis("communication step", "ms", log=True),
     )
     rows = [
@@ -105,16 +106,12 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
     return _write(folder, page, worst.errors[-1], f"at {milliseconds(steps[-1])}, {worst.name}")
 
 
-def _drawn(errors: Sequence[float] | np.ndarray) -> np.ndarray:
-    return np.maximum(np.asarray(errors, float), FLOOR)
-
-
 def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
     folder.mkdir(parents=True, exist_ok=True)
     name = page.data.name
     pages.write_run(folder / f"{name}.html", page)
     plot = page.data.plots[0]
-    line = sparkline(-np.log10(page.data.x), np.log10(plot.curves[0].values))
+    line = sparkline(-np.log10(page.data.x), np.log10(np.maximum(plot.curves[0].values, FLOOR)))
     return Entry(
         name=name,
         title=page.title,

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from cosim.comparison import Run
+from cosim import project
+from cosim.comparison import Failure, Run
 from cosim.convergence import Convergence
 from cosim.output_files import from_here
 from cosim.report import assets, overview, scenario_page, studies_page
@@ -41,6 +42,7 @@ class ReportWriter:
         sweeps: Sequence[Sweep] = (),
         studies: Sequence[Convergence] = (),
         progress: Callable[[int], object] = lambda _: None,
+        failures: Sequence[Failure] = (),
     ) -> Path:
         """Write all pages; return the one to open: that of a single file, or the overview.
 
@@ -52,17 +54,27 @@ class ReportWriter:
         studies : sequence of Convergence, optional
         progress : callable, optional
             Called with 1 after each scenario.
+        failures : sequence of Failure, optional
+            Runs that did not end.
         """
-        scenarios, files = [], []
-        for group in groups.values():
-            scenario = group[0].scenario
-            if group[0].compared:
-                again = f"./run.sh {scenario.name}"
-                scenarios.append(scenario_page.write(self.folder / SCENARIOS, group, again))
+        failed: dict[Path, list[Failure]] = {}
+        for failure in failures:
+            failed.setdefault(failure.scenario.path, []).append(failure)
+        scenarios: list[overview.Entry] = []
+        files: list[overview.Entry] = []
+        for path in dict.fromkeys((*groups, *failed)):
+            group, others = groups.get(path, ()), failed.get(path, ())
+            scenario = (group or others)[0].scenario
+            ours = group[0].compared if group else project.is_ours(path)
+            section, entries = (SCENARIOS, scenarios) if ours else (FILES, files)
+            again = f"./run.sh {scenario.name}" if ours else f"./run.sh '{from_here(path)}'"
+            folder = self.folder / section
+            if group:
+                entries.append(scenario_page.write(folder, group, again, others))
             else:
-                again = f"./run.sh '{from_here(scenario.path)}'"
-                files.append(scenario_page.write(self.folder / FILES, group, again))
-                self.files[scenario.name] = self.folder / FILES / files[-1].page
+                entries.append(scenario_page.write_failed(folder, others[0], again))
+            if not ours:
+                self.files[scenario.name] = folder / entries[-1].page
             progress(1)
         written = [studies_page.write_sweeps(self.folder / STUDIES, sweeps)] if sweeps else []
         written += [studies_page.write_convergence(self.folder / STUDIES, x) for x in studies]

@@ -13,9 +13,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -35,6 +35,14 @@ MESSAGE = re.compile(
     r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
 )
 BAD = ("Discard", "Error", "Fatal")
+# what FMUs with a solver say of it at the end of a run, with its meaning in a table
+STATISTICS = {
+    "solver_steps": "solver steps",
+    "solver_rhs_evaluations": "evaluations",
+    "solver_restarts": "restarts",
+    "solver_failed_steps": "failed steps",
+    "effective_relative_tolerance": "effective tolerance",
+}
 READERS = {"Real": "get_real", "Integer": "get_integer", "Boolean": "get_bool"}  # of Ecos, by type
 
 
@@ -47,6 +55,16 @@ class Run:
     values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
     wall_time: float  # s, of the steps with the reading
     messages: tuple[str, ...]  # warnings of the components
+    # by component.variable, of those in STATISTICS that there are
+    statistics: Mapping[str, float] = field(default_factory=dict)
+
+
+class StoppedError(UserError):
+    """A run that a component did not finish; `run` has its rows up to there, if there are any."""
+
+    def __init__(self, text: str, run: Run | None = None) -> None:
+        super().__init__(text)
+        self.run = run
 
 
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
@@ -64,18 +82,24 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     ------
     UserError
         If a component fails or gives a value that is not finite (the text names component,
-        variable and time), or if Ecos itself fails.
+        variable and time), or if Ecos itself fails. After the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
     _check_parameters(ssp, variant)
+    statistics = [
+        f"{component}.{name}"
+        for component, model in ssp.models.items()
+        for name in STATISTICS
+        if name in model.variables
+    ]
     with temporary_folder() as folder:
         plan = {
             "ssp": str(ssp.path.resolve()),
             "variant": variant,
-            "names": [f"{c}::{v}" for c, _, v in (name.partition(".") for name in names)],
-            "readers": [READERS[ssp.variable(name).type] for name in names],
+            "variables": _to_read(ssp, names),
+            "statistics": _to_read(ssp, statistics),
             "start": system.start,
             "step": system.step,
             "steps": system.steps,
@@ -89,17 +113,41 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
         values = np.load(folder / ROWS)
         done = json.loads((folder / DONE).read_text(encoding="utf-8"))
     times = system.start + system.step * np.arange(len(values))
-    _check_values(ssp, variant, names, times, values)
     messages = [match for match in map(MESSAGE.search, log.splitlines()) if match]
+    warnings = [f"{_sender(ssp, m)}: {m['text']}" for m in messages if m["status"] not in BAD]
+    result = Run(
+        tuple(names),
+        times,
+        values,
+        done["wall_time"],
+        tuple(dict.fromkeys(warnings)),
+        dict(zip(statistics, done["statistics"], strict=True)),
+    )
+    try:
+        _check_values(ssp, variant, names, times, values)
+        _check_messages(ssp, variant, times, messages)
+    except UserError as error:  # what was read after the last step is not to be trusted
+        before = replace(result, times=times[:-1], values=values[:-1], statistics={})
+        raise StoppedError(str(error), before if len(times) > 1 else None) from None
+    return result
+
+
+def _check_messages(
+    ssp: "Ssp", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
+) -> None:
+    """Refuse a run in which a component has failed, or that Ecos has stopped."""
     for match in messages:
         if match["status"] in BAD:
             where = f"{variant}: component {_sender(ssp, match)}"
-            when = "in initialization" if len(values) == 1 else f"by t = {times[-1]:.6g} s"
+            when = "in initialization" if len(times) == 1 else f"by t = {times[-1]:.6g} s"
             raise UserError(f"{where} failed {when} ({match['status'].lower()}): {match['text']}")
-    if len(values) != system.steps + 1:
+    if len(times) != ssp.system.steps + 1:
         raise UserError(f"{ssp.path}: {variant}: Ecos stopped at t = {times[-1]:.6g} s")
-    texts = [f"{_sender(ssp, m)}: {m['text']}" for m in messages]
-    return Run(tuple(names), times, values, done["wall_time"], tuple(dict.fromkeys(texts)))
+
+
+def _to_read(ssp: "Ssp", names: Sequence[str]) -> list[tuple[str, str]]:
+    """Names of variables as Ecos has them, each after the name of its reader."""
+    return [(READERS[ssp.variable(name).type], name.replace(".", "::", 1)) for name in names]
 
 
 def _check_parameters(ssp: "Ssp", variant: str) -> None:
@@ -199,9 +247,9 @@ def _child(folder: Path) -> None:
         )
 
     plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
-    names, steps = plan["names"], plan["steps"]
+    steps = plan["steps"]
     EcosLib.set_log_level("debug")
-    rows = np.empty((steps + 1, len(names)))
+    rows = np.empty((steps + 1, len(plan["variables"])))
     flush = ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush
     seen = 0
 
@@ -219,18 +267,17 @@ def _child(folder: Path) -> None:
     with EcosSimulation(step_size=plan["step"], ssp_path=plan["ssp"]) as simulation:
         if not simulation.init(start_time=plan["start"], parameter_set=plan["variant"]):
             raise RuntimeError(EcosLib.get_last_error())
-        readers = [
-            (getattr(simulation, reader), name)
-            for reader, name in zip(plan["readers"], names, strict=True)
-        ]
+        readers = [(getattr(simulation, reader), name) for reader, name in plan["variables"]]
         row, begin = 0, time.perf_counter()
         while go_on(row) and row < steps:
             simulation.step()
             row += 1
         wall_time = time.perf_counter() - begin
+        statistics = [getattr(simulation, reader)(name) for reader, name in plan["statistics"]]
         simulation.terminate()
     np.save(folder / ROWS, rows[: row + 1])
-    (folder / DONE).write_text(json.dumps({"wall_time": wall_time}), encoding="utf-8", newline="\n")
+    done = json.dumps({"wall_time": wall_time, "statistics": statistics})
+    (folder / DONE).write_text(done, encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

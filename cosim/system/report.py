@@ -4,22 +4,28 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cosim import project, trajectory_csv
+from cosim.errors import UserError
+from cosim.model import KINDS, Value, Variable
 from cosim.output_files import whole
 from cosim.report import assets, motion, overview, pages
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData
 from cosim.report.sparkline import path as sparkline
+from cosim.system import ecos
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
+from cosim.system.structure import System
 from cosim.system.study import Diagram, Study
 from cosim.texts import milliseconds, short
 
-MOST_ROWS = 600  # of a file of values, which has many columns
+MOST_ROWS = 400  # of a file of values, which has many columns
+DIGITS = 12  # there; errors have a bound of 1e-7
 
 
 @dataclass(frozen=True)
@@ -56,34 +62,21 @@ def remove(report: Path, system: str, variants: Sequence[str]) -> None:
 
 def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
-    assets.write(report)
-    folder = report / SYSTEM
-    folder.mkdir(parents=True, exist_ok=True)
-    run, csv = outcome.run, f"{outcome.variant}.csv"
-    every = _every(len(run.times))
-    rows = np.arange(0, len(run.times), every)
-    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows])
-    with whole(folder / f"{section.name}.svg") as path:
-        path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
-    plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
-    step = milliseconds(every * section.ssp.system.step)
-    moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    run, folder = outcome.run, _folder(report, section)
+    data = _data(section, outcome)
     page = RunPage(
-        title=f"{section.ssp.path.stem}: {outcome.variant}",
-        description=f"Run by Ecos with steps of {milliseconds(section.ssp.system.step)}.",
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
-        data=RunData(outcome.variant, "", run.times[rows], plots, motion=moving),
-        tables=[*_parameters(section.ssp, outcome.variant), _errors(section.ssp, outcome)],
+        data=data,
+        tables=[
+            *_parameters(section.ssp, outcome.variant),
+            *_solvers(section.ssp, run),
+            _errors(section.ssp, outcome),
+        ],
         notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
         failures=[*_failures(outcome), *run.messages],
-        csv=csv,
-        csv_note=f"The file has a row every {step}.",
-        diagram=(
-            f"{section.name}.svg",
-            f"Components of {section.ssp.path.stem} and the signals between them",
-        ),
-        again=f"./run.sh system {outcome.variant}",
+        **_values(folder, outcome),
+        **_texts(section, outcome.variant),
     )
     pages.write_run(folder / f"{outcome.variant}.html", page)
     return Entry(
@@ -95,19 +88,83 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         error=float(outcome.error) if np.isfinite(outcome.error) else None,
         bound=BOUND,
         detail=f"worst variable: {outcome.worst}",
-        line=sparkline(page.data.x, plots[0].curves[0].values),
-        line_text=plots[0].text,
+        line=sparkline(data.x, data.plots[0].curves[0].values),
+        line_text=data.plots[0].text,
     )
 
 
-def _every(rows: int) -> int:
-    """Least of 1, 2, 5, 10, ... such that every such row makes `MOST_ROWS` steps at most."""
-    size = 1
-    while True:
-        for factor in (1, 2, 5):
-            if (rows - 1) / (factor * size) <= MOST_ROWS:
-                return factor * size
+def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
+    """Write the page of a variant that did not run to its end: what there is of it."""
+    folder, system = _folder(report, section), section.ssp.system
+    run = error.run if isinstance(error, ecos.StoppedError) else None
+    facts = [("system", section.title), ("time", f"{system.start:g} to {system.stop:g} s")]
+    data, values, line, text = None, {}, "", ""
+    if run is not None:
+        outcome = Outcome(variant, len(run.times) - 1, run, {})
+        data, values = _data(section, outcome), _values(folder, outcome)
+        line, text = sparkline(data.x, data.plots[0].curves[0].values), data.plots[0].text
+        facts.append(("results until", f"{run.times[-1]:g} s"))
+    page = RunPage(
+        status=FAILED,
+        facts=facts,
+        data=data,
+        tables=_parameters(section.ssp, variant),
+        failures=[str(error)],
+        **values,
+        **_texts(section, variant),
+    )
+    pages.write_run(folder / f"{variant}.html", page)
+    name = f"{variant}.html"
+    return Entry(variant, "", section.title, name, FAILED, None, None, str(error), line, text)
+
+
+def _folder(report: Path, section: Section) -> Path:
+    """Folder of the pages, with what they share."""
+    assets.write(report)
+    folder = report / SYSTEM
+    folder.mkdir(parents=True, exist_ok=True)
+    with whole(folder / f"{section.name}.svg") as path:
+        path.write_bytes((section.folder / project.DIAGRAM).read_bytes())
+    return folder
+
+
+def _texts(section: Section, variant: str) -> dict[str, Any]:
+    """What a page says of a variant, however its run ended."""
+    stem = section.ssp.path.stem
+    return {
+        "title": f"{stem}: {variant}",
+        "description": _description(section.ssp.system, variant),
+        "diagram": (f"{section.name}.svg", f"Components of {stem} and the signals between them"),
+        "again": f"./run.sh system {variant}",
+    }
+
+
+def _data(section: Section, outcome: Outcome) -> RunData:
+    """Plots and motion, at the rows that the file of values has."""
+    times = outcome.run.times
+    rows = kept_rows(len(times))
+    plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
+    moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
+    return RunData(outcome.variant, "", times[rows], plots, motion=moving)
+
+
+def _values(folder: Path, outcome: Outcome) -> dict[str, str]:
+    """Write the file of values; what the page says of it."""
+    run, csv = outcome.run, f"{outcome.variant}.csv"
+    rows = kept_rows(len(run.times))
+    trajectory_csv.write_short(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS)
+    every = np.diff(run.times[rows])[:1].sum()
+    note = f"The file has a row every {milliseconds(every)}, with {DIGITS} digits."
+    return {"csv": csv, "csv_note": note, "warning": pages.thinned(len(rows), len(run.times))}
+
+
+def kept_rows(count: int) -> np.ndarray:
+    """Rows of `count` that the file of values has: every 1, 2, 5, 10, ...th and the last one."""
+    size, every = 1, 0
+    while not every:
+        every = next((x * size for x in (1, 2, 5) if (count - 1) / (x * size) <= MOST_ROWS), 0)
         size *= 10
+    return np.unique(np.append(np.arange(0, count, every), count - 1))
 
 
 def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram, rows: np.ndarray) -> Plot:
@@ -148,18 +205,53 @@ def _failures(outcome: Outcome) -> list[str]:
     return [f"the error of {outcome.worst}, {outcome.error:.1e}, is above its bound {short(BOUND)}"]
 
 
+def _description(system: System, variant: str) -> str:
+    """What the variant is, and how it is run."""
+    said = system.descriptions.get(variant, "").rstrip(".")
+    how = f"Run by Ecos with steps of {milliseconds(system.step)}."
+    return f"{said}. {how}" if said else how
+
+
 def _parameters(ssp: Ssp, variant: str) -> list[Table]:
-    """What the variant sets, component by component."""
-    rows = []
-    for component, values in ssp.system.parameter_sets[variant].items():
-        for name, value in values.items():
-            known = ssp.models[component].variables[name]
-            shown = known.written(value)
-            text = str(shown).lower() if isinstance(shown, bool) else shown
-            rows.append((component, name, text, known.unit or "", known.description))
+    """What the variant sets, then per component what has its start value."""
+    given = ssp.system.parameter_sets[variant]
+    connected = {(x.end_component, x.end_connector) for x in ssp.system.connections}
+    rows: list[Sequence[object]] = []
+    others = []
+    for component, model in ssp.models.items():
+        values = given.get(component, {})
+        rows += [(component, *_cells(model.variables[name], values[name])) for name in values]
+        rest = [
+            _cells(variable, value)
+            for name, value in model.start_values.items()
+            if name not in values and (component, name) not in connected
+            for variable in [model.variables[name]]
+            if any(variable.is_a(kind) for kind in KINDS)
+        ]
+        if rest:
+            title = f"All other start values of {component}"
+            others.append(Table(title, ("name", "value", "unit", "meaning"), rest, folded=True))
     head = ("component", "name", "value", "unit", "meaning")
-    note = "What is not here has its start value in the FMU."
-    return [Table("Parameters of this variant", head, rows, note=note)] if rows else []
+    own = [Table("Parameters of this variant", head, rows)] if rows else []
+    return own + others
+
+
+def _cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
+    shown = variable.written(value)
+    text = str(shown).lower() if isinstance(shown, bool) else shown
+    return variable.name, text, variable.unit or "", variable.description
+
+
+def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
+    """Statistics of the components that integrate."""
+    rows = []
+    for component in ssp.models:
+        values = [run.statistics.get(f"{component}.{name}") for name in ecos.STATISTICS]
+        if any(value is not None for value in values):
+            cells = ("–" if x is None else short(x) if isinstance(x, float) else x for x in values)
+            rows.append((component, *cells))
+    note = "Of components with a solver, from the start to the end of the run."
+    return [Table("Solvers", ("component", *ecos.STATISTICS.values()), rows, note)] if rows else []
 
 
 def _errors(ssp: Ssp, outcome: Outcome) -> Table:

@@ -51,6 +51,7 @@ class SspReader:
     def __init__(self, path: Path, folder: Path) -> None:
         self.path = path
         self.folder = folder
+        self.descriptions: dict[str, str] = {}  # of parameter sets, by name
 
     def fail(self, file: str, message: str, node: etree._Element | None = None) -> NoReturn:
         line = f", line {node.sourceline}" if node is not None else ""
@@ -108,6 +109,7 @@ class SspReader:
             stop=stop,
             step=step,
             parameters=self.variants(bound),
+            descriptions=self.descriptions,
         )
 
     def component(self, node: etree._Element) -> Component:
@@ -192,6 +194,8 @@ class SspReader:
                     STRUCTURE, f"component {component!r}: set {name!r} is bound twice", binding
                 )
             sets[name] = self.values(source, root, component)
+            if root.get("description"):
+                self.descriptions.setdefault(name, " ".join(root.get("description").split()))
         return sets
 
     def values(self, file: str, root: etree._Element, component: str) -> dict[str, Parameter]:

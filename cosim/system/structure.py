@@ -1,6 +1,7 @@
 """A system of connected FMUs: components, connections, and the variants of its parameters."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from cosim.model import Value
 
@@ -61,6 +62,7 @@ class System:
     step: float  # s, communication step
     # variant -> component -> variable; a component without a binding has no values
     parameters: dict[str, dict[str, dict[str, Parameter]]]
+    descriptions: Mapping[str, str] = field(default_factory=dict)  # of variants that have one
 
     @property
     def parameter_sets(self) -> dict[str, dict[str, dict[str, Value]]]:

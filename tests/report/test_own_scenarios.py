@@ -9,7 +9,8 @@ import pytest
 from cosim import scenario
 from cosim.report import browser as shown
 from cosim.report.overview import Entry, forget, read, record
-from tests.report.conftest import CONTENT, STRANGE
+from tests.report.conftest import CONTENT, STRANGE, show
+from tests.support.browser import Browser
 from tests.support.cosim_project import FMUS, assert_one_line, call, declared
 
 
@@ -125,6 +126,48 @@ def test_what_is_no_file_is_refused(capsys: pytest.CaptureFixture[str], name: st
     code, out, err = call(capsys, "run", name, "--report", "out")
     assert (code, out) == (2, "") and name in err
     assert_one_line(err)
+
+
+STOPS = CONTENT.replace('"erk"', '"cvode_adams"').replace(
+    "[initial]", "max_internal_steps = 1\n[initial]\ndq1 = 1e4"
+)
+
+
+def test_a_run_that_fails_is_in_the_report(
+    capsys: pytest.CaptureFixture[str], browser: Browser
+) -> None:
+    """Its page replaces that of an earlier run, and the files after it still run."""
+    Path("a.toml").write_text(CONTENT, encoding="utf-8")
+    assert call(capsys, "run", "a.toml", "--report", "out")[0] == 0
+    Path("a.toml").write_text(STOPS, encoding="utf-8")
+    Path("b.toml").write_text(CONTENT, encoding="utf-8")
+    code, out, err = call(capsys, "run", "a.toml", "b.toml", "--report", "out")
+    assert code == 2 and err.startswith("error: ") and "the integrator took all" in err
+    assert_one_line(err)
+    assert "FAILED" in out and "b: out/files/b.html" in out
+    entries = {entry.name: entry for entry in read(Path("out"), "files")}
+    assert {name: entry.status for name, entry in entries.items()} == {"a": "FAILED", "b": "ran"}
+    browser.open(Path("out/index.html"))
+    assert "1 of 2 failed" in browser.run("return document.body.innerText")
+    assert err.removeprefix("error: ").strip() in entries["a"].detail
+    browser.open(Path("out/files/a.html"))
+    text = browser.run("return document.body.innerText")
+    assert err.removeprefix("error: ").strip() in text and "dq1" in text
+    browser.check_quiet()
+
+
+def test_a_run_that_fails_shows_its_rows(
+    capsys: pytest.CaptureFixture[str], browser: Browser
+) -> None:
+    late = CONTENT.replace("[0.5, 10.0]]", "[0.5, 10.0], [0.51, 1e300]]")
+    Path("late.toml").write_text(late, encoding="utf-8")
+    code, _, err = call(capsys, "run", "late.toml", "--report", "out")
+    assert code == 2 and "in the step from t = 0.5" in err
+    show(browser, Path("out/files/late.html"))
+    last = float(Path("out/files/late.csv").read_text("utf-8").splitlines()[-1].split(",")[0])
+    assert 0.5 <= last < 0.6 and browser.run("return page.x.at(-1)") == last
+    assert browser.run("return page.player.motion.q1.length") > 50
+    browser.check_quiet()
 
 
 def test_two_files_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,7 +7,7 @@
 
 const Plots = (() => {
   const FEW = 40; // rows; up to here each one gets a marker
-  const DASHES = ['solid', 'dash', 'dot', 'dashdot'];
+  const DASHES = [[], [6, 4], [2, 3], [7, 3, 2, 3]]; // px, drawn and left out
   const COLOURS = 6;
 
   /** Data of the page, with arrays unpacked. */
@@ -56,6 +56,12 @@ const Plots = (() => {
     };
   }
 
+  /** Colour and dashes of a curve. */
+  function styleOf(curve, i, palette) {
+    if (curve.limit) return { colour: palette.ink, dashes: DASHES[1] };
+    return { colour: palette.curves[i % COLOURS], dashes: DASHES[Math.floor(i / COLOURS) % DASHES.length] };
+  }
+
   /** Traces of plotly: references below, levels dashed, curves on top. */
   function traces(plot, x, palette) {
     const mode = x.length <= FEW ? 'lines+markers' : 'lines';
@@ -70,19 +76,24 @@ const Plots = (() => {
       mode: 'lines',
       line: { color: palette.ink, width: 1, dash: 'dash' },
     }));
-    const curves = plot.curves.map((curve, i) => ({
-      x,
-      y: curve.values,
-      mode,
-      line: {
-        color: curve.limit ? palette.ink : palette.curves[i % COLOURS],
-        width: curve.limit ? 1 : 1.6,
-        simplify: false,
-        shape: curve.steps ? 'vh' : 'linear',
-        dash: curve.limit ? 'dash' : DASHES[Math.floor(i / COLOURS) % DASHES.length],
-      },
-      marker: { size: 5 },
-    }));
+    // a logarithmic axis has no 0
+    const drawn = (values) => (plot.floor ? values.map((value) => Math.max(value, plot.floor)) : values);
+    const curves = plot.curves.map((curve, i) => {
+      const { colour, dashes } = styleOf(curve, i, palette);
+      return {
+        x,
+        y: drawn(curve.values),
+        mode,
+        line: {
+          color: colour,
+          width: curve.limit ? 1 : 1.6,
+          simplify: false,
+          shape: curve.steps ? 'vh' : 'linear',
+          dash: dashes.map((length) => `${length}px`).join() || 'solid',
+        },
+        marker: { size: 5 },
+      };
+    });
     return [...references, ...levels, ...curves];
   }
 
@@ -119,29 +130,38 @@ const Plots = (() => {
 
   /** Entries of the legend, which show the values at the cursor too. */
   function entries(list, plot, palette) {
-    const entry = (name, colour, limit = false) => {
+    const entry = (name, { colour, dashes = [] }) => {
       const item = document.createElement('li');
-      const swatch = document.createElement('span');
-      swatch.className = 'swatch';
-      swatch.style.borderColor = colour;
-      if (limit) swatch.style.borderTopStyle = 'dashed';
       const value = document.createElement('span');
-      item.append(swatch, `${name} `, value);
+      item.append(swatch(colour, dashes), `${name} `, value);
       list.append(item);
       return value;
     };
-    const label = (curve, i) =>
-      curve.limit ? [curve.name, palette.ink, true] : [curve.name, palette.curves[i % COLOURS]];
+    const label = (curve, i) => [curve.name, styleOf(curve, i, palette)];
     list.replaceChildren();
     const found = plot.curves.flatMap((curve, i) => {
       const own = { values: curve.values, text: entry(...label(curve, i)) };
       own.text.dataset.curve = curve.name;
       if (!curve.reference) return [own];
       const name = plot.curves.length > 1 ? `reference of ${curve.name}` : 'reference';
-      return [own, { values: curve.reference, text: entry(name, palette.reference) }];
+      return [own, { values: curve.reference, text: entry(name, { colour: palette.reference }) }];
     });
-    for (const level of plot.levels ?? []) entry(level.name, palette.ink, true);
+    for (const level of plot.levels ?? []) entry(level.name, { colour: palette.ink, dashes: DASHES[1] });
     return found;
+  }
+
+  /** A piece of a line as the plot has it. */
+  function swatch(colour, dashes) {
+    const picture = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+    picture.setAttribute('class', 'swatch');
+    picture.setAttribute('viewBox', '0 0 22 6');
+    picture.setAttribute('aria-hidden', 'true');
+    const line = document.createElementNS(picture.namespaceURI, 'path');
+    line.setAttribute('d', 'M0 3H22');
+    line.setAttribute('stroke', colour);
+    line.setAttribute('stroke-dasharray', dashes.join(' '));
+    picture.append(line);
+    return picture;
   }
 
   /** One plot: the figure, its drawing, its values at the cursor. */
