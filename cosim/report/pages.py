@@ -61,8 +61,9 @@ def thinned(shown: int, count: int) -> str:
     if shown >= count:
         return ""
     return (
-        f"This page shows {shown} of the run's {count} communication points. What happens between "
-        "them is not seen: a fast oscillation may look like a slow one, a short peak may be missing."
+        f"This page shows {shown} of the run's {count} communication points. What happens "
+        "between them is not seen: a fast oscillation may look like a slow one, a short peak may "
+        "be missing."
     )
 
 

@@ -20,16 +20,21 @@ from cosim.simulation import Result
 from cosim.texts import bits, milliseconds, number, ordinal, short
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
+MOST_POINTS = 8  # of a table that is an input, to be listed
 FLOOR = 1e-18  # errors below it, 0 among them, are drawn here; no double is that good
 
 
-def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()) -> Entry:
+def write(
+    folder: Path, name: str, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()
+) -> Entry:
     """Write the page and the values of a scenario; its line in the overview.
 
     Parameters
     ----------
     folder : Path
         Of the section in the report.
+    name : str
+        Of the page and the file of values.
     runs : sequence of Run
         Of one scenario; the first one is drawn.
     again : str
@@ -40,7 +45,7 @@ def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Fail
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
     columns = recorded(scenario, first.fmu.model, first.result)
-    csv = f"{scenario.name}.csv"
+    csv = f"{name}.csv"
     values = np.column_stack([column.astype(float) for column in columns.values()])
     digits = DIGITS if first.compared else None
     trajectory_csv.write_short(folder / csv, first.result.times, list(columns), values, digits)
@@ -70,15 +75,15 @@ def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Fail
         warning=pages.thinned(len(rows), len(scenario.times)),
         again=again,
     )
-    pages.write_run(folder / f"{scenario.name}.html", page)
-    return _entry(page, runs, plots[0])
+    pages.write_run(folder / f"{name}.html", page)
+    return _entry(name, page, runs, plots[0])
 
 
-def write_failed(folder: Path, failure: Failure, again: str) -> Entry:
+def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry:
     """Write the page of a scenario that did not run to its end: what there is of it."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
-    csv, data, line, text = f"{scenario.name}.csv", None, "", ""
+    csv, data, line, text = f"{name}.csv", None, "", ""
     (folder / csv).unlink(missing_ok=True)  # of an earlier run
     facts = [
         ("model", f"{model.name} (FMI {model.fmi_version})"),
@@ -106,12 +111,12 @@ def write_failed(folder: Path, failure: Failure, again: str) -> Entry:
         csv=csv if data else "",
         again=again,
     )
-    pages.write_run(folder / f"{scenario.name}.html", page)
+    pages.write_run(folder / f"{name}.html", page)
     return Entry(
-        name=scenario.name,
+        name=name,
         title=page.title,
         group=f"{model.name} (FMI {model.fmi_version})",
-        page=f"{scenario.name}.html",
+        page=f"{name}.html",
         status=FAILED,
         error=None,
         bound=None,
@@ -235,7 +240,8 @@ def _failure(run: Run) -> str:
 
 
 def _notes(runs: Sequence[Run]) -> list[str]:
-    texts = [f"The FMU says: {text}" for text in runs[0].result.messages]
+    messages = (text for run in runs for text in run.result.messages)
+    texts = [f"The FMU says: {text}" for text in dict.fromkeys(messages)]
     if not runs[0].compared:
         tight = short(tighter(runs[0].result.tolerance))
         texts.append(
@@ -350,18 +356,25 @@ def describe(signal: Signal) -> str:
         if len(signal.points) == 1:
             return str(signal.points[0][1]).lower()
         return ", ".join(f"{str(on).lower()} from {number(time)} s" for time, on in signal.points)
+    if len(signal.points) <= MOST_POINTS:
+        points = (f"{number(value)} at {number(time)} s" for time, value in signal.points)
+        return ", ".join(points) + (", linear in between" if len(signal.points) > 1 else "")
     low, high = (f(value for _, value in signal.points) for f in (min, max))
-    return f"table of {len(signal.points)} points between {number(low)} and {number(high)}"
+    begin, end = signal.points[0][0], signal.points[-1][0]
+    return (
+        f"table of {len(signal.points)} points from {number(begin)} to {number(end)} s, values "
+        f"from {number(low)} to {number(high)}, linear in between"
+    )
 
 
-def _entry(page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
+def _entry(name: str, page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
     first = runs[0]
     model, curve = first.fmu.model, plot.curves[0]
     return Entry(
-        name=first.scenario.name,
+        name=name,
         title=page.title,
         group=f"{model.name} (FMI {model.fmi_version})",
-        page=f"{first.scenario.name}.html",
+        page=f"{name}.html",
         status=page.status,
         error=first.error if np.isfinite(first.error) else None,
         bound=first.bound if first.compared else None,

@@ -49,10 +49,11 @@ class Section:
 
 
 def remove(report: Path, system: str, variants: Sequence[str]) -> None:
-    """Remove what an earlier run left of these variants, and of all from the overview."""
+    """Remove what an earlier run left of these variants."""
     folder = report / SYSTEM
-    overview.forget(report, SYSTEM)
-    (folder / f"{system}.svg").unlink(missing_ok=True)
+    overview.forget(report, SYSTEM, variants)
+    if not overview.read(report, SYSTEM):
+        (folder / f"{system}.svg").unlink(missing_ok=True)
     for variant in variants:
         for suffix in (".csv", ".html"):
             (folder / f"{variant}{suffix}").unlink(missing_ok=True)
@@ -73,7 +74,10 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
             *_solvers(section.ssp, run),
             _errors(section.ssp, outcome),
         ],
-        notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
+        notes=[
+            *(f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES),
+            "These numbers are of all steps, also of those that the file leaves out.",
+        ],
         failures=[*_failures(outcome), *run.messages],
         **_values(folder, outcome),
         **_texts(section, outcome.variant),

@@ -103,7 +103,7 @@ def test_the_page_says_what_ran(browser: Browser, report: Path) -> None:
         "solver_method erk",
         "q1 0.3 rad Angle of joint 1",
         "tau1 N.m 1 sin(2π 1 Hz t)",
-        "f2 N table of 2 points between 9 and 10",
+        "f2 N 9 at 0 s, 10 at 0.5 s, linear in between",
         "Errors are estimated from a run of the same FMU at tolerance 1e-11",
     ):
         assert part in text, part
