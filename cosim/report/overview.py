@@ -41,6 +41,7 @@ class Entry:
     detail: str  # what the error is of
     line: str  # path of the sparkline
     line_text: str  # what it shows
+    line_of: str = ""  # the variable of the sparkline
     source: str = ""  # file of a user
 
 

@@ -22,7 +22,12 @@ _templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_templates.filters |= {"address": quote, "number": texts.number, "short": texts.short}
+_templates.filters |= {
+    "address": quote,
+    "minus": texts.minus,
+    "number": texts.number,
+    "short": texts.short,
+}
 _templates.tests["numeric"] = lambda cell: NUMERIC.fullmatch(str(cell)) is not None
 
 

@@ -1,6 +1,6 @@
 """The page of a scenario, and its line in the overview."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim import trajectory_csv
 from cosim.comparison import Failure, Run, tighter
-from cosim.model import Model
+from cosim.model import Model, Variable
 from cosim.report import motion, pages
 from cosim.report.overview import FAILED, PASSED, RAN, Entry
 from cosim.report.pages import RunPage, Table
@@ -17,7 +17,7 @@ from cosim.report.sparkline import path as sparkline
 from cosim.scenario import Scenario
 from cosim.signals import Constant, Signal, Sines, Switches
 from cosim.simulation import Result
-from cosim.texts import bits, milliseconds, number, ordinal, short
+from cosim.texts import bits, milliseconds, number, ordinal, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
 MOST_POINTS = 8  # of a table that is an input, to be listed
@@ -83,7 +83,7 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
     """Write the page of a scenario that did not run to its end: what there is of it."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
-    csv, data, line, text = f"{name}.csv", None, "", ""
+    csv, data, line, text, plots = f"{name}.csv", None, "", "", []
     (folder / csv).unlink(missing_ok=True)  # of an earlier run
     facts = [
         ("model", f"{model.name} (FMI {model.fmi_version})"),
@@ -123,6 +123,7 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
         detail=failure.text,
         line=line,
         line_text=text,
+        line_of=plots[0].curves[0].name if data else "",
     )
 
 
@@ -194,9 +195,20 @@ def _value_plots(
         )
 
     return [
-        Plot(", ".join(names), variables[names[0]].unit or "", [curve(name) for name in names])
+        Plot(
+            ", ".join(names),
+            unit(variables[names[0]].unit),
+            [curve(name) for name in names],
+            note=meanings(variables[name] for name in names),
+        )
         for names in panels
     ]
+
+
+def meanings(variables: Iterable[Variable]) -> str:
+    """What the numbers of Integers stand for, as their descriptions say."""
+    texts = [v.description for v in variables if v.type == "Integer" and v.description]
+    return ". ".join(texts) + "." if texts else ""
 
 
 def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
@@ -210,7 +222,7 @@ def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
         curves.append(Curve(name, errors))
         if run.compared:
             levels.append((f"bound {short(run.bound)}", run.bound))
-    return Plot("largest relative error of all outputs", "", curves, True, levels, FLOOR)
+    return Plot("largest relative error of all outputs", "", curves, True, levels, floor=FLOOR)
 
 
 def _facts(run: Run) -> list[tuple[str, str]]:
@@ -278,7 +290,7 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
                 "Inputs",
                 ("input", "unit", "course", "meaning"),
                 [
-                    (name, known.unit or "", describe(signal), known.description)
+                    (name, unit(known.unit), describe(signal), known.description)
                     for name, signal in scenario.signals.items()
                     if (known := model.variables[name])
                 ],
@@ -300,7 +312,7 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
 def _values(title: str, model: Model, values: dict, folded: bool = False) -> Table:
     variables = model.variables
     rows = [
-        (name, _cell(known.written(value)), known.unit or "", known.description)
+        (name, _cell(known.written(value)), unit(known.unit), known.description)
         for name, value in values.items()
         if (known := variables[name])
     ]
@@ -333,7 +345,7 @@ def _errors(runs: Sequence[Run]) -> Table:
     head = ["output", "unit", *(f"tolerance {short(run.result.tolerance)}" for run in runs)]
     variables = runs[0].fmu.model.variables
     rows = [
-        [name, variables[name].unit or "", *(f"{run.errors[name]:.2e}" for run in runs)]
+        [name, unit(variables[name].unit), *(f"{run.errors[name]:.2e}" for run in runs)]
         for name in runs[0].errors
         if all(name in run.errors for run in runs)
     ]
@@ -381,4 +393,5 @@ def _entry(name: str, page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
         detail=f"worst output: {first.worst}",
         line=sparkline(page.data.x, curve.values),
         line_text=plot.text,
+        line_of=curve.name,
     )

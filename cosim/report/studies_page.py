@@ -123,4 +123,5 @@ def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
         detail=detail,
         line=line,
         line_text=plot.text,
+        line_of=plot.curves[0].name,
     )
