@@ -18,7 +18,7 @@ def head(*lines: str) -> None:
 
 def messages(label: str, texts: Iterable[str]) -> None:
     """Print what an FMU or an engine has to say, to standard error."""
-    for text in texts:
+    for text in dict.fromkeys(texts):
         print(f"{label}: {text}", file=sys.stderr)
 
 

@@ -1,5 +1,6 @@
 """Numbers and verdicts as text, the same on the console, on pages and in pictures."""
 
+import re
 from collections.abc import Sequence, Sized
 
 
@@ -18,6 +19,17 @@ def ordinal(number: int) -> str:
     """2nd, 3rd, 10th."""
     teen = number // 10 % 10 == 1
     return f"{number}{'th' if teen else {1: 'st', 2: 'nd', 3: 'rd'}.get(number % 10, 'th')}"
+
+
+def minus(text: object) -> str:
+    """A text with minus signs for the hyphens before digits, as the plots have them."""
+    return re.sub(r"(?<![\w.-])-(?=\d)|(?<=\de)-(?=\d)", "\N{MINUS SIGN}", str(text))
+
+
+def unit(text: str | None) -> str:
+    """A unit of FMI as it is written: N·m for N.m, m/s² for m/s2; nothing for none."""
+    raised = re.sub(r"(?<=[a-z])[23]", lambda found: {"2": "²", "3": "³"}[found[0]], text or "")
+    return raised.replace(".", "·")
 
 
 def counted(things: Sized, name: str) -> str:

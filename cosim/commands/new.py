@@ -9,6 +9,8 @@ from cosim.fmu_file import read_model
 from cosim.output_files import whole
 
 SUFFIX = ".toml"
+# what no file can be called on Windows, with any suffix
+RESERVED = {"CON", "PRN", "AUX", "NUL"} | {f"{x}{i}" for x in ("COM", "LPT") for i in range(1, 10)}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -40,7 +42,11 @@ def _path(name: str) -> Path:
         raise UserError(f"{name!r} is no name for a scenario")
     if any(not character.isprintable() for character in name):
         raise UserError(f"{name!r}: a name has printable characters only")
-    return path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
+    if path.name.startswith("-"):
+        raise UserError(f"{name!r}: a name begins with no hyphen, or run.sh takes it for an option")
+    if path.name.partition(".")[0].rstrip().upper() in RESERVED:
+        raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
+    return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
 
 
 def _usual_model() -> Path:

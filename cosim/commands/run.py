@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
         with written(options.report):
             writer.begin()
             if chosen:
-                writer.forget()
+                writer.forget({scenario.name for scenario in chosen} if options.names else None)
         sweeps: list[Sweep] = []
         studies: list[Convergence] = []
         failures: list[Failure] = []
@@ -114,7 +114,7 @@ def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
     own: dict[str, Path] = {}
     for name in dict.fromkeys(names):
         path = Path(name)
-        if path.suffix != ".toml":
+        if path.suffix.lower() != ".toml":
             files[project.scenario_file(name)] = None
         elif project.is_ours(path):
             files[path.resolve()] = None

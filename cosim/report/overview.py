@@ -5,7 +5,7 @@ from: so scenarios, systems and files of users show up together though different
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -41,21 +41,33 @@ class Entry:
     detail: str  # what the error is of
     line: str  # path of the sparkline
     line_text: str  # what it shows
+    line_of: str = ""  # the variable of the sparkline
+    source: str = ""  # file of a user
 
 
 def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:
-    """Make `entries` those of a section, and write the overview; return its path."""
+    """Put `entries` before the others of a section, and write the overview; return its path."""
+    names = {entry.name for entry in entries}
+    others = [entry for entry in read(report, section) if entry.name not in names]
+    _keep(report, section, [*entries, *others])
+    return write(report)
+
+
+def _keep(report: Path, section: str, entries: Sequence[Entry]) -> None:
     folder = report / section
     folder.mkdir(parents=True, exist_ok=True)
     with whole(folder / ENTRIES) as path:
         text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
         path.write_text(text + "\n", encoding="utf-8", newline="\n")
-    return write(report)
 
 
-def forget(report: Path, section: str) -> None:
-    """Remove the entries of a section from the overview, and the overview if nothing is left."""
-    (report / section / ENTRIES).unlink(missing_ok=True)
+def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:
+    """Remove entries of a section, all or some; and the overview if nothing is left in it."""
+    others = [] if names is None else [e for e in read(report, section) if e.name not in names]
+    if others:
+        _keep(report, section, others)
+    else:
+        (report / section / ENTRIES).unlink(missing_ok=True)
     if any(read(report, name) for name in SECTIONS):
         write(report)
     else:
@@ -77,7 +89,8 @@ def write(report: Path) -> Path:
     for folder, title in SECTIONS.items():
         entries = read(report, folder)
         if entries:
-            sections.append({"folder": folder, "title": title, "summary": _summary(entries)})
+            summary = _summary(entries)
+            sections.append({"folder": folder, "title": title, "summary": summary})
             groups: dict[str, list[Entry]] = {}
             for entry in entries:
                 groups.setdefault(entry.group, []).append(entry)

@@ -22,7 +22,12 @@ _templates = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
-_templates.filters |= {"address": quote, "number": texts.number, "short": texts.short}
+_templates.filters |= {
+    "address": quote,
+    "minus": texts.minus,
+    "number": texts.number,
+    "short": texts.short,
+}
 _templates.tests["numeric"] = lambda cell: NUMERIC.fullmatch(str(cell)) is not None
 
 
@@ -61,8 +66,9 @@ def thinned(shown: int, count: int) -> str:
     if shown >= count:
         return ""
     return (
-        f"This page shows {shown} of the run's {count} communication points. What happens between "
-        "them is not seen: a fast oscillation may look like a slow one, a short peak may be missing."
+        f"This page shows {shown} of the run's {count} communication points. What happens "
+        "between them is not seen: a fast oscillation may look like a slow one, a short peak may "
+        "be missing."
     )
 
 

@@ -32,6 +32,7 @@ class Plot:
     curves: Sequence[Curve]
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
+    note: str = ""  # what its numbers stand for
     floor: float | None = None  # smaller values, 0 among them, are drawn here
 
     @property

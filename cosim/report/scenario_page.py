@@ -1,6 +1,6 @@
 """The page of a scenario, and its line in the overview."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim import trajectory_csv
 from cosim.comparison import Failure, Run, tighter
-from cosim.model import Model
+from cosim.model import Model, Variable
 from cosim.report import motion, pages
 from cosim.report.overview import FAILED, PASSED, RAN, Entry
 from cosim.report.pages import RunPage, Table
@@ -17,19 +17,24 @@ from cosim.report.sparkline import path as sparkline
 from cosim.scenario import Scenario
 from cosim.signals import Constant, Signal, Sines, Switches
 from cosim.simulation import Result
-from cosim.texts import bits, milliseconds, number, ordinal, short
+from cosim.texts import bits, milliseconds, number, ordinal, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
+MOST_POINTS = 8  # of a table that is an input, to be listed
 FLOOR = 1e-18  # errors below it, 0 among them, are drawn here; no double is that good
 
 
-def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()) -> Entry:
+def write(
+    folder: Path, name: str, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()
+) -> Entry:
     """Write the page and the values of a scenario; its line in the overview.
 
     Parameters
     ----------
     folder : Path
         Of the section in the report.
+    name : str
+        Of the page and the file of values.
     runs : sequence of Run
         Of one scenario; the first one is drawn.
     again : str
@@ -40,7 +45,7 @@ def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Fail
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
     columns = recorded(scenario, first.fmu.model, first.result)
-    csv = f"{scenario.name}.csv"
+    csv = f"{name}.csv"
     values = np.column_stack([column.astype(float) for column in columns.values()])
     digits = DIGITS if first.compared else None
     trajectory_csv.write_short(folder / csv, first.result.times, list(columns), values, digits)
@@ -70,15 +75,15 @@ def write(folder: Path, runs: Sequence[Run], again: str, failures: Sequence[Fail
         warning=pages.thinned(len(rows), len(scenario.times)),
         again=again,
     )
-    pages.write_run(folder / f"{scenario.name}.html", page)
-    return _entry(page, runs, plots[0])
+    pages.write_run(folder / f"{name}.html", page)
+    return _entry(name, page, runs, plots[0])
 
 
-def write_failed(folder: Path, failure: Failure, again: str) -> Entry:
+def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry:
     """Write the page of a scenario that did not run to its end: what there is of it."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
-    csv, data, line, text = f"{scenario.name}.csv", None, "", ""
+    csv, data, line, text, plots = f"{name}.csv", None, "", "", []
     (folder / csv).unlink(missing_ok=True)  # of an earlier run
     facts = [
         ("model", f"{model.name} (FMI {model.fmi_version})"),
@@ -106,18 +111,19 @@ def write_failed(folder: Path, failure: Failure, again: str) -> Entry:
         csv=csv if data else "",
         again=again,
     )
-    pages.write_run(folder / f"{scenario.name}.html", page)
+    pages.write_run(folder / f"{name}.html", page)
     return Entry(
-        name=scenario.name,
+        name=name,
         title=page.title,
         group=f"{model.name} (FMI {model.fmi_version})",
-        page=f"{scenario.name}.html",
+        page=f"{name}.html",
         status=FAILED,
         error=None,
         bound=None,
         detail=failure.text,
         line=line,
         line_text=text,
+        line_of=plots[0].curves[0].name if data else "",
     )
 
 
@@ -189,9 +195,20 @@ def _value_plots(
         )
 
     return [
-        Plot(", ".join(names), variables[names[0]].unit or "", [curve(name) for name in names])
+        Plot(
+            ", ".join(names),
+            unit(variables[names[0]].unit),
+            [curve(name) for name in names],
+            note=meanings(variables[name] for name in names),
+        )
         for names in panels
     ]
+
+
+def meanings(variables: Iterable[Variable]) -> str:
+    """What the numbers of Integers stand for, as their descriptions say."""
+    texts = [v.description for v in variables if v.type == "Integer" and v.description]
+    return ". ".join(texts) + "." if texts else ""
 
 
 def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
@@ -205,7 +222,7 @@ def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
         curves.append(Curve(name, errors))
         if run.compared:
             levels.append((f"bound {short(run.bound)}", run.bound))
-    return Plot("largest relative error of all outputs", "", curves, True, levels, FLOOR)
+    return Plot("largest relative error of all outputs", "", curves, True, levels, floor=FLOOR)
 
 
 def _facts(run: Run) -> list[tuple[str, str]]:
@@ -235,7 +252,8 @@ def _failure(run: Run) -> str:
 
 
 def _notes(runs: Sequence[Run]) -> list[str]:
-    texts = [f"The FMU says: {text}" for text in runs[0].result.messages]
+    messages = (text for run in runs for text in run.result.messages)
+    texts = [f"The FMU says: {text}" for text in dict.fromkeys(messages)]
     if not runs[0].compared:
         tight = short(tighter(runs[0].result.tolerance))
         texts.append(
@@ -272,7 +290,7 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
                 "Inputs",
                 ("input", "unit", "course", "meaning"),
                 [
-                    (name, known.unit or "", describe(signal), known.description)
+                    (name, unit(known.unit), describe(signal), known.description)
                     for name, signal in scenario.signals.items()
                     if (known := model.variables[name])
                 ],
@@ -294,7 +312,7 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
 def _values(title: str, model: Model, values: dict, folded: bool = False) -> Table:
     variables = model.variables
     rows = [
-        (name, _cell(known.written(value)), known.unit or "", known.description)
+        (name, _cell(known.written(value)), unit(known.unit), known.description)
         for name, value in values.items()
         if (known := variables[name])
     ]
@@ -327,7 +345,7 @@ def _errors(runs: Sequence[Run]) -> Table:
     head = ["output", "unit", *(f"tolerance {short(run.result.tolerance)}" for run in runs)]
     variables = runs[0].fmu.model.variables
     rows = [
-        [name, variables[name].unit or "", *(f"{run.errors[name]:.2e}" for run in runs)]
+        [name, unit(variables[name].unit), *(f"{run.errors[name]:.2e}" for run in runs)]
         for name in runs[0].errors
         if all(name in run.errors for run in runs)
     ]
@@ -350,22 +368,30 @@ def describe(signal: Signal) -> str:
         if len(signal.points) == 1:
             return str(signal.points[0][1]).lower()
         return ", ".join(f"{str(on).lower()} from {number(time)} s" for time, on in signal.points)
+    if len(signal.points) <= MOST_POINTS:
+        points = (f"{number(value)} at {number(time)} s" for time, value in signal.points)
+        return ", ".join(points) + (", linear in between" if len(signal.points) > 1 else "")
     low, high = (f(value for _, value in signal.points) for f in (min, max))
-    return f"table of {len(signal.points)} points between {number(low)} and {number(high)}"
+    begin, end = signal.points[0][0], signal.points[-1][0]
+    return (
+        f"table of {len(signal.points)} points from {number(begin)} to {number(end)} s, values "
+        f"from {number(low)} to {number(high)}, linear in between"
+    )
 
 
-def _entry(page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
+def _entry(name: str, page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
     first = runs[0]
     model, curve = first.fmu.model, plot.curves[0]
     return Entry(
-        name=first.scenario.name,
+        name=name,
         title=page.title,
         group=f"{model.name} (FMI {model.fmi_version})",
-        page=f"{first.scenario.name}.html",
+        page=f"{name}.html",
         status=page.status,
         error=first.error if np.isfinite(first.error) else None,
         bound=first.bound if first.compared else None,
         detail=f"worst output: {first.worst}",
         line=sparkline(page.data.x, curve.values),
         line_text=plot.text,
+        line_of=curve.name,
     )

@@ -114,13 +114,14 @@ def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
     line = sparkline(-np.log10(page.data.x), np.log10(np.maximum(plot.curves[0].values, FLOOR)))
     return Entry(
         name=name,
-        title=page.title,
+        title=f"{page.title}: {error:.1e} {detail}",
         group="Errors over all scenarios",
         page=f"{name}.html",
         status=page.status,
-        error=float(error) if np.isfinite(error) else None,
+        error=None,  # errors of studies are no bounds of each other
         bound=None,
         detail=detail,
         line=line,
         line_text=plot.text,
+        line_of=plot.curves[0].name,
     )

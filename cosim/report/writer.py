@@ -1,6 +1,8 @@
 """What the command `run` puts into a report."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 
 from cosim import project
@@ -23,10 +25,10 @@ class ReportWriter:
         """Write what all pages share: fails now, not after all runs, if there is no room."""
         assets.write(self.folder)
 
-    def forget(self) -> None:
-        """Take what an earlier run found out of the overview."""
-        overview.forget(self.folder, SCENARIOS)
-        overview.forget(self.folder, STUDIES)
+    def forget(self, names: Collection[str] | None = None) -> None:
+        """Take what an earlier run found of all scenarios, or of some, out of the overview."""
+        overview.forget(self.folder, SCENARIOS, names)
+        overview.forget(self.folder, STUDIES, None if names is None else [studies_page.ACCURACY])
 
     @staticmethod
     def grouped(runs: Sequence[Run]) -> dict[Path, list[Run]]:
@@ -69,17 +71,25 @@ class ReportWriter:
             section, entries = (SCENARIOS, scenarios) if ours else (FILES, files)
             again = f"./run.sh {scenario.name}" if ours else f"./run.sh '{from_here(path)}'"
             folder = self.folder / section
+            name = scenario.name if ours else self._free_name(path)
             if group:
-                entries.append(scenario_page.write(folder, group, again, others))
+                entry = scenario_page.write(folder, name, group, again, others)
             else:
-                entries.append(scenario_page.write_failed(folder, others[0], again))
+                entry = scenario_page.write_failed(folder, name, others[0], again)
+            entries.append(entry if ours else replace(entry, source=str(path)))
             if not ours:
-                self.files[scenario.name] = folder / entries[-1].page
+                self.files[name] = folder / entry.page
             progress(1)
         written = [studies_page.write_sweeps(self.folder / STUDIES, sweeps)] if sweeps else []
         written += [studies_page.write_convergence(self.folder / STUDIES, x) for x in studies]
         index = self._record(scenarios, files, written)
         return index if scenarios or len(files) != 1 else self.folder / FILES / files[0].page
+
+    def _free_name(self, file: Path) -> str:
+        """Name of the page of a user's file, unless that is the page of a file elsewhere."""
+        sources = {entry.name: entry.source for entry in overview.read(self.folder, FILES)}
+        names = chain([file.stem], (f"{file.stem} ({i})" for i in count(2)))
+        return next(name for name in names if sources.get(name) in (None, str(file)))
 
     def _record(
         self,
@@ -93,7 +103,5 @@ class ReportWriter:
             index = overview.record(self.folder, SCENARIOS, scenarios)
             index = overview.record(self.folder, STUDIES, studies)
         if files:
-            names = {entry.name for entry in files}
-            before = [e for e in overview.read(self.folder, FILES) if e.name not in names]
-            index = overview.record(self.folder, FILES, [*files, *before])
+            index = overview.record(self.folder, FILES, files)
         return index

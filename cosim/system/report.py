@@ -16,13 +16,14 @@ from cosim.report import assets, motion, overview, pages
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData
+from cosim.report.scenario_page import meanings
 from cosim.report.sparkline import path as sparkline
 from cosim.system import ecos
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
 from cosim.system.structure import System
 from cosim.system.study import Diagram, Study
-from cosim.texts import milliseconds, short
+from cosim.texts import milliseconds, short, unit
 
 MOST_ROWS = 400  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
@@ -49,10 +50,11 @@ class Section:
 
 
 def remove(report: Path, system: str, variants: Sequence[str]) -> None:
-    """Remove what an earlier run left of these variants, and of all from the overview."""
+    """Remove what an earlier run left of these variants."""
     folder = report / SYSTEM
-    overview.forget(report, SYSTEM)
-    (folder / f"{system}.svg").unlink(missing_ok=True)
+    overview.forget(report, SYSTEM, variants)
+    if not overview.read(report, SYSTEM):
+        (folder / f"{system}.svg").unlink(missing_ok=True)
     for variant in variants:
         for suffix in (".csv", ".html"):
             (folder / f"{variant}{suffix}").unlink(missing_ok=True)
@@ -73,7 +75,10 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
             *_solvers(section.ssp, run),
             _errors(section.ssp, outcome),
         ],
-        notes=[f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES],
+        notes=[
+            *(f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES),
+            "These numbers are of all steps, also of those that the file leaves out.",
+        ],
         failures=[*_failures(outcome), *run.messages],
         **_values(folder, outcome),
         **_texts(section, outcome.variant),
@@ -90,6 +95,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         detail=f"worst variable: {outcome.worst}",
         line=sparkline(data.x, data.plots[0].curves[0].values),
         line_text=data.plots[0].text,
+        line_of=data.plots[0].curves[0].name,
     )
 
 
@@ -115,7 +121,9 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
     )
     pages.write_run(folder / f"{variant}.html", page)
     name = f"{variant}.html"
-    return Entry(variant, "", section.title, name, FAILED, None, None, str(error), line, text)
+    first = data.plots[0].curves[0].name if data else ""
+    known = section.title, name, FAILED, None, None, str(error), line, text, first
+    return Entry(variant, "", *known)
 
 
 def _folder(report: Path, section: Section) -> Path:
@@ -179,8 +187,9 @@ def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram, rows: np.ndarray) -> Plo
                 steps=ssp.variable(name).type != "Real",
             )
         )
-    units = [ssp.variable(name).unit or "" for name in diagram.curves]
-    return Plot(diagram.title, units[0], curves)
+    variables = [ssp.variable(name) for name in diagram.curves]
+    meaning = meanings(variables)
+    return Plot(diagram.title, unit(variables[0].unit), curves, note=meaning)
 
 
 def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
@@ -239,7 +248,7 @@ def _parameters(ssp: Ssp, variant: str) -> list[Table]:
 def _cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
     shown = variable.written(value)
     text = str(shown).lower() if isinstance(shown, bool) else shown
-    return variable.name, text, variable.unit or "", variable.description
+    return variable.name, text, unit(variable.unit), variable.description
 
 
 def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
@@ -256,7 +265,7 @@ def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:
 
 def _errors(ssp: Ssp, outcome: Outcome) -> Table:
     rows = [
-        (name, ssp.variable(name).unit or "", f"{error:.2e}")
+        (name, unit(ssp.variable(name).unit), f"{error:.2e}")
         for name, error in outcome.errors.items()
     ]
     note = (

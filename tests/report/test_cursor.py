@@ -44,7 +44,11 @@ def test_the_cursor_shows_rows_of_the_values(
         )
         found = np.flatnonzero(values["time"] == time)
         assert len(found) == 1 and (row < rows - 1 or found[0] == last)
-        seen = {curve: text.split()[0] for curve, text in shown if curve in values}
+        seen = {
+            curve: text.split()[0].replace("\N{MINUS SIGN}", "-")
+            for curve, text in shown
+            if curve in values
+        }
         assert curves <= set(seen)
         for curve, text in seen.items():
             value = values[curve][found[0]]

@@ -9,6 +9,8 @@ import pytest
 from cosim import scenario
 from cosim.report import browser as shown
 from cosim.report.overview import Entry, forget, read, record
+from cosim.report.scenario_page import describe
+from cosim.signals import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
 from tests.support.cosim_project import FMUS, assert_one_line, call, declared
@@ -57,7 +59,7 @@ def test_the_usual_model_has_the_most_scenarios(capsys: pytest.CaptureFixture[st
     assert 'model = "rp_manipulator"' in Path("first.toml").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", [STRANGE, "mit Leerzeichen", "a.b", 'quote " and \\ here', "-x"])
+@pytest.mark.parametrize("name", [STRANGE, "mit Leerzeichen", "a.b", 'quote " and \\ here'])
 def test_strange_names(capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str) -> None:
     assert call(capsys, "new", "--", name)[0] == 0
     assert f"{name}.toml" in {path.name for path in tmp_path.iterdir()}
@@ -80,6 +82,10 @@ def test_a_file_that_exists_stays(capsys: pytest.CaptureFixture[str]) -> None:
         ([""], "is no name for a scenario"),
         (["folder/"], "is no name for a scenario"),
         (["a\nb"], "printable characters"),
+        (["--", "-x"], "begins with no hyphen"),
+        (["--", "--open.toml"], "begins with no hyphen"),
+        (["con"], "Windows keeps this name"),
+        (["CON.TOML"], "Windows keeps this name"),
         (["x" * 300], "cannot be written: File name too long"),
         (["x", "--model", "rp_manipulater"], "did you mean 'rp_manipulator'?"),
     ],
@@ -198,6 +204,48 @@ def test_files_stay_in_the_overview_and_scenarios_beside_them(
     page = Path("out/index.html").read_text(encoding="utf-8")
     for href in ("files/a", "files/b", "scenarios/constant_effort_single_step"):
         assert page.count(f'href="{href}.html"') == 1
+
+
+def test_capitals_of_a_suffix_do_not_matter(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(capsys, "new", "Swing.TOML")[0] == 0
+    assert [path.name for path in Path.cwd().iterdir()] == ["Swing.TOML"]
+    code, out, _ = call(capsys, "run", "Swing.TOML", "--report", "out")
+    assert code == 0 and "Swing: out/files/Swing.html" in out
+
+
+def test_files_of_one_name_have_pages_of_their_own(capsys: pytest.CaptureFixture[str]) -> None:
+    for folder, speed in (("a", "0.3"), ("b", "0.4"), ("a", "0.3")):
+        Path(folder).mkdir(exist_ok=True)
+        text = CONTENT.replace("q1 = 0.3", f"q1 = {speed}")
+        Path(folder, "x.toml").write_text(text, encoding="utf-8")
+        assert call(capsys, "run", f"{folder}/x.toml", "--report", "out")[0] == 0
+    entries = {entry.name: entry.source for entry in read(Path("out"), "files")}
+    assert entries == {
+        "x": str(Path("a/x.toml").absolute()),
+        "x (2)": str(Path("b/x.toml").absolute()),
+    }
+    starts = [
+        Path(f"out/files/{name}.csv").read_text("utf-8").splitlines()[1].split(",")[1]
+        for name in entries
+    ]
+    assert sorted(starts) == ["0.3", "0.4"]
+
+
+def test_other_scenarios_stay_when_some_run_again(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("late_start", "constant_effort_single_step"):
+        arguments = (name, "--tolerance", "1e-8", "--report", "out")
+        assert call(capsys, "run", *arguments)[0] == 0
+    page = Path("out/index.html").read_text(encoding="utf-8")
+    for name in ("late_start", "constant_effort_single_step"):
+        assert page.count(f'href="scenarios/{name}.html"') == 1
+
+
+def test_a_long_table_is_summed_up() -> None:
+    points = tuple((float(i), float(i % 3)) for i in range(3))
+    assert describe(Table(points)) == "0 at 0 s, 1 at 1 s, 2 at 2 s, linear in between"
+    many = tuple((i / 10, float(i % 7)) for i in range(50))
+    summed = "table of 50 points from 0 to 4.9 s, values from 0 to 6, linear in between"
+    assert describe(Table(many)) == summed
 
 
 def test_the_page_of_a_file_is_opened(

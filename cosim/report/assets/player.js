@@ -147,7 +147,8 @@ class Player {
         </label>
       </div>
       <ul class="player-values"></ul>
-      <p class="player-keys">Keys: <kbd>Space</kbd> plays and pauses, <kbd>←</kbd> <kbd>→</kbd> go
+      <p class="player-keys">Keys, while a control of the player has the focus:
+        <kbd>Space</kbd> plays and pauses, <kbd>←</kbd> <kbd>→</kbd> go
         by a row, with <kbd>Shift</kbd> by twenty, <kbd>Home</kbd> <kbd>End</kbd> to the ends.</p>`;
     const found = name => this.element.querySelector(name);
     this.canvas = found('canvas');

@@ -41,7 +41,12 @@ const Plots = (() => {
     if (!Number.isFinite(number)) return '–';
     const rounded = Number(number.toPrecision(digits));
     const tiny = rounded !== 0 && Math.abs(rounded) < 1e-4;
-    return tiny ? rounded.toExponential() : String(rounded);
+    return minus(tiny ? rounded.toExponential() : String(rounded));
+  }
+
+  /** A text with minus signs before its digits, as the axes have them. */
+  function minus(text) {
+    return text.replace(/(?<![\w.-])-(?=\d)|(?<=\de)-(?=\d)/g, '\u2212');
   }
 
   function colours() {
@@ -133,7 +138,7 @@ const Plots = (() => {
     const entry = (name, { colour, dashes = [] }) => {
       const item = document.createElement('li');
       const value = document.createElement('span');
-      item.append(swatch(colour, dashes), `${name} `, value);
+      item.append(swatch(colour, dashes), `${minus(name)} `, value);
       list.append(item);
       return value;
     };
