@@ -35,7 +35,7 @@ MESSAGE = re.compile(
     r"(?P<status>OK|Warning|Discard|Error|Fatal) (?P<text>.*)"
 )
 BAD = ("Discard", "Error", "Fatal")
-# what FMUs with a solver say of it at the end of a run, with its meaning in a table
+# what FMUs say of their solver at the end of a run, and how a table calls it
 STATISTICS = {
     "solver_steps": "solver steps",
     "solver_rhs_evaluations": "evaluations",

@@ -9,7 +9,9 @@ from tests.support.cosim_project import FMUS, declared
 from tests.support.paths import ROOT
 
 SOURCES = sorted(path for path in (ROOT / "cosim").rglob("*") if path.suffix in (".py", ".html"))
-SOLVER = {"time", "solver_steps", "solver_rhs_evaluations"}  # of every model with states
+# of every model with states
+SOLVER = {"time", "solver_steps", "solver_rhs_evaluations", "solver_restarts"}
+SOLVER |= {"solver_failed_steps", "effective_relative_tolerance"}
 # words of English, letters and an argument of Ecos that are names of variables too
 WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
 WORDS |= {"start_time", "position"}

@@ -190,7 +190,7 @@ def test_the_command_runs_it(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert (pictures / "stick_slip.png").stat().st_size > 50_000
     written = read_csv(tmp_path / "system/stick_slip.csv")
     for name, values in run("stick_slip").items():
-        np.testing.assert_allclose(written[name], values[::10], rtol=1e-11)
+        np.testing.assert_allclose(written[name], values[::10], rtol=1e-11)  # twelve digits
 
 
 def test_systems_are_listed_with_their_variants(capsys: pytest.CaptureFixture[str]) -> None:

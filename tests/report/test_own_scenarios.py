@@ -176,6 +176,23 @@ def test_a_run_that_fails_shows_its_rows(
     browser.check_quiet()
 
 
+def test_a_run_that_never_starts_has_a_page_without_plots(
+    capsys: pytest.CaptureFixture[str], browser: Browser
+) -> None:
+    massless = CONTENT.replace("[initial]", "m1 = 0.0\nI1z = 0.0\nI2z = 0.0\n[initial]")
+    Path("x.toml").write_text(CONTENT, encoding="utf-8")
+    assert call(capsys, "run", "x.toml", "--report", "out")[0] == 0
+    Path("x.toml").write_text(massless, encoding="utf-8")
+    code, _, err = call(capsys, "run", "x.toml", "--report", "out")
+    assert code == 2
+    browser.open(Path("out/files/x.html"))
+    text = browser.run("return document.body.innerText")
+    assert err.removeprefix("error: ").strip() in text and "FAILED" in text
+    assert browser.run("return document.querySelector('.plot') === null")
+    assert not Path("out/files/x.csv").exists()  # of the earlier run
+    browser.check_quiet()
+
+
 def test_two_files_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("a", "b"):
         Path(name).mkdir()

@@ -202,7 +202,7 @@ def test_modes_are_in_words_and_courses_have_names(browser: Browser, report: Pat
 
 
 def test_numbers_and_units_have_one_style(browser: Browser, report: Path) -> None:
-    for name in PAGES[1:]:
+    for name in (PAGES[2], PAGES[-1]):
         show(browser, report / name)
         browser.run("document.querySelectorAll('details').forEach(x => { x.open = true; })")
         shown = browser.run(
