@@ -55,7 +55,8 @@ class Runner:
         self._record = np.empty((len(job.times), len(job.watched)))
         self._tangent = loop.Tangent.none() if job.tangent is None else loop.Tangent(*job.tangent)
         self._growth = np.empty(0 if job.tangent is None else job.steps)
-        place = {name: i for i, name in enumerate(job.watched)}
+        self._integers: list[int] = []  # at the end of the last run
+        place = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
         self._places = [[place[name] for name in m.variables] for m in job.measures]
 
     def __enter__(self) -> "Runner":
@@ -81,7 +82,7 @@ class Runner:
             failures.append(failure)
             if failure:
                 continue
-            recorded = Recorded(job.times, self._record, self._growth)
+            recorded = Recorded(job.times, self._record, self._growth, self._integers)
             for j, (measure, places) in enumerate(zip(job.measures, self._places, strict=True)):
                 measures[i, j] = measure.value(recorded, places)
             if number in job.trajectories:
@@ -93,6 +94,7 @@ class Runner:
         try:
             self._initialize(point)
             self._advance()
+            self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
             return ""
         except UserError as error:
             self._drop_instances()
