@@ -11,7 +11,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.campaign import loop
-from cosim.campaign.fmi_calls import FUNCTIONS
+from cosim.campaign.fmi_calls import DISCARD, TERMINATED, functions
 from cosim.campaign.job import Job, Target
 from cosim.campaign.measures import Recorded
 from cosim.errors import UserError, one_line
@@ -184,9 +184,13 @@ class Runner:
     def _check(self, failure: Sequence[int], when: str) -> None:
         """Raise the user's error if the loop says that a function failed."""
         status, function, component = failure
-        if status >= loop.DISCARD:
-            error = FMICallException(FUNCTIONS[function], status)
-            raise self._instances[component].failure(error, when)
+        if status < DISCARD:
+            return
+        instance = self._instances[component]
+        if status == TERMINATED:
+            raise UserError(f"{instance.name}: the FMU ends the simulation {when}")
+        error = FMICallException(functions(instance)[function], status)
+        raise instance.failure(error, when)
 
 
 @contextmanager
