@@ -8,9 +8,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from zipfile import ZipFile
 
 import fmpy
 import numpy as np
+from lxml import etree
 
 from cosim import project, scenario
 from cosim.campaign.campaign_file import Campaign
@@ -24,7 +26,11 @@ from cosim.scenario import MAX_STEPS, Scenario
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 
-VERSION = "2.0"  # of FMI, whose functions the loop calls
+# attribute of a model description, by version of FMI
+PROVIDES_DERIVATIVES = {
+    "2.0": "providesDirectionalDerivative",
+    "3.0": "providesDirectionalDerivatives",
+}
 
 
 class Base(ABC):
@@ -154,11 +160,17 @@ class ScenarioBase(Base):
 
     def derivatives(self) -> list[tuple[int, int]]:
         """Value references of each state's derivative and of the state."""
-        described = fmpy.read_model_description(self.path)
-        if not described.coSimulation.providesDirectionalDerivative:
+        if not self._gives_derivatives():
             raise WrongValueError("the FMU gives no directional derivatives")
-        found = [unknown.variable for unknown in described.derivatives]
+        found = [x.variable for x in fmpy.read_model_description(self.path).derivatives]
         return [(v.valueReference, v.derivative.valueReference) for v in found]
+
+    def _gives_derivatives(self) -> bool:
+        """What fmpy does not read of FMI 3.0."""
+        with ZipFile(self.path) as archive:
+            root = etree.fromstring(archive.read("modelDescription.xml"))
+        attribute = PROVIDES_DERIVATIVES[self._model.fmi_version]
+        return root.find("CoSimulation").get(attribute) in ("true", "1")
 
 
 class SystemBase(Base):
@@ -266,7 +278,6 @@ def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
         file = project.scenario_file(campaign.scenario)
         path = given or project.built(project.model_folder(file), ".fmu", "--fmu")
         model = read_model(path)
-        _check_version(path, model)
         yield ScenarioBase(path, scenario.load(file, model, times), model)
         return
     folders = project.systems()
@@ -277,8 +288,6 @@ def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
         )
     path = given or project.built(folders[campaign.system], ".ssp", "--fmu")
     with ssp.unpacked(path) as system:
-        for model in system.models.values():
-            _check_version(path, model)
         variants = system.system.parameter_sets
         if campaign.variant not in variants:
             guess = did_you_mean(campaign.variant, variants)
@@ -286,11 +295,6 @@ def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
             raise UserError(f"variant: no variant {campaign.variant!r}{guess} (known: {known})")
         given_times = _system_times(system, times)
         yield SystemBase(campaign.system, system, campaign.variant, given_times)
-
-
-def _check_version(path: Path, model: Model) -> None:
-    if model.fmi_version != VERSION:
-        raise UserError(f"{path}: is of FMI {model.fmi_version}, campaigns run FMI {VERSION}")
 
 
 def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:

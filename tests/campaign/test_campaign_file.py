@@ -48,7 +48,14 @@ MISTAKES = {
         "[keep]: keeps nothing of a run",
     ),
     "unknown variable": ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
-    "no Real variable": ([('"q1", "q2"', '"solver_steps"')], "'solver_steps' is not a Real"),
+    "no number": (
+        [('"q1", "q2"', '"solver_method"')],
+        "[keep] final: 'solver_method' is not a Real or Integer variable",
+    ),
+    "no Real variable": (
+        [('maximum = ["dq1"]', 'maximum = ["solver_steps"]')],
+        "[keep] maximum: 'solver_steps' is not a Real variable",
+    ),
     "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
     "unknown column": (
         [("seed = 3", 'worst = ["final(q3)"]')],
