@@ -75,6 +75,8 @@ if [ "$platforms" = yes ]; then
   need gcc-aarch64-linux-gnu command -v aarch64-linux-gnu-gcc
   need libc6-dev-arm64-cross test -e /usr/aarch64-linux-gnu/include/math.h
   need gcc-mingw-w64-x86-64 command -v x86_64-w64-mingw32-gcc
+  # of the tests of campaigns on two hosts
+  need iproute2 command -v ip
   # of the tests of pages
   need chromium command -v chromium
   need chromium-driver command -v chromedriver

@@ -6,15 +6,15 @@ campaign. Only this process writes results: workers need no common disk.
 """
 
 import logging
-import math
 import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from weakref import WeakSet
 
 import dask
 import numpy as np
@@ -33,10 +33,12 @@ from cosim.campaign.worker import NAME, Plugin, run_block
 from cosim.errors import UserError, one_line
 
 AHEAD = 3  # blocks under way for each thread of a worker
-COUNT_EVERY = 5.0  # s, between two looks at how many threads there are
+COUNT_EVERY = 5000  # ms, between two looks at how many threads there are
 KILLS = 5  # so many workers may die over a task
 RESTART_EVERY = 2000  # ms
-WAIT = 60  # s, for the first worker
+ATTEMPTS = 3  # to reach all workers: the scheduler may count one whose host is gone
+WAIT = 60  # s, without a worker
+GONE = "the scheduler is gone"
 DIED = "the worker died in this run"
 GOES_ON = "the same command goes on from what is there"
 
@@ -46,6 +48,7 @@ SETTINGS = {
     # what watches workers many times a second takes three per cent of a core, for nothing here
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "500ms",
+    "distributed.worker.memory.monitor-interval": "1s",
     "distributed.worker.memory.terminate": False,  # the system decides when memory is short
 }
 
@@ -108,19 +111,27 @@ class Engine:
     ) -> None:
         self._client, self._campaign, self._job = client, campaign, job
         self._points, self._results = points, results
-        self._counted, self._ahead = -math.inf, 0
+        self._address = client.scheduler.address
+        self._futures: WeakSet[Future] = WeakSet()
+        self._lost = GONE  # why futures are cancelled
         self._begin(archives)
 
     def _begin(self, archives: Mapping[str, bytes]) -> None:
-        try:
-            self._client.wait_for_workers(1, timeout=WAIT)
-        except TimeoutError:
-            raise UserError(f"{self._client.scheduler.address}: has no workers") from None
-        replies = self._client.register_plugin(Plugin(self._job, archives))
-        for address, reply in (replies or {}).items():
+        for address, reply in self._registered(Plugin(self._job, archives)).items():
             if isinstance(reply, dict) and reply.get("status") == "error":
                 error = pickle.loads(reply["exception"].data) if "exception" in reply else reply
                 raise UserError(f"{address}: the worker cannot run this: {one_line(error)}")
+
+    def _registered(self, plugin: Plugin) -> dict:
+        """Give all workers the plugin; their replies."""
+        for _ in range(ATTEMPTS):
+            with suppress(OSError):
+                try:
+                    self._client.wait_for_workers(1, timeout=WAIT)
+                except TimeoutError:
+                    raise UserError(f"{self._address}: has no workers") from None
+                return self._client.register_plugin(plugin) or {}
+        raise UserError(f"{self._address}: {GONE}, or a worker cannot be reached; {GOES_ON}")
 
     def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         """Run blocks and keep their results; `done` is called with the number of runs of each.
@@ -130,11 +141,26 @@ class Engine:
         UserError
             If the cluster is lost or the results cannot be written.
         """
+        watch = PeriodicCallback(self._watch, COUNT_EVERY)
         try:
+            self._seen, self._threads = time.monotonic(), sum(self._client.nthreads().values())
+            self._client.loop.add_callback(watch.start)
             self._run(blocks, done)
-            self._client.unregister_worker_plugin(NAME)
         except (OSError, FutureCancelledError):
-            raise UserError(f"the scheduler is gone; {GOES_ON}") from None
+            raise UserError(f"{self._lost}; {GOES_ON}") from None
+        finally:
+            self._client.loop.add_callback(watch.stop)
+        with suppress(OSError):  # a worker whose host is gone needs nothing
+            self._client.unregister_worker_plugin(NAME)
+
+    async def _watch(self) -> None:
+        """Count threads, in the thread of the client; give up when there have long been none."""
+        self._threads = sum((await self._client.nthreads(asynchronous=True)).values())
+        if self._threads:
+            self._seen = time.monotonic()
+        elif time.monotonic() > self._seen + WAIT:
+            self._lost = f"{self._address}: has no workers any more"
+            await self._client.cancel(list(self._futures), asynchronous=True)
 
     def _run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         waiting = iter(blocks)
@@ -155,10 +181,8 @@ class Engine:
         self, waiting: Iterator[int], tasks: as_completed, under_way: dict[str, _Block]
     ) -> None:
         """Submit blocks until enough are under way, also for workers that have come later."""
-        if time.monotonic() >= self._counted + COUNT_EVERY:
-            self._counted = time.monotonic()
-            self._ahead = AHEAD * max(sum(self._client.nthreads().values()), 1)
-        for number in islice(waiting, max(self._ahead - len(under_way), 0)):
+        ahead = AHEAD * max(self._threads, 1)
+        for number in islice(waiting, max(ahead - len(under_way), 0)):
             runs = self._campaign.block_range(number)
             block = _Block(number, runs, self._points.of(runs))
             future = self._submit(list(runs), block.points)
@@ -167,7 +191,9 @@ class Engine:
 
     def _submit(self, runs: Sequence[int], points: np.ndarray) -> Future:
         targets = self._points.targets(points, self._job)
-        return self._client.submit(run_block, runs, targets, pure=False)
+        future = self._client.submit(run_block, runs, targets, pure=False)
+        self._futures.add(future)
+        return future
 
     def _rows(self, future: Future, block: _Block) -> Rows:
         """Results of a task; run by run if workers died over it again and again."""
@@ -189,7 +215,7 @@ class Engine:
 
     def _error(self, future: Future) -> BaseException:
         if future.status == "cancelled" or self._client.status != "running":
-            raise UserError(f"the scheduler is gone; {GOES_ON}")
+            raise UserError(f"{self._lost}; {GOES_ON}")
         return future.exception()
 
 

@@ -1,14 +1,17 @@
-/* The runs of rate.py by a plain loop in C: what a campaign's rate is compared with.
+/* The runs of a campaign by a plain loop in C, with FMI 2.0: what the campaign's rate is compared
+ * with.
  *
- * c_loop LIBRARY GUID RUNS THREADS: each thread has one instance and
- * resets it between runs. Prints seconds of wall time and of processor time, and a sum of results.
+ * c_loop RUNS THREADS RESULTS: each thread has one instance of each FMU and resets it between runs.
+ * Components step in Jacobi order. Prints seconds of wall time and of processor time; of each run
+ * the last and the largest of all values that are read go to the file RESULTS, as doubles.
+ *
+ * c_loop.py writes work.h: the FMUs, what is set, connections and points.
  */
 #define _POSIX_C_SOURCE 200809L
 
 #include <dlfcn.h>
 #include <math.h>
 #include <pthread.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,30 +19,51 @@
 
 #include "fmi2Functions.h"
 
-#define STEPS       2000
-#define STEP        1e-3 /* s */
-#define TOLERANCE   1e-8
-#define MAX_THREADS 64
+struct real {
+    int component;
+    fmi2ValueReference reference;
+    double value;
+};
 
-enum { M2 = 2, Q1 = 10, Q2 = 11, DQ1 = 12, DQ2 = 13, TAU1 = 20, F2 = 21 };
+struct integer {
+    int component;
+    fmi2ValueReference reference;
+    int value; /* of an Integer, an enumeration or a Boolean */
+};
 
-static fmi2InstantiateTYPE *instantiate;
-static fmi2FreeInstanceTYPE *free_instance;
-static fmi2ResetTYPE *reset;
-static fmi2SetupExperimentTYPE *setup;
-static fmi2EnterInitializationModeTYPE *enter;
-static fmi2ExitInitializationModeTYPE *leave;
-static fmi2SetRealTYPE *set_real;
-static fmi2GetRealTYPE *get_real;
-static fmi2DoStepTYPE *do_step;
+#define LENGTH(array) ((int)(sizeof(array) / sizeof((array)[0])))
 
-static double inputs[STEPS][2];
-static const char *guid;
+#include "work.h"
+
+enum {
+    COMPONENTS = LENGTH(libraries),
+    RUNS = LENGTH(points),
+    STEPS = LENGTH(times) - 1,
+    HELD = LENGTH(held) / (STEPS + 1), /* inputs that are held over a step */
+    INPUTS = LENGTH(inputs),
+    OUTPUTS = LENGTH(outputs),
+    MAX_THREADS = 64
+};
+
+static struct {
+    fmi2InstantiateTYPE *instantiate;
+    fmi2FreeInstanceTYPE *free_instance;
+    fmi2ResetTYPE *reset;
+    fmi2SetupExperimentTYPE *setup;
+    fmi2EnterInitializationModeTYPE *enter;
+    fmi2ExitInitializationModeTYPE *leave;
+    fmi2SetRealTYPE *set_real;
+    fmi2GetRealTYPE *get_real;
+    fmi2SetIntegerTYPE *set_integer;
+    fmi2SetBooleanTYPE *set_boolean;
+    fmi2DoStepTYPE *do_step;
+} fmus[COMPONENTS];
+
+static double results[RUNS][2][OUTPUTS];
 
 struct work {
     pthread_t thread;
-    unsigned runs, first;
-    double sum;
+    int first, behind; /* runs */
     int failed;
 };
 
@@ -57,48 +81,133 @@ static void *find(void *library, const char *name) {
     return function;
 }
 
-/* One run; the largest q2, which a campaign keeps, too. */
-static int run(fmi2Component instance, double m2, double q1, double *largest) {
-    static const fmi2ValueReference in[] = {TAU1, F2}, out[] = {Q1, Q2, DQ1, DQ2};
-    const fmi2ValueReference mass = M2, angle = Q1;
-    double state[4];
+static void load(int c) {
+    void *library = dlopen(libraries[c], RTLD_NOW | RTLD_LOCAL);
+    if (library == NULL) {
+        fprintf(stderr, "c_loop: %s\n", dlerror());
+        exit(2);
+    }
+    *(void **)&fmus[c].instantiate = find(library, "fmi2Instantiate");
+    *(void **)&fmus[c].free_instance = find(library, "fmi2FreeInstance");
+    *(void **)&fmus[c].reset = find(library, "fmi2Reset");
+    *(void **)&fmus[c].setup = find(library, "fmi2SetupExperiment");
+    *(void **)&fmus[c].enter = find(library, "fmi2EnterInitializationMode");
+    *(void **)&fmus[c].leave = find(library, "fmi2ExitInitializationMode");
+    *(void **)&fmus[c].set_real = find(library, "fmi2SetReal");
+    *(void **)&fmus[c].get_real = find(library, "fmi2GetReal");
+    *(void **)&fmus[c].set_integer = find(library, "fmi2SetInteger");
+    *(void **)&fmus[c].set_boolean = find(library, "fmi2SetBoolean");
+    *(void **)&fmus[c].do_step = find(library, "fmi2DoStep");
+}
 
-    int failed = setup(instance, fmi2True, TOLERANCE, 0.0, fmi2True, STEPS * STEP) != fmi2OK;
-    failed |= set_real(instance, &mass, 1, &m2) != fmi2OK;
-    failed |= set_real(instance, &angle, 1, &q1) != fmi2OK;
-    failed |= enter(instance) != fmi2OK;
-    failed |= set_real(instance, in, 2, inputs[0]) != fmi2OK;
-    failed |= leave(instance) != fmi2OK;
-    *largest = -INFINITY;
+/* values: first what is held, then what is read of each component. */
+static int set_inputs(fmi2Component *instances, const double *values) {
+    double to_set[INPUTS + 1];
+    int failed = 0;
+    for (int c = 0; c < COMPONENTS; c++) {
+        const int begin = first_input[c], count = first_input[c + 1] - begin;
+        if (count == 0) {
+            continue;
+        }
+        for (int k = 0; k < count; k++) {
+            to_set[k] = values[sources[begin + k]];
+        }
+        failed |= fmus[c].set_real(instances[c], inputs + begin, (size_t)count, to_set) != fmi2OK;
+    }
+    return failed;
+}
+
+static int read_outputs(fmi2Component *instances, double *values) {
+    int failed = 0;
+    for (int c = 0; c < COMPONENTS; c++) {
+        const int begin = first_output[c], count = first_output[c + 1] - begin;
+        failed |= fmus[c].get_real(instances[c], outputs + begin, (size_t)count,
+                                   values + HELD + begin) != fmi2OK;
+    }
+    return failed;
+}
+
+static int initialize(fmi2Component *instances, const double *point, double *values) {
+    int failed = 0;
+    for (int c = 0; c < COMPONENTS; c++) {
+        failed |= fmus[c].setup(instances[c], TOLERANCE > 0, TOLERANCE, times[0], fmi2True,
+                                times[STEPS]) != fmi2OK;
+    }
+    for (int i = 0; i < LENGTH(reals); i++) {
+        const struct real *set = &reals[i];
+        failed |= fmus[set->component].set_real(instances[set->component], &set->reference, 1,
+                                                &set->value) != fmi2OK;
+    }
+    for (int i = 0; i < LENGTH(integers); i++) {
+        const struct integer *set = &integers[i];
+        failed |= fmus[set->component].set_integer(instances[set->component], &set->reference, 1,
+                                                   &set->value) != fmi2OK;
+    }
+    for (int i = 0; i < LENGTH(booleans); i++) {
+        const struct integer *set = &booleans[i];
+        failed |= fmus[set->component].set_boolean(instances[set->component], &set->reference, 1,
+                                                   &set->value) != fmi2OK;
+    }
+    for (int i = 0; i < LENGTH(targets); i++) {
+        const struct real *set = &targets[i];
+        failed |= fmus[set->component].set_real(instances[set->component], &set->reference, 1,
+                                                &point[i]) != fmi2OK;
+    }
+    for (int c = 0; c < COMPONENTS; c++) {
+        failed |= fmus[c].enter(instances[c]) != fmi2OK;
+    }
+    memcpy(values, held, HELD * sizeof *held);
+    for (int pass = 0; pass < COMPONENTS; pass++) { /* outputs reach all inputs */
+        failed |= read_outputs(instances, values);
+        failed |= set_inputs(instances, values);
+    }
+    for (int c = 0; c < COMPONENTS; c++) {
+        failed |= fmus[c].leave(instances[c]) != fmi2OK;
+    }
+    return failed | read_outputs(instances, values);
+}
+
+static int run(fmi2Component *instances, const double *point, double (*result)[OUTPUTS]) {
+    double values[HELD + OUTPUTS], *last = result[0], *largest = result[1];
+    int failed = initialize(instances, point, values);
+    memcpy(largest, values + HELD, OUTPUTS * sizeof *largest);
     for (int i = 0; i < STEPS && !failed; i++) {
-        failed |= set_real(instance, in, 2, inputs[i]) != fmi2OK;
-        failed |= do_step(instance, i * STEP, (i + 1) * STEP - i * STEP, fmi2True) != fmi2OK;
-        failed |= get_real(instance, out, 4, state) != fmi2OK;
-        if (state[1] > *largest) {
-            *largest = state[1];
+        memcpy(values, held + i * HELD, HELD * sizeof *held);
+        failed |= set_inputs(instances, values);
+        for (int c = 0; c < COMPONENTS; c++) {
+            failed |= fmus[c].do_step(instances[c], times[i], times[i + 1] - times[i], fmi2True) !=
+                      fmi2OK;
+        }
+        failed |= read_outputs(instances, values);
+        for (int k = 0; k < OUTPUTS; k++) {
+            largest[k] = fmax(largest[k], values[HELD + k]);
         }
     }
+    memcpy(last, values + HELD, OUTPUTS * sizeof *last);
     return failed;
 }
 
 static void *work_through(void *argument) {
     struct work *work = argument;
     const fmi2CallbackFunctions callbacks = {ignore, calloc, free, NULL, NULL};
-    fmi2Component instance =
-        instantiate("c_loop", fmi2CoSimulation, guid, "", &callbacks, fmi2False, fmi2False);
-    if (instance == NULL) {
-        work->failed = 1;
-        return NULL;
+    fmi2Component instances[COMPONENTS];
+    for (int c = 0; c < COMPONENTS; c++) {
+        instances[c] = fmus[c].instantiate("c_loop", fmi2CoSimulation, guids[c], "", &callbacks,
+                                           fmi2False, fmi2False);
+        if (instances[c] == NULL) {
+            work->failed = 1;
+            return NULL;
+        }
     }
-    for (unsigned i = 0; i < work->runs && !work->failed; i++) {
-        /* all over the box of rate.py, in the order of the golden ratio */
-        const double u = fmod(0.61803398874989485 * (work->first + i), 1.0);
-        double largest;
-        work->failed = run(instance, 0.8 + 0.4 * u, -1.6 + 0.2 * u, &largest) != 0;
-        work->sum += largest;
-        work->failed |= reset(instance) != fmi2OK;
+    for (int i = work->first; i < work->behind && !work->failed; i++) {
+        work->failed = run(instances, points[i], results[i]);
+        for (int c = 0; c < COMPONENTS; c++) {
+            work->failed |= fmus[c].reset(instances[c]) != fmi2OK;
+        }
     }
-    free_instance(instance);
+    for (int c = 0; c < COMPONENTS; c++) {
+        fmus[c].free_instance(instances[c]);
+    }
     return NULL;
 }
 
@@ -108,56 +217,42 @@ static double now(clockid_t clock) {
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-int main(int count, char **arguments) {
-    if (count != 5) {
-        fprintf(stderr, "usage: c_loop LIBRARY GUID RUNS THREADS\n");
-        return 2;
-    }
-    void *library = dlopen(arguments[1], RTLD_NOW | RTLD_LOCAL);
-    if (library == NULL) {
-        fprintf(stderr, "c_loop: %s\n", dlerror());
-        return 2;
-    }
-    guid = arguments[2];
-    *(void **)&instantiate = find(library, "fmi2Instantiate");
-    *(void **)&free_instance = find(library, "fmi2FreeInstance");
-    *(void **)&reset = find(library, "fmi2Reset");
-    *(void **)&setup = find(library, "fmi2SetupExperiment");
-    *(void **)&enter = find(library, "fmi2EnterInitializationMode");
-    *(void **)&leave = find(library, "fmi2ExitInitializationMode");
-    *(void **)&set_real = find(library, "fmi2SetReal");
-    *(void **)&get_real = find(library, "fmi2GetReal");
-    *(void **)&do_step = find(library, "fmi2DoStep");
-    for (int i = 0; i < STEPS; i++) {
-        const double t = i * STEP, turn = 2 * 3.14159265358979323846;
-        inputs[i][0] = -0.78 + 2.28 * sin(turn * 0.42 * t + 0.03);
-        inputs[i][1] =
-            -10.15 + 0.9 * sin(turn * 0.84 * t + 2.9) + 2.09 * sin(turn * 0.57 * t - 1.77);
-    }
-
+/* Seconds of wall time; exits if a run fails. */
+static double work_by(int threads, int runs) {
     struct work works[MAX_THREADS] = {0};
-    const unsigned runs = (unsigned)strtoul(arguments[3], NULL, 10);
-    const unsigned threads = (unsigned)strtoul(arguments[4], NULL, 10);
-    if (threads < 1 || threads > MAX_THREADS) {
-        return 2;
-    }
     const double begin = now(CLOCK_MONOTONIC);
-    for (unsigned i = 0; i < threads; i++) {
-        works[i].first = i * (runs / threads);
-        works[i].runs = runs / threads;
+    for (int i = 0; i < threads; i++) {
+        works[i].first = i * runs / threads;
+        works[i].behind = (i + 1) * runs / threads;
         if (pthread_create(&works[i].thread, NULL, work_through, &works[i]) != 0) {
-            return 2;
+            exit(2);
         }
     }
-    double sum = 0.0;
     int failed = 0;
-    for (unsigned i = 0; i < threads; i++) {
+    for (int i = 0; i < threads; i++) {
         pthread_join(works[i].thread, NULL);
-        sum += works[i].sum;
         failed |= works[i].failed;
     }
-    const double wall = now(CLOCK_MONOTONIC) - begin;
-    printf("%.6f %.6f %.17g\n", wall, now(CLOCK_PROCESS_CPUTIME_ID), sum);
-    dlclose(library);
-    return failed;
+    if (failed) {
+        fprintf(stderr, "c_loop: a run failed\n");
+        exit(1);
+    }
+    return now(CLOCK_MONOTONIC) - begin;
+}
+
+int main(int count, char **arguments) {
+    const int runs = count == 4 ? atoi(arguments[1]) : 0;
+    const int threads = count == 4 ? atoi(arguments[2]) : 0;
+    if (runs < 1 || runs > RUNS || threads < 1 || threads > MAX_THREADS) {
+        fprintf(stderr, "usage: c_loop RUNS THREADS RESULTS\n");
+        return 2;
+    }
+    for (int c = 0; c < COMPONENTS; c++) {
+        load(c);
+    }
+    const double wall = work_by(threads, runs);
+    printf("%.6f %.6f\n", wall, now(CLOCK_PROCESS_CPUTIME_ID));
+    FILE *file = fopen(arguments[3], "wb");
+    return file == NULL || fwrite(results, sizeof *results, (size_t)runs, file) != (size_t)runs ||
+           fclose(file) != 0;
 }

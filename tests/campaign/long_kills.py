@@ -1,4 +1,4 @@
-"""Kills workers at random, the scheduler and the campaign, and fills the disk: the same table.
+"""Kills workers, the scheduler and the campaign, loses links, fills the disk: the same table.
 
     build/venv/bin/python -m tests.campaign.long_kills
 
@@ -18,12 +18,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.campaign.files import write
+from tests.campaign.hosts import LOOPBACK, Network, NotPermittedError, network
 from tests.campaign.processes import (
     blocks,
     cluster,
     completed,
     finish,
     kill_group,
+    registered,
     start,
     table,
     wait_for,
@@ -85,16 +87,54 @@ def stop_by_signals(file: Path, output: Path, undisturbed: str) -> None:
 
 def kill_scheduler(file: Path, output: Path, undisturbed: str) -> None:
     """Kill a scheduler that runs elsewhere; another one goes on."""
-    with cluster(2) as (address, scheduler, _):
+    with cluster(LOOPBACK, [LOOPBACK, LOOPBACK]) as (address, scheduler, _):
         process = start(file, output, "--scheduler", address)
         wait_for(lambda: blocks(output) >= 5)
         os.kill(scheduler.pid, signal.SIGKILL)
         code, _, err = finish(process)
         assert code == 2 and "the scheduler is gone" in err, err
-    with cluster(1) as (address, *_):
+    with cluster(LOOPBACK, [LOOPBACK]) as (address, *_):
         assert completed(file, output, "--scheduler", address) == undisturbed
     code, _, err = finish(start(file, output / "none", "--scheduler", "tcp://127.0.0.1:9"))
     assert code == 2 and "the scheduler cannot be reached" in err, err
+
+
+def lose_links(file: Path, output: Path, undisturbed: str) -> None:
+    """Lose links to a worker, to all, to the scheduler, with the time-outs of Dask."""
+    try:
+        with network() as made:
+            _lose_links(file, output, undisturbed, made)
+    except (FileNotFoundError, NotPermittedError) as error:
+        print(f"  left out: {error}")
+
+
+def _lose_links(file: Path, output: Path, undisturbed: str, apart: Network) -> None:
+    here, there = apart.here, apart.there
+
+    def cut_in(folder: Path, address: str) -> tuple[int, str, str]:
+        """A campaign during which the link is lost."""
+        process = start(file, folder, "--scheduler", address, host=here)
+        wait_for(lambda: blocks(folder) >= 5)
+        apart.cut()
+        assert process.poll() is None
+        result = finish(process)
+        apart.mend()
+        return result
+
+    with cluster(here, [here, there]) as (address, _, arms):
+        registered(arms[1])
+        code, out, err = cut_in(output / "one", address)
+        assert code == 0, err
+        assert table(out) == undisturbed
+    with cluster(here, [there, there]) as (address, *_):
+        code, _, err = cut_in(output / "all", address)
+        assert code == 2 and "has no workers any more; the same command goes on" in err, err
+    with cluster(there, [there, there]) as (address, *_):
+        options = ("--scheduler", address)
+        assert completed(file, output / "all", *options, host=here) == undisturbed
+        code, _, err = cut_in(output / "scheduler", address)
+        assert code == 2 and "the scheduler is gone; the same command goes on" in err, err
+        assert completed(file, output / "scheduler", *options, host=here) == undisturbed
 
 
 def fill_disk(file: Path, output: Path, undisturbed: str) -> None:
@@ -129,6 +169,7 @@ TRIALS: tuple[Callable[[Path, Path, str], None], ...] = (
     kill_campaign,
     stop_by_signals,
     kill_scheduler,
+    lose_links,
     fill_disk,
 )
 

@@ -7,27 +7,27 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from tests.campaign.hosts import LOOPBACK, Host
 from tests.support.paths import ROOT
 
 PATIENCE = 240  # s; a busy machine is slow
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
-def python(*arguments: object, **options: object) -> subprocess.Popen:
+def python(*arguments: object, host: Host = LOOPBACK) -> subprocess.Popen:
     """A Python program in another process group."""
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", *map(str, arguments)],
+        [*host.enter, sys.executable, "-P", "-m", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env=ENVIRONMENT,
         start_new_session=True,
         preexec_fn=_heed_signals,
-        **options,
     )
 
 
@@ -36,9 +36,9 @@ def _heed_signals() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def start(file: Path, output: Path, *options: object) -> subprocess.Popen:
+def start(file: Path, output: Path, *options: object, host: Host = LOOPBACK) -> subprocess.Popen:
     """Begin a campaign."""
-    return python("cosim", "campaign", file, "--output", output, *options)
+    return python("cosim", "campaign", file, "--output", output, *options, host=host)
 
 
 def finish(process: subprocess.Popen) -> tuple[int, str, str]:
@@ -62,9 +62,9 @@ def table(out: str) -> str:
     return re.search(r"^table: ([0-9a-f]{64})$", out, re.MULTILINE)[1]
 
 
-def completed(file: Path, output: Path, *options: object) -> str:
+def completed(file: Path, output: Path, *options: object, host: Host = LOOPBACK) -> str:
     """Run a campaign to its end; the hash of its table."""
-    code, out, err = finish(start(file, output, *options))
+    code, out, err = finish(start(file, output, *options, host=host))
     assert code == 0, err
     return table(out)
 
@@ -108,22 +108,28 @@ def workers(process: subprocess.Popen) -> list[int]:
 
 
 @contextmanager
-def cluster(count: int) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
+def cluster(
+    scheduler: Host, workers: Sequence[Host]
+) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
     """Address of a scheduler, its process and those of workers, a process group each."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    address = f"tcp://127.0.0.1:{port}"
+    address = f"tcp://{scheduler.address}:{port}"
     common = ("--no-dashboard",)
-    scheduler = python("dask", "scheduler", "--host", "127.0.0.1", "--port", port, *common)
-    arms = [
-        python("dask", "worker", address, "--nthreads", 1, "--no-nanny", *common)
-        for _ in range(count)
-    ]
+    place = ("--host", scheduler.address, "--port", port)
+    made = [python("dask", "scheduler", *place, *common, host=scheduler)]
+    options = (address, "--nthreads", 1, "--no-nanny", *common)
+    made += [python("dask", "worker", *options, host=host) for host in workers]
     try:
-        yield address, scheduler, arms
+        yield address, made[0], made[1:]
     finally:
-        for process in (scheduler, *arms):
+        for process in made:
             if process.poll() is None:
                 kill_group(process)
             process.communicate()
+
+
+def registered(worker: subprocess.Popen) -> None:
+    """Wait until a worker of a cluster has found its scheduler."""
+    assert any("Registered to" in line for line in worker.stderr), "the worker has ended"

@@ -22,17 +22,9 @@ import numpy as np
 from cosim.campaign import campaign_file
 from cosim.campaign.loop import Wires
 from cosim.campaign.runs import Runner
-from tests.campaign.files import HEAD
-from tests.campaign.rate import TEXT
 from tests.campaign.runners import runner
+from tests.campaign.works import WORKS
 from tests.support.paths import ROOT
-
-SYSTEM = HEAD + (
-    'system = "closed_loop"\nvariant = "nominal"\nsampling = "random"\nruns = {runs}\n'
-    "time = {{ stop = 2.0 }}\n[set]\n'arm.relative_tolerance' = 1e-8\n"
-    "[parameters.'arm.m2']\nuniform = [0.9, 1.1]\n[keep.tracking.tip]\n"
-    "of = [['arm.ee_x', 'trajectory.ee_x_ref'], ['arm.ee_y', 'trajectory.ee_y_ref']]\n"
-)
 
 
 class _Wires(Structure):
@@ -129,8 +121,8 @@ def main() -> int:
     runs = parser.parse_args().runs
     with TemporaryDirectory() as name:
         library = compiled(Path(name))
-        measure("arm", TEXT, runs, library, Path(name))
-        measure("closed_loop", SYSTEM, runs, library, Path(name))
+        for work, text in WORKS.items():
+            measure(work, text, runs, library, Path(name))
     return 0
 
 

@@ -9,12 +9,19 @@ from pathlib import Path
 
 import pytest
 
+from cosim.campaign import bases, campaign_file, engine, planning
+from cosim.campaign.points import Points
+from cosim.campaign.results import Results
+from cosim.errors import UserError
 from tests.campaign.files import write
+from tests.campaign.hosts import LOOPBACK
 from tests.campaign.processes import (
     blocks,
+    cluster,
     completed,
     finish,
     kill_group,
+    registered,
     start,
     table,
     wait_for,
@@ -65,3 +72,24 @@ def test_a_stopped_campaign_says_so(file: Path, tmp_path: Path) -> None:
     assert "stopped; the same command goes on from what is there" in err
     assert "Traceback" not in err
     assert not list(tmp_path.glob(".*"))
+
+
+def test_a_campaign_whose_workers_are_gone_ends(
+    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(engine, "WAIT", 1)
+    monkeypatch.setattr(engine, "COUNT_EVERY", 100)
+    campaign = campaign_file.read(file)
+    with (
+        bases.opened(campaign, None) as base,
+        cluster(LOOPBACK, [LOOPBACK]) as (address, _, arms),
+        engine.cluster(address, None, tmp_path) as client,
+    ):
+        registered(arms[0])
+        job = planning.plan(campaign, base, file)
+        points = Points(campaign, planning.constants(campaign, base))
+        results = Results(tmp_path, campaign, job, "")
+        results.begin()
+        made = engine.Engine(client, campaign, job, base.archives, points, results)
+        with pytest.raises(UserError, match="has no workers any more; the same command goes on"):
+            made.run(range(campaign.blocks), lambda _: kill_group(arms[0]))
