@@ -271,20 +271,29 @@ class SystemBase(Base):
 
 
 @contextmanager
-def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
-    """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one."""
+def opened(campaign: Campaign, given: Path | None, where: object = "campaign") -> Iterator[Base]:
+    """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one.
+
+    Raises
+    ------
+    UserError
+        If it cannot be opened; beginning with `where` if the campaign's text is wrong.
+    """
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
-        file = project.scenario_file(campaign.scenario)
+        with _said_of(where):
+            file = project.scenario_file(campaign.scenario)
         path = given or project.built(project.model_folder(file), ".fmu", "--fmu")
         model = read_model(path)
-        yield ScenarioBase(path, scenario.load(file, model, times), model)
+        with _said_of(where):
+            loaded = scenario.load(file, model, times)
+        yield ScenarioBase(path, loaded, model)
         return
     folders = project.systems()
     if campaign.system not in folders:
         guess = did_you_mean(campaign.system, folders)
         raise UserError(
-            f"system: no system {campaign.system!r}{guess} (known: {', '.join(folders)})"
+            f"{where}: system: no system {campaign.system!r}{guess} (known: {', '.join(folders)})"
         )
     path = given or project.built(folders[campaign.system], ".ssp", "--fmu")
     with ssp.unpacked(path) as system:
@@ -292,9 +301,20 @@ def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
         if campaign.variant not in variants:
             guess = did_you_mean(campaign.variant, variants)
             known = ", ".join(variants)
-            raise UserError(f"variant: no variant {campaign.variant!r}{guess} (known: {known})")
-        given_times = _system_times(system, times)
+            raise UserError(
+                f"{where}: variant: no variant {campaign.variant!r}{guess} (known: {known})"
+            )
+        with _said_of(where):
+            given_times = _system_times(system, times)
         yield SystemBase(campaign.system, system, campaign.variant, given_times)
+
+
+@contextmanager
+def _said_of(where: object) -> Iterator[None]:
+    try:
+        yield
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
 
 
 def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:

@@ -1,13 +1,14 @@
 """Checks what a campaign says of its scenario or system, and makes the job of it."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NoReturn
 
 import numpy as np
 
 from cosim.campaign.bases import Base, ScenarioBase
 from cosim.campaign.campaign_file import Campaign, Distribution
+from cosim.campaign.expressions import Expression
 from cosim.campaign.job import Job, Target
 from cosim.campaign.measures import (
     FINAL_INTEGER,
@@ -17,7 +18,7 @@ from cosim.campaign.measures import (
     final_integer,
     plain,
 )
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, did_you_mean, one_line
 from cosim.model import INPUTS, Value, Variable, WrongValueError
 
 RUN, FAILURE = "run", "failure"  # columns of every table
@@ -96,18 +97,29 @@ class _Planner:
             if found is not None:
                 self.check_distribution(distribution, found[1], place)
                 targets[name] = self.target(name, *found)
-        known = set(campaign.parameters) | set(self.constants())
+        constants, varying = self.constants(), set(campaign.parameters)
         for name, expression in campaign.expressions.items():
             place = f"[derived] {name}"
+            known = varying | set(constants)
             for other in expression.names - known:
                 self.fail(place, f"unknown name {other!r}{did_you_mean(other, known)}")
-            known.add(name)
+            if expression.names & varying:
+                varying.add(name)
+            else:
+                constants[name] = self.constant(expression, constants, place)
             found = self.settable(name, place, name in used)
             if found is not None:
                 if found[1].type != "Real":
                     self.fail(place, f"is of type {found[1].type}, expected Real")
                 targets[name] = self.target(name, *found)
         return targets
+
+    def constant(self, expression: Expression, constants: Mapping[str, float], place: str) -> float:
+        """Value of an expression that is the same in all runs."""
+        try:
+            return expression.value(constants)
+        except (ArithmeticError, ValueError) as error:
+            self.fail(place, f"has no value: {one_line(error)}")
 
     def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
         """The variable; None if it is none but `used` by an expression."""
