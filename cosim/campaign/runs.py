@@ -199,20 +199,28 @@ def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str,
     with ExitStack() as stack:
         fmus = {}
         for digest, content in archives.items():
-            path = folder / f"{digest}.fmu"
+            path = _copy(folder, digest)
             path.write_bytes(content)
             fmus[digest] = stack.enter_context(Fmu(path, folder))
         yield fmus
 
 
-def check(job: Job, archives: Mapping[str, bytes]) -> None:
-    """Load the FMUs of a job and make an instance of each; UserError if that fails."""
-    with (
-        TemporaryDirectory(prefix="cosim-") as folder,
-        open_fmus(archives, Path(folder)) as fmus,
-        Runner(job, fmus) as runner,
-    ):
-        runner.instantiate()
+def check(job: Job, archives: Mapping[str, bytes], path: Path) -> None:
+    """Load the FMUs of a job and make an instance of each; UserError of `path` if that fails."""
+    with TemporaryDirectory(prefix="cosim-") as name:
+        folder = Path(name)
+        try:
+            with open_fmus(archives, folder) as fmus, Runner(job, fmus) as runner:
+                runner.instantiate()
+        except UserError as error:
+            text = str(error)
+            for digest in archives:
+                text = text.replace(str(_copy(folder, digest)), str(path))
+            raise UserError(text) from None
+
+
+def _copy(folder: Path, digest: str) -> Path:
+    return folder / f"{digest}.fmu"
 
 
 class Workshop:

@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
             return 0
         text = Path(options.file).read_text(encoding="utf-8")
         results = Results(folder, campaign, job, text)
-        runs.check(job, base.archives)
+        runs.check(job, base.archives, base.path)
         results.begin()
         _run_missing(options, _Plan(campaign, base, job, points, results))
         failed = results.failed()

@@ -1,6 +1,7 @@
 """Campaign files: what they mean, and what is refused with its place and reason."""
 
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -8,7 +9,7 @@ from cosim import __main__ as cli
 from cosim.campaign import bases, planning
 from cosim.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
-from tests.support.cosim_project import assert_one_line
+from tests.support.cosim_project import FMUS, assert_one_line
 
 MISTAKES = {
     "no file of TOML": ([("seed = 3", "seed = ")], "not valid TOML"),
@@ -158,6 +159,19 @@ def test_a_mistake_of_a_system_is_refused(
         bases.opened(given := campaign(tmp_path, SYSTEM, [(old, new)]), None) as base,
     ):
         planning.plan(given, base, "test")
+
+
+def test_a_damaged_binary_is_that_of_the_file_of_the_user(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = tmp_path / "mine.fmu"
+    with ZipFile(FMUS["rp_manipulator"]) as archive, ZipFile(fmu, "w") as copy:
+        for name in archive.namelist():
+            content = archive.read(name)
+            copy.writestr(name, content[:64] + bytes(999) if name.endswith(".so") else content)
+    assert cli.main(["campaign", str(write(tmp_path)), "--fmu", str(fmu)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"error: {fmu}: ")
 
 
 def test_blocks_cover_all_runs(tmp_path: Path) -> None:
