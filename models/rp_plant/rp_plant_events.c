@@ -110,6 +110,9 @@ static bool settle(struct rp_plant_values *values, const struct event *event, co
 static bool collide(struct rp_plant_values *values, const struct event *event, const int side[2]) {
     enum { MOST_ELASTIC = 8, MOST = 16 };
     const struct rp_plant_parameters *p = &values->parameters;
+    if (side[0] == 0 && side[1] == 0) {
+        return false;
+    }
     bool jumps = settle(values, event, side);
     for (int count = 0; count < MOST && moves_into_stop(values, side); count++) {
         const bool elastic = count < MOST_ELASTIC;
@@ -258,7 +261,7 @@ static bool is_at_rest(const void *values_pointer) {
 
 /* As plant_stop_indicators. */
 static void describe_stops(const struct rp_plant_values *values, int contact, int joint,
-                           struct indicator indicators[PLANT_INDICATORS]) {
+                           struct indicator *const of_joint[PLANT_INDICATORS]) {
     const struct rp_plant_parameters *p = &values->parameters;
     const size_t q = (size_t)joint;
     const double dq = values->dq[joint];
@@ -268,44 +271,44 @@ static void describe_stops(const struct rp_plant_values *values, int contact, in
     const struct indicator below_upper = {INDICATOR_OF_STATE, q, -1.0, p->upper[joint], dq < 0.0};
     const struct indicator over_upper = {INDICATOR_OF_STATE, q, 1.0, -p->upper[joint], dq > 0.0};
     if (contact == RP_PLANT_APART) {
-        indicators[LOWER] = over_lower;
-        indicators[UPPER] = below_upper;
+        *of_joint[LOWER] = over_lower;
+        *of_joint[UPPER] = below_upper;
         return;
     }
     const int side = contact > 0 ? 1 : -1;
-    indicators[side > 0 ? LOWER : UPPER] = side > 0 ? below_lower : over_upper;
+    *of_joint[side > 0 ? LOWER : UPPER] = side > 0 ? below_lower : over_upper;
     if (p->stop_damping[joint] > 0.0) {
         const double sign = abs(contact) == RP_PLANT_PUSHED ? 1.0 : -1.0;
         const double factor = -sign * side * p->stop_damping[joint];
-        indicators[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false};
+        *of_joint[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false};
     }
 }
 
 /* As plant_indicators. */
 static void describe_joint(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
-                           int joint, struct indicator indicators[PLANT_INDICATORS]) {
+                           int joint, struct indicator *const of_joint[PLANT_INDICATORS]) {
     const struct rp_plant_parameters *p = &values->parameters;
     const int mode = modes->joint[joint];
     const size_t q = (size_t)joint;
     for (int k = 0; k < PLANT_INDICATORS; k++) {
-        indicators[k] = (struct indicator){.kind = INDICATOR_UNUSED};
+        of_joint[k]->kind = INDICATOR_UNUSED;
     }
     if (mode == RP_PLANT_STUCK) {
         const int closed = rp_plant_closed_stop(p, joint, values->q[joint]);
         if (closed >= 0) {
-            indicators[SLIP_FORWARD].kind = INDICATOR_OF_MODEL;
+            of_joint[SLIP_FORWARD]->kind = INDICATOR_OF_MODEL;
         }
         if (closed <= 0) {
-            indicators[SLIP_BACKWARD].kind = INDICATOR_OF_MODEL;
+            of_joint[SLIP_BACKWARD]->kind = INDICATOR_OF_MODEL;
         }
         return;
     }
     if (rp_plant_slides(mode)) {
-        indicators[SLIP_FORWARD] =
+        *of_joint[SLIP_FORWARD] =
             (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
     }
     if (p->stops[joint] == RP_PLANT_STOPS_RIGID || rp_plant_has_contacts(p, joint)) {
-        describe_stops(values, modes->contact[joint], joint, indicators);
+        describe_stops(values, modes->contact[joint], joint, of_joint);
     }
 }
 
@@ -314,11 +317,11 @@ static void describe(const void *values_pointer, struct indicator indicators[]) 
     const struct rp_plant_modes modes =
         rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
     for (int i = 0; i < 2; i++) {
-        struct indicator of_joint[PLANT_INDICATORS];
-        describe_joint(values, &modes, i, of_joint);
+        struct indicator *of_joint[PLANT_INDICATORS];
         for (int k = 0; k < PLANT_INDICATORS; k++) {
-            indicators[plant_indicator_index(i, k)] = of_joint[k];
+            of_joint[k] = &indicators[plant_indicator_index(i, k)];
         }
+        describe_joint(values, &modes, i, of_joint);
     }
 }
 

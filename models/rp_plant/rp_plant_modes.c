@@ -43,35 +43,17 @@ void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], con
     }
 }
 
-static bool has_modes(const struct rp_plant_parameters *p) {
-    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) ||
-           rp_plant_has_contacts(p, 0) || rp_plant_has_contacts(p, 1);
-}
-
-struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
-                                               const double q[2], const double dq[2],
-                                               const struct rp_plant_inputs *inputs) {
+struct rp_plant_modes rp_plant_first_modes(const struct rp_plant_values *values, const double q[2],
+                                           const double dq[2],
+                                           const struct rp_plant_inputs *inputs) {
     const struct rp_plant_parameters *p = &values->parameters;
     struct rp_plant_modes modes = values->modes;
-    if (modes.payload == RP_PLANT_UNDECIDED) {
-        modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
-        if (has_modes(p)) {
-            struct rp_plant_decision decision;
-            if (rp_plant_find_rest(p, q, dq, &modes, &decision.rest)) {
-                rp_plant_decide(p, q, dq, inputs, &modes, &decision);
-            }
-            rp_plant_begin_contacts(p, q, dq, inputs, &modes);
-            return modes;
-        }
+    modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+    struct rp_plant_decision decision;
+    if (rp_plant_find_rest(p, q, dq, &modes, &decision.rest)) {
+        rp_plant_decide(p, q, dq, inputs, &modes, &decision);
     }
-    for (int i = 0; i < 2; i++) {
-        if (!rp_plant_has_contacts(p, i)) {
-            modes.contact[i] = RP_PLANT_APART;
-        }
-        if (!rp_plant_can_be_held(p, i)) {
-            modes.joint[i] = RP_PLANT_FREE;
-        }
-    }
+    rp_plant_begin_contacts(p, q, dq, inputs, &modes);
     return modes;
 }
 
