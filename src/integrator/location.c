@@ -17,6 +17,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     }
     location->step.row = calloc(states, sizeof *location->step.row);
     location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
+    location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
     location->x = calloc(2 * states, sizeof *location->x);
@@ -25,9 +26,9 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->noise = calloc(count, sizeof *location->noise);
     location->fired = calloc(count, sizeof *location->fired);
     if (location->step.row == NULL || location->step.indicator_row == NULL ||
-        location->first == NULL || location->samples == NULL || location->x == NULL ||
-        location->z == NULL || location->is_armed == NULL || location->noise == NULL ||
-        location->fired == NULL) {
+        location->used == NULL || location->first == NULL || location->samples == NULL ||
+        location->x == NULL || location->z == NULL || location->is_armed == NULL ||
+        location->noise == NULL || location->fired == NULL) {
         location_destroy(location);
         return false;
     }
@@ -43,6 +44,7 @@ void location_destroy(struct location *location) {
     free(location->x);
     free(location->samples);
     free(location->first);
+    free(location->used);
     free(location->step.indicator_row);
     free(location->step.row);
     *location = (struct location){.time = INFINITY};
@@ -61,8 +63,14 @@ enum status location_restart(struct location *location, const struct indicator *
         return STATUS_OK;
     }
     bool needs_model = false;
+    location->used_count = 0;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         const struct indicator *indicator = &indicators[i];
+        if (indicator->kind == INDICATOR_UNUSED) {
+            continue;
+        }
+        location->used[location->used_count] = i;
+        location->used_count++;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
         location->is_armed[i] = false;
         if (indicator->kind == INDICATOR_OF_STATE) {
@@ -327,9 +335,9 @@ static const double same_time = 4.0 * 0x1p-52;
 
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
-    const size_t count = location->ode->indicator_count;
     bool needs_model = false;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
@@ -346,13 +354,16 @@ enum status location_search(struct location *location) {
     }
 
     double s = INFINITY;
-    for (size_t i = 0; i < count; i++) {
-        s = location->first[i] < s ? location->first[i] : s;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const double first = location->first[location->used[k]];
+        s = first < s ? first : s;
     }
     if (!(s <= 1.0)) {
         return STATUS_OK;
     }
-    for (size_t i = 0; i < count; i++) {
+    memset(location->fired, 0, location->ode->indicator_count * sizeof *location->fired);
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
         location->fired[i] = location->first[i] <= s + same_time;
     }
     location->time = s == 1.0 ? step->end : step->begin + s * (step->end - step->begin);

@@ -28,6 +28,8 @@ struct step_polynomial {
 struct location {
     const struct ode *ode;
     const struct indicator *indicators;  /* since the restart; NULL: none is searched */
+    size_t *used;                        /* those of them that are not INDICATOR_UNUSED */
+    size_t used_count;
     const double *tolerances;            /* absolute ones, of the states */
     bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
     double *noise;                       /* by indicator of a state: one that is 0 at the restart

@@ -449,7 +449,8 @@ static enum status search(struct taylor *taylor, double end) {
         copy_row(taylor, taylor->row[i], length, step->row[i]);
     }
     step->has_indicators = row_of_indicator != NULL;
-    for (size_t i = 0; step->has_indicators && i < taylor->problem->ode.indicator_count; i++) {
+    for (size_t k = 0; step->has_indicators && k < location->used_count; k++) {
+        const size_t i = location->used[k];
         if (location->indicators[i].kind == INDICATOR_OF_MODEL) {
             copy_row(taylor, taylor->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }
