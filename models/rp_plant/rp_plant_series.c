@@ -218,7 +218,10 @@ static double exponential(const struct motion *m, int i, int k, double row[][SER
 /* As plant_sliding_friction. */
 static double sliding_friction(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
     const double coulomb = m->p->coulomb_friction[i];
-    const double e = m->depends_on_velocity[i] ? exponential(m, i, k, row) : 0.0;
+    if (!m->depends_on_velocity[i]) {
+        return k == 0 ? coulomb : 0.0;
+    }
+    const double e = exponential(m, i, k, row);
     const double breakaway = m->p->breakaway_friction[i];
     return k == 0 ? breakaway * e + coulomb * (1.0 - e) : (breakaway - coulomb) * e;
 }
