@@ -67,6 +67,7 @@ struct motion {
     const struct rp_plant_parameters *p;
     struct rp_plant_modes modes;
     bool has_wrench;
+    double direction[2];         /* of a joint that slides: 1 or -1; else 0 */
     bool depends_on_velocity[2]; /* friction of the joint, where it slides */
     double per_vs[2];
     double m2, a, g, m1_lc1; /* m2, a: of link 2 with payload */
@@ -161,6 +162,7 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     m->modes = rp_plant_modes_in_effect(values, q, dq, &inputs);
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
+        m->direction[i] = rp_plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
         m->depends_on_velocity[i] =
             has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
         m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
@@ -245,8 +247,8 @@ static double compliant_force(const struct motion *m, int i, int k, double row[]
 static void write_efforts(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
     for (int i = 0; i < 2; i++) {
         double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
-        if (rp_plant_slides(m->modes.joint[i])) {
-            effort -= m->modes.joint[i] * sliding_friction(m, i, k, row);
+        if (m->direction[i] != 0.0) {
+            effort -= m->direction[i] * sliding_friction(m, i, k, row);
         }
         if (m->modes.contact[i] != RP_PLANT_APART) {
             effort += compliant_force(m, i, k, row);
@@ -287,13 +289,15 @@ static inline struct products products_of_order(double row[][SERIES_LENGTH], dou
     return sum;
 }
 
-/* What follows from the orders up to n: coefficients of order n + 1, and two terms of order n. */
+/* What follows from the states' orders up to n: coefficients of order n + 1, and two terms of
+ * order n. */
 struct next {
     double L, s, c, w, v, P;
     double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
 
 static inline struct next next_order(const struct motion *m, int n, double row[][SERIES_LENGTH]) {
+    write_efforts(m, n, row);
     const double h = m->origin->unit / (n + 1);
     struct next next = {.L = h * row[V][n]};
     const struct products sum = products_of_order(row, next.L, n);
@@ -370,24 +374,19 @@ static enum status extend(const struct series_origin *origin, int first, int las
         return STATUS_OK;
     }
     set_bodies(&m, row[Q2][0]);
-    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
-    struct next next;
     if (first == 0) {
         begin_rows(&m, row);
-    } else if (is_held) {
-        next = next_order(&m, first - 1, row);
     }
-    for (int k = first; k <= last; k++) {
-        if (k > 0) {
-            if (!is_held) {
-                next = next_order(&m, k - 1, row);
-            }
-            write_order(&m, k, &next, row);
+    // the indicators of an order need what follows from it
+    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
+    const int end = is_held ? last + 1 : last;
+    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
+        const struct next next = next_order(&m, n, row);
+        if (is_held && n >= first) {
+            write_indicators(&m, n, &next, row);
         }
-        write_efforts(&m, k, row);
-        if (is_held) {
-            next = next_order(&m, k, row);
-            write_indicators(&m, k, &next, row);
+        if (n < last) {
+            write_order(&m, n + 1, &next, row);
         }
     }
     return STATUS_OK;
