@@ -30,9 +30,11 @@ static double near_limit(double limit) {
     return 1e-9 + 4.0 * DBL_EPSILON * fabs(limit);
 }
 
-/* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones. */
-static void arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
+/* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones.
+ * True if a joint is on one of these. */
+static bool arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
+    bool is_any = false;
     for (int i = 0; i < 2; i++) {
         const double hit = fired->hit[i] > 0 ? p->lower[i] : p->upper[i];
         const bool is_near = fired->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
@@ -45,8 +47,10 @@ static void arrive(struct rp_plant_values *values, const struct fired *fired, in
         }
         if (side[i] != 0) {
             values->q[i] = side[i] > 0 ? p->lower[i] : p->upper[i];
+            is_any = true;
         }
     }
+    return is_any;
 }
 
 /* Whether a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
@@ -110,9 +114,6 @@ static bool settle(struct rp_plant_values *values, const struct event *event, co
 static bool collide(struct rp_plant_values *values, const struct event *event, const int side[2]) {
     enum { MOST_ELASTIC = 8, MOST = 16 };
     const struct rp_plant_parameters *p = &values->parameters;
-    if (side[0] == 0 && side[1] == 0) {
-        return false;
-    }
     bool jumps = settle(values, event, side);
     for (int count = 0; count < MOST && moves_into_stop(values, side); count++) {
         const bool elastic = count < MOST_ELASTIC;
@@ -152,10 +153,11 @@ static bool take_payload(struct rp_plant_values *values) {
 
 /* ---- struct model_events -------------------------------------------------------------------- */
 
-static struct fired read_fired(const struct rp_plant_values *values, const bool *at_zero) {
-    struct fired fired = {.halted = {false}};
+static void read_fired(const struct rp_plant_values *values, const bool *at_zero,
+                       struct fired *fired) {
+    *fired = (struct fired){.halted = {false}};
     if (at_zero == NULL || values->modes.payload == RP_PLANT_UNDECIDED) {
-        return fired;
+        return;
     }
     for (int i = 0; i < 2; i++) {
         bool of_joint[PLANT_INDICATORS];
@@ -163,16 +165,15 @@ static struct fired read_fired(const struct rp_plant_values *values, const bool 
             of_joint[k] = at_zero[plant_indicator_index(i, k)];
         }
         const int mode = values->modes.joint[i];
-        fired.halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
+        fired->halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
-            fired.leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
+            fired->leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
         }
         if (mode != RP_PLANT_STUCK && of_joint[LOWER] != of_joint[UPPER]) {
-            fired.hit[i] = of_joint[LOWER] ? 1 : -1;
+            fired->hit[i] = of_joint[LOWER] ? 1 : -1;
         }
-        fired.turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
+        fired->turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
     }
-    return fired;
 }
 
 bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
@@ -211,7 +212,8 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
-    const struct fired fired = read_fired(values, event->fired);
+    struct fired fired;
+    read_fired(values, event->fired, &fired);
 
     bool jumps = false;
     for (int i = 0; i < 2; i++) {
@@ -228,8 +230,7 @@ static enum status update(void *values_pointer, const struct event *event) {
         jumps = true;
     }
     int side[2];
-    arrive(values, &fired, side);
-    if (collide(values, event, side)) {
+    if (arrive(values, &fired, side) && collide(values, event, side)) {
         jumps = true;
     }
 
@@ -254,8 +255,8 @@ static bool are_possible(const void *values_pointer) {
 
 static bool is_at_rest(const void *values_pointer) {
     const struct rp_plant_values *values = values_pointer;
-    const struct rp_plant_modes modes =
-        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     return modes.joint[0] == RP_PLANT_STUCK && modes.joint[1] == RP_PLANT_STUCK;
 }
 
@@ -314,8 +315,8 @@ static void describe_joint(const struct rp_plant_values *values, const struct rp
 
 static void describe(const void *values_pointer, struct indicator indicators[]) {
     const struct rp_plant_values *values = values_pointer;
-    const struct rp_plant_modes modes =
-        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     for (int i = 0; i < 2; i++) {
         struct indicator *of_joint[PLANT_INDICATORS];
         for (int k = 0; k < PLANT_INDICATORS; k++) {
@@ -332,7 +333,8 @@ static enum status indicators(const void *values_pointer, double t, const double
     struct rp_plant_inputs inputs;
     (void)t;
     memcpy(&inputs, u, sizeof inputs);
-    const struct rp_plant_modes modes = rp_plant_modes_in_effect(values, x, x + 2, &inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
     struct rp_plant_motion motion = {.reaction = {0.0}};
     if (modes.joint[0] == RP_PLANT_STUCK || modes.joint[1] == RP_PLANT_STUCK) {
         rp_plant_motion(p, &modes, x, x + 2, &inputs, &motion);

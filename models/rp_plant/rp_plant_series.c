@@ -159,7 +159,7 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     };
     m->origin = origin;
     m->p = &values->parameters;
-    m->modes = rp_plant_modes_in_effect(values, q, dq, &inputs);
+    rp_plant_modes_in_effect(values, q, dq, &inputs, &m->modes);
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
         m->direction[i] = rp_plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;

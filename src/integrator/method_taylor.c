@@ -240,9 +240,13 @@ static void evaluate(const struct taylor *taylor, double s, double x[], double d
     } else {
         evaluate_of(taylor, s, 4, four_x, four_dx);
     }
-    memcpy(x, four_x, sizeof four_x);
+    for (int i = 0; i < 4; i++) {
+        x[i] = four_x[i];
+    }
     if (dx != NULL) {
-        memcpy(dx, four_dx, sizeof four_dx);
+        for (int i = 0; i < 4; i++) {
+            dx[i] = four_dx[i];
+        }
     }
 }
 
