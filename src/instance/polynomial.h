@@ -2,6 +2,7 @@
 #ifndef POLYNOMIAL_H
 #define POLYNOMIAL_H
 
+#include <math.h>
 #include <stdbool.h>
 
 enum { POLYNOMIAL_DEGREE = 3 };
@@ -14,7 +15,7 @@ struct polynomial {
 /* It is not constant. */
 static inline bool polynomial_moves(const struct polynomial *polynomial) {
     const double *d = polynomial->d;
-    return d[1] != 0.0 || d[2] != 0.0 || d[3] != 0.0;
+    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // one branch
 }
 
 /* Value at time t (s) after the origin. */
