@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 
 enum { POLYNOMIAL_DEGREE = 3 };
 
@@ -16,6 +17,15 @@ struct polynomial {
 static inline bool polynomial_moves(const struct polynomial *polynomial) {
     const double *d = polynomial->d;
     return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // one branch
+}
+
+/* One of them is not constant. */
+static inline bool polynomials_move(const struct polynomial polynomials[], size_t count) {
+    bool found = false;
+    for (size_t i = 0; i < count; i++) {
+        found |= polynomial_moves(&polynomials[i]);
+    }
+    return found;
 }
 
 /* Value at time t (s) after the origin. */
