@@ -54,6 +54,22 @@ static enum status evaluate(struct location *location, double t, const double x[
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
 
+/* Of INDICATOR_OF_STATE. */
+static double at_state(const struct indicator *indicator, const double x[]) {
+    return indicator->offset + indicator->factor * x[indicator->state];
+}
+
+static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
+                                double *z) {
+    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
+        *z = at_state(&location->indicators[i], x);
+        return STATUS_OK;
+    }
+    const enum status status = evaluate(location, t, x);
+    *z = location->z[i];
+    return status;
+}
+
 enum status location_restart(struct location *location, const struct indicator *indicators,
                              const double x[]) {
     location->indicators = indicators;
@@ -74,7 +90,7 @@ enum status location_restart(struct location *location, const struct indicator *
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
         location->is_armed[i] = false;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            const double z = indicator->offset + indicator->factor * x[indicator->state];
+            const double z = at_state(indicator, x);
             const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
@@ -390,16 +406,17 @@ bool location_correction(struct location *location, double t, const double x[], 
     while (!location->fired[i]) {
         i++;
     }
-    if (evaluate(location, t, x) != STATUS_OK) {
+    double z;
+    double z_ahead;
+    if (evaluate_one(location, i, t, x, &z) != STATUS_OK) {
         return false;
     }
-    const double z = location->z[i];
     for (size_t j = 0; j < location->ode->state_count; j++) {
         location->x[j] = x[j] + ahead * dx[j];
     }
-    if (evaluate(location, t + ahead, location->x) != STATUS_OK) {
+    if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
         return false;
     }
-    *correction = -z * ahead / (location->z[i] - z);
+    *correction = -z * ahead / (z_ahead - z);
     return isfinite(*correction);
 }
