@@ -15,7 +15,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     if (count == 0) {
         return true;
     }
-    location->step.row = calloc(states, sizeof *location->step.row);
+    location->rows = calloc(states, sizeof *location->rows);
     location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
     location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
@@ -25,10 +25,10 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->is_armed = calloc(count, sizeof *location->is_armed);
     location->noise = calloc(count, sizeof *location->noise);
     location->fired = calloc(count, sizeof *location->fired);
-    if (location->step.row == NULL || location->step.indicator_row == NULL ||
-        location->used == NULL || location->first == NULL || location->samples == NULL ||
-        location->x == NULL || location->z == NULL || location->is_armed == NULL ||
-        location->noise == NULL || location->fired == NULL) {
+    if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
+        location->first == NULL || location->samples == NULL || location->x == NULL ||
+        location->z == NULL || location->is_armed == NULL || location->noise == NULL ||
+        location->fired == NULL) {
         location_destroy(location);
         return false;
     }
@@ -46,7 +46,7 @@ void location_destroy(struct location *location) {
     free(location->first);
     free(location->used);
     free(location->step.indicator_row);
-    free(location->step.row);
+    free(location->rows);
     *location = (struct location){.time = INFINITY};
 }
 
@@ -392,6 +392,7 @@ enum status location_search_at_rest(struct location *location, const double x[],
     step->end = t;
     step->is_from_end = false;
     step->degree = 0;
+    step->row = location->rows;
     for (size_t i = 0; i < location->ode->state_count; i++) {
         step->row[i][0] = x[i];
     }

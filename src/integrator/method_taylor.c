@@ -428,10 +428,6 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
 
 /* Writes the coefficients of a row over time in units of this length. */
 static void copy_row(const struct taylor *taylor, const double from[], double length, double to[]) {
-    if (length == 1.0) {
-        memcpy(to, from, ((size_t)taylor->order + 1) * sizeof *to);
-        return;
-    }
     double power = 1.0;
     for (int k = 0; k <= taylor->order; k++) {
         to[k] = from[k] * power;
@@ -449,7 +445,8 @@ static enum status search(struct taylor *taylor, double end) {
     step->end = end;
     step->is_from_end = false;
     step->degree = taylor->order;
-    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+    step->row = length == 1.0 ? taylor->row : location->rows;
+    for (size_t i = 0; length != 1.0 && i < taylor->problem->ode.state_count; i++) {
         copy_row(taylor, taylor->row[i], length, step->row[i]);
     }
     step->has_indicators = row_of_indicator != NULL;
