@@ -94,15 +94,18 @@ static bool find_event(const struct step *step, bool has_moved, struct clock_tim
     const size_t count = instance->model->events->indicator_count;
     const bool *fired =
         has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
-    *time = step->until;
+    if (fired == NULL && !step->meets_time_event) {
+        return false;
+    }
     memset(instance->fired, 0, instance_event_size(instance->model));
     if (fired != NULL) {
         memcpy(instance->fired, fired, count * sizeof *fired);
         *time = clock_add(instance->state.restart_time, instance->state.latest_time);
     } else {
-        instance->fired[count] = step->meets_time_event;
+        instance->fired[count] = true;
+        *time = step->until;
     }
-    return fired != NULL || step->meets_time_event;
+    return true;
 }
 
 /* At the end of the step, and no other time event is there. */
