@@ -245,6 +245,8 @@ static double compliant_force(const struct motion *m, int i, int k, double row[]
     return m->p->stop_stiffness[i] * (contact * d[k] - damped);
 }
 
+/* Order k of the effort of a joint, without the wrench. Inline, as most of it is left out for most
+ * joints. */
 ALWAYS_INLINE double effort_of(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
     double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
     if (m->direction[i] != 0.0) {
@@ -285,11 +287,11 @@ static inline struct products products_of_order(double row[][SERIES_LENGTH], dou
     return sum;
 }
 
-/* What follows from the states' orders up to n: coefficients of order n + 1, and two terms of
- * order n. */
+/* What follows from the orders up to n: coefficients of order n + 1, and terms of order n. */
 struct next {
     double L, s, c, w, v, P;
-    double effort[2], P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
+    double effort[2];
+    double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
 
 static inline struct next next_order(const struct motion *m, int n, double row[][SERIES_LENGTH]) {
@@ -378,7 +380,7 @@ static enum status extend(const struct series_origin *origin, int first, int las
     if (first == 0) {
         begin_rows(&m, row);
     }
-    // the indicators of an order need what follows from it
+    // indicators of an order take what follows from it
     const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
     const int end = is_held ? last + 1 : last;
     for (int n = first > 0 ? first - 1 : 0; n < end; n++) {

@@ -16,7 +16,7 @@ struct polynomial {
 /* It is not constant. */
 static inline bool polynomial_moves(const struct polynomial *polynomial) {
     const double *d = polynomial->d;
-    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // one branch
+    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // with one branch
 }
 
 /* One of them is not constant. */

@@ -11,7 +11,8 @@ static enum status rest(struct step *step, enum continuation continuation) {
     struct instance_state *state = &instance->state;
     const struct polynomial *inputs =
         continuation == CONTINUE_AFTER_EVENT ? instance->memory.current : instance->memory.pending;
-    // inputs that are held leave the modes as they are
+    // inputs that are held leave the modes as they are; only behind an event it counts what was
+    // held
     const bool is_searched = polynomials_move(inputs, count_of(instance->model->inputs));
     if (is_searched || step->meets_time_event) {
         instance_hold(instance, step->end, inputs);
