@@ -30,9 +30,11 @@ static double near_limit(double limit) {
     return 1e-9 + 4.0 * DBL_EPSILON * fabs(limit);
 }
 
-/* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones. */
-static void arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
+/* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones.
+ * True if a joint is on one of these. */
+static bool arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
+    bool is_any = false;
     for (int i = 0; i < 2; i++) {
         const double hit = fired->hit[i] > 0 ? p->lower[i] : p->upper[i];
         const bool is_near = fired->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
@@ -45,8 +47,10 @@ static void arrive(struct rp_plant_values *values, const struct fired *fired, in
         }
         if (side[i] != 0) {
             values->q[i] = side[i] > 0 ? p->lower[i] : p->upper[i];
+            is_any = true;
         }
     }
+    return is_any;
 }
 
 /* Whether a joint on a stop leaves it and comes back from no more than the tolerance of q: at v^2 /
@@ -149,10 +153,11 @@ static bool take_payload(struct rp_plant_values *values) {
 
 /* ---- struct model_events -------------------------------------------------------------------- */
 
-static struct fired read_fired(const struct rp_plant_values *values, const bool *at_zero) {
-    struct fired fired = {.halted = {false}};
+static void read_fired(const struct rp_plant_values *values, const bool *at_zero,
+                       struct fired *fired) {
+    *fired = (struct fired){.halted = {false}};
     if (at_zero == NULL || values->modes.payload == RP_PLANT_UNDECIDED) {
-        return fired;
+        return;
     }
     for (int i = 0; i < 2; i++) {
         bool of_joint[PLANT_INDICATORS];
@@ -160,16 +165,15 @@ static struct fired read_fired(const struct rp_plant_values *values, const bool 
             of_joint[k] = at_zero[plant_indicator_index(i, k)];
         }
         const int mode = values->modes.joint[i];
-        fired.halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
+        fired->halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
-            fired.leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
+            fired->leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
         }
         if (mode != RP_PLANT_STUCK && of_joint[LOWER] != of_joint[UPPER]) {
-            fired.hit[i] = of_joint[LOWER] ? 1 : -1;
+            fired->hit[i] = of_joint[LOWER] ? 1 : -1;
         }
-        fired.turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
+        fired->turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
     }
-    return fired;
 }
 
 bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
@@ -208,7 +212,8 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
-    const struct fired fired = read_fired(values, event->fired);
+    struct fired fired;
+    read_fired(values, event->fired, &fired);
 
     bool jumps = false;
     for (int i = 0; i < 2; i++) {
@@ -225,8 +230,7 @@ static enum status update(void *values_pointer, const struct event *event) {
         jumps = true;
     }
     int side[2];
-    arrive(values, &fired, side);
-    if (collide(values, event, side)) {
+    if (arrive(values, &fired, side) && collide(values, event, side)) {
         jumps = true;
     }
 
@@ -251,14 +255,14 @@ static bool are_possible(const void *values_pointer) {
 
 static bool is_at_rest(const void *values_pointer) {
     const struct rp_plant_values *values = values_pointer;
-    const struct rp_plant_modes modes =
-        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     return modes.joint[0] == RP_PLANT_STUCK && modes.joint[1] == RP_PLANT_STUCK;
 }
 
 /* As plant_stop_indicators. */
 static void describe_stops(const struct rp_plant_values *values, int contact, int joint,
-                           struct indicator indicators[PLANT_INDICATORS]) {
+                           struct indicator *const of_joint[PLANT_INDICATORS]) {
     const struct rp_plant_parameters *p = &values->parameters;
     const size_t q = (size_t)joint;
     const double dq = values->dq[joint];
@@ -268,57 +272,57 @@ static void describe_stops(const struct rp_plant_values *values, int contact, in
     const struct indicator below_upper = {INDICATOR_OF_STATE, q, -1.0, p->upper[joint], dq < 0.0};
     const struct indicator over_upper = {INDICATOR_OF_STATE, q, 1.0, -p->upper[joint], dq > 0.0};
     if (contact == RP_PLANT_APART) {
-        indicators[LOWER] = over_lower;
-        indicators[UPPER] = below_upper;
+        *of_joint[LOWER] = over_lower;
+        *of_joint[UPPER] = below_upper;
         return;
     }
     const int side = contact > 0 ? 1 : -1;
-    indicators[side > 0 ? LOWER : UPPER] = side > 0 ? below_lower : over_upper;
+    *of_joint[side > 0 ? LOWER : UPPER] = side > 0 ? below_lower : over_upper;
     if (p->stop_damping[joint] > 0.0) {
         const double sign = abs(contact) == RP_PLANT_PUSHED ? 1.0 : -1.0;
         const double factor = -sign * side * p->stop_damping[joint];
-        indicators[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false};
+        *of_joint[PUSH] = (struct indicator){INDICATOR_OF_STATE, 2 + q, factor, sign, false};
     }
 }
 
 /* As plant_indicators. */
 static void describe_joint(const struct rp_plant_values *values, const struct rp_plant_modes *modes,
-                           int joint, struct indicator indicators[PLANT_INDICATORS]) {
+                           int joint, struct indicator *const of_joint[PLANT_INDICATORS]) {
     const struct rp_plant_parameters *p = &values->parameters;
     const int mode = modes->joint[joint];
     const size_t q = (size_t)joint;
     for (int k = 0; k < PLANT_INDICATORS; k++) {
-        indicators[k] = (struct indicator){.kind = INDICATOR_UNUSED};
+        of_joint[k]->kind = INDICATOR_UNUSED;
     }
     if (mode == RP_PLANT_STUCK) {
         const int closed = rp_plant_closed_stop(p, joint, values->q[joint]);
         if (closed >= 0) {
-            indicators[SLIP_FORWARD].kind = INDICATOR_OF_MODEL;
+            of_joint[SLIP_FORWARD]->kind = INDICATOR_OF_MODEL;
         }
         if (closed <= 0) {
-            indicators[SLIP_BACKWARD].kind = INDICATOR_OF_MODEL;
+            of_joint[SLIP_BACKWARD]->kind = INDICATOR_OF_MODEL;
         }
         return;
     }
     if (rp_plant_slides(mode)) {
-        indicators[SLIP_FORWARD] =
+        *of_joint[SLIP_FORWARD] =
             (struct indicator){.kind = INDICATOR_OF_STATE, .state = 2 + q, .factor = mode};
     }
     if (p->stops[joint] == RP_PLANT_STOPS_RIGID || rp_plant_has_contacts(p, joint)) {
-        describe_stops(values, modes->contact[joint], joint, indicators);
+        describe_stops(values, modes->contact[joint], joint, of_joint);
     }
 }
 
 static void describe(const void *values_pointer, struct indicator indicators[]) {
     const struct rp_plant_values *values = values_pointer;
-    const struct rp_plant_modes modes =
-        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     for (int i = 0; i < 2; i++) {
-        struct indicator of_joint[PLANT_INDICATORS];
-        describe_joint(values, &modes, i, of_joint);
+        struct indicator *of_joint[PLANT_INDICATORS];
         for (int k = 0; k < PLANT_INDICATORS; k++) {
-            indicators[plant_indicator_index(i, k)] = of_joint[k];
+            of_joint[k] = &indicators[plant_indicator_index(i, k)];
         }
+        describe_joint(values, &modes, i, of_joint);
     }
 }
 
@@ -329,7 +333,8 @@ static enum status indicators(const void *values_pointer, double t, const double
     struct rp_plant_inputs inputs;
     (void)t;
     memcpy(&inputs, u, sizeof inputs);
-    const struct rp_plant_modes modes = rp_plant_modes_in_effect(values, x, x + 2, &inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
     struct rp_plant_motion motion = {.reaction = {0.0}};
     if (modes.joint[0] == RP_PLANT_STUCK || modes.joint[1] == RP_PLANT_STUCK) {
         rp_plant_motion(p, &modes, x, x + 2, &inputs, &motion);

@@ -29,7 +29,8 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
     struct rp_plant_inputs inputs;
     (void)t;
     memcpy(&inputs, u, sizeof inputs);
-    const struct rp_plant_modes modes = rp_plant_modes_in_effect(values, x, x + 2, &inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
     struct rp_plant_motion motion;
     rp_plant_motion(&values->parameters, &modes, x, x + 2, &inputs, &motion);
     dx[0] = x[2];
@@ -47,7 +48,8 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     struct rp_plant_inputs inputs;
     (void)t;
     memcpy(&inputs, u, sizeof inputs);
-    const struct rp_plant_modes modes = rp_plant_modes_in_effect(values, x, x + 2, &inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
     struct rp_plant_jacobians ddq_by;
     rp_plant_jacobians(&values->parameters, &modes, x, x + 2, &inputs, &ddq_by);
     for (size_t j = 0; j < 2; j++) {
@@ -68,8 +70,8 @@ static enum status outputs(void *values_pointer, double t) {
     struct rp_plant_values *values = values_pointer;
     const struct rp_plant_values *from = values;
     (void)t;
-    const struct rp_plant_modes modes =
-        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     calculate(&from, &modes, &values);
     return STATUS_OK;
 }
@@ -80,8 +82,8 @@ static enum status propagate(const void *values_pointer, double t, double dt, vo
     // no field depends on the time itself
     (void)t;
     (void)dt;
-    const struct rp_plant_modes modes =
-        rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
     rp_plant_propagate(values, &modes, first, second);
     return STATUS_OK;
 }

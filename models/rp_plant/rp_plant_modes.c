@@ -16,6 +16,7 @@ static int moving_mode(const struct rp_plant_parameters *p, int joint, int direc
 
 bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
                         struct rp_plant_modes *modes, struct rp_plant_rest *rest) {
+    bool is_any = false;
     rp_plant_find_contacts(p, q, dq, modes);
     for (int i = 0; i < 2; i++) {
         rest->breakaway[i] = rp_plant_breakaway(p, i);
@@ -23,8 +24,9 @@ bool rp_plant_find_rest(const struct rp_plant_parameters *p, const double q[2], 
         rest->at_rest[i] = dq[i] == 0.0 && (rest->breakaway[i] > 0.0 || rest->closed[i] != 0);
         modes->joint[i] =
             rest->at_rest[i] ? RP_PLANT_STUCK : moving_mode(p, i, dq[i] > 0.0 ? 1 : -1);
+        is_any |= rest->at_rest[i];
     }
-    return rest->at_rest[0] || rest->at_rest[1];
+    return is_any;
 }
 
 void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], const double dq[2],
@@ -43,36 +45,17 @@ void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], con
     }
 }
 
-static bool has_modes(const struct rp_plant_parameters *p) {
-    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) ||
-           rp_plant_has_contacts(p, 0) || rp_plant_has_contacts(p, 1);
-}
-
-struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
-                                               const double q[2], const double dq[2],
-                                               const struct rp_plant_inputs *inputs) {
+void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2],
+                          const double dq[2], const struct rp_plant_inputs *inputs,
+                          struct rp_plant_modes *modes) {
     const struct rp_plant_parameters *p = &values->parameters;
-    struct rp_plant_modes modes = values->modes;
-    if (modes.payload == RP_PLANT_UNDECIDED) {
-        modes.payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
-        if (has_modes(p)) {
-            struct rp_plant_decision decision;
-            if (rp_plant_find_rest(p, q, dq, &modes, &decision.rest)) {
-                rp_plant_decide(p, q, dq, inputs, &modes, &decision);
-            }
-            rp_plant_begin_contacts(p, q, dq, inputs, &modes);
-            return modes;
-        }
+    *modes = values->modes;
+    modes->payload = values->payload_attached != 0 ? RP_PLANT_ATTACHED : RP_PLANT_RELEASED;
+    struct rp_plant_decision decision;
+    if (rp_plant_find_rest(p, q, dq, modes, &decision.rest)) {
+        rp_plant_decide(p, q, dq, inputs, modes, &decision);
     }
-    for (int i = 0; i < 2; i++) {
-        if (!rp_plant_has_contacts(p, i)) {
-            modes.contact[i] = RP_PLANT_APART;
-        }
-        if (!rp_plant_can_be_held(p, i)) {
-            modes.joint[i] = RP_PLANT_FREE;
-        }
-    }
-    return modes;
+    rp_plant_begin_contacts(p, q, dq, inputs, modes);
 }
 
 /* ---- Breaking away -------------------------------------------------------------------------- */

@@ -47,10 +47,31 @@ void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], con
 void rp_plant_break_away(struct rp_plant_values *values, const struct event *event,
                          const struct rp_plant_decision *decision, const int leaves[2]);
 
-/* The modes that hold: those of the last event, or during initialization, when none has been, those
- * that follow from parameters, states and inputs. */
-struct rp_plant_modes rp_plant_modes_in_effect(const struct rp_plant_values *values,
-                                               const double q[2], const double dq[2],
-                                               const struct rp_plant_inputs *inputs);
+/* Writes the modes that follow from parameters, states and inputs. */
+void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2],
+                          const double dq[2], const struct rp_plant_inputs *inputs,
+                          struct rp_plant_modes *modes);
+
+/* Writes the modes that hold: those of the last event, or during initialization, when none has
+ * been, the first ones. Inline, as each evaluation asks for them; a modified copy that is returned
+ * stalls the processor, which cannot load parts together that were stored apart. */
+static inline void rp_plant_modes_in_effect(const struct rp_plant_values *values, const double q[2],
+                                            const double dq[2],
+                                            const struct rp_plant_inputs *inputs,
+                                            struct rp_plant_modes *modes) {
+    *modes = values->modes;
+    if (modes->payload == RP_PLANT_UNDECIDED) {
+        rp_plant_first_modes(values, q, dq, inputs, modes);
+        return;
+    }
+    for (int i = 0; i < 2; i++) {
+        if (!rp_plant_has_contacts(&values->parameters, i)) {
+            modes->contact[i] = RP_PLANT_APART;
+        }
+        if (!rp_plant_can_be_held(&values->parameters, i)) {
+            modes->joint[i] = RP_PLANT_FREE;
+        }
+    }
+}
 
 #endif

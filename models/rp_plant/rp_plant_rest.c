@@ -16,11 +16,10 @@ static void accelerate(const struct rp_plant_inertia *inertia, const bool moves[
     }
 }
 
-/* By how much friction and stop of a joint that stays fall short. */
+/* By how much friction and stop of a joint that stays fall short: a closed stop takes any push
+ * towards it. */
 static double missing_hold(double reaction, double breakaway, int closed) {
-    const double forward = closed < 0 ? -INFINITY : reaction - breakaway;
-    const double backward = closed > 0 ? -INFINITY : -reaction - breakaway;
-    return fmax(forward, backward);
+    return (closed == 0 ? fabs(reaction) : closed * reaction) - breakaway;
 }
 
 double rp_plant_rest_misfit(const struct rp_plant_rest *rest, const int pattern[2],
@@ -56,7 +55,8 @@ double rp_plant_rest_misfit(const struct rp_plant_rest *rest, const int pattern[
             missing = missing == 0.0 ? INFINITY : missing;
         }
         const double scale = fabs(rest->forces[i]) + fabs(other) + rest->breakaway[i];
-        misfit = fmax(misfit, scale > 0.0 ? missing / scale : missing);
+        const double relative = scale > 0.0 ? missing / scale : missing;
+        misfit = relative > misfit ? relative : misfit;
     }
     return misfit;
 }
@@ -64,21 +64,15 @@ double rp_plant_rest_misfit(const struct rp_plant_rest *rest, const int pattern[
 void rp_plant_rest_decide(const struct rp_plant_rest *rest, struct rp_plant_outcome *outcome) {
     // staying comes first
     static const int order[3] = {0, 1, -1};
-    double least = INFINITY;
     const int count[2] = {rest->at_rest[0] ? 3 : 1, rest->at_rest[1] ? 3 : 1};
-    (void)rp_plant_rest_misfit(rest, (const int[2]){0, 0}, outcome);
-    for (int i = 0; i < count[0]; i++) {
-        for (int j = 0; j < count[1]; j++) {
-            struct rp_plant_outcome tried;
-            const int pattern[2] = {order[i], order[j]};
-            const double misfit = rp_plant_rest_misfit(rest, pattern, &tried);
-            if (misfit < least) {
-                least = misfit;
-                *outcome = tried;
-            }
-            if (misfit <= 0.0) {
-                return;
-            }
+    double least = rp_plant_rest_misfit(rest, (const int[2]){0, 0}, outcome);
+    for (int k = 1; k < count[0] * count[1] && !(least <= 0.0); k++) {
+        struct rp_plant_outcome tried;
+        const int pattern[2] = {order[k / count[1]], order[k % count[1]]};
+        const double misfit = rp_plant_rest_misfit(rest, pattern, &tried);
+        if (misfit < least) {
+            least = misfit;
+            *outcome = tried;
         }
     }
 }

@@ -21,6 +21,7 @@
 
 #include "arithmetic_double.h"
 #include "jet.h"
+#include "platform.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_modes.h"
 #include "rp_series.h"
@@ -43,8 +44,6 @@ enum row {
     C,
     X, // end effector, where there is a wrench
     Y,
-    E1, // efforts
-    E2,
     RATIO,                     // r = q' / vs of a sliding joint whose friction depends on it
     RATE = RATIO + 2,          // k r_k
     EXPONENTIAL = RATE + 2,    // e = exp(-r^2)
@@ -67,6 +66,7 @@ struct motion {
     const struct rp_plant_parameters *p;
     struct rp_plant_modes modes;
     bool has_wrench;
+    double direction[2];         /* of a joint that slides: 1 or -1; else 0 */
     bool depends_on_velocity[2]; /* friction of the joint, where it slides */
     double per_vs[2];
     double m2, a, g, m1_lc1; /* m2, a: of link 2 with payload */
@@ -158,9 +158,10 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
     };
     m->origin = origin;
     m->p = &values->parameters;
-    m->modes = rp_plant_modes_in_effect(values, q, dq, &inputs);
+    rp_plant_modes_in_effect(values, q, dq, &inputs, &m->modes);
     m->has_wrench = has_wrench(origin);
     for (int i = 0; i < 2; i++) {
+        m->direction[i] = rp_plant_slides(m->modes.joint[i]) ? m->modes.joint[i] : 0.0;
         m->depends_on_velocity[i] =
             has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
         m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
@@ -180,15 +181,16 @@ static double with_input(const struct motion *m, int input, const double x[], in
 }
 
 /* Adds Q1 = x fy - y fx + mz and Q2 = c1 fx + s1 fy. */
-static void add_wrench(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
+static void add_wrench(const struct motion *m, int k, double row[][SERIES_LENGTH],
+                       double effort[2]) {
     const double a = m->p->arm.a;
     const double L_c = jet_product(row[L], row[C], k) - m->offset_z * row[C][k];
     const double L_s = jet_product(row[L], row[S], k) - m->offset_z * row[S][k];
     row[X][k] = L_c - a * row[S][k];
     row[Y][k] = L_s + a * row[C][k];
     const double moment = with_input(m, FY, row[X], k) - with_input(m, FX, row[Y], k);
-    row[E1][k] += moment + jet_input(m->origin, MZ, k);
-    row[E2][k] += with_input(m, FX, row[C], k) + with_input(m, FY, row[S], k);
+    effort[0] += moment + jet_input(m->origin, MZ, k);
+    effort[1] += with_input(m, FX, row[C], k) + with_input(m, FY, row[S], k);
 }
 
 /* Order k of e = exp(-r^2), from e' = -2 r' (r e). */
@@ -216,9 +218,13 @@ static double exponential(const struct motion *m, int i, int k, double row[][SER
 }
 
 /* As plant_sliding_friction. */
-static double sliding_friction(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
+ALWAYS_INLINE double sliding_friction(const struct motion *m, int i, int k,
+                                      double row[][SERIES_LENGTH]) {
     const double coulomb = m->p->coulomb_friction[i];
-    const double e = m->depends_on_velocity[i] ? exponential(m, i, k, row) : 0.0;
+    if (!m->depends_on_velocity[i]) {
+        return k == 0 ? coulomb : 0.0;
+    }
+    const double e = exponential(m, i, k, row);
     const double breakaway = m->p->breakaway_friction[i];
     return k == 0 ? breakaway * e + coulomb * (1.0 - e) : (breakaway - coulomb) * e;
 }
@@ -239,20 +245,17 @@ static double compliant_force(const struct motion *m, int i, int k, double row[]
     return m->p->stop_stiffness[i] * (contact * d[k] - damped);
 }
 
-static void write_efforts(const struct motion *m, int k, double row[][SERIES_LENGTH]) {
-    for (int i = 0; i < 2; i++) {
-        double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
-        if (rp_plant_slides(m->modes.joint[i])) {
-            effort -= m->modes.joint[i] * sliding_friction(m, i, k, row);
-        }
-        if (m->modes.contact[i] != RP_PLANT_APART) {
-            effort += compliant_force(m, i, k, row);
-        }
-        row[E1 + i][k] = effort;
+/* Order k of the effort of a joint, without the wrench. Inline, as most of it is left out for most
+ * joints. */
+ALWAYS_INLINE double effort_of(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
+    double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
+    if (m->direction[i] != 0.0) {
+        effort -= m->direction[i] * sliding_friction(m, i, k, row);
     }
-    if (m->has_wrench) {
-        add_wrench(m, k, row);
+    if (m->modes.contact[i] != RP_PLANT_APART) {
+        effort += compliant_force(m, i, k, row);
     }
+    return effort;
 }
 
 /* ---- Motion --------------------------------------------------------------------------------- */
@@ -284,15 +287,22 @@ static inline struct products products_of_order(double row[][SERIES_LENGTH], dou
     return sum;
 }
 
-/* What follows from the orders up to n: coefficients of order n + 1, and two terms of order n. */
+/* What follows from the orders up to n: coefficients of order n + 1, and terms of order n. */
 struct next {
     double L, s, c, w, v, P;
+    double effort[2];
     double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
 
 static inline struct next next_order(const struct motion *m, int n, double row[][SERIES_LENGTH]) {
     const double h = m->origin->unit / (n + 1);
-    struct next next = {.L = h * row[V][n]};
+    struct next next = {
+        .L = h * row[V][n],
+        .effort = {effort_of(m, 0, n, row), effort_of(m, 1, n, row)},
+    };
+    if (m->has_wrench) {
+        add_wrench(m, n, row, next.effort);
+    }
     const struct products sum = products_of_order(row, next.L, n);
     const double L0 = row[L][0];
     next.s = h * sum.w_c;
@@ -300,13 +310,13 @@ static inline struct next next_order(const struct motion *m, int n, double row[]
     next.P_w = sum.P_w;
     next.weight = m->g * (m->m1_lc1 * row[C][n] + m->m2 * sum.L_c);
     const double known = m->m2 * (L0 * sum.ahead_L_w + sum.ahead_L_P);
-    const double R2 = h * (row[E2][n] * m->per_m2 + sum.P_w - m->g * row[S][n]);
+    const double R2 = h * (next.effort[1] * m->per_m2 + sum.P_w - m->g * row[S][n]);
     if (is_stuck(m, 1)) {
         const double fall = m->m2 * m->g * m->a * row[S][n];
-        const double R = h * (row[E1][n] - next.weight + fall);
+        const double R = h * (next.effort[0] - next.weight + fall);
         next.w = is_stuck(m, 0) ? 0.0 : (R - known) * m->per_inertia;
     } else {
-        const double pushed = row[E1][n] + m->a * row[E2][n];
+        const double pushed = next.effort[0] + m->a * next.effort[1];
         const double R1 = h * (pushed + m->a * m->m2 * sum.P_w - next.weight);
         next.w = is_stuck(m, 0) ? 0.0 : (R1 - known - m->a_mu_b2 * R2) * m->per_inertia;
         next.v = m->mu * (R2 + m->a * next.w);
@@ -337,8 +347,8 @@ static void write_indicators(const struct motion *m, int k, const struct next *n
     const double coriolis = 2.0 * m->m2 * jet_product(row[P], row[V], k);
     const double fall = m->g * row[S][k];
     const double reaction[2] = {
-        row[E1][k] - coriolis - next->weight + a_m2 * (fall + rate * next->v),
-        row[E2][k] + m->m2 * (next->P_w - fall) + a_m2 * rate * next->w,
+        next->effort[0] - coriolis - next->weight + a_m2 * (fall + rate * next->v),
+        next->effort[1] + m->m2 * (next->P_w - fall) + a_m2 * rate * next->w,
     };
     for (int i = 0; i < 2; i++) {
         if (is_stuck(m, i)) {
@@ -367,24 +377,19 @@ static enum status extend(const struct series_origin *origin, int first, int las
         return STATUS_OK;
     }
     set_bodies(&m, row[Q2][0]);
-    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
-    struct next next;
     if (first == 0) {
         begin_rows(&m, row);
-    } else if (is_held) {
-        next = next_order(&m, first - 1, row);
     }
-    for (int k = first; k <= last; k++) {
-        if (k > 0) {
-            if (!is_held) {
-                next = next_order(&m, k - 1, row);
-            }
-            write_order(&m, k, &next, row);
+    // indicators of an order take what follows from it
+    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
+    const int end = is_held ? last + 1 : last;
+    for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
+        const struct next next = next_order(&m, n, row);
+        if (is_held && n >= first) {
+            write_indicators(&m, n, &next, row);
         }
-        write_efforts(&m, k, row);
-        if (is_held) {
-            next = next_order(&m, k, row);
-            write_indicators(&m, k, &next, row);
+        if (n < last) {
+            write_order(&m, n + 1, &next, row);
         }
     }
     return STATUS_OK;

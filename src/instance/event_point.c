@@ -51,12 +51,8 @@ enum status instance_pass_due_event(struct instance *instance, struct event_coun
 }
 
 bool instance_is_unchanged(const struct instance *instance) {
-    for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        if (polynomial_moves(&instance->memory.running[i])) {
-            return false;
-        }
-    }
     return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
+           !polynomials_move(instance->memory.running, count_of(instance->model->inputs)) &&
            instance_holds_all(instance);
 }
 

@@ -101,6 +101,12 @@ static void hold_bytes(struct instance *instance, struct span span) {
     memcpy(instance->memory.held + span.offset, instance->memory.values + span.offset, span.size);
 }
 
+void instance_end_history(struct instance *instance) {
+    instance->state.restart_time = instance->state.time;
+    instance->state.has_history = false;
+    instance->history_is_lost = false;
+}
+
 static inline void hold_all(struct instance *instance, struct clock_time end,
                             const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
@@ -127,10 +133,8 @@ static inline void hold_all(struct instance *instance, struct clock_time end,
         const struct clock_time stop = {.s = state->experiment.stop_time};
         state->span = fmax(clock_difference(stop, state->time), target);
     }
-    state->restart_time = state->time;
     state->first_time = target;
-    state->has_history = false; // until the first advance has succeeded
-    instance->history_is_lost = false;
+    instance_end_history(instance); // until the first advance has succeeded
 }
 
 void instance_hold(struct instance *instance, struct clock_time end,

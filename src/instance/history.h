@@ -31,6 +31,9 @@ NONNULL int64_t instance_longest_history(const struct instance *instance);
 NONNULL void instance_hold(struct instance *instance, struct clock_time end,
                            const struct polynomial inputs[]);
 
+/* The history is over; times since the restart count from the present time on. */
+NONNULL void instance_end_history(struct instance *instance);
+
 /* Prepares the integrator for an advance to the time end by this continuation. */
 MUST_CHECK NONNULL enum status instance_prepare_history(struct instance *instance,
                                                         struct clock_time end,

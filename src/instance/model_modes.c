@@ -59,7 +59,8 @@ static enum status update(struct instance *instance, const bool *fired) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         instance->du[i] = instance->memory.current[i].d[1];
     }
-    char reason[200] = "";
+    char reason[200];
+    reason[0] = '\0';
     const struct event event = {
         .t = instance->state.time.s,
         .fired = fired,

@@ -2,7 +2,9 @@
 #ifndef POLYNOMIAL_H
 #define POLYNOMIAL_H
 
+#include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 
 enum { POLYNOMIAL_DEGREE = 3 };
 
@@ -14,7 +16,16 @@ struct polynomial {
 /* It is not constant. */
 static inline bool polynomial_moves(const struct polynomial *polynomial) {
     const double *d = polynomial->d;
-    return d[1] != 0.0 || d[2] != 0.0 || d[3] != 0.0;
+    return fabs(d[1]) + fabs(d[2]) + fabs(d[3]) != 0.0; // with one branch
+}
+
+/* One of them is not constant. */
+static inline bool polynomials_move(const struct polynomial polynomials[], size_t count) {
+    bool found = false;
+    for (size_t i = 0; i < count; i++) {
+        found |= polynomial_moves(&polynomials[i]);
+    }
+    return found;
 }
 
 /* Value at time t (s) after the origin. */

@@ -9,17 +9,22 @@
 static enum status rest(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    instance_hold(instance, step->end,
-                  continuation == CONTINUE_AFTER_EVENT ? instance->memory.current
-                                                       : instance->memory.pending);
+    const struct polynomial *inputs =
+        continuation == CONTINUE_AFTER_EVENT ? instance->memory.current : instance->memory.pending;
+    // inputs that are held leave the modes as they are; only behind an event it counts what was
+    // held
+    const bool is_searched = polynomials_move(inputs, count_of(instance->model->inputs));
+    if (is_searched || step->meets_time_event) {
+        instance_hold(instance, step->end, inputs);
+    } else {
+        instance_end_history(instance);
+    }
     const struct integrator_start start = {
-        .span = state->span,
-        // inputs that are held leave the modes as they are
-        .indicators = instance->inputs_move ? instance_describe_indicators(instance) : NULL,
+        .indicators = is_searched ? instance_describe_indicators(instance) : NULL,
     };
     state->next_step = 0.0;
     return integrator_rest(instance->integrator,
-                           doubles_of(instance->memory.held, instance->model->states), &start,
+                           doubles_of(instance->memory.values, instance->model->states), &start,
                            clock_difference(step->until, state->restart_time), &state->latest_time);
 }
 
@@ -90,15 +95,18 @@ static bool find_event(const struct step *step, bool has_moved, struct clock_tim
     const size_t count = instance->model->events->indicator_count;
     const bool *fired =
         has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
-    *time = step->until;
+    if (fired == NULL && !step->meets_time_event) {
+        return false;
+    }
     memset(instance->fired, 0, instance_event_size(instance->model));
     if (fired != NULL) {
         memcpy(instance->fired, fired, count * sizeof *fired);
         *time = clock_add(instance->state.restart_time, instance->state.latest_time);
     } else {
-        instance->fired[count] = step->meets_time_event;
+        instance->fired[count] = true;
+        *time = step->until;
     }
-    return fired != NULL || step->meets_time_event;
+    return true;
 }
 
 /* At the end of the step, and no other time event is there. */

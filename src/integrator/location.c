@@ -15,8 +15,9 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     if (count == 0) {
         return true;
     }
-    location->step.row = calloc(states, sizeof *location->step.row);
+    location->rows = calloc(states, sizeof *location->rows);
     location->step.indicator_row = calloc(count, sizeof *location->step.indicator_row);
+    location->used = calloc(count, sizeof *location->used);
     location->first = calloc(count, sizeof *location->first);
     location->samples = calloc(count, sizeof *location->samples);
     location->x = calloc(2 * states, sizeof *location->x);
@@ -24,7 +25,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->is_armed = calloc(count, sizeof *location->is_armed);
     location->noise = calloc(count, sizeof *location->noise);
     location->fired = calloc(count, sizeof *location->fired);
-    if (location->step.row == NULL || location->step.indicator_row == NULL ||
+    if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
         location->z == NULL || location->is_armed == NULL || location->noise == NULL ||
         location->fired == NULL) {
@@ -43,13 +44,30 @@ void location_destroy(struct location *location) {
     free(location->x);
     free(location->samples);
     free(location->first);
+    free(location->used);
     free(location->step.indicator_row);
-    free(location->step.row);
+    free(location->rows);
     *location = (struct location){.time = INFINITY};
 }
 
 static enum status evaluate(struct location *location, double t, const double x[]) {
     return location->ode->indicators(t, x, location->z, location->ode->context);
+}
+
+/* Of INDICATOR_OF_STATE. */
+static double at_state(const struct indicator *indicator, const double x[]) {
+    return indicator->offset + indicator->factor * x[indicator->state];
+}
+
+static enum status evaluate_one(struct location *location, size_t i, double t, const double x[],
+                                double *z) {
+    if (location->indicators[i].kind == INDICATOR_OF_STATE) {
+        *z = at_state(&location->indicators[i], x);
+        return STATUS_OK;
+    }
+    const enum status status = evaluate(location, t, x);
+    *z = location->z[i];
+    return status;
 }
 
 enum status location_restart(struct location *location, const struct indicator *indicators,
@@ -61,12 +79,18 @@ enum status location_restart(struct location *location, const struct indicator *
         return STATUS_OK;
     }
     bool needs_model = false;
+    location->used_count = 0;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         const struct indicator *indicator = &indicators[i];
+        if (indicator->kind == INDICATOR_UNUSED) {
+            continue;
+        }
+        location->used[location->used_count] = i;
+        location->used_count++;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
         location->is_armed[i] = false;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            const double z = indicator->offset + indicator->factor * x[indicator->state];
+            const double z = at_state(indicator, x);
             const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
@@ -327,9 +351,9 @@ static const double same_time = 4.0 * 0x1p-52;
 
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
-    const size_t count = location->ode->indicator_count;
     bool needs_model = false;
-    for (size_t i = 0; i < count; i++) {
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
@@ -346,13 +370,16 @@ enum status location_search(struct location *location) {
     }
 
     double s = INFINITY;
-    for (size_t i = 0; i < count; i++) {
-        s = location->first[i] < s ? location->first[i] : s;
+    for (size_t k = 0; k < location->used_count; k++) {
+        const double first = location->first[location->used[k]];
+        s = first < s ? first : s;
     }
     if (!(s <= 1.0)) {
         return STATUS_OK;
     }
-    for (size_t i = 0; i < count; i++) {
+    memset(location->fired, 0, location->ode->indicator_count * sizeof *location->fired);
+    for (size_t k = 0; k < location->used_count; k++) {
+        const size_t i = location->used[k];
         location->fired[i] = location->first[i] <= s + same_time;
     }
     location->time = s == 1.0 ? step->end : step->begin + s * (step->end - step->begin);
@@ -365,6 +392,7 @@ enum status location_search_at_rest(struct location *location, const double x[],
     step->end = t;
     step->is_from_end = false;
     step->degree = 0;
+    step->row = location->rows;
     for (size_t i = 0; i < location->ode->state_count; i++) {
         step->row[i][0] = x[i];
     }
@@ -379,16 +407,17 @@ bool location_correction(struct location *location, double t, const double x[], 
     while (!location->fired[i]) {
         i++;
     }
-    if (evaluate(location, t, x) != STATUS_OK) {
+    double z;
+    double z_ahead;
+    if (evaluate_one(location, i, t, x, &z) != STATUS_OK) {
         return false;
     }
-    const double z = location->z[i];
     for (size_t j = 0; j < location->ode->state_count; j++) {
         location->x[j] = x[j] + ahead * dx[j];
     }
-    if (evaluate(location, t + ahead, location->x) != STATUS_OK) {
+    if (evaluate_one(location, i, t + ahead, location->x, &z_ahead) != STATUS_OK) {
         return false;
     }
-    *correction = -z * ahead / (location->z[i] - z);
+    *correction = -z * ahead / (z_ahead - z);
     return isfinite(*correction);
 }

@@ -19,7 +19,7 @@ struct step_polynomial {
     double end;
     bool is_from_end;
     int degree;
-    double (*row)[SERIES_LENGTH];
+    double (*row)[SERIES_LENGTH]; /* in `rows` of struct location, or of the method */
     bool has_indicators;
     double (*indicator_row)[SERIES_LENGTH]; /* where `has_indicators`: those of the model, over s as
                                                the states; else they are interpolated */
@@ -27,7 +27,9 @@ struct step_polynomial {
 
 struct location {
     const struct ode *ode;
-    const struct indicator *indicators;  /* since the restart; NULL: none is searched */
+    const struct indicator *indicators; /* since the restart; NULL: none is searched */
+    size_t *used;                       /* those of them that are not INDICATOR_UNUSED */
+    size_t used_count;
     const double *tolerances;            /* absolute ones, of the states */
     bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
     double *noise;                       /* by indicator of a state: one that is 0 at the restart
@@ -35,6 +37,7 @@ struct location {
     bool *fired;                         /* by indicator: it is at 0 at `time` */
     double time;                         /* of the event, s since the restart; INFINITY: none */
     struct step_polynomial step;         /* the last one; methods write it */
+    double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
     double *x;                           /* at one point */
     double *dx;                          /* room for another one */
     double *z;                           /* by indicator, at one point */

@@ -291,6 +291,7 @@ static enum status search(struct cvode *cvode, double begin, double end) {
     step->end = end;
     step->is_from_end = true;
     step->degree = columns->count - 1;
+    step->row = problem->location.rows;
     for (size_t i = 0; i < problem->ode.state_count; i++) {
         for (int k = 0; k < columns->count; k++) {
             step->row[i][k] = columns->data[columns->count - 1 - k][i];

@@ -85,6 +85,7 @@ static enum status search(struct erk *erk, double t, const double x[]) {
     step->end = t;
     step->is_from_end = false;
     step->degree = 3;
+    step->row = problem->location.rows;
     for (size_t i = 0; i < n; i++) {
         const double change = x[i] - erk->step_x[i];
         const double first = h * erk->step_dx[i];

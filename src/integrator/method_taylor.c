@@ -240,9 +240,13 @@ static void evaluate(const struct taylor *taylor, double s, double x[], double d
     } else {
         evaluate_of(taylor, s, 4, four_x, four_dx);
     }
-    memcpy(x, four_x, sizeof four_x);
+    for (int i = 0; i < 4; i++) {
+        x[i] = four_x[i];
+    }
     if (dx != NULL) {
-        memcpy(dx, four_dx, sizeof four_dx);
+        for (int i = 0; i < 4; i++) {
+            dx[i] = four_dx[i];
+        }
     }
 }
 
@@ -424,10 +428,6 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
 
 /* Writes the coefficients of a row over time in units of this length. */
 static void copy_row(const struct taylor *taylor, const double from[], double length, double to[]) {
-    if (length == 1.0) {
-        memcpy(to, from, ((size_t)taylor->order + 1) * sizeof *to);
-        return;
-    }
     double power = 1.0;
     for (int k = 0; k <= taylor->order; k++) {
         to[k] = from[k] * power;
@@ -445,11 +445,13 @@ static enum status search(struct taylor *taylor, double end) {
     step->end = end;
     step->is_from_end = false;
     step->degree = taylor->order;
-    for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
+    step->row = length == 1.0 ? taylor->row : location->rows;
+    for (size_t i = 0; length != 1.0 && i < taylor->problem->ode.state_count; i++) {
         copy_row(taylor, taylor->row[i], length, step->row[i]);
     }
     step->has_indicators = row_of_indicator != NULL;
-    for (size_t i = 0; step->has_indicators && i < taylor->problem->ode.indicator_count; i++) {
+    for (size_t k = 0; step->has_indicators && k < location->used_count; k++) {
+        const size_t i = location->used[k];
         if (location->indicators[i].kind == INDICATOR_OF_MODEL) {
             copy_row(taylor, taylor->row[row_of_indicator[i]], length, step->indicator_row[i]);
         }

@@ -22,9 +22,10 @@ static const struct hammer_values *hammer(void) {
     return (const void *)toy->memory.values;
 }
 
-static void start_hammer(int method, double start_time, double between, double offset) {
+static void start_as(const struct model_description *description, int method, double start_time,
+                     double between, double offset) {
     const struct instance_experiment experiment = {.start_time = start_time};
-    create(&hammer_description);
+    create(description);
     ASSERT_OK(instance_setup_experiment(toy, &experiment));
     set_int(TOY_METHOD, method);
     set(TOY_TOLERANCE, 1e-10);
@@ -33,6 +34,10 @@ static void start_hammer(int method, double start_time, double between, double o
     set(TOY_PARAMETER3, kick);
     set(TOY_INPUT, force);
     initialize();
+}
+
+static void start_hammer(int method, double start_time, double between, double offset) {
+    start_as(&hammer_description, method, start_time, between, offset);
 }
 
 /* The motion from x = 1 m at rest, t s after the start. */
@@ -280,6 +285,42 @@ static void test_a_stroke_is_left_to_event_mode(void) {
     TEST_ASSERT_TRUE(instance_met_event(toy));
     ASSERT_OK(instance_do_step_with(toy, first + 0.1 + 0.2, 0.1, &left)); // passes it first
     TEST_ASSERT_EQUAL_INT(2, hammer()->strokes);
+}
+
+static bool is_held_until_struck(const void *values) {
+    return ((const struct hammer_values *)values)->strokes == 0;
+}
+
+/* A mass that is held until the first stroke moves the same whether or not a step ends there. */
+static void test_a_stroke_ends_rest(void) {
+    const struct step_options left = {.at_event = EVENTS_LEFT};
+    static struct model_description description; // they outlive the test
+    static struct model model;
+    static struct model_events events;
+    description = hammer_description;
+    model = *hammer_description.model;
+    events = *model.events;
+    events.is_at_rest = is_held_until_struck;
+    model.events = &events;
+    description.model = &model;
+    for (int method = 1; method <= 4; method++) {
+        double straight[3];
+        for (int i = 0; i < 2; i++) {
+            start_as(&description, method, 0.0, 5.0, first);
+            if (i == 1) {
+                ASSERT_OK(instance_do_step_with(toy, 0.0, 1.0, &left));
+                TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(toy));
+                TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+            }
+            ASSERT_OK(instance_do_step(toy, instance_time(toy), 1.0 - instance_time(toy)));
+            const double x[] = {get(TOY_POSITION), get(TOY_SPEED), get_int(TOY_STEPS)};
+            TEST_ASSERT_DOUBLE_WITHIN(1e-9, kick + force * (1.0 - first), x[1]);
+            if (i == 0) {
+                memcpy(straight, x, sizeof straight);
+            }
+            TEST_ASSERT_EQUAL_MEMORY(straight, x, sizeof straight);
+        }
+    }
 }
 
 /* An integrator outside goes to the time that it was given. */

@@ -222,7 +222,8 @@ static double rate_at(const void *context, double value) {
  * tests/rp_manipulator. */
 /* The joint of a state rests, so that nothing depends on the state while the modes last. */
 static bool state_rests(int state) {
-    const struct rp_plant_modes modes = rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs);
+    struct rp_plant_modes modes;
+    rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs, &modes);
     return modes.joint[state % 2] == RP_PLANT_STUCK;
 }
 
@@ -288,7 +289,8 @@ static void test_rates_of_the_reactions(void) {
         }
         first.inputs = du;
         TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
-        const struct rp_plant_modes modes = rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs);
+        struct rp_plant_modes modes;
+        rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs, &modes);
         rp_plant_reaction_rates(&v.parameters, &modes, v.q, v.dq, &v.inputs, &du, rates);
         for (int i = 0; i < 2; i++) {
             const bool stuck = modes.joint[i] == RP_PLANT_STUCK;
