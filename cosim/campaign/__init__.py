@@ -5,7 +5,8 @@ From what a user writes to the page, a module each; a module imports only from l
 
     expressions, campaign_file     the file, checked by itself
     sampling                       parameters of each run, by scipy and SALib
-    fmi_calls, loop, measures      the compiled loop over a loaded FMU; what is kept of a run
+    fmi_calls, fmi3_adapters       functions of a loaded FMU, for compiled code
+    loop, measures                 the compiled loop; what is kept of a run
     job                            all that workers need, picklable
     points                         parameters of a block, and what follows from them
     bases, planning                the scenario or system; the file checked against it

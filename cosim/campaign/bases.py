@@ -8,9 +8,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from zipfile import ZipFile
 
 import fmpy
 import numpy as np
+from lxml import etree
 
 from cosim import project, scenario
 from cosim.campaign.campaign_file import Campaign
@@ -24,7 +26,11 @@ from cosim.scenario import MAX_STEPS, Scenario
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 
-VERSION = "2.0"  # of FMI, whose functions the loop calls
+# attribute of a model description, by version of FMI
+PROVIDES_DERIVATIVES = {
+    "2.0": "providesDirectionalDerivative",
+    "3.0": "providesDirectionalDerivatives",
+}
 
 
 class Base(ABC):
@@ -154,11 +160,17 @@ class ScenarioBase(Base):
 
     def derivatives(self) -> list[tuple[int, int]]:
         """Value references of each state's derivative and of the state."""
-        described = fmpy.read_model_description(self.path)
-        if not described.coSimulation.providesDirectionalDerivative:
+        if not self._gives_derivatives():
             raise WrongValueError("the FMU gives no directional derivatives")
-        found = [unknown.variable for unknown in described.derivatives]
+        found = [x.variable for x in fmpy.read_model_description(self.path).derivatives]
         return [(v.valueReference, v.derivative.valueReference) for v in found]
+
+    def _gives_derivatives(self) -> bool:
+        """What fmpy does not read of FMI 3.0."""
+        with ZipFile(self.path) as archive:
+            root = etree.fromstring(archive.read("modelDescription.xml"))
+        attribute = PROVIDES_DERIVATIVES[self._model.fmi_version]
+        return root.find("CoSimulation").get(attribute) in ("true", "1")
 
 
 class SystemBase(Base):
@@ -259,38 +271,50 @@ class SystemBase(Base):
 
 
 @contextmanager
-def opened(campaign: Campaign, given: Path | None) -> Iterator[Base]:
-    """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one."""
+def opened(campaign: Campaign, given: Path | None, where: object = "campaign") -> Iterator[Base]:
+    """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one.
+
+    Raises
+    ------
+    UserError
+        If it cannot be opened; beginning with `where` if the campaign's text is wrong.
+    """
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
-        file = project.scenario_file(campaign.scenario)
+        with _said_of(where):
+            file = project.scenario_file(campaign.scenario)
         path = given or project.built(project.model_folder(file), ".fmu", "--fmu")
         model = read_model(path)
-        _check_version(path, model)
-        yield ScenarioBase(path, scenario.load(file, model, times), model)
+        with _said_of(where):
+            loaded = scenario.load(file, model, times)
+        yield ScenarioBase(path, loaded, model)
         return
     folders = project.systems()
     if campaign.system not in folders:
         guess = did_you_mean(campaign.system, folders)
         raise UserError(
-            f"system: no system {campaign.system!r}{guess} (known: {', '.join(folders)})"
+            f"{where}: system: no system {campaign.system!r}{guess} (known: {', '.join(folders)})"
         )
     path = given or project.built(folders[campaign.system], ".ssp", "--fmu")
     with ssp.unpacked(path) as system:
-        for model in system.models.values():
-            _check_version(path, model)
         variants = system.system.parameter_sets
         if campaign.variant not in variants:
             guess = did_you_mean(campaign.variant, variants)
             known = ", ".join(variants)
-            raise UserError(f"variant: no variant {campaign.variant!r}{guess} (known: {known})")
-        given_times = _system_times(system, times)
+            raise UserError(
+                f"{where}: variant: no variant {campaign.variant!r}{guess} (known: {known})"
+            )
+        with _said_of(where):
+            given_times = _system_times(system, times)
         yield SystemBase(campaign.system, system, campaign.variant, given_times)
 
 
-def _check_version(path: Path, model: Model) -> None:
-    if model.fmi_version != VERSION:
-        raise UserError(f"{path}: is of FMI {model.fmi_version}, campaigns run FMI {VERSION}")
+@contextmanager
+def _said_of(where: object) -> Iterator[None]:
+    try:
+        yield
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from None
 
 
 def _system_times(opened: Ssp, given: Mapping[str, float]) -> np.ndarray:

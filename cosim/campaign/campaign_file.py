@@ -27,11 +27,13 @@ from cosim.input_files import read_toml, show
 MAX_RUNS = 10**9
 WHOLE = ("latin", "indices")  # samplings whose points are made at once
 MAX_WHOLE = 10**7  # runs of those
+BEYOND = 10**99  # no greater number of runs is written out
 MAX_PARAMETERS = 1000
 MAX_BLOCK = 100_000
 LONGEST_NAME = 100
 
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
+Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 Number = FiniteFloat | bool | str
@@ -59,6 +61,11 @@ class Distribution(_Table):
     def numbers(self) -> list[float]:
         """What is given for it."""
         return getattr(self, self.kind)
+
+    @property
+    def size(self) -> int:
+        """Number of values of a grid."""
+        return len(self.values) if self.kind == "values" else self.points
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -138,7 +145,7 @@ class Time(_Table):
 class Campaign(_Table):
     """A campaign file."""
 
-    title: Text
+    title: Title
     description: Text
     scenario: Name | None = None
     system: Name | None = None
@@ -160,7 +167,7 @@ class Campaign(_Table):
     def count(self) -> int:
         """Number of runs."""
         if self.sampling == "grid":
-            return math.prod(len(grid_values(d)) for d in self.parameters.values())
+            return math.prod(d.size for d in self.parameters.values())
         if self.sampling == "indices":
             return self.runs * (len(self.parameters) + 2)
         return self.runs
@@ -225,19 +232,21 @@ class Campaign(_Table):
             )
         most = MAX_WHOLE if self.sampling in WHOLE else MAX_RUNS
         if self.count > most:
-            raise ValueError(f"runs: makes {self.count:.4g}, expected at most {most}")
+            about = f"{min(self.count, BEYOND):.4g}"
+            raise ValueError(f"runs: makes {about}, expected at most {most}")
 
 
-def grid_values(distribution: Distribution) -> list[float]:
-    """Values of a parameter on a grid; both limits are among them if there are two or more."""
+def grid_value(distribution: Distribution, place: int) -> float:
+    """Value of a parameter on a grid; both limits are among them if there are two or more."""
     if distribution.kind == "values":
-        return distribution.numbers
+        return distribution.values[place]
     low, high = distribution.numbers
-    count = distribution.points
+    last = distribution.size - 1
+    if place in (0, last):
+        return high if place else low
     if distribution.kind == "log_uniform":
-        ratio = high / low
-        return [low * ratio ** (i / max(count - 1, 1)) for i in range(count)]
-    return [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
+        return low * (high / low) ** (place / last)
+    return low + (high - low) * place / last
 
 
 def read(path: Path) -> Campaign:
@@ -273,6 +282,17 @@ def _as_tuples(content: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
+# what pydantic says in words of Python, by the type of the mistake
+EXPECTED = {
+    "dict_type": "expected a table",
+    "list_type": "expected a list",
+    "model_type": "expected a table",
+    "string_pattern_mismatch": "expected one line of text",
+    "too_short": "expected a longer list",
+    "tuple_type": "expected a list",
+}
+
+
 def _explained(error: ValidationError) -> str:
     """The first mistake in one line: where, what is expected, what is there."""
     first = error.errors()[0]
@@ -289,7 +309,7 @@ def _explained(error: ValidationError) -> str:
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "value_error":
         return f"{where}{message}"
-    message = message[0].lower() + message[1:]
+    message = EXPECTED.get(first["type"], message[0].lower() + message[1:])
     return f"{where}{message.replace('input should be', 'expected')}, got {show(first['input'])}"
 
 

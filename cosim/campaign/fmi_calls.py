@@ -1,25 +1,39 @@
 """Functions of a loaded FMU of FMI 2.0, called from compiled code by their addresses.
 
 Addresses are arguments, not constants: one compiled loop serves every FMU, and numba keeps it on
-disk. All pointers are integers. Each call returns the FMU's status.
+disk. All pointers are integers. Each call returns the FMU's status. FMUs of FMI 3.0 are called in
+the same way, through `cosim.campaign.fmi3_adapters`.
 """
 
 from ctypes import c_void_p, cast
-from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-FUNCTIONS = (
-    "fmi2SetReal",
-    "fmi2GetReal",
-    "fmi2SetBoolean",
-    "fmi2GetBoolean",
-    "fmi2DoStep",
-    "fmi2GetDirectionalDerivative",
-)
-SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(len(FUNCTIONS))
+from cosim.fmi_instance import Instance
+
+FUNCTIONS = {
+    "2.0": (
+        "fmi2SetReal",
+        "fmi2GetReal",
+        "fmi2SetBoolean",
+        "fmi2GetBoolean",
+        "fmi2DoStep",
+        "fmi2GetDirectionalDerivative",
+    ),
+    "3.0": (
+        "fmi3SetFloat64",
+        "fmi3GetFloat64",
+        "fmi3SetBoolean",
+        "fmi3GetBoolean",
+        "fmi3DoStep",
+        "fmi3GetDirectionalDerivative",
+    ),
+}
+SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(6)
+DISCARD = 2  # the first status of FMI that stops a run
+TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 
 _POINTER = ir.IntType(8).as_pointer()
 _SIZE = ir.IntType(64)
@@ -27,11 +41,17 @@ _STATUS = ir.IntType(32)
 _REAL = ir.DoubleType()
 
 
-def addresses(library: Any) -> list[int]:
-    """Addresses of `FUNCTIONS` in a loaded library, a CDLL of ctypes; 0 where it lacks one."""
+def functions(instance: Instance) -> tuple[str, ...]:
+    """Names of the functions that an instance is called by."""
+    return FUNCTIONS[instance.fmu.model.fmi_version]
+
+
+def addresses(instance: Instance) -> list[int]:
+    """Addresses of its functions in the loaded library; 0 where it lacks one."""
+    library = instance.fmi.dll
     return [
         cast(getattr(library, name), c_void_p).value or 0 if hasattr(library, name) else 0
-        for name in FUNCTIONS
+        for name in functions(instance)
     ]
 
 

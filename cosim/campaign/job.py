@@ -59,6 +59,7 @@ class Job:
     propagates: bool  # outputs feed inputs
     watched: tuple[str, ...]  # what is recorded
     places: np.ndarray  # (watched,) among the Reals of the loop
+    integers: dict[str, tuple[int, str]]  # component and variable of those read at the end
     tangent: tuple[np.ndarray, np.ndarray] | None  # references of derivatives and states
     targets: tuple[tuple[str, Target], ...]  # by column of the table
     measures: tuple[Measure, ...]

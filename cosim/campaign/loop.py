@@ -14,6 +14,7 @@ from numba import njit
 
 from cosim.campaign.fmi_calls import (
     DERIVATIVE,
+    DISCARD,
     DO_STEP,
     GET_BOOLEAN,
     GET_REAL,
@@ -26,7 +27,7 @@ from cosim.campaign.fmi_calls import (
 )
 from cosim.fmi_instance import Instance
 
-DISCARD = 2  # the first status of FMI that stops a run
+COLUMNS = 7  # component and addresses of its functions
 
 
 @dataclass(frozen=True)
@@ -99,9 +100,22 @@ class Tangent:
 
 
 def component_calls(instances: Sequence[Instance]) -> np.ndarray:
-    """Component and addresses of its functions, (instances, 1 + functions), for the loop."""
-    rows = [[_component(x), *addresses(x.fmi.dll)] for x in instances]
-    return np.array(rows, np.int64)
+    """Component and addresses of its functions, for the loop; then what adapters need.
+
+    (instances, 2 * COLUMNS), without a copy: an adapter is given the address of its part.
+    """
+    calls = np.zeros((len(instances), 2 * COLUMNS), np.int64)
+    for row, instance in zip(calls, instances, strict=True):
+        called, adapted = row[:COLUMNS], row[COLUMNS:]
+        own = _component(instance), *addresses(instance)
+        if instance.fmu.model.fmi_version == "2.0":
+            called[:] = own
+        else:
+            from cosim.campaign.fmi3_adapters import ADDRESSES  # takes time
+
+            called[:] = adapted.ctypes.data, *ADDRESSES
+            adapted[:] = own
+    return calls
 
 
 def _component(instance: Instance) -> int:
@@ -110,7 +124,7 @@ def _component(instance: Instance) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _set(calls, wires, component, which, function, always):
+def _set(calls, wires, component, function, always):
     """Set the inputs of a component from the values; the status of the FMU."""
     inputs, first, sources, _, _, values, to_set = wires
     begin, end = first[component], first[component + 1]
@@ -122,7 +136,7 @@ def _set(calls, wires, component, which, function, always):
     if begin == end or not changed:
         return 0
     return move_values(
-        calls[component, 1 + which],
+        calls[component, 1 + function],
         calls[component, 0],
         inputs.ctypes.data + begin * inputs.itemsize,
         end - begin,
@@ -131,7 +145,7 @@ def _set(calls, wires, component, which, function, always):
 
 
 @njit(cache=True, nogil=True)
-def _read(calls, wires, component, which):
+def _read(calls, wires, component, function):
     """Read the outputs of a component into the values; the status of the FMU."""
     _, _, _, outputs, first, values, _ = wires
     begin, end = first[component], first[component + 1]
@@ -139,7 +153,7 @@ def _read(calls, wires, component, which):
         return 0
     place = len(values) - len(outputs) + begin
     return move_values(
-        calls[component, 1 + which],
+        calls[component, 1 + function],
         calls[component, 0],
         outputs.ctypes.data + begin * outputs.itemsize,
         end - begin,
@@ -154,10 +168,10 @@ def set_inputs(calls, reals, switches, always):
     Returns status, function and component.
     """
     for c in range(len(calls)):
-        status = _set(calls, reals, c, SET_REAL, SET_REAL, True)
+        status = _set(calls, reals, c, SET_REAL, True)
         if status >= DISCARD:
             return status, SET_REAL, c
-        status = _set(calls, switches, c, SET_BOOLEAN, SET_BOOLEAN, always)
+        status = _set(calls, switches, c, SET_BOOLEAN, always)
         if status >= DISCARD:
             return status, SET_BOOLEAN, c
     return 0, 0, 0
@@ -208,7 +222,7 @@ def advance(calls, times, held, held_switches, reals, switches, watched, record,
 
     Parameters
     ----------
-    calls : (components, 1 + functions) of component_calls
+    calls : (components, 2 * COLUMNS) of component_calls
     times : (n + 1,) s
     held, held_switches : (n + 1, held values), held over the step from times[i]
     reals, switches : Wires.arrays()

@@ -11,6 +11,7 @@ from numba import njit
 
 PLAIN = ("start", "final", "minimum", "maximum", "rms", "integral")  # of one variable
 LYAPUNOV = "lyapunov"
+FINAL_INTEGER = "final_integer"
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Recorded:
     times: np.ndarray  # (n + 1,) s
     values: np.ndarray  # (n + 1, variables) in their units
     growth: np.ndarray  # (n,): by how much each step lengthens a small deviation, if one is carried
+    integers: Sequence[int] = ()  # (integers,) at the end
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,12 @@ class Measure:
     options: tuple[float, ...] = ()
 
     def value(self, recorded: Recorded, places: Sequence[int]) -> float:
-        """The number; `places`: columns of `recorded.values` of the variables."""
+        """The number; `places` of the variables: columns of `values`, or among `integers`."""
         times, rows = recorded.times, recorded.values
         if self.kind == LYAPUNOV:
             return _log_sum(recorded.growth) / (times[-1] - times[0])
+        if self.kind == FINAL_INTEGER:
+            return float(recorded.integers[places[0]])
         if self.kind in ("largest_distance", "rms_distance"):
             pairs = np.array(places).reshape(-1, 2)
             distance = _distance(rows, pairs[:, 0], pairs[:, 1])
@@ -65,6 +69,11 @@ class Measure:
 def plain(kind: str, variable: str) -> Measure:
     """One of `PLAIN` of a variable."""
     return Measure(f"{kind}({variable})", (variable,), kind)
+
+
+def final_integer(variable: str) -> Measure:
+    """Value of an Integer at the end."""
+    return Measure(f"final({variable})", (variable,), FINAL_INTEGER)
 
 
 @njit(cache=True, nogil=True)

@@ -1,16 +1,24 @@
 """Checks what a campaign says of its scenario or system, and makes the job of it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NoReturn
 
 import numpy as np
 
 from cosim.campaign.bases import Base, ScenarioBase
 from cosim.campaign.campaign_file import Campaign, Distribution
+from cosim.campaign.expressions import Expression
 from cosim.campaign.job import Job, Target
-from cosim.campaign.measures import LYAPUNOV, PLAIN, Measure, plain
-from cosim.errors import UserError, did_you_mean
+from cosim.campaign.measures import (
+    FINAL_INTEGER,
+    LYAPUNOV,
+    PLAIN,
+    Measure,
+    final_integer,
+    plain,
+)
+from cosim.errors import UserError, did_you_mean, one_line
 from cosim.model import INPUTS, Value, Variable, WrongValueError
 
 RUN, FAILURE = "run", "failure"  # columns of every table
@@ -40,7 +48,8 @@ class _Planner:
         targets = self.targets()
         fixed = self.fixed()
         measures = self.measures()
-        measured = (v for measure in measures for v in measure.variables)
+        integers = {m.variables[0]: None for m in measures if m.kind == FINAL_INTEGER}
+        measured = (v for measure in measures for v in measure.variables if v not in integers)
         watched = tuple(dict.fromkeys([*measured, *also]))
         tangent = self.tangent()
         if len(watched) * len(base.times) > MAX_RECORDED:
@@ -67,6 +76,7 @@ class _Planner:
             propagates=len(components) > 1,
             watched=watched,
             places=np.array(places, np.int64),
+            integers=dict(zip(integers, self.read(integers), strict=True)),
             tangent=tangent,
             targets=tuple(targets.items()),
             measures=tuple(measures),
@@ -87,18 +97,29 @@ class _Planner:
             if found is not None:
                 self.check_distribution(distribution, found[1], place)
                 targets[name] = self.target(name, *found)
-        known = set(campaign.parameters) | set(self.constants())
+        constants, varying = self.constants(), set(campaign.parameters)
         for name, expression in campaign.expressions.items():
             place = f"[derived] {name}"
+            known = varying | set(constants)
             for other in expression.names - known:
                 self.fail(place, f"unknown name {other!r}{did_you_mean(other, known)}")
-            known.add(name)
+            if expression.names & varying:
+                varying.add(name)
+            else:
+                constants[name] = self.constant(expression, constants, place)
             found = self.settable(name, place, name in used)
             if found is not None:
                 if found[1].type != "Real":
                     self.fail(place, f"is of type {found[1].type}, expected Real")
                 targets[name] = self.target(name, *found)
         return targets
+
+    def constant(self, expression: Expression, constants: Mapping[str, float], place: str) -> float:
+        """Value of an expression that is the same in all runs."""
+        try:
+            return expression.value(constants)
+        except (ArithmeticError, ValueError) as error:
+            self.fail(place, f"has no value: {one_line(error)}")
 
     def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
         """The variable; None if it is none but `used` by an expression."""
@@ -160,10 +181,11 @@ class _Planner:
         keep = self.campaign.keep
         found = []
         for kind in PLAIN:
-            names = getattr(keep, kind)
-            for name in names:
-                self.readable(name, f"[keep] {kind}")
-            found += [plain(kind, name) for name in names]
+            types = ("Real", "Integer") if kind == "final" else ("Real",)
+            for name in getattr(keep, kind):
+                variable = self.readable(name, f"[keep] {kind}", types)
+                is_integer = variable.type == "Integer"
+                found.append(final_integer(name) if is_integer else plain(kind, name))
         for name, settling in keep.settling.items():
             self.readable(settling.variable, f"[keep.settling.{name}]")
             options = (settling.target, settling.band)
@@ -184,17 +206,18 @@ class _Planner:
             self.fail("[keep]", "keeps nothing of a run")
         return found
 
-    def readable(self, name: str, place: str) -> None:
+    def readable(self, name: str, place: str, types: Sequence[str] = ("Real",)) -> Variable:
         try:
             _, variable = self.base.variable(name)
         except WrongValueError as error:
             self.fail(place, error)
-        if variable.type != "Real" or variable.causality == "independent":
-            self.fail(place, f"{name!r} is not a Real variable")
+        if variable.type not in types or variable.causality == "independent":
+            self.fail(place, f"{name!r} is not a {' or '.join(types)} variable")
+        return variable
 
-    def read(self, watched: Sequence[str]) -> dict[tuple[int, str], None]:
-        """Component and name of each watched variable."""
-        found = (self.base.variable(name) for name in watched)
+    def read(self, names: Iterable[str]) -> dict[tuple[int, str], None]:
+        """Component and name of each variable."""
+        found = (self.base.variable(name) for name in names)
         return {(component, variable.name): None for component, variable in found}
 
     def tangent(self) -> tuple[np.ndarray, np.ndarray] | None:

@@ -11,7 +11,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.campaign import loop
-from cosim.campaign.fmi_calls import FUNCTIONS
+from cosim.campaign.fmi_calls import DISCARD, TERMINATED, functions
 from cosim.campaign.job import Job, Target
 from cosim.campaign.measures import Recorded
 from cosim.errors import UserError, one_line
@@ -55,7 +55,8 @@ class Runner:
         self._record = np.empty((len(job.times), len(job.watched)))
         self._tangent = loop.Tangent.none() if job.tangent is None else loop.Tangent(*job.tangent)
         self._growth = np.empty(0 if job.tangent is None else job.steps)
-        place = {name: i for i, name in enumerate(job.watched)}
+        self._integers: list[int] = []  # at the end of the last run
+        place = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
         self._places = [[place[name] for name in m.variables] for m in job.measures]
 
     def __enter__(self) -> "Runner":
@@ -81,7 +82,7 @@ class Runner:
             failures.append(failure)
             if failure:
                 continue
-            recorded = Recorded(job.times, self._record, self._growth)
+            recorded = Recorded(job.times, self._record, self._growth, self._integers)
             for j, (measure, places) in enumerate(zip(job.measures, self._places, strict=True)):
                 measures[i, j] = measure.value(recorded, places)
             if number in job.trajectories:
@@ -93,6 +94,7 @@ class Runner:
         try:
             self._initialize(point)
             self._advance()
+            self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
             return ""
         except UserError as error:
             self._drop_instances()
@@ -182,9 +184,13 @@ class Runner:
     def _check(self, failure: Sequence[int], when: str) -> None:
         """Raise the user's error if the loop says that a function failed."""
         status, function, component = failure
-        if status >= loop.DISCARD:
-            error = FMICallException(FUNCTIONS[function], status)
-            raise self._instances[component].failure(error, when)
+        if status < DISCARD:
+            return
+        instance = self._instances[component]
+        if status == TERMINATED:
+            raise UserError(f"{instance.name}: the FMU ends the simulation {when}")
+        error = FMICallException(functions(instance)[function], status)
+        raise instance.failure(error, when)
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from SALib.sample import sobol as saltelli
 from scipy import special
 from scipy.stats import qmc
 
-from cosim.campaign.campaign_file import WHOLE, Campaign, Distribution, grid_values
+from cosim.campaign.campaign_file import WHOLE, Campaign, Distribution, grid_value
 
 SMALLEST = 2.0**-54  # a normal distribution is cut there, where its values are still finite
 
@@ -33,9 +33,10 @@ class Sampler:
 
     def _grid(self, runs: range) -> np.ndarray:
         """The last parameter changes fastest."""
-        axes = [grid_values(d) for d in self._distributions]
-        places = np.unravel_index(np.arange(runs.start, runs.stop), [len(axis) for axis in axes])
-        return np.column_stack([np.array(a)[i] for a, i in zip(axes, places, strict=True)])
+        sizes = [d.size for d in self._distributions]
+        places = np.unravel_index(np.arange(runs.start, runs.stop), sizes)
+        axes = zip(self._distributions, places, strict=True)
+        return np.column_stack([[grid_value(d, i) for i in axis.tolist()] for d, axis in axes])
 
     def _unit(self, runs: range) -> np.ndarray:
         """Points of the unit cube, (runs, parameters)."""

@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     from cosim.campaign.results import Results
 
     campaign = campaign_file.read(options.file)
-    with bases.opened(campaign, options.fmu) as base:
+    with bases.opened(campaign, options.fmu, options.file) as base:
         job = planning.plan(campaign, base, options.file)
         points = Points(campaign, planning.constants(campaign, base))
         folder = _folder(options, campaign)

@@ -13,7 +13,7 @@ struct wires {
     int64_t output_place; /* of the first output among the values */
 };
 
-/* As the rows of component_calls. */
+/* As the rows of component_calls, of FMUs of FMI 2.0. */
 struct calls {
     fmi2Component component;
     fmi2SetRealTYPE *set_real;
@@ -22,6 +22,7 @@ struct calls {
     fmi2GetBooleanTYPE *get_boolean;
     fmi2DoStepTYPE *do_step;
     fmi2GetDirectionalDerivativeTYPE *derivative;
+    void *of_adapters[7];
 };
 
 /* All steps of a run; 0, or what failed. times: steps + 1; held: (steps + 1) x held_count; watched:

@@ -48,7 +48,41 @@ MISTAKES = {
         "[keep]: keeps nothing of a run",
     ),
     "unknown variable": ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
-    "no Real variable": ([('"q1", "q2"', '"solver_steps"')], "'solver_steps' is not a Real"),
+    "no number": (
+        [('"q1", "q2"', '"solver_method"')],
+        "[keep] final: 'solver_method' is not a Real or Integer variable",
+    ),
+    "no Real variable": (
+        [('maximum = ["dq1"]', 'maximum = ["solver_steps"]')],
+        "[keep] maximum: 'solver_steps' is not a Real variable",
+    ),
+    "huge grid": (
+        [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3000000000")]
+        + [("normal = [-2.0, 0.2]", "values = [-2.0]")],
+        "runs: makes 3e+09, expected at most 1000000000",
+    ),
+    "huge grid of two": (
+        [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", f"[1.0, 3.0]\npoints = {2**62}")]
+        + [("normal = [-2.0, 0.2]", f"uniform = [-2.0, 0.2]\npoints = {2**62}")],
+        "runs: makes 2.127e+37, expected at most 1000000000",
+    ),
+    "no list": ([('["q1", "q2"]', '"q1"')], "keep.final: expected a list, got 'q1'"),
+    "no table": (
+        [("uniform = [1.0, 3.0]", "")] + [("[parameters.m2]", "[parameters]\nm2 = 1.0")],
+        "parameters.m2: expected a table, got 1.0",
+    ),
+    "empty list": (
+        [("uniform = [1.0, 3.0]", "values = []")],
+        "parameters.m2.values: expected a longer list, got []",
+    ),
+    "title that moves the cursor": (
+        [('"Test"', '"\\u001b[2J"')],
+        "title: expected one line of text",
+    ),
+    "derived value without a value": (
+        [("[keep]", '[derived]\ndq1 = "1 / 0"\n[keep]')],
+        "[derived] dq1: has no value: ",
+    ),
     "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
     "unknown column": (
         [("seed = 3", 'worst = ["final(q3)"]')],
@@ -76,6 +110,7 @@ def test_a_mistake_is_refused(
     assert cli.main(["campaign", str(path), "--output", str(output)]) == 2
     error = capsys.readouterr().err
     assert_one_line(error)
+    assert str(path) in error
     assert expected in error
     assert not output.exists()
 

@@ -13,7 +13,7 @@ from cosim.simulation import simulate
 from cosim.system import ssp
 from tests.campaign.files import ARM, HEAD, campaign
 from tests.campaign.runners import rows, runner
-from tests.support.cosim_project import BUILD, FMUS, load
+from tests.support.cosim_project import BUILD, FMUS, fmi3_fmu, load
 from tests.support.paths import ROOT
 
 OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
@@ -106,6 +106,41 @@ def test_booleans_go_through_a_system(tmp_path: Path) -> None:
     for i, name in enumerate(job.watched):
         expected = reference[:, names.index(name)]
         assert np.max(np.abs(record[steps, i] - expected)) < 1e-7 * np.max(np.abs(expected))
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_events_and_counters_are_those_of_a_simulation(version: str, tmp_path: Path) -> None:
+    name = "thrown_against_stop"
+    path = FMUS["rp_plant"] if version == "2.0" else fmi3_fmu(FMUS["rp_plant"])
+    text = HEAD + (
+        f'scenario = "{name}"\nsampling = "grid"\n[parameters.dq2]\nvalues = [0.0, 2.5, 3.2]\n'
+        "[keep]\nfinal = ['solver_steps', 'last_event_time', 'event_count']\n"
+        "maximum = ['last_event_time']\n"
+    )
+    with runner(campaign(tmp_path, text), tmp_path, fmu=path) as (runs, job, points):
+        assert [m.column for m in job.measures] == [
+            *("final(solver_steps)", "final(last_event_time)", "final(event_count)"),
+            "maximum(last_event_time)",
+        ]
+        found = rows(runs, job, points, range(3))
+    scenario = load(name)
+    counts = set()
+    for dq2, (steps, last, count, largest) in zip((0.0, 2.5, 3.2), found.measures, strict=True):
+        changed = dataclasses.replace(
+            scenario,
+            initial=scenario.initial | {"dq2": dq2},
+            panels=(("event_count",),),
+            reference_every=1,
+        )
+        with Fmu(path) as fmu:
+            result = simulate(fmu, changed)
+        counted = result.integers["event_count"]
+        assert (steps, count) == (result.solver_steps, counted[-1])
+        row = int(np.flatnonzero(np.diff(counted))[-1])  # of the step with the last event
+        assert result.times[row] < last <= result.times[row + 1]
+        assert largest == last
+        counts.add(count)
+    assert len(counts) == 3
 
 
 def test_a_run_does_not_depend_on_those_before(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from cosim.campaign.campaign_file import Distribution, grid_value
 from cosim.campaign.points import Points
 from cosim.campaign.sampling import Sampler
 from tests.campaign.files import ARM, campaign
@@ -76,6 +77,26 @@ def test_a_grid_is_all_combinations(tmp_path: Path) -> None:
     assert np.allclose(np.unique(points[:, 0]), [2, 3, 4, 5])
     assert np.allclose(np.unique(points[:, 1]), [0.01, 0.1, 1, 10, 100])
     assert np.array_equal(points[:3, 3], [1, 4, 9])
+
+
+@pytest.mark.parametrize("kind", ["uniform", "log_uniform"])
+def test_a_grid_has_both_limits_to_the_bit(kind: str) -> None:
+    random = np.random.default_rng(1)
+    for size in random.integers(2, 9, 2000).tolist():
+        low, high = sorted(random.uniform(0.1, 5.0, 2).tolist())
+        axis = Distribution.model_validate({kind: [low, high], "points": size})
+        found = [grid_value(axis, place) for place in range(size)]
+        assert found[0] == low and found[-1] == high
+        assert found == sorted(found)
+
+
+def test_blocks_of_a_long_grid_need_no_memory_for_it(tmp_path: Path) -> None:
+    changes = [("sobol", "grid"), ("runs = 40\n", ""), ("5.0]", "5.0]\npoints = 1000000000")]
+    changes += [("log_uniform = [0.01, 100.0]", "values = [1.0]")]
+    changes += [("normal = [1.0, 0.5]", "values = [7.0]"), ("[1.0, 4.0, 9.0]", "[1.0]")]
+    last = Sampler(campaign(tmp_path, TEXT, changes)).points(range(10**9 - 3, 10**9))
+    assert last[-1, 0] == 5.0
+    assert np.allclose(np.diff(last[:, 0]), 3e-9, rtol=1e-6)
 
 
 def test_groups_for_indices_differ_in_one_parameter(tmp_path: Path) -> None:

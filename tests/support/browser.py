@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -120,10 +121,7 @@ class Browser:
 
     def violations(self) -> list[str]:
         """What axe-core finds against the accessibility guidelines (WCAG), contrast included."""
-        from axe_selenium_python import Axe
-
-        axe = Axe(self.driver)
-        axe.inject()
+        self.run((files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
         result = self.driver.execute_async_script(
             "const done = arguments[arguments.length - 1];"
             "axe.run().then(done, error => done({failure: String(error)}))"
