@@ -37,7 +37,8 @@ COUNT_EVERY = 5000  # ms, between two looks at how many threads there are
 KILLS = 5  # so many workers may die over a task
 RESTART_EVERY = 2000  # ms
 ATTEMPTS = 3  # to reach all workers: the scheduler may count one whose host is gone
-WAIT = 60  # s, without a worker
+WAIT = 60  # s, for the first worker
+PATIENCE = 120  # s, without any worker later on
 GONE = "the scheduler is gone"
 DIED = "the worker died in this run"
 GOES_ON = "the same command goes on from what is there"
@@ -158,7 +159,7 @@ class Engine:
         self._threads = sum((await self._client.nthreads(asynchronous=True)).values())
         if self._threads:
             self._seen = time.monotonic()
-        elif time.monotonic() > self._seen + WAIT:
+        elif time.monotonic() > self._seen + PATIENCE:
             self._lost = f"{self._address}: has no workers any more"
             await self._client.cancel(list(self._futures), asynchronous=True)
 

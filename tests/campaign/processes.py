@@ -14,14 +14,15 @@ from pathlib import Path
 from tests.campaign.hosts import LOOPBACK, Host
 from tests.support.paths import ROOT
 
-PATIENCE = 240  # s; a busy machine is slow
+PATIENCE = 900  # s; a busy machine is slow
+WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")  # nothing is left of tests that are killed
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
 def python(*arguments: object, host: Host = LOOPBACK) -> subprocess.Popen:
-    """A Python program in another process group."""
+    """A Python program in another process group, which ends with this program."""
     return subprocess.Popen(
-        [*host.enter, sys.executable, "-P", "-m", *map(str, arguments)],
+        [*host.enter, *WITH_PARENT, sys.executable, "-P", "-m", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -77,7 +77,7 @@ def test_a_stopped_campaign_says_so(file: Path, tmp_path: Path) -> None:
 def test_a_campaign_whose_workers_are_gone_ends(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(engine, "WAIT", 1)
+    monkeypatch.setattr(engine, "PATIENCE", 1)
     monkeypatch.setattr(engine, "COUNT_EVERY", 100)
     campaign = campaign_file.read(file)
     with (
