@@ -6,31 +6,35 @@ campaign. Only this process writes results: workers need no common disk.
 """
 
 import logging
-import pickle
+import multiprocessing.resource_tracker
+import signal
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from uuid import uuid4
 from weakref import WeakSet
 
 import dask
 import numpy as np
 from dask.system import CPU_COUNT
 from distributed import Client, Future, LocalCluster, as_completed
-from distributed.client import FutureCancelledError
+from distributed.client import ClosedClientError, FutureCancelledError, WorkerStartTimeoutError
+from distributed.core import Status
 from distributed.scheduler import KilledWorker
 from tornado.ioloop import PeriodicCallback
 
 from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Job
 from cosim.campaign.points import Points
-from cosim.campaign.results import Results
+from cosim.campaign.results import GOES_ON, Results
 from cosim.campaign.runs import Rows
-from cosim.campaign.worker import NAME, Plugin, run_block
+from cosim.campaign.worker import Plugin, run_block
 from cosim.errors import UserError, one_line
+from cosim.interruption import uninterrupted
 
 AHEAD = 3  # blocks under way for each thread of a worker
 COUNT_EVERY = 5000  # ms, between two looks at how many threads there are
@@ -39,9 +43,10 @@ RESTART_EVERY = 2000  # ms
 ATTEMPTS = 3  # to reach all workers: the scheduler may count one whose host is gone
 WAIT = 60  # s, for the first worker
 PATIENCE = 120  # s, without any worker later on
+FAREWELL = 5  # s, for workers to remove what they have got
+CONNECTION = (OSError, FutureCancelledError, ClosedClientError)
 GONE = "the scheduler is gone"
 DIED = "the worker died in this run"
-GOES_ON = "the same command goes on from what is there"
 
 SETTINGS = {
     "distributed.scheduler.allowed-failures": KILLS,
@@ -58,24 +63,44 @@ SETTINGS = {
 def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
     """A cluster on this machine, one process a core, whose files are in `folder`."""
     count = workers or CPU_COUNT
-    with (
-        LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=":0",
-            local_directory=str(folder),
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster) as client,
-    ):
-        # a worker that dies while it starts is given up otherwise
-        keeper = PeriodicCallback(partial(cluster.scale, count), RESTART_EVERY)
-        cluster.loop.add_callback(keeper.start)
-        try:
-            yield client
-        finally:
-            cluster.loop.add_callback(keeper.stop)
+    with ExitStack() as stack:
+        with uninterrupted():  # a cluster that is half made cannot be closed
+            # without workers at first: one that dies while it starts would end the cluster
+            made = LocalCluster(
+                n_workers=0,
+                threads_per_worker=1,
+                memory_limit=1 / count,  # of what there is
+                processes=True,
+                dashboard_address=":0",
+                local_directory=str(folder),
+                silence_logs=logging.CRITICAL,
+            )
+            client = stack.enter_context(Client(stack.enter_context(made)))
+        made.sync(_keep_signals_from_children)
+        keeper = PeriodicCallback(partial(_keep_workers, made, count), RESTART_EVERY)
+        stack.callback(made.loop.add_callback, keeper.stop)
+        made.loop.add_callback(keeper.start)
+        made.scale(count)
+        with suppress(TimeoutError):  # the campaign begins with those that are there
+            client.wait_for_workers(count, timeout=WAIT)
+        yield client
+
+
+async def _keep_signals_from_children() -> None:
+    """Block signals of the terminal in this thread, for all processes that it will start."""
+    if hasattr(signal, "pthread_sigmask"):
+        block = partial(signal.pthread_sigmask, signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+        block()
+        multiprocessing.resource_tracker.ensure_running()  # unblocks SIGINT again
+        block()
+
+
+def _keep_workers(made: LocalCluster, count: int) -> None:
+    """Make workers again that died while they started; nannies take care of the others."""
+    for name, nanny in list(made.workers.items()):
+        if nanny.status in (Status.failed, Status.closed):
+            del made.workers[name]
+    made.scale(count)
 
 
 @contextmanager
@@ -115,24 +140,37 @@ class Engine:
         self._address = client.scheduler.address
         self._futures: WeakSet[Future] = WeakSet()
         self._lost = GONE  # why futures are cancelled
-        self._begin(archives)
+        # workers may have other campaigns, or this one twice
+        self._plugin = f"cosim-campaign-{uuid4()}"
+        try:
+            self._threads = self._begin(Plugin(self._plugin, job, archives))
+        except BaseException:
+            self._end()
+            raise
 
-    def _begin(self, archives: Mapping[str, bytes]) -> None:
-        for address, reply in self._registered(Plugin(self._job, archives)).items():
-            if isinstance(reply, dict) and reply.get("status") == "error":
-                error = pickle.loads(reply["exception"].data) if "exception" in reply else reply
-                raise UserError(f"{address}: the worker cannot run this: {one_line(error)}")
-
-    def _registered(self, plugin: Plugin) -> dict:
-        """Give all workers the plugin; their replies."""
+    def _begin(self, plugin: Plugin) -> int:
+        """Give all workers the plugin; the number of their threads."""
         for _ in range(ATTEMPTS):
-            with suppress(OSError):
-                try:
-                    self._client.wait_for_workers(1, timeout=WAIT)
-                except TimeoutError:
-                    raise UserError(f"{self._address}: has no workers") from None
-                return self._client.register_plugin(plugin) or {}
+            try:
+                self._client.wait_for_workers(1, timeout=WAIT)
+                self._client.register_plugin(plugin)
+                return sum(self._client.nthreads().values())
+            except WorkerStartTimeoutError:
+                raise UserError(f"{self._address}: has no workers") from None
+            except Exception as error:  # of a worker: any
+                if not _is_of_connection(error):
+                    text = one_line(error) or type(error).__name__
+                    raise UserError(f"{self._address}: a worker cannot run this: {text}") from None
         raise UserError(f"{self._address}: {GONE}, or a worker cannot be reached; {GOES_ON}")
+
+    def _end(self) -> None:
+        """Take the plugin from all workers, if they can be reached."""
+        with suppress(*CONNECTION, ValueError):  # ValueError: it has not been registered
+            self._client.sync(self._forget, callback_timeout=FAREWELL)
+
+    async def _forget(self) -> None:
+        await self._client.cancel(list(self._futures), asynchronous=True)
+        await self._client.scheduler.unregister_worker_plugin(name=self._plugin)
 
     def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         """Run blocks and keep their results; `done` is called with the number of runs of each.
@@ -144,15 +182,16 @@ class Engine:
         """
         watch = PeriodicCallback(self._watch, COUNT_EVERY)
         try:
-            self._seen, self._threads = time.monotonic(), sum(self._client.nthreads().values())
+            self._seen = time.monotonic()
             self._client.loop.add_callback(watch.start)
             self._run(blocks, done)
-        except (OSError, FutureCancelledError):
+        except CONNECTION as error:
+            if not _is_of_connection(error):
+                raise
             raise UserError(f"{self._lost}; {GOES_ON}") from None
         finally:
             self._client.loop.add_callback(watch.stop)
-        with suppress(OSError):  # a worker whose host is gone needs nothing
-            self._client.unregister_worker_plugin(NAME)
+            self._end()
 
     async def _watch(self) -> None:
         """Count threads, in the thread of the client; give up when there have long been none."""
@@ -192,7 +231,7 @@ class Engine:
 
     def _submit(self, runs: Sequence[int], points: np.ndarray) -> Future:
         targets = self._points.targets(points, self._job)
-        future = self._client.submit(run_block, runs, targets, pure=False)
+        future = self._client.submit(run_block, self._plugin, runs, targets, pure=False)
         self._futures.add(future)
         return future
 
@@ -218,6 +257,11 @@ class Engine:
         if future.status == "cancelled" or self._client.status != "running":
             raise UserError(f"{self._lost}; {GOES_ON}")
         return future.exception()
+
+
+def _is_of_connection(error: Exception) -> bool:
+    """Whether an error is of Dask's connections: errors of the system have numbers, too."""
+    return isinstance(error, CONNECTION) and not getattr(error, "errno", None)
 
 
 def _joined(parts: Sequence[Rows]) -> Rows:

@@ -1,5 +1,6 @@
 """What a worker of Dask gets once, also if it starts later or again, and what it then runs."""
 
+import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,34 +10,51 @@ from distributed import Worker, WorkerPlugin, get_worker
 from cosim.campaign.job import Job
 from cosim.campaign.runs import Rows, Workshop
 
-NAME = "cosim-campaign"
-
 
 class Plugin(WorkerPlugin):
-    """FMUs and job on a worker."""
+    """FMUs and job of a campaign on a worker, which may have those of others, too."""
 
-    name = NAME
-
-    def __init__(self, job: Job, archives: Mapping[str, bytes]) -> None:
-        self._job, self._archives = job, archives
-        self.workshop: Workshop | None = None
+    def __init__(self, name: str, job: Job, archives: Mapping[str, bytes]) -> None:
+        self.name, self._job, self._archives = name, job, archives
+        self._workshop: Workshop | None = None
+        self._lock = threading.Lock()
+        self._users = 0  # the worker, and threads that make runs
 
     def setup(self, worker: Worker) -> None:
         """Unpack the FMUs beside the worker's own files."""
-        self.workshop = Workshop(self._job, self._archives, Path(worker.local_directory))
+        self._workshop = Workshop(self._job, self._archives, Path(worker.local_directory))
+        self._users = 1
 
     def teardown(self, worker: Worker) -> None:
-        """Remove them."""
-        if self.workshop is not None:
-            self.workshop.close()
+        """Remove them, after the runs that are under way."""
+        if self._workshop is not None:
+            self._leave()
 
-    def __getstate__(self) -> tuple[Job, Mapping[str, bytes]]:
-        return self._job, self._archives
+    def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
+        """Make runs in this thread."""
+        with self._lock:
+            if not self._users:
+                raise RuntimeError("the campaign has ended")
+            self._users += 1
+        try:
+            return self._workshop.rows(numbers, points)
+        finally:
+            self._leave()
 
-    def __setstate__(self, state: tuple[Job, Mapping[str, bytes]]) -> None:
+    def _leave(self) -> None:
+        with self._lock:
+            self._users -= 1
+            is_last = not self._users
+        if is_last:
+            self._workshop.close()
+
+    def __getstate__(self) -> tuple[str, Job, Mapping[str, bytes]]:
+        return self.name, self._job, self._archives
+
+    def __setstate__(self, state: tuple[str, Job, Mapping[str, bytes]]) -> None:
         self.__init__(*state)
 
 
-def run_block(numbers: Sequence[int], points: np.ndarray) -> Rows:
-    """Make runs with the values (runs, targets) of the job's targets."""
-    return get_worker().plugins[NAME].workshop.rows(numbers, points)
+def run_block(plugin: str, numbers: Sequence[int], points: np.ndarray) -> Rows:
+    """Make runs with the values (runs, targets) of the targets of a plugin's job."""
+    return get_worker().plugins[plugin].rows(numbers, points)

@@ -3,15 +3,22 @@
 long_kills.py kills workers and fills the disk.
 """
 
+import errno
 import os
+import re
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from distributed import Client
 
 from cosim.campaign import bases, campaign_file, engine, planning
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
+from cosim.campaign.worker import Plugin
 from cosim.errors import UserError
 from tests.campaign.files import write
 from tests.campaign.hosts import LOOPBACK
@@ -25,7 +32,10 @@ from tests.campaign.processes import (
     start,
     table,
     wait_for,
+    workers,
 )
+
+Made = tuple[engine.Engine, Results]
 
 RUNS, BLOCK = 240, 6
 CHANGES = [("runs = 40", f"runs = {RUNS}"), ("block = 8", f"block = {BLOCK}")]
@@ -79,17 +89,168 @@ def test_a_campaign_whose_workers_are_gone_ends(
 ) -> None:
     monkeypatch.setattr(engine, "PATIENCE", 1)
     monkeypatch.setattr(engine, "COUNT_EVERY", 100)
-    campaign = campaign_file.read(file)
     with (
-        bases.opened(campaign, None) as base,
         cluster(LOOPBACK, [LOOPBACK]) as (address, _, arms),
         engine.cluster(address, None, tmp_path) as client,
     ):
         registered(arms[0])
+        with (
+            engine_of(client, file, tmp_path) as (made, _),
+            pytest.raises(UserError, match="has no workers any more; the same command goes on"),
+        ):
+            made.run(range(RUNS // BLOCK), lambda _: kill_group(arms[0]))
+
+
+@contextmanager
+def engine_of(client: Client, file: Path, folder: Path) -> Iterator[Made]:
+    """An engine and its results."""
+    campaign = campaign_file.read(file)
+    with bases.opened(campaign, None) as base:
         job = planning.plan(campaign, base, file)
         points = Points(campaign, planning.constants(campaign, base))
-        results = Results(tmp_path, campaign, job, "")
+        results = Results(folder, campaign, job, file.read_text())
         results.begin()
-        made = engine.Engine(client, campaign, job, base.archives, points, results)
-        with pytest.raises(UserError, match="has no workers any more; the same command goes on"):
-            made.run(range(campaign.blocks), lambda _: kill_group(arms[0]))
+        yield engine.Engine(client, campaign, job, base.archives, points, results), results
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Two short campaigns over the same model, which keep different variables of it."""
+    other = [("seed = 3", "seed = 4"), ('final = ["q1", "q2"]', 'final = ["q2", "q1"]')]
+    folders = (tmp_path_factory.mktemp(name) for name in ("first", "second"))
+    return tuple(write(folder, changes=c) for folder, c in zip(folders, ([], other), strict=True))
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Client, Path]]:
+    """A cluster of one worker, and the folder of its files."""
+    folder = tmp_path_factory.mktemp("workers")
+    with engine.cluster(None, 1, folder) as client:
+        yield client, folder
+
+
+def test_campaigns_share_workers(
+    small: tuple[Path, Path], local: tuple[Client, Path], tmp_path: Path
+) -> None:
+    client, folder = local
+    tables = []
+    for i, file in enumerate(small):
+        with engine_of(client, file, tmp_path / f"alone_{i}") as (made, results):
+            made.run(range(5), lambda _: None)
+            tables.append(results.digest())
+    with (
+        engine_of(client, small[0], tmp_path / "first") as (first, first_results),
+        engine_of(client, small[0], tmp_path / "same") as (same, same_results),
+        engine_of(client, small[1], tmp_path / "other") as (other, other_results),
+    ):
+        first.run(range(2), lambda _: None)
+        first_results.block(1)
+        # each run takes only what is its own from the worker
+        other.run(range(3), lambda _: None)
+        same.run(range(5), lambda _: None)
+        assert same_results.digest() == tables[0]
+    for name, file in (("first", small[0]), ("other", small[1])):
+        with engine_of(client, file, tmp_path / name) as (again, results):
+            again.run(results.missing(), lambda _: None)
+    assert [first_results.digest(), other_results.digest()] == tables
+    assert not list(folder.glob("**/cosim-*"))
+
+
+def test_a_stopped_campaign_leaves_nothing_on_workers(
+    small: tuple[Path, Path], local: tuple[Client, Path], tmp_path: Path
+) -> None:
+    client, folder = local
+
+    def stop(_: int) -> None:
+        assert list(folder.glob("**/cosim-*"))
+        raise KeyboardInterrupt
+
+    with engine_of(client, small[0], tmp_path) as (made, _), pytest.raises(KeyboardInterrupt):
+        made.run(range(5), stop)
+    wait_for(lambda: not list(folder.glob("**/cosim-*")))
+
+
+def test_an_error_of_the_system_is_not_one_of_the_scheduler(
+    small: tuple[Path, Path], local: tuple[Client, Path], tmp_path: Path
+) -> None:
+    def fail(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with (
+        engine_of(local[0], small[0], tmp_path) as (made, _),
+        pytest.raises(OSError, match=re.escape(os.strerror(errno.ENOSPC))),
+    ):
+        made.run(range(5), fail)
+
+
+def test_what_is_wrong_at_a_worker_is_said(
+    small: tuple[Path, Path], local: tuple[Client, Path], tmp_path: Path
+) -> None:
+    client, folder = local
+    (there,) = (path for path in folder.glob("dask-scratch-space/worker-*") if path.is_dir())
+    away = there.rename(folder / "away")
+    try:
+        with (
+            pytest.raises(UserError, match="a worker cannot run this: .*No such file"),
+            engine_of(client, small[0], tmp_path),
+        ):
+            pass
+    finally:
+        away.rename(there)
+
+
+def test_a_worker_that_is_killed_as_it_starts_is_made_again(
+    small: tuple[Path, Path], tmp_path: Path
+) -> None:
+    process = start(small[0], tmp_path, "--workers", 2)
+    wait_for(lambda: workers(process))
+    os.kill(workers(process)[0], signal.SIGKILL)
+    code, _, err = finish(process)
+    assert code == 0, err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_campaign_that_is_stopped_as_it_starts_says_only_so(
+    ending: signal.Signals, small: tuple[Path, Path], tmp_path: Path
+) -> None:
+    process = start(small[0], tmp_path, "--workers", 2)
+    wait_for(lambda: workers(process))
+    # a terminal sends these to all processes of the group
+    (os.kill if ending == signal.SIGTERM else os.killpg)(process.pid, ending)
+    code, _, err = finish(process)
+    assert code == 128 + ending
+    assert err.splitlines()[0] == "stopped; the same command goes on from what is there"
+    assert err.splitlines()[1:] == (["interrupted"] if ending == signal.SIGINT else [])
+    assert not list(tmp_path.glob(".*"))
+
+
+class Shop:
+    """Stands for the FMUs of a worker."""
+
+    closed = False
+
+    def __init__(self, *_: object) -> None:
+        pass
+
+    def rows(self, plugin: Plugin, _: object) -> bool:
+        """End the campaign during the runs; whether the FMUs are still there."""
+        plugin.teardown(None)
+        return not self.closed
+
+    def close(self) -> None:
+        """Remove the FMUs."""
+        self.closed = True
+
+
+def test_fmus_stay_until_runs_under_way_have_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shop = Shop()
+    monkeypatch.setattr("cosim.campaign.worker.Workshop", lambda *_: shop)
+    plugin = Plugin("name", None, {})
+    plugin.setup(SimpleNamespace(local_directory=tmp_path))
+    assert plugin.rows(plugin, None)
+    assert shop.closed
+    with pytest.raises(RuntimeError, match="the campaign has ended"):
+        plugin.rows(plugin, None)

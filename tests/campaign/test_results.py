@@ -4,6 +4,8 @@ import dataclasses
 import errno
 import json
 import os
+import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from cosim.campaign.campaign_file import MAX_RUNS
 from cosim.campaign.results import Results
 from cosim.campaign.runs import Rows
 from cosim.errors import UserError
@@ -22,15 +25,21 @@ class Folder:
     """Results of a campaign whose rows are made up."""
 
     def __init__(self, given, job, points, folder: Path) -> None:
-        self.given, self.points = given, points
+        self.given, self.job, self.points = given, job, points
         self.results = Results(folder, given, job, "text")
 
-    def write(self, block: int) -> None:
+    def write(self, block: int, changed: str = "") -> None:
+        """Write a block, with a change in what is given by name."""
         runs = self.given.block_range(block)
-        numbers = np.arange(4.0) + np.array(runs)[:, None]
+        points, numbers = self.points.of(runs), np.arange(4.0) + np.array(runs)[:, None]
+        failures = ["why" if run == 5 else "" for run in runs]
+        if changed == "failure":
+            failures[3] = "x"
+        elif changed:
+            {"points": points, "measures": numbers}[changed][3, 1] += 1
         record = {run: np.full((201, 4), float(run)) for run in (3, 17) if run in runs}
-        rows = Rows(np.array(runs), numbers, ["why" if r == 5 else "" for r in runs], record)
-        self.results.write(block, self.points.of(runs), rows)
+        rows = Rows(np.array(runs), numbers, failures, record)
+        self.results.write(block, points, rows)
 
 
 @pytest.fixture
@@ -62,13 +71,8 @@ def test_the_hash_is_that_of_all_values(folder: Folder) -> None:
     before = folder.results.digest()
     folder.write(2)
     assert folder.results.digest() == before
-    path = folder.results.block_path(2)
-    table = pq.read_table(path)
-    for name in ("m2", "failure", "run", "maximum(dq1)"):
-        values = table[name].to_pylist()
-        values[3] = "x" if name == "failure" else values[3] + 1
-        place = table.column_names.index(name)
-        pq.write_table(table.set_column(place, table.schema.field(name), [values]), path)
+    for changed in ("points", "measures", "failure"):
+        folder.write(2, changed)
         assert folder.results.digest() != before
 
 
@@ -82,6 +86,130 @@ def test_what_is_missing_or_damaged_is_run_again(folder: Folder) -> None:
     assert folder.results.missing() == [1, 2, 3]
 
 
+def test_another_block_by_the_name_of_one_is_run_again(folder: Folder) -> None:
+    for block in range(5):
+        folder.write(block)
+    shutil.copy(folder.results.block_path(0), folder.results.block_path(1))
+    assert folder.results.missing() == [1]
+    with pytest.raises(UserError, match=r"block_0000000001\.parquet: is missing or damaged"):
+        folder.results.table(["m2"])
+
+
+def test_damage_is_found_by_each_reading(folder: Folder) -> None:
+    for block in range(5):
+        folder.write(block)
+    right = folder.results.block(2)
+    path = folder.results.block_path(2)
+    content = path.read_bytes()
+    places = range(4, len(content) - 8, 11)  # between the magic numbers of the format
+    found = 0
+    for place in places:
+        changed = bytearray(content)
+        changed[place] ^= 1 << place % 8
+        path.write_bytes(changed)
+        if folder.results.missing() == [2]:
+            found += 1
+            with pytest.raises(UserError, match=re.escape(f"{path}: is missing or damaged")):
+                folder.results.digest()
+        else:
+            assert folder.results.block(2).equals(right)
+    assert found > len(places) / 2
+    path.write_bytes(bytes(~byte & 0xFF for byte in content))
+    folder.results.begin()
+    assert folder.results.missing() == [2]
+
+
+def test_a_block_without_its_trajectories_is_run_again(folder: Folder) -> None:
+    for block in range(5):
+        folder.write(block)
+    assert folder.results.missing() == []
+    folder.results.trajectory_path(3).unlink()
+    path = folder.results.trajectory_path(17)
+    path.write_bytes(path.read_bytes()[:-1])
+    assert folder.results.missing() == [0, 2]
+    folder.write(0)
+    folder.write(2, "failure")  # of run 19
+    assert folder.results.missing() == []
+
+
+def test_failed_runs_have_no_trajectories(tmp_path: Path) -> None:
+    given = campaign(tmp_path, changes=[("trajectories = [3, 17]", "trajectories = [5]")])
+    with runner(given, tmp_path) as (_, job, points):
+        made = Folder(given, job, points, tmp_path / "output")
+        made.results.begin()
+        made.write(0)
+    assert made.results.missing() == [1, 2, 3, 4]
+
+
+def test_blocks_of_another_campaign_are_refused(folder: Folder) -> None:
+    folder.write(0)
+    given, job = folder.given, folder.job
+    manifest = folder.results.folder / "manifest.json"
+    content = manifest.read_bytes()
+    manifest.unlink()
+    other = Results(folder.results.folder, given, job, "another text")
+    with pytest.raises(UserError, match=r"block_0000000000\.parquet: is a block of another"):
+        other.begin()
+    assert not manifest.exists()
+    folder.results.begin()  # those of its own are taken
+    assert manifest.read_bytes() == content
+    assert folder.results.missing() == [1, 2, 3, 4]
+    pq.write_table(folder.results.block(0).replace_schema_metadata(), other.block_path(7))
+    with pytest.raises(UserError, match="is a block of another"):
+        folder.results.begin()
+
+
+@pytest.mark.parametrize("has_links", [True, False])
+def test_of_two_campaigns_that_begin_at_once_one_gets_the_folder(
+    has_links: bool, folder: Folder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new = folder.results.folder.parent / "new"
+    given, job = folder.given, folder.job
+    first, same, other = (Results(new, given, job, text) for text in ("text", "text", "other"))
+    link, is_first = os.link, iter([True])
+
+    def meanwhile(source: Path, target: Path) -> None:
+        """The first begins just before the other one writes its manifest."""
+        if not has_links:
+            raise PermissionError
+        if next(is_first, False):
+            with monkeypatch.context() as process:
+                process.setattr(os, "getpid", lambda: 1)
+                first.begin()
+        link(source, target)
+
+    monkeypatch.setattr(os, "link", meanwhile)
+    if has_links:
+        with pytest.raises(UserError, match="has another campaign"):
+            other.begin()
+    first.begin()
+    same.begin()
+    with pytest.raises(UserError, match="has another campaign"):
+        other.begin()
+    assert json.loads((new / "manifest.json").read_text())["campaign"] == "text"
+    assert not list(new.glob(".*"))
+
+
+@pytest.mark.parametrize("place", ["file", "/proc/x"])
+def test_a_folder_that_cannot_be_written_is_said_as_it_is(
+    place: str, folder: Folder, tmp_path: Path
+) -> None:
+    if place == "/proc/x" and not Path("/proc/self").exists():
+        pytest.skip("no such file system here")
+    (tmp_path / "file").touch()
+    results = Results(tmp_path / place, folder.given, folder.job, "text")
+    with pytest.raises(UserError, match="cannot be written: (Not a dir|No such file)") as caught:
+        results.begin()
+    assert "goes on" not in str(caught.value)
+
+
+def test_names_are_in_the_order_of_the_runs(folder: Folder) -> None:
+    numbers = [0, 9, 10, 10**7 - 1, 10**7, MAX_RUNS - 1]
+    for path in (folder.results.block_path, folder.results.trajectory_path):
+        names = [path(number).name for number in numbers]
+        assert names == sorted(names)
+
+
 @pytest.mark.parametrize("key", ["campaign", "seed", "fmu_sha256", "versions"])
 def test_results_of_another_campaign_are_refused(key: str, folder: Folder) -> None:
     path = folder.results.folder / "manifest.json"
@@ -90,16 +218,17 @@ def test_results_of_another_campaign_are_refused(key: str, folder: Folder) -> No
     path.write_text(json.dumps(manifest | {key: "other"}))
     with pytest.raises(UserError, match=f"has another {key}"):
         folder.results.begin()
-    path.write_text("{")
-    with pytest.raises(UserError, match="cannot be read"):
-        folder.results.begin()
+    for damaged in ("{", "[" * 10**5, "[]"):
+        path.write_text(damaged)
+        with pytest.raises(UserError, match=r"manifest\.json: .* give another folder by --output"):
+            folder.results.begin()
 
 
 def test_leftovers_of_killed_processes_are_removed(folder: Folder) -> None:
     gone, here = 2**22 + 1, os.getpid()  # above the largest number of a process in Linux
-    left = [folder.results.folder / "blocks" / f".{gone}.block_0000001.parquet"]
+    left = [folder.results.folder / "blocks" / f".{gone}.block_0000000001.parquet"]
     left.append(folder.results.folder / f".{gone}.workers" / "file")
-    used = folder.results.folder / "blocks" / f".{here}.block_0000001.parquet"
+    used = folder.results.folder / "blocks" / f".{here}.block_0000000001.parquet"
     for path in (*left, used):
         path.parent.mkdir(exist_ok=True)
         path.touch()
@@ -122,7 +251,7 @@ def test_a_full_disk_leaves_no_part_of_a_file(
     with pytest.raises(UserError, match="No space left on device; the same command goes on"):
         folder.write(1)
     there = [path.name for path in (folder.results.folder / "blocks").iterdir()]
-    assert there == ["block_0000000.parquet"]
+    assert there == ["block_0000000000.parquet"]
     monkeypatch.setattr(pq, "write_table", written)
     folder.write(1)
     assert folder.results.missing() == [2, 3, 4]
