@@ -45,6 +45,12 @@ class Results:
 
     # ---- The folder ------------------------------------------------------------------------------
 
+    def check(self) -> None:
+        """Refuse a folder that holds results of another campaign, by a UserError."""
+        path = self.folder / MANIFEST
+        if path.exists():
+            self._check_manifest(path, self._manifest())
+
     def begin(self) -> None:
         """Make the folder, or check that it holds results of the same campaign.
 
@@ -55,8 +61,7 @@ class Results:
         """
         wanted = self._manifest()
         path = self.folder / MANIFEST
-        if path.exists():
-            self._check_manifest(path, wanted)
+        self.check()
         self._check_room()
         try:
             for name in (BLOCKS, TRAJECTORIES):
