@@ -120,7 +120,7 @@ def _add_campaign(commands: argparse._SubParsersAction) -> None:
         help="run a scenario or a system many times, over parameters",
         description="Runs what is missing of a campaign, on a cluster of Dask, and writes tables "
         "and a page. A campaign that was stopped goes on. Exit code: 0 all runs are there, "
-        "2 wrong use or stopped.",
+        "1 the run of --replay fails, 2 wrong use or stopped.",
     )
     campaign.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
     campaign.add_argument(

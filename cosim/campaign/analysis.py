@@ -1,7 +1,8 @@
 """What a campaign's table says: quantiles, worst cases, failures, Sobol' indices."""
 
+import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +15,14 @@ QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 WORST = 10  # runs that are listed
 RESAMPLES = 1000  # of the bootstrap
 CONFIDENCE = 0.95
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\.?\d[\d.]*(?:[eE][-+]?\d+)?|(?:inf|nan)\b)")
 
 
 @dataclass(frozen=True)
 class Failure:
-    """A reason for which runs have failed."""
+    """Runs that have failed for the same reason, whatever numbers it has."""
 
-    reason: str
+    reason: str  # of the first one
     count: int
     run: int  # the first one
 
@@ -49,10 +51,17 @@ def worst(values: np.ndarray) -> list[int]:
     return numbers[order[:WORST]].tolist()
 
 
-def failures(reasons: Sequence[str]) -> list[Failure]:
+def failures(reasons: Iterable[str]) -> list[Failure]:
     """Reasons of the runs that failed, the most frequent first."""
-    counts = Counter(reason for reason in reasons if reason)
-    return [Failure(reason, n, list(reasons).index(reason)) for reason, n in counts.most_common()]
+    counts: Counter[str] = Counter()
+    firsts: dict[str, tuple[str, int]] = {}
+    for run, reason in enumerate(reasons):
+        if reason:
+            kind = NUMBER.sub("0", reason)
+            counts[kind] += 1
+            firsts.setdefault(kind, (reason, run))
+    ordered = ((firsts[kind], count) for kind, count in counts.most_common())
+    return [Failure(reason, count, run) for (reason, run), count in ordered]
 
 
 def groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
@@ -62,7 +71,7 @@ def groups(campaign: Campaign, values: np.ndarray) -> np.ndarray:
 
 
 def indices(campaign: Campaign, values: np.ndarray) -> list[Index]:
-    """Sobol' indices of `values`, (runs,); none if they do not vary or most runs have failed.
+    """Sobol' indices of `values`, (runs,); none if they do not vary or hardly a group is complete.
 
     First-order and total indices with the confidence `CONFIDENCE`, by SALib.
     """

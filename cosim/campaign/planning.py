@@ -20,6 +20,7 @@ from cosim.campaign.measures import (
 )
 from cosim.errors import UserError, did_you_mean, one_line
 from cosim.model import INPUTS, Value, Variable, WrongValueError
+from cosim.texts import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table
 MAX_RECORDED = 100_000_000  # numbers that a run records
@@ -236,6 +237,11 @@ class _Planner:
 
     def check_columns(self, measures: Sequence[Measure]) -> None:
         """Columns that the page asks for are there, and no name stands for two."""
+        places = {name: f"[parameters.{name}]" for name in self.campaign.parameters}
+        places |= {name: f"[derived] {name}" for name in self.campaign.derived}
+        for name in (RUN, FAILURE):
+            if name in places:
+                self.fail(places[name], "every table has a column of that name")
         columns = columns_of(self.campaign, measures)
         for column in columns:
             if columns.count(column) > 1:
@@ -253,6 +259,32 @@ class _Planner:
 def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:
     """Columns of the table that hold numbers."""
     return [*campaign.parameters, *campaign.derived, *(measure.column for measure in measures)]
+
+
+def units(campaign: Campaign, base: Base, measures: Iterable[Measure]) -> dict[str, str]:
+    """Units of the columns of numbers; empty texts where there is none, or it is not known."""
+
+    def of(name: str) -> str:
+        try:
+            found = base.variable(name)[1].unit
+        except WrongValueError:  # only derived values use it
+            return ""
+        return "" if found == "1" else unit(found)
+
+    found = {name: of(name) for name in (*campaign.parameters, *campaign.derived)}
+    for measure in measures:
+        match measure.kind:
+            case "settling":
+                text = "s"
+            case "crossings":
+                text = ""
+            case "integral":
+                text = of(measure.variables[0])
+                text = f"({text})·s" if "/" in text else f"{text}·s".strip("·")
+            case _:
+                text = "1/s" if measure.kind == LYAPUNOV else of(measure.variables[0])
+        found[measure.column] = text
+    return found
 
 
 def constants(campaign: Campaign, base: Base) -> dict[str, float]:

@@ -1,8 +1,11 @@
 """Runs one run of a campaign again, and writes all its Real outputs and a page with its motion."""
 
 import dataclasses
+import multiprocessing
+import signal
+from collections.abc import Mapping
+from multiprocessing.connection import Connection
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -12,21 +15,25 @@ from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Job
 from cosim.campaign.planning import plan
 from cosim.campaign.points import Points
-from cosim.campaign.runs import Runner, open_fmus
+from cosim.campaign.runs import Rows, Runner, open_fmus
 from cosim.errors import UserError
+from cosim.interruption import temporary_folder
 from cosim.report import assets, motion, pages
 from cosim.report.motion import Recorded
 from cosim.report.overview import RAN
-from cosim.report.pages import RunPage, Table
+from cosim.report.pages import INDEX, RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData, thinned
 
 FOLDER = "replays"
+DIED = "the run takes its process down"
 
 
 def replay(
     campaign: Campaign, base: Base, points: Points, run: int, folder: Path, command: str
-) -> list[str]:
-    """Run again; lines that say what came out, files among them. `command` does it again.
+) -> tuple[list[str], bool]:
+    """Run again; lines that say what came out, files among them, and whether it ended.
+
+    The page shows `command`, which does it again.
 
     Raises
     ------
@@ -38,15 +45,11 @@ def replay(
     job = plan(campaign, base, "replay", base.real_outputs())
     job = dataclasses.replace(job, trajectories=frozenset([run]))
     values = points.of(range(run, run + 1))
-    with (
-        TemporaryDirectory(prefix="cosim-") as temporary,
-        open_fmus(base.archives, Path(temporary)) as fmus,
-        Runner(job, fmus) as runner,
-    ):
-        rows = runner.rows([run], points.targets(values, job))
+    rows = _apart(job, base.archives, run, points.targets(values, job))
     given = dict(zip(points.names, values[0].tolist(), strict=True))
-    if rows.failures[0]:
-        return [*_lines(given), f"failed: {rows.failures[0]}"]
+    failure = rows.failures[0] if rows else DIED
+    if failure:
+        return [*_lines(given), f"failed: {failure}"], False
     columns = [measure.column for measure in job.measures]
     kept = dict(zip(columns, rows.measures[0].tolist(), strict=True))
     record = rows.trajectories[run]
@@ -67,9 +70,46 @@ def replay(
         csv=table.name,
         csv_note="It has all Real outputs.",
         again=command,
+        overview=(folder / INDEX).exists(),
     )
     written = pages.write_run(table.with_suffix(".html"), page)
-    return [*_lines(given), *_lines(kept), str(table), str(written)]
+    return [*_lines(given), *_lines(kept), str(table), str(written)], True
+
+
+def _apart(job: Job, archives: Mapping[str, bytes], run: int, targets: np.ndarray) -> Rows | None:
+    """Make a run in another process, which it may take down: None then."""
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=_serve, args=(there,), daemon=True)
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)  # in the other one: this one ends it
+    try:
+        process.start()
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    with temporary_folder() as folder:
+        try:
+            there.close()
+            here.send((job, archives, folder, run, targets))
+            rows = here.recv()
+        except (EOFError, ConnectionError):
+            return None
+        finally:
+            process.kill()
+            process.join()
+    if isinstance(rows, UserError):
+        raise rows
+    return rows
+
+
+def _serve(connection: Connection) -> None:
+    """Receive a run and send its rows, or the user's error."""
+    job, archives, folder, run, targets = connection.recv()
+    try:
+        with open_fmus(archives, folder) as fmus, Runner(job, fmus) as runner:
+            rows = runner.rows([run], targets)
+    except UserError as error:
+        rows = error
+    connection.send(rows)
 
 
 def _lines(named: dict[str, float]) -> list[str]:

@@ -55,6 +55,13 @@ class Results:
 
     # ---- The folder ------------------------------------------------------------------------------
 
+    def check(self) -> None:
+        """Refuse a folder that holds results of another campaign, by a UserError."""
+        path = self.folder / MANIFEST
+        if path.exists():
+            self._check_manifest(path)
+        self._check_blocks()
+
     def begin(self) -> None:
         """Make the folder, or check that it holds results of the same campaign.
 
@@ -65,9 +72,7 @@ class Results:
         """
         check_writable(self.folder)
         path = self.folder / MANIFEST
-        if path.exists():
-            self._check_manifest(path)
-        self._check_blocks()
+        self.check()
         self._check_room()
         try:
             for name in (BLOCKS, TRAJECTORIES):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim import project
-from cosim.errors import UserError
+from cosim.errors import UserError, one_line
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 
@@ -39,13 +39,14 @@ def run(options: argparse.Namespace) -> int:
         job = planning.plan(campaign, base, options.file)
         points = Points(campaign, planning.constants(campaign, base))
         folder = _folder(options, campaign)
-        if options.replay is not None:
-            again = f"{_command(options)} --replay {options.replay}"
-            lines = replay.replay(campaign, base, points, options.replay, folder, again)
-            print(*lines, sep="\n")
-            return 0
         text = Path(options.file).read_text(encoding="utf-8")
         results = Results(folder, campaign, job, text)
+        if options.replay is not None:
+            results.check()
+            again = f"{_command(options)} --replay {options.replay}"
+            lines, ended = replay.replay(campaign, base, points, options.replay, folder, again)
+            print(*lines, sep="\n")
+            return 0 if ended else 1
         runs.check(job, base.archives, base.path)
         results.begin()
         _run_missing(options, _Plan(campaign, base, job, points, results))
@@ -57,19 +58,33 @@ def run(options: argparse.Namespace) -> int:
         if campaign.count > page.MOST:
             print(f"results: {from_here(folder)}, no page of more than {page.MOST} runs")
             return 0
-        with written(folder):
-            index = page.write(campaign, job, results, _command(options), digest)
+        units = planning.units(campaign, base, job.measures)
+        try:
+            with written(folder):
+                index = page.write(campaign, job, results, units, _command(options), digest)
+        except UserError:
+            raise
+        except Exception as error:  # the libraries that draw raise what they like
+            raise UserError(
+                f"{folder}: the page cannot be written: {type(error).__name__}: {one_line(error)}; "
+                "the results are complete"
+            ) from error
     print(f"page: {from_here(index)}")
     return 0
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the campaign, in the present folder."""
-    parts = ["./run.sh", "campaign", str(from_here(options.file))]
+    """What to type for the campaign, in the project's folder."""
+    parts = ["./run.sh", "campaign", _from_root(options.file)]
     for name in ("fmu", "output"):
         value = getattr(options, name)
-        parts += [] if value is None else [f"--{name}", str(value)]
+        parts += [] if value is None else [f"--{name}", _from_root(value)]
     return shlex.join(parts)
+
+
+def _from_root(path: Path) -> str:
+    path = path.absolute()
+    return str(path.relative_to(project.ROOT) if path.is_relative_to(project.ROOT) else path)
 
 
 def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:

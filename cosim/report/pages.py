@@ -28,7 +28,14 @@ _templates.filters |= {
     "number": texts.number,
     "short": texts.short,
 }
-_templates.tests["numeric"] = lambda cell: NUMERIC.fullmatch(str(cell)) is not None
+_templates.tests |= {
+    "numeric": lambda cell: NUMERIC.fullmatch(str(cell)) is not None,
+    "command": lambda cell: isinstance(cell, Command),
+}
+
+
+class Command(str):
+    """What to type, as a cell of a table."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,7 @@ class RunPage:
     warning: str = ""  # what plots and animation do not show
     diagram: tuple[str, str] | None = None  # file name beside the page, and what it shows
     again: str = ""  # the command that runs it again
+    overview: bool = True  # whether there is one
 
 
 def thinned(shown: int, count: int) -> str:

@@ -93,3 +93,13 @@ def test_quantiles_leave_out_failed_runs() -> None:
 def test_failures_are_counted_by_reason() -> None:
     found = analysis.failures(["", "a", "b", "", "b"])
     assert [(x.reason, x.count, x.run) for x in found] == [("b", 2, 2), ("a", 1, 1)]
+
+
+def test_reasons_that_differ_in_numbers_are_one() -> None:
+    many = [f"m2 = {-1.5e-3 * i} is refused at t = {i / 8}s: 1e-09 to inf" for i in range(1000)]
+    found = analysis.failures([*many, "m1 = 2 is refused", "m1 = -.5e+7 is refused", "m1 = nan"])
+    assert [(x.reason, x.count, x.run) for x in found] == [
+        (many[0], 1000, 0),
+        ("m1 = 2 is refused", 2, 1000),
+        ("m1 = nan", 1, 1002),
+    ]

@@ -95,6 +95,14 @@ MISTAKES = {
         [("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')],
         "'open(1)': expected",
     ),
+    "run": (
+        [("[keep]", '[parameters.run]\nuniform = [0.0, 1.0]\n[derived]\ndq1 = "run"\n[keep]')],
+        "[parameters.run]: every table has a column of that name",
+    ),
+    "failure": (
+        [("[keep]", '[derived]\nfailure = "1"\ndq1 = "failure"\n[keep]')],
+        "[derived] failure: every table has a column of that name",
+    ),
     "set twice": ([("[keep]", "[set]\nm2 = 1.0\n[keep]")], "[set] m2: is in [parameters]"),
     "set too low": ([("[keep]", "[set]\nm1 = -1.0\n[keep]")], "[set] m1: expected at least 0.0 kg"),
     "no time": ([("stop = 1.0", "stop = -1.0")], "[time] stop: expected a time after start"),

@@ -1,9 +1,13 @@
 """The command: pages, replays, and what others do not import."""
 
+import argparse
 import json
 import re
+import shlex
+import shutil
 import subprocess
 import sys
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +15,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim import __main__ as cli
+from cosim.campaign import figures, page
+from cosim.commands.campaign import _command
 from tests.campaign.files import write
 from tests.campaign.processes import ENVIRONMENT, finish, start, table
 from tests.support.paths import ROOT
@@ -36,19 +42,93 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_page_shows_it_all(done: Path) -> None:
-    page = (done / "output" / "index.html").read_text(encoding="utf-8")
-    for name in re.findall(r'<img class="diagram" src="([^"]+)"', page):
+    page = text_of(done / "output" / "index.html")
+    pictures = re.findall(r'<img src="([^"]+)"', page)
+    assert set(pictures) == {"distributions.png", "indices.png", "map_0.png"}
+    for name in pictures:
         assert (done / "output" / name).read_bytes().startswith(b"\x89PNG")
-    assert {"distributions.png", "indices.png", "map_0.png"} == set(
-        re.findall(r'<img class="diagram" src="([^"]+)"', page)
-    )
     assert (done / "hash").read_text() in page
     found = pq.read_table(done / "output" / "blocks")
     worst = int(np.nanargmax(found["maximum(dq1)"].to_numpy()))
-    first = re.search(r"campaign (.*) --replay (\d+)</code>", page)
-    assert int(first[2]) == found["run"][worst].as_py()
+    assert commands(page)[1][-2:] == ["--replay", str(found["run"][worst].as_py())]
     failed = [run for run, why in zip(found["run"], found["failure"], strict=True) if why.as_py()]
-    assert f"{len(failed)} runs failed" in page if failed else "runs failed" not in page
+    assert f"{len(failed)} of 32 runs failed" in page if failed else "runs failed" not in page
+
+
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
+
+
+def commands(page: str) -> list[list[str]]:
+    """Commands that a page shows, split as a shell does it."""
+    found = [unescape(re.sub("<.*?>", "", code)) for code in re.findall("<code>.*?</code>", page)]
+    return [shlex.split(text) for text in found if text.startswith("./run.sh")]
+
+
+def in_this_process(done: Path, output: Path, *options: str) -> int:
+    return cli.main(["campaign", str(done / "test.toml"), "--output", str(output), *options])
+
+
+def copied(done: Path, folder: Path) -> Path:
+    return Path(shutil.copytree(done / "output", folder / "output"))
+
+
+def test_its_commands_work_in_the_projects_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "John's runs"
+    folder.mkdir()
+    changes = [("runs = 40", 'runs = 2\nworst = ["m2"]'), ("[3, 17]", "[0]")]
+    write(folder, changes=changes)
+    program = [sys.executable, "-P", "-m", "cosim"]
+    arguments = ["campaign", "test.toml", "--output", "the output", "--workers", "1"]
+    subprocess.run([*program, *arguments], cwd=folder, env=ENVIRONMENT, check=True)
+    page = folder / "the output" / "index.html"
+    first, second, *_ = commands(text_of(page))
+    page.unlink()
+    for command in (first, second):
+        subprocess.run([*program, *command[1:]], cwd=ROOT, env=ENVIRONMENT, check=True)
+    assert page.exists() and len(list(page.parent.glob("replays/run_?.csv"))) == 1
+
+
+def test_commands_of_files_of_the_project_have_short_paths(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT / "models")
+    given = {"file": Path("machine/campaigns/tolerance.toml"), "fmu": None}
+    options = argparse.Namespace(**given, output=ROOT / "build" / "a b")
+    assert _command(options) == (
+        "./run.sh campaign models/machine/campaigns/tolerance.toml --output 'build/a b'"
+    )
+
+
+def test_an_error_of_the_page_loses_no_results(
+    done: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    output = copied(done, tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(figures, "distributions", lambda _: 1 / 0)
+        assert in_this_process(done, output) == 2
+    error = capsys.readouterr().err
+    assert "the page cannot be written: ZeroDivisionError" in error
+    assert "the results are complete" in error
+    assert in_this_process(done, output) == 0
+    assert table(capsys.readouterr().out) == (done / "hash").read_text()
+
+
+def test_pictures_have_so_many_columns_at_most(
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page, "DRAWN", 2)
+    output = copied(done, tmp_path)
+    assert in_this_process(done, output) == 0
+    text = text_of(output / "index.html")
+    assert text.count("The picture leaves out maximum(dq1) and what is below it") == 2
+    heights = [height(folder / "indices.png") for folder in (done / "output", output)]
+    assert heights[0] == pytest.approx(2 * heights[1], abs=4)
+
+
+def height(picture: Path) -> int:
+    return int.from_bytes(picture.read_bytes()[20:24], "big")
 
 
 def test_a_replay_is_the_run_again(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,9 +155,39 @@ def test_a_replay_is_the_run_again(done: Path, capsys: pytest.CaptureFixture[str
         re.search(r'<script type="application/json" id="run">(.*?)</script>', page)[1]
     )
     assert moving["motion"]["arm"]["l1"] > 0
+    assert '<a href="../index.html">' in page
     assert (output / "assets" / "player.js").is_file()
     assert cli.main([*arguments[:-1], "32"]) == 2
     assert "the campaign has runs 0 to 31" in capsys.readouterr().err
+
+
+def test_a_replay_leaves_the_results_of_another_campaign_alone(
+    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = copied(done, tmp_path)
+    assert in_this_process(done, output, "--replay", "3") == 0
+    before = {path: path.read_bytes() for path in (output / "replays").iterdir()}
+    (tmp_path / "test.toml").write_text(text_of(done / "test.toml").replace("seed = 3", "seed = 4"))
+    capsys.readouterr()
+    assert in_this_process(tmp_path, output, "--replay", "3") == 2
+    assert "has another campaign" in capsys.readouterr().err
+    assert before == {path: path.read_bytes() for path in (output / "replays").iterdir()}
+
+
+def test_the_replay_of_a_failed_run_fails(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path, changes=[("uniform = [1.0, 3.0]", "normal = [-50.0, 0.5]")])
+    assert in_this_process(tmp_path, tmp_path / "output", "--replay", "3") == 1
+    out = capsys.readouterr().out
+    assert "failed: hanging_swing" in out and "is refused" in out
+    assert not (tmp_path / "output").exists()
+
+
+def test_a_replay_before_the_campaign_leads_to_no_page(tmp_path: Path) -> None:
+    output = tmp_path / "output"
+    assert in_this_process(write(tmp_path).parent, output, "--replay", "3") == 0
+    assert "index.html" not in text_of(output / "replays" / "run_3.html")
 
 
 def test_no_other_command_imports_what_campaigns_need() -> None:

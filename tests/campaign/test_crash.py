@@ -8,6 +8,7 @@ import fmpy
 import numpy as np
 import pytest
 
+from cosim import __main__ as cli
 from cosim.campaign import bases, campaign_file, engine, planning
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
@@ -48,16 +49,22 @@ def crashing(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_run_that_takes_its_worker_down(
-    crashing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A campaign whose run 3 crashes."""
     scenario = tmp_path / "models" / "crashing" / "scenarios" / "toy.toml"
     scenario.parent.mkdir(parents=True)
     scenario.write_text(SCENARIO)
     monkeypatch.setattr("cosim.project.ROOT", tmp_path)
+    path = tmp_path / "test.toml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+def test_a_run_that_takes_its_worker_down(
+    crashing: Path, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(engine.SETTINGS, "distributed.scheduler.allowed-failures", 1)
-    file = tmp_path / "test.toml"
-    file.write_text(CAMPAIGN)
     campaign = campaign_file.read(file)
     with bases.opened(campaign, crashing) as base:
         job = planning.plan(campaign, base, file)
@@ -75,3 +82,14 @@ def test_a_run_that_takes_its_worker_down(
     expected = np.arange(8.0)
     expected[3] = np.nan
     assert np.array_equal(table["final(y)"], expected, equal_nan=True)
+
+
+def test_its_replay_ends_with_a_message(
+    crashing: Path, file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["campaign", str(file), "--fmu", str(crashing), "--output", str(file.parent / "o")]
+    assert cli.main([*arguments, "--replay", "2"]) == 0
+    assert "final(y) = 2.0" in capsys.readouterr().out.splitlines()
+    assert cli.main([*arguments, "--replay", "3"]) == 1
+    out = capsys.readouterr().out.splitlines()
+    assert out == ["x = 3.0", "failed: the run takes its process down"]

@@ -1,0 +1,159 @@
+"""The page of a campaign in a browser: it fits, is quiet and readable, and says what is missing."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from tests.campaign.files import write
+from tests.campaign.processes import completed
+from tests.support.browser import Browser
+
+RUNS = 16  # groups
+CHANGES = [
+    ("seed = 3", 'seed = 3\nworst = ["maximum(dq1)", "settling(a)"]'),
+    ("sobol", "indices"),
+    ("runs = 40", f"runs = {RUNS}"),
+    ("uniform = [1.0, 3.0]", "normal = [1.0, 0.5]"),  # a negative mass is refused
+    (
+        "trajectories = [3, 17]",
+        '[keep.settling.a]\nvariable = "q1"\ntarget = -1.5\nband = 0.1\n'
+        '[keep.settling.never]\nvariable = "q1"\ntarget = 90.0\nband = 0.1\n'
+        '[[maps]]\nx = "m2"\ny = "q1"\ncolour = "settling(a)"\n'
+        '[[maps]]\nx = "m2"\ny = "q1"\ncolour = "settling(never)"',
+    ),
+]
+FAILING = [("uniform = [1.0, 3.0]", "normal = [-50.0, 0.5]")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a campaign some of whose runs fail, and some do not settle."""
+    folder = tmp_path_factory.mktemp("campaign")
+    completed(write(folder, changes=CHANGES), folder / "output", "--workers", 1)
+    return folder / "output"
+
+
+@pytest.fixture(scope="module")
+def failing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a campaign all of whose runs fail."""
+    folder = tmp_path_factory.mktemp("failing")
+    completed(write(folder, changes=FAILING), folder / "output", "--workers", 1)
+    return folder / "output"
+
+
+def shown(browser: Browser, folder: Path, **view) -> str:
+    """Text of the page, a row of a table a line."""
+    browser.open(folder / "index.html", **view)
+    return browser.run("return document.body.innerText").replace("\N{MINUS SIGN}", "-")
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [400, 900, 1400])
+@pytest.mark.parametrize("name", ["folder", "failing"])
+def test_it_fits_is_quiet_and_accessible(
+    name: str, width: int, dark: bool, browser: Browser, request: pytest.FixtureRequest
+) -> None:
+    shown(browser, request.getfixturevalue(name), width=width, dark=dark)
+    browser.check_quiet()
+    assert browser.overflow() == 0
+    assert browser.violations() == []
+
+
+def test_pictures_keep_their_colours_in_the_dark(browser: Browser, folder: Path) -> None:
+    """White under a picture and no filter over it: what its colours mean does not change."""
+    shown(browser, folder, dark=True)
+    seen = browser.run(
+        "return [...document.images].map(image => {"
+        "const filters = [];"
+        "for (let x = image; x; x = x.parentElement) { filters.push(getComputedStyle(x).filter); }"
+        "return [image.naturalWidth, filters.every(x => x === 'none'),"
+        "getComputedStyle(image.parentElement).backgroundColor]})"
+    )
+    assert len(seen) == 3
+    for width, unfiltered, background in seen:
+        assert width > 500 and unfiltered and background == "rgb(255, 255, 255)"
+
+
+def test_what_is_missing_is_counted_and_told_from_failed_runs(
+    browser: Browser, folder: Path
+) -> None:
+    text = shown(browser, folder)
+    found = pq.read_table(folder / "blocks")
+    failed = int(np.sum(found["failure"].to_numpy() != ""))
+    settles = np.isfinite(found["settling(a)"].to_numpy())
+    energy = np.isfinite(found["integral(actuator_power)"].to_numpy())
+    assert 0 < failed < len(settles) - settles.sum()
+    assert f"{failed} of {len(settles)} runs failed." in text
+    rows = [line.split() for line in text.splitlines()]
+    for label, there in (("settling(a) [s]", settles), ("integral(actuator_power) [W·s]", energy)):
+        row = next(row for row in rows if row[:2] == label.split() and len(row) > 3)
+        assert int(row[-1]) == np.sum(~there)
+    lacking = len(settles) - settles.sum() - failed
+    assert f"settling(a) does not settle in {lacking} of {len(settles)} runs." in text
+    assert "final(q1) does not" not in text and "final(q1) is no" not in text
+    assert f"Nothing is drawn for the {np.sum(~settles)} runs that have no value there." in text
+    assert "settling(never) over m2 and q1\n\nNo run has a value." in text
+
+
+def test_indices_say_on_how_many_groups_they_stand(browser: Browser, folder: Path) -> None:
+    text = shown(browser, folder)
+    found = pq.read_table(folder / "blocks")
+    complete = {
+        name: np.isfinite(found[name].to_numpy()).reshape(RUNS, 4).all(axis=1).sum()
+        for name in ("final(q1)", "maximum(dq1)")
+    }
+    rows = [line.split() for line in text.splitlines()]
+    for name, count in complete.items():
+        groups = [
+            row[-1] for row in rows if len(row) == 7 and row[:2] in ([name, "m2"], [name, "q1"])
+        ]
+        assert groups == [str(count)] * 2
+        assert 1 < count < RUNS
+    assert f"There are {RUNS} groups of runs." in text
+    assert re.search(r"No indices, as it does not vary or lacks values: .*settling\(never\)", text)
+    wide = re.search("Too few runs: a ± is above 0.5 for (.*)\\.", text)
+    indices = [row for row in rows if len(row) == 7 and row[1] in ("m2", "q1")]
+    for row in indices:
+        if max(float(row[3]), float(row[5])) > 0.51:
+            assert row[0] in wide[1]
+    assert any(float(row[3]) > 0.51 for row in indices)
+
+
+def test_failed_runs_are_a_line_for_each_kind_of_reason(
+    browser: Browser, folder: Path, failing: Path
+) -> None:
+    assert "No run has a value." in shown(browser, failing)
+    for results in (folder, failing):
+        shown(browser, results)
+        rows = browser.run(
+            "return [...document.querySelectorAll('#failures ~ .wide tbody tr')].map("
+            "row => [...row.cells].map(cell => cell.innerText))"
+        )
+        reasons = pq.read_table(results / "blocks")["failure"].to_pylist()
+        failed = [run for run, reason in enumerate(reasons) if reason]
+        assert [row[:2] for row in rows] == [[str(len(failed)), str(failed[0])]]
+        assert rows[0][3].endswith(f" --replay {failed[0]}")
+    assert len(set(reasons)) == len(reasons)
+
+
+def test_options_of_a_command_are_not_broken(browser: Browser, folder: Path) -> None:
+    shown(browser, folder, width=400)
+    heights = browser.run(
+        "return [...document.querySelectorAll('.option')].map(x => x.getClientRects().length)"
+    )
+    assert len(heights) > 10 and set(heights) == {1}
+
+
+def test_numbers_are_aligned_to_the_right_with_minus_signs(browser: Browser, folder: Path) -> None:
+    shown(browser, folder)
+    cells = browser.run(
+        "return [...document.querySelectorAll('td')].map("
+        "cell => [cell.innerText, getComputedStyle(cell).textAlign])"
+    )
+    numbers = [(text, side) for text, side in cells if re.fullmatch(r"\W?[\d.]+(e\W?\d+)?", text)]
+    assert len(numbers) > 50 and {side for _, side in numbers} == {"right"}
+    assert not any("-" in text for text, _ in numbers)
+    assert any("\N{MINUS SIGN}" in text for text, _ in numbers)
