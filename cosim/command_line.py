@@ -1,11 +1,14 @@
 """Options of the command line: a parser for each command."""
 
 import argparse
+import math
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
 from cosim import project
 from cosim.errors import UserError
+from cosim.federation import SILENCE
 from cosim.model import VERSIONS
 
 
@@ -157,6 +160,13 @@ def _count(text: str) -> int:
     return int(text)
 
 
+def _seconds(text: str) -> float:
+    with suppress(ValueError):
+        if 0 < float(text) < math.inf:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
+
+
 def _add_federation(commands: argparse._SubParsersAction) -> None:
     federation = commands.add_parser(
         "federation",
@@ -184,6 +194,7 @@ def _add_federation(commands: argparse._SubParsersAction) -> None:
         metavar="COMPONENT",
         help="components that are not started here: prints the command that steps each",
     )
+    _add_silence(federation, "processes that do not answer for so long end the federation")
     federation.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
     federate = commands.add_parser(
         "federate",
@@ -195,6 +206,15 @@ def _add_federation(commands: argparse._SubParsersAction) -> None:
     federate.add_argument("component", metavar="COMPONENT")
     federate.add_argument(
         "--broker", required=True, metavar="ADDRESS", help="of the federation, as --listen there"
+    )
+    _add_silence(federate, "most that a call of the FMU may take, or the broker be silent")
+    # for processes that a federation starts: they end with their standard input
+    federate.add_argument("--owned", action="store_true", help=argparse.SUPPRESS)
+
+
+def _add_silence(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument(
+        "--silence", type=_seconds, metavar="S", default=SILENCE, help=f"{text} (default: 60 s)"
     )
 
 

@@ -3,7 +3,7 @@
 import argparse
 
 from cosim.errors import UserError, did_you_mean
-from cosim.federation import component
+from cosim.federation import addresses, component, watching
 from cosim.federation.parts import parts
 from cosim.fmu_file import Fmu
 from cosim.system import ssp
@@ -11,6 +11,7 @@ from cosim.system import ssp
 
 def run(options: argparse.Namespace) -> int:
     """Step the component to the end."""
+    addresses.check_form(options.broker)
     with ssp.unpacked(options.ssp) as system:
         made = parts(system, options.variant)
         if options.component not in made:
@@ -21,5 +22,6 @@ def run(options: argparse.Namespace) -> int:
             )
         with Fmu(system.fmu(options.component)) as fmu:
             fmu.path = options.ssp / system.system.component(options.component).source
-            component.run(made[options.component], fmu, options.broker)
+            is_gone = watching.end_of_input().is_set if options.owned else lambda: False
+            component.run(made[options.component], fmu, options.broker, options.silence, is_gone)
     return 0

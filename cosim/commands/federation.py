@@ -10,7 +10,7 @@ import numpy as np
 from cosim import console, project
 from cosim.coupling.master import Master
 from cosim.errors import UserError, did_you_mean
-from cosim.federation import federation
+from cosim.federation import addresses, federation
 from cosim.federation.federation import Record
 from cosim.federation.parts import parts, real_connections
 from cosim.fmu_file import Fmu
@@ -27,7 +27,8 @@ def run(options: argparse.Namespace) -> int:
     if path is None:
         folder, _ = study.of_coupling()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
-    address = options.listen or federation.free_address()
+    address = options.listen or addresses.free()
+    addresses.check_free(address)
     with ssp.unpacked(path) as system:
         _check_names(system, options)
         names = options.names or list(system.system.parameters)
@@ -40,7 +41,9 @@ def run(options: argparse.Namespace) -> int:
         for name in names:
             label, steps = f"{name} by HELICS", system.system.steps
             with Progress(label, steps) as progress:
-                record = federation.run(system, name, address, options.elsewhere, progress)
+                record = federation.run(
+                    system, name, address, options.elsewhere, options.silence, progress
+                )
             difference, master_time = _master(system, name, record)
             ecos_time = ecos.run(system, name, comparison.recorded(system)).wall_time
             passed = difference <= BOUND

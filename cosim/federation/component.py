@@ -1,32 +1,72 @@
 """The process of one component: steps its FMU between the exchanges of the federation."""
 
+from collections.abc import Callable
+
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.coupling.connected_instance import start_value
 from cosim.errors import UserError
+from cosim.federation import watching
 from cosim.federation.network import Federate
 from cosim.federation.parts import Part
+from cosim.federation.watching import Silence
 from cosim.fmi_instance import Instance, Reals
 from cosim.fmu_file import Fmu
 
 
-def run(part: Part, fmu: Fmu, address: str) -> None:
+def run(
+    part: Part,
+    fmu: Fmu,
+    address: str,
+    silence: float,
+    is_gone: Callable[[], bool] = lambda: False,
+) -> None:
     """Step a component from the first to the last communication point.
+
+    Parameters
+    ----------
+    part : Part
+    fmu : Fmu
+    address : str
+        Of the federation.
+    silence : float
+        s, that a call of the FMU may take, and the broker be silent.
+    is_gone : callable, optional
+        Whether the process is gone that started this one.
 
     Raises
     ------
     UserError
-        If the FMU fails, the federation ends, or an output changes that must not.
+        If the FMU fails, the federation steps something else or ends, or an output changes that
+        must not.
     """
-    federate = Federate(part.component, address, sorted({s.component for s in part.sources}))
-    try:
-        with fmu.instance(part.component) as instance:
+    name = part.component
+    federate = Federate(name, address, sorted({s.component for s in part.sources}))
+    still = Silence(federate, silence)
+
+    def work() -> None:
+        federate.join()
+        part.check_same(federate.system())
+        with fmu.instance(name) as instance:
             _Stepper(part, instance, federate).run()
         federate.leave()
-    except UserError as error:
-        federate.fail(str(error))
-        raise
+
+    def look() -> None:
+        if is_gone():
+            raise UserError(f"{name}: the process that started it is gone")
+        if not still.too_long():
+            return
+        if not federate.waits:
+            raise UserError(f"{name}: its FMU has not returned for {silence:g} s")
+        if not federate.has_broker():
+            raise UserError(f"{name}: the broker at {address} has been silent for {silence:g} s")
+
+    def end(error: BaseException) -> None:
+        is_known = isinstance(error, UserError)
+        federate.fail(str(error) if is_known else f"{name}: its process was ended")
+
+    watching.run(work, look, end)
 
 
 class _Stepper:

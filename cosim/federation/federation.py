@@ -1,30 +1,26 @@
 """A federation: the broker, a process for each component, and the one that records."""
 
 import os
-import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from cosim import project
 from cosim.errors import UserError
-from cosim.federation import network
-from cosim.federation.network import Federate
+from cosim.federation import SILENCE, watching
+from cosim.federation.network import ABSENT, ENDED, Broker, Federate
 from cosim.federation.parts import Part, parts
+from cosim.federation.watching import LEAVE, Silence
+from cosim.interruption import temporary_folder, uninterrupted
 from cosim.system.ssp import Ssp
 
 RECORDER = "recorder"
-FOLLOWS = "federation"  # is in what processes say that others have stopped
-POLL = 0.05  # s, between two looks at the processes
-LEAVE = 2.0  # s, for processes to end after others have
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +33,6 @@ class Record:
     wall_time: float  # s, of all steps
 
 
-def free_address() -> str:
-    """An address on this machine at which nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{network.LOCAL}:{probe.getsockname()[1]}"
-
-
 def command(ssp: Path, variant: str, component: str, address: str) -> list[str]:
     """The command that steps a component, on this machine or on another one with the same files."""
     return ["-m", "cosim", "federate", str(ssp), variant, component, "--broker", address]
@@ -54,6 +43,7 @@ def run(
     variant: str,
     address: str,
     elsewhere: Collection[str] = (),
+    silence: float = SILENCE,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Record:
     """Run a variant, each component in its own process.
@@ -66,6 +56,8 @@ def run(
         Where the broker listens, as "tcp://127.0.0.1:23404".
     elsewhere : collection of str
         Components that other machines step: they are waited for.
+    silence : float
+        s, after which a process that is silent ends the federation.
     progress : callable, optional
         Called with the number of steps made.
 
@@ -75,20 +67,46 @@ def run(
         If a process fails; its text is the first one that one of them gave.
     """
     made = parts(ssp, variant)
-    with TemporaryDirectory(prefix="cosim-") as name, network.broker(len(made) + 1, address) as end:
-        folder = Path(name)
-        local = {c: command(ssp.path, variant, c, address) for c in made if c not in elsewhere}
-        with _processes(local, folder, end) as processes:
-            try:
-                return _recorded(made, address, progress)
-            except UserError as error:
-                _wait(processes)
-                raise _first_failure(processes, folder) or error from error
+    whole = next(iter(made.values())).system
+    local = [component for component in made if component not in elsewhere]
+    started = {
+        c: [*command(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
+        for c in local
+    }
+    with (
+        temporary_folder() as folder,
+        Broker(len(made) + 1, address, whole) as broker,
+        _processes(started, folder) as processes,
+    ):
+        recorder = Federate(RECORDER, address, list(made), publishes=False)
+        still = Silence(recorder, silence)
+
+        def look() -> None:
+            if any(process.poll() not in (None, 0) for process in processes.values()):
+                broker.end("a process has failed")
+            if still.too_long():
+                # one without inputs may be far ahead, and at the end
+                there = [c for c in made if c in elsewhere or processes[c].poll() is None]
+                silent = broker.silent(there, elsewhere)
+                if silent:
+                    verb = "have" if len(silent) > 1 else "has"
+                    names = ", ".join(silent)
+                    raise UserError(f"{names} {verb} been silent for {silence:g} s (--silence)")
+
+        def end(error: BaseException) -> None:
+            broker.end(str(error) if isinstance(error, UserError) else "it was interrupted")
+
+        try:
+            return watching.run(lambda: _recorded(recorder, made, progress), look, end)
+        except UserError as error:
+            _wait(processes)
+            raise _first_failure(processes, folder) or error from error
 
 
-def _recorded(made: Mapping[str, Part], address: str, progress: Callable[[int], object]) -> Record:
+def _recorded(
+    recorder: Federate, made: Mapping[str, Part], progress: Callable[[int], object]
+) -> Record:
     """Follow the federation to its end, and record what is published."""
-    recorder = Federate(RECORDER, address, list(made), publishes=False)
     first = next(iter(made.values()))
     names = tuple(f"{c}.{output}" for c, part in made.items() for output in part.published)
     rows = np.empty((len(first.times), len(names)))
@@ -97,6 +115,7 @@ def _recorded(made: Mapping[str, Part], address: str, progress: Callable[[int], 
         published = recorder.read()
         rows[point] = [value for component in made for value in published[component]]
 
+    recorder.join()
     recorder.enter_initialization()
     for _ in range(first.rounds):
         recorder.exchange()
@@ -118,34 +137,29 @@ def _recorded(made: Mapping[str, Part], address: str, progress: Callable[[int], 
 
 @contextmanager
 def _processes(
-    commands: Mapping[str, list[str]], folder: Path, end: Callable[[str], None]
+    commands: Mapping[str, list[str]], folder: Path
 ) -> Iterator[dict[str, subprocess.Popen]]:
-    """Processes by component, watched: where one fails, the federation ends. None is left."""
-    environment = os.environ | {"PYTHONPATH": str(project.ROOT)}
+    """Processes by component. None is left: they end when their standard input is closed.
+
+    Their texts and temporary files are in `folder`.
+    """
+    places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
+    environment = os.environ | places | {"PYTHONPATH": str(project.ROOT)}
     processes: dict[str, subprocess.Popen] = {}
-    is_over = threading.Event()
-
-    def watch() -> None:
-        while not is_over.wait(POLL):
-            if any(process.poll() not in (None, 0) for process in processes.values()):
-                end("a process has failed")
-                return
-
-    watcher = threading.Thread(target=watch, daemon=True)
     try:
         for component, arguments in commands.items():
-            with (folder / component).open("wb") as log:
+            with (folder / component).open("wb") as log, uninterrupted():
                 processes[component] = subprocess.Popen(
                     [sys.executable, "-P", *arguments],
-                    stdin=subprocess.DEVNULL,
+                    stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=subprocess.STDOUT,
                     env=environment,
                 )
-        watcher.start()
         yield processes
     finally:
-        is_over.set()
+        for process in processes.values():
+            process.stdin.close()
         _wait(processes)
         for process in processes.values():
             process.kill()
@@ -161,7 +175,7 @@ def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
 
 
 def _first_failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
-    """What the process says that failed first: the others only say that the federation ended."""
+    """What the process here says that failed first: others only say that the federation ended."""
     texts = []
     for component, process in processes.items():
         if process.returncode in (None, 0):
@@ -171,5 +185,5 @@ def _first_failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> U
         if process.returncode < 0:
             text = f"{component}: its process was ended by signal {-process.returncode}"
         texts.append(text)
-    texts.sort(key=lambda text: FOLLOWS in text)
-    return UserError(texts[0]) if texts else None
+    first = (text for text in texts if ENDED not in text and ABSENT not in text)
+    return next(map(UserError, first), None)

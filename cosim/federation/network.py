@@ -4,15 +4,24 @@ HELICS counts communication points: its time k is the k-th of them, whatever its
 time is rounded to HELICS's own resolution, and every process calculates it from its own counter.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import re
+import time
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+from threading import Thread
 from typing import Any
 
 import numpy as np
 
 from cosim.errors import UserError, one_line
 
-LOCAL = "tcp://127.0.0.1"
+ENDED = "the federation ended"  # in what processes say that others have stopped
+ABSENT = "no federation at"  # the same of one that comes later
+ANSWER = 5.0  # s, for another process to answer
+SYSTEM = "system"  # what all must step, a global value of the federation
+QUIET = "--loglevel=none"
 
 
 def helics() -> Any:
@@ -24,28 +33,89 @@ def helics() -> Any:
             f"helics, which only federations need, cannot be loaded: {one_line(error)} "
             "(./setup.sh --federation installs it)"
         ) from error
+    warnings.filterwarnings("ignore", "This function will return a JSON", UserWarning)
     return package
 
 
-@contextmanager
-def broker(count: int, address: str) -> Iterator[Callable[[str], None]]:
-    """The broker of a federation of `count` processes, listening at `address`; gone at the end.
+class Broker:
+    """What all processes of a federation are connected to.
 
-    Gives a function that ends the federation for all, and says why.
+    Parameters
+    ----------
+    count : int
+        Of processes.
+    address : str
+        Where it listens.
+    system : str
+        What all must step.
     """
-    h = helics()
-    options = f"-f {count} --local_interface={address} --loglevel=none"
-    try:
-        made = h.helicsCreateBroker("zmq", "", options)
-    except h.HelicsException as error:
-        raise UserError(f"no broker at {address}: {one_line(error)}") from error
-    try:
-        if not h.helicsBrokerIsConnected(made):
+
+    def __init__(self, count: int, address: str, system: str) -> None:
+        h = self._h = helics()
+        self._questions = _Questions()
+        options = f"-f {count} --local_interface={address} {QUIET}"
+        try:
+            self._broker = h.helicsCreateBroker("zmq", "", options)
+        except h.HelicsException as error:
+            raise UserError(f"no broker at {address}: {one_line(error)}") from error
+        if not h.helicsBrokerIsConnected(self._broker):
+            self._close()
             raise UserError(f"no broker at {address}: nothing can listen there")
-        yield lambda text: h.helicsBrokerGlobalError(made, 1, text.encode())  # takes no str
-    finally:
-        h.helicsBrokerDisconnect(made)
-        h.helicsBrokerFree(made)
+        h.helicsBrokerSetGlobal(self._broker, SYSTEM, system)
+
+    def __enter__(self) -> "Broker":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._close()
+
+    def _close(self) -> None:
+        self._h.helicsBrokerDisconnect(self._broker)
+        if self._questions.ended():  # else they still use it
+            self._h.helicsBrokerFree(self._broker)
+
+    def end(self, text: str) -> None:
+        """End the federation for all, and say why."""
+        self._h.helicsBrokerGlobalError(self._broker, 1, text.encode())  # takes no str
+
+    def silent(self, names: Sequence[str], elsewhere: Collection[str]) -> list[str]:
+        """Processes that do not answer; one `elsewhere` may still have to be started."""
+
+        def ask(name: str) -> object:
+            query = self._h.helicsCreateQuery(name, "current_time")
+            return self._h.helicsQueryBrokerExecute(query, self._broker)
+
+        answers = self._questions.answers(ask, names)
+        unknown = {n for n, a in answers.items() if isinstance(a, dict) and "error" in a}
+        return [n for n in names if n not in answers or (n in unknown and n not in elsewhere)]
+
+
+class _Questions:
+    """Questions to other processes, in threads: HELICS may wait for an answer without end."""
+
+    def __init__(self) -> None:
+        self._threads: list[Thread] = []
+
+    def answers(self, ask: Callable[[str], object], names: Sequence[str]) -> dict[str, object]:
+        """What `ask` returns in time, by name."""
+        answers: dict[str, object] = {}
+
+        def put(name: str) -> None:
+            with suppress(helics().HelicsException):  # an error is no answer
+                answers[name] = ask(name)
+
+        self._threads = [Thread(target=put, args=(name,), daemon=True) for name in names]
+        for thread in self._threads:
+            thread.start()
+        self.ended()
+        return dict(answers)
+
+    def ended(self) -> bool:
+        """Wait for the answers, but not for long."""
+        latest = time.monotonic() + ANSWER
+        for thread in self._threads:
+            thread.join(max(0.0, latest - time.monotonic()))
+        return not any(thread.is_alive() for thread in self._threads)
 
 
 class Federate:
@@ -65,31 +135,60 @@ class Federate:
     def __init__(
         self, name: str, address: str, sources: Sequence[str], publishes: bool = True
     ) -> None:
-        h = self._h = helics()
-        info = h.helicsCreateFederateInfo()
-        h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
-        h.helicsFederateInfoSetCoreInitString(
-            info, f"--federates=1 --broker_address={address} --loglevel=none"
-        )
-        h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
-        with self._explained(f"no federation at {address}"):
-            self._federate = h.helicsCreateValueFederate(name, info)
-        vector = h.HELICS_DATA_TYPE_VECTOR
-        if publishes:
-            self._publication = h.helicsFederateRegisterGlobalPublication(
-                self._federate, name, vector, ""
-            )
-        self._subscriptions = {
-            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
-            for source in sources
-        }
+        self._h = helics()
+        self._name, self._address, self._sources = name, address, sources
+        self._publishes = publishes
+        self._federate: Any = None  # before it has joined
+        self.waits = False  # for others
+        self.calls = 0  # changes of `waits`
 
     @contextmanager
-    def _explained(self, text: str) -> Iterator[None]:
+    def _waiting(self, text: str) -> Iterator[None]:
+        self.waits, self.calls = True, self.calls + 1
         try:
             yield
         except self._h.HelicsException as error:
-            raise UserError(f"{text}: {one_line(error)}") from error
+            said = re.sub(r"^\[-?\d+\] ", "", one_line(error))
+            raise UserError(f"{text}: {said}") from error
+        finally:
+            self.waits, self.calls = False, self.calls + 1
+
+    def join(self) -> None:
+        """Connect to the broker."""
+        h = self._h
+        info = h.helicsCreateFederateInfo()
+        h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
+        h.helicsFederateInfoSetCoreInitString(
+            info, f"--federates=1 --broker_address={self._address} {QUIET}"
+        )
+        h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
+        h.helicsFederateInfoSetIntegerProperty(
+            info, h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
+        )
+        with self._waiting(f"{ABSENT} {self._address}"):
+            self._federate = h.helicsCreateValueFederate(self._name, info)
+        if self._publishes:
+            self._publication = h.helicsFederateRegisterGlobalPublication(
+                self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
+            )
+        self._subscriptions = {
+            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
+            for source in self._sources
+        }
+
+    def system(self) -> str:
+        """What all must step, as the broker knows it."""
+        with self._waiting(f"at the start {ENDED}"):
+            return str(self._ask("global_value", SYSTEM))
+
+    def has_broker(self) -> bool:
+        """Whether the broker answers."""
+        ask = partial(self._ask, about="federates")
+        return self._federate is None or bool(_Questions().answers(ask, ["root"]))
+
+    def _ask(self, target: str, about: str) -> object:
+        query = self._h.helicsCreateQuery(target, about)
+        return self._h.helicsQueryExecute(query, self._federate)
 
     def publish(self, values: np.ndarray) -> None:
         """Publish the values of the next communication point, (values,)."""
@@ -102,27 +201,30 @@ class Federate:
 
     def enter_initialization(self) -> None:
         """Wait for all others; what is published before is read after the first `exchange`."""
-        with self._explained("the federation does not start"):
+        with self._waiting(f"at the start {ENDED}"):
             self._h.helicsFederateEnterInitializingMode(self._federate)
 
     def exchange(self) -> None:
         """Give and take values in initialization."""
-        with self._explained("in initialization the federation ended"):
-            self._h.helicsFederateEnterExecutingModeIterative(
-                self._federate, self._h.HELICS_ITERATION_REQUEST_FORCE_ITERATION
+        h = self._h
+        with self._waiting(f"in initialization {ENDED}"):
+            result = h.helicsFederateEnterExecutingModeIterative(
+                self._federate, h.HELICS_ITERATION_REQUEST_FORCE_ITERATION
             )
+        if result != h.HELICS_ITERATION_RESULT_ITERATING:
+            raise UserError(f"in initialization {ENDED}")
 
     def begin(self) -> None:
         """To the first communication point."""
-        with self._explained("in initialization the federation ended"):
+        with self._waiting(f"in initialization {ENDED}"):
             self._h.helicsFederateEnterExecutingMode(self._federate)
 
     def go_to(self, point: int) -> None:
         """Wait until all others have published the values of communication point `point`."""
-        with self._explained(f"before communication point {point} the federation ended"):
+        with self._waiting(f"before communication point {point} {ENDED}"):
             granted = self._h.helicsFederateRequestTime(self._federate, float(point))
         if granted != point:
-            raise UserError(f"before communication point {point} the federation ended")
+            raise UserError(f"before communication point {point} {ENDED}")
 
     def leave(self) -> None:
         """Leave at the end."""
@@ -130,4 +232,6 @@ class Federate:
 
     def fail(self, text: str) -> None:
         """End the federation, because this process cannot go on."""
-        self._h.helicsFederateGlobalError(self._federate, 1, text)
+        if self._federate is not None:
+            with suppress(self._h.HelicsException):  # it has ended already
+                self._h.helicsFederateGlobalError(self._federate, 1, text)

@@ -1,5 +1,6 @@
 """What each process of a federation does: its component, and where its inputs come from."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,6 +32,21 @@ class Part:
     constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
     rounds: int  # after so many exchanges of outputs in initialization none changes any more
     times: np.ndarray  # s, communication points
+    system: str  # variant and SHA-256 of the SSP: those of all processes must be the same
+
+    def check_same(self, other: str) -> None:
+        """UserError if the federation steps another variant, or that of another SSP."""
+        if other == self.system:
+            return
+        (here, own), (there, foreign) = self.system.rsplit(" ", 1), other.rsplit(" ", 1)
+        if here != there:
+            raise UserError(
+                f"{self.component}: its variant is {here!r}, that of the federation is {there!r}"
+            )
+        raise UserError(
+            f"{self.component}: its SSP is not that of the federation (SHA-256 {own[:12]}..., "
+            f"expected {foreign[:12]}...): copy the file"
+        )
 
 
 def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
@@ -50,6 +66,7 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
         raise UserError(f"{ssp.path}: has no variant {variant!r}{hint} (there are: {known})")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
     times = system.start + system.step * np.arange(system.steps + 1)
+    whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
     made = {}
     for component in system.components:
         name = component.name
@@ -67,6 +84,7 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
             constant=tuple({c.start_connector for c in others if c.start_component == name}),
             rounds=len(system.components) + 1,
             times=times,
+            system=whole,
         )
     return made
 

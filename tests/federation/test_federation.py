@@ -1,5 +1,6 @@
 """The closed loop as a federation: each FMU in its own process, coupled by HELICS."""
 
+import socket
 import subprocess
 import sys
 import threading
@@ -13,7 +14,7 @@ import pytest
 from cosim.__main__ import main
 from cosim.coupling.master import Master
 from cosim.errors import UserError
-from cosim.federation import federation
+from cosim.federation import addresses, federation
 from cosim.federation.parts import parts, real_connections
 from cosim.fmu_file import Fmu
 from cosim.system import ssp
@@ -52,7 +53,7 @@ def by_the_master(system: Ssp, variant: str) -> tuple[tuple[str, ...], np.ndarra
 
 @pytest.mark.parametrize("variant", ["nominal", "heavy_payload_integral"])
 def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
-    record = federation.run(short, variant, federation.free_address())
+    record = federation.run(short, variant, addresses.free())
     names, rows = by_the_master(short, variant)
     assert set(record.names) == set(names)
     expected = rows[:, [names.index(name) for name in record.names]]
@@ -64,7 +65,7 @@ def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
 
 def test_a_component_may_be_stepped_elsewhere(short: Ssp) -> None:
     """By a command of its own, as on another machine."""
-    address = federation.free_address()
+    address = addresses.free()
     arguments = federation.command(short.path, "nominal", "arm", address)
     other = subprocess.Popen([sys.executable, *arguments], cwd=ROOT)
     try:
@@ -72,7 +73,7 @@ def test_a_component_may_be_stepped_elsewhere(short: Ssp) -> None:
         assert other.wait(timeout=30) == 0
     finally:
         other.kill()
-    together = federation.run(short, "nominal", federation.free_address())
+    together = federation.run(short, "nominal", addresses.free())
     assert np.array_equal(record.values, together.values)
 
 
@@ -81,7 +82,7 @@ def test_a_process_that_is_killed_ends_the_federation(tmp_path: Path) -> None:
         killed = threading.Thread(target=kill_soon, args=("controller",))
         killed.start()
         with pytest.raises(UserError, match="controller: its process was ended by signal 9"):
-            federation.run(system, "nominal", federation.free_address())
+            federation.run(system, "nominal", addresses.free())
         killed.join()
     assert not list(processes_of("")), "a process is left"
 
@@ -117,7 +118,7 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
     changes = {STRUCTURE: SHORT, ARM: replace(TOLERANCE, none)}
     path = edited(SSP, tmp_path / "NoInertia.ssp", changes)
     with ssp.unpacked(path) as system, pytest.raises(UserError, match="arm: .* I1z"):
-        federation.run(system, "nominal", federation.free_address())
+        federation.run(system, "nominal", addresses.free())
 
 
 @pytest.mark.parametrize(
@@ -125,11 +126,23 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
     [
         (["nominall"], "no variant 'nominall', did you mean 'nominal'?"),
         (["nominal", "--elsewhere", "arn"], "no component 'arn', did you mean 'arm'?"),
-        (["nominal", "--listen", "tcp://192.0.2.1:23404"], "nothing can listen there"),
+        (["nominal", "--listen", "tcp://192.0.2.1:23404"], "192.0.2.1 is no address of this"),
+        (["nominal", "--listen", "192.168.0.1:23404"], "expected an address as tcp://"),
+        (["nominal", "--listen", "tcp://127.0.0.1:65535"], "expected an address as tcp://"),
+        (["nominal", "--silence", "0"], "expected a positive number of seconds"),
     ],
 )
 def test_wrong_use(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["federation", "--ssp", str(SSP), *arguments]) == 2
-    text = capsys.readouterr().err.strip()
-    assert words in text
-    assert text.startswith("error: ")
+    output = capsys.readouterr()
+    assert words in output.err
+    assert output.err.startswith("error: ")
+    assert not output.out, "the head of a table that stays empty"
+
+
+@pytest.mark.parametrize("offset", [0, 1])
+def test_a_port_that_is_in_use_is_named(offset: int) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        with pytest.raises(UserError, match=f"port {port} is in use"):
+            addresses.check_free(f"tcp://127.0.0.1:{port - offset}")

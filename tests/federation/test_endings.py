@@ -1,0 +1,188 @@
+"""How a federation ends that does not come to its end: by signals, silence or different systems."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import psutil
+import pytest
+
+from cosim.errors import UserError
+from cosim.federation import addresses, component
+from cosim.federation.network import Broker
+from cosim.federation.parts import parts
+from cosim.system import ssp
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP, edited, replace
+
+LIMIT = 60.0  # s, far above what an end takes
+
+Process = subprocess.Popen
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator:
+    """Starts commands in sessions of their own; none is left.
+
+    Their temporary files are in the folder `temporary` of the test.
+    """
+    (tmp_path / "temporary").mkdir()
+    environment = os.environ | {"TMPDIR": str(tmp_path / "temporary")}
+    started: list[Process] = []
+
+    def do(*arguments: str) -> Process:
+        made = subprocess.Popen(
+            [sys.executable, "-m", "cosim", *arguments],
+            cwd=ROOT,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        started.append(made)
+        return made
+
+    yield do
+    for process in started:
+        with left_of(process) as children:
+            process.kill()
+            process.communicate()
+        for child in children:
+            child.kill()
+
+
+@contextmanager
+def left_of(process: Process) -> Iterator[list[psutil.Process]]:
+    """Children of a process, of which the list keeps those that are still there at the end."""
+    try:
+        children = psutil.Process(process.pid).children(recursive=True)
+    except psutil.NoSuchProcess:
+        children = []
+    yield children
+    children[:] = [c for c in children if c.is_running() and c.status() != psutil.STATUS_ZOMBIE]
+
+
+def federation(start, *arguments: str) -> Process:
+    return start("federation", "nominal", "--ssp", str(SSP), *arguments)
+
+
+def federate(start, system: Path, variant: str, address: str) -> Process:
+    return start("federate", str(system), variant, "arm", "--broker", address)
+
+
+def components(process: Process, count: int) -> list[psutil.Process]:
+    """Processes of components as soon as `count` of them are there and have joined."""
+    until = time.monotonic() + LIMIT
+    while time.monotonic() < until:
+        found = psutil.Process(process.pid).children(recursive=True)
+        # a thread of the command, its watcher and those of HELICS
+        if len(found) == count and all(child.num_threads() > 5 for child in found):
+            return found
+        time.sleep(0.05)
+    raise AssertionError("the components have not started")
+
+
+def gone(children: list[psutil.Process]) -> bool:
+    _, left = psutil.wait_procs(children, timeout=30.0)
+    return not left
+
+
+def test_another_variant_elsewhere_is_refused_by_both(start) -> None:
+    address = addresses.free()
+    here = federation(start, "--listen", address, "--elsewhere", "arm")
+    there = federate(start, SSP, "heavy_payload", address)
+    words = "arm: its variant is 'heavy_payload', that of the federation is 'nominal'"
+    for process in (here, there):
+        text, _ = process.communicate(timeout=LIMIT)
+        assert process.returncode == 2, text
+        assert words in text
+
+
+def test_another_ssp_elsewhere_is_refused_by_both(start, tmp_path: Path) -> None:
+    """Of another tolerance of the arm."""
+    change = {"resources/arm_nominal.ssv": replace("1e-11", "1e-10")}
+    other = edited(SSP, tmp_path / "Other.ssp", change)
+    address = addresses.free()
+    here = federation(start, "--listen", address, "--elsewhere", "arm")
+    there = federate(start, other, "nominal", address)
+    for process in (here, there):
+        text, _ = process.communicate(timeout=LIMIT)
+        assert process.returncode == 2, text
+        assert "arm: its SSP is not that of the federation" in text
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_one_that_waits_for_others_can_be_stopped(
+    start, number: int, code: int, tmp_path: Path
+) -> None:
+    here = federation(start, "--listen", addresses.free(), "--elsewhere", "arm")
+    children = components(here, 2)
+    here.send_signal(number)
+    here.communicate(timeout=15.0)  # HELICS would wait without end
+    assert here.returncode == code
+    assert gone(children)
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def test_components_end_with_the_process_that_is_killed(start) -> None:
+    here = federation(start, "--listen", addresses.free(), "--elsewhere", "arm")
+    children = components(here, 2)
+    here.kill()
+    assert gone(children), "HELICS notices it after a minute"
+
+
+def test_a_component_that_is_killed_leaves_no_files(start, tmp_path: Path) -> None:
+    here = federation(start)
+    components(here, 3)[0].kill()
+    text, _ = here.communicate(timeout=LIMIT)
+    assert here.returncode == 2
+    assert "its process was ended by signal 9" in text
+    assert "[error]" not in text, "HELICS writes too"
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+def test_a_component_that_is_silent_is_named(start) -> None:
+    here = federation(start, "--silence", "2")
+    silent = next(c for c in components(here, 3) if "controller" in c.cmdline())
+    silent.suspend()
+    text, _ = here.communicate(timeout=LIMIT)
+    assert here.returncode == 2
+    assert text.splitlines()[-1] == "error: controller has been silent for 2 s (--silence)"
+
+
+def test_a_broker_that_is_silent_is_named(start) -> None:
+    address = addresses.free()
+    here = federation(start, "--listen", address, "--elsewhere", "arm", "controller")
+    components(here, 1)
+    there = start("federate", str(SSP), "nominal", "arm", "--broker", address, "--silence", "2")
+    until = time.monotonic() + LIMIT
+    while psutil.Process(there.pid).num_threads() < 5 and time.monotonic() < until:
+        time.sleep(0.05)
+    time.sleep(1.0)
+    here.send_signal(signal.SIGSTOP)
+    text, _ = there.communicate(timeout=LIMIT)
+    assert there.returncode == 2
+    assert f"arm: the broker at {address} has been silent for 2 s" in text
+
+
+def test_an_fmu_that_does_not_return_is_named() -> None:
+    def hang(_: str) -> None:
+        time.sleep(LIMIT)
+
+    address = addresses.free()
+    with ssp.unpacked(SSP) as system:
+        part = parts(system, "nominal")["arm"]
+    begin = time.monotonic()
+    with (
+        Broker(2, address, part.system),
+        pytest.raises(UserError, match="arm: its FMU has not returned for 1 s"),
+    ):
+        component.run(part, SimpleNamespace(instance=hang), address, 1.0)
+    assert time.monotonic() - begin < LIMIT, "it was waited for"
