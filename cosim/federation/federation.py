@@ -73,12 +73,13 @@ def run(
         c: [*command(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
         for c in local
     }
+    recorder = Federate(RECORDER, address, list(made), publishes=False)
     with (
         temporary_folder() as folder,
         Broker(len(made) + 1, address, whole) as broker,
+        _joined(recorder),
         _processes(started, folder) as processes,
     ):
-        recorder = Federate(RECORDER, address, list(made), publishes=False)
         still = Silence(recorder, silence)
 
         def look() -> None:
@@ -103,6 +104,13 @@ def run(
             raise _first_failure(processes, folder) or error from error
 
 
+@contextmanager
+def _joined(recorder: Federate) -> Iterator[None]:
+    """Join before all others: what one of them refuses is heard by those that have joined."""
+    recorder.join()
+    yield
+
+
 def _recorded(
     recorder: Federate, made: Mapping[str, Part], progress: Callable[[int], object]
 ) -> Record:
@@ -115,7 +123,6 @@ def _recorded(
         published = recorder.read()
         rows[point] = [value for component in made for value in published[component]]
 
-    recorder.join()
     recorder.enter_initialization()
     for _ in range(first.rounds):
         recorder.exchange()
