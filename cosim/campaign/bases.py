@@ -72,7 +72,7 @@ class Base(ABC):
     @property
     @abstractmethod
     def hashes(self) -> dict[str, str]:
-        """SHA-256 of the FMU of each component."""
+        """SHA-256 of the files that runs follow from: scenario or SSP, and FMUs."""
 
     def settable(self, name: str) -> tuple[int, Variable]:
         """A variable that a run may start from; WrongValueError if there is none of that name."""
@@ -88,7 +88,7 @@ class ScenarioBase(Base):
 
     def __init__(self, path: Path, given: Scenario, model: Model) -> None:
         content = path.read_bytes()
-        digest = hashlib.sha256(content).hexdigest()
+        digest = _sha256(content)
         self.path, self.folder, self.archives = path, given.model, {digest: content}
         self._hash, self._scenario, self._model = digest, given, model
         self.times, self.tolerance = given.times, given.tolerance
@@ -156,7 +156,8 @@ class ScenarioBase(Base):
 
     @property
     def hashes(self) -> dict[str, str]:
-        return {self._model.name: self._hash}
+        file = self._scenario.path
+        return {file.name: _sha256(file.read_bytes()), self._model.name: self._hash}
 
     def derivatives(self) -> list[tuple[int, int]]:
         """Value references of each state's derivative and of the state."""
@@ -184,7 +185,7 @@ class SystemBase(Base):
         self.archives, self._hashes = {}, {}
         for name in self._names:
             content = opened.fmu(name).read_bytes()
-            self._hashes[name] = hashlib.sha256(content).hexdigest()
+            self._hashes[name] = _sha256(content)
             self.archives[self._hashes[name]] = content
 
     def variable(self, name: str) -> tuple[int, Variable]:
@@ -267,7 +268,11 @@ class SystemBase(Base):
 
     @property
     def hashes(self) -> dict[str, str]:
-        return self._hashes
+        return {self.path.name: _sha256(self.path.read_bytes())} | self._hashes
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 @contextmanager

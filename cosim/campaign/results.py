@@ -277,7 +277,7 @@ def _manifest(campaign: Campaign, job: Job, text: str) -> dict[str, object]:
         "seed": campaign.seed,
         "runs": campaign.count,
         "blocks": campaign.blocks,
-        "fmu_sha256": job.hashes,
+        "sha256": job.hashes,
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in PACKAGES},

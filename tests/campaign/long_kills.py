@@ -32,7 +32,7 @@ from tests.campaign.processes import (
     workers,
 )
 
-RUNS, KILLS = 1200, 20
+RUNS, KILLS = 2400, 20
 PAUSE = 0.5  # s, between two kills
 DISK = 8_000_000  # bytes: room for all, until something else takes it
 STEPS = [("runs = 40", f"runs = {RUNS}"), ("block = 8", "block = 6")]

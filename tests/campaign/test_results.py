@@ -13,12 +13,15 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from cosim import project
+from cosim.campaign import bases
 from cosim.campaign.campaign_file import MAX_RUNS
 from cosim.campaign.results import Results
 from cosim.campaign.runs import Rows
 from cosim.errors import UserError
 from tests.campaign.files import campaign
 from tests.campaign.runners import runner
+from tests.support.cosim_project import FMUS
 
 
 class Folder:
@@ -210,7 +213,7 @@ def test_names_are_in_the_order_of_the_runs(folder: Folder) -> None:
         assert names == sorted(names)
 
 
-@pytest.mark.parametrize("key", ["campaign", "seed", "fmu_sha256", "versions"])
+@pytest.mark.parametrize("key", ["campaign", "seed", "sha256", "versions"])
 def test_results_of_another_campaign_are_refused(key: str, folder: Folder) -> None:
     path = folder.results.folder / "manifest.json"
     manifest = json.loads(path.read_text())
@@ -222,6 +225,26 @@ def test_results_of_another_campaign_are_refused(key: str, folder: Folder) -> No
         path.write_text(damaged)
         with pytest.raises(UserError, match=r"manifest\.json: .* give another folder by --output"):
             folder.results.begin()
+
+
+def test_results_of_an_edited_scenario_are_refused(
+    folder: Folder, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    known = project.scenario_file(folder.given.scenario)
+    edited = tmp_path / known.name
+    monkeypatch.setattr(project, "scenario_file", lambda _: edited)
+    text = f'model = "rp_manipulator"\n{known.read_text(encoding="utf-8")}'
+
+    def begin() -> None:
+        with bases.opened(folder.given, FMUS["rp_manipulator"]) as base:
+            job = dataclasses.replace(folder.job, hashes=base.hashes)
+        Results(tmp_path / "edited", folder.given, job, "text").begin()
+
+    edited.write_text(text, encoding="utf-8")
+    begin()
+    edited.write_text(f"# edited\n{text}", encoding="utf-8")
+    with pytest.raises(UserError, match="has another sha256"):
+        begin()
 
 
 def test_leftovers_of_killed_processes_are_removed(folder: Folder) -> None:
