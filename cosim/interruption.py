@@ -28,6 +28,11 @@ def handle_endings() -> list[int]:
     return _received
 
 
+def arrived() -> bool:
+    """Whether a signal has arrived that ends the program."""
+    return bool(_received)
+
+
 def _stop(number: int, _: object) -> None:
     _received.append(number)
     if _depth:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from cosim import project
 from cosim.errors import UserError, one_line
+from cosim.interruption import arrived
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 
@@ -130,7 +131,8 @@ def _run_missing(options: argparse.Namespace, plan: _Plan) -> None:
             with Progress(plan.campaign.title, ahead, "runs") as progress:
                 made.run(blocks, progress)
             seconds = time.perf_counter() - begin
-    except (KeyboardInterrupt, SystemExit):
-        print(f"stopped; {engine.GOES_ON}", file=sys.stderr)
+    except BaseException:  # Dask may turn that of a signal into another one
+        if arrived():
+            print(f"stopped; {engine.GOES_ON}", file=sys.stderr)
         raise
     print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")

@@ -1,6 +1,9 @@
 """Campaign files for the tests."""
 
+import re
+import shlex
 from collections.abc import Sequence
+from html import unescape
 from pathlib import Path
 
 from cosim.campaign import campaign_file
@@ -46,3 +49,9 @@ def write(folder: Path, text: str = ARM, changes: Sequence[tuple[str, str]] = ()
 def campaign(folder: Path, text: str = ARM, changes: Sequence[tuple[str, str]] = ()) -> Campaign:
     """A campaign from its file."""
     return campaign_file.read(write(folder, text, changes))
+
+
+def commands(page: str) -> list[list[str]]:
+    """Commands that a page shows, split as a shell does it."""
+    found = [unescape(re.sub("<.*?>", "", code)) for code in re.findall("<code>.*?</code>", page)]
+    return [shlex.split(text) for text in found if text.startswith("./run.sh")]

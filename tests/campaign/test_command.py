@@ -3,11 +3,9 @@
 import argparse
 import json
 import re
-import shlex
 import shutil
 import subprocess
 import sys
-from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +15,7 @@ import pytest
 from cosim import __main__ as cli
 from cosim.campaign import figures, page
 from cosim.commands.campaign import _command
-from tests.campaign.files import write
+from tests.campaign.files import commands, write
 from tests.campaign.processes import ENVIRONMENT, finish, start, table
 from tests.support.paths import ROOT
 
@@ -57,12 +55,6 @@ def test_the_page_shows_it_all(done: Path) -> None:
 
 def text_of(page: Path) -> str:
     return page.read_text(encoding="utf-8")
-
-
-def commands(page: str) -> list[list[str]]:
-    """Commands that a page shows, split as a shell does it."""
-    found = [unescape(re.sub("<.*?>", "", code)) for code in re.findall("<code>.*?</code>", page)]
-    return [shlex.split(text) for text in found if text.startswith("./run.sh")]
 
 
 def in_this_process(done: Path, output: Path, *options: str) -> int:
