@@ -18,6 +18,7 @@ from tests.campaign.files import ARM, HEAD, campaign, commands, write
 from tests.campaign.processes import completed
 from tests.campaign.runners import rows, runner
 from tests.support.cosim_project import BUILD, FMUS, fmi3_fmu, repacked
+from tests.support.paths import ROOT
 
 ARM2 = FMUS["rp_manipulator"]
 ARM3 = fmi3_fmu(ARM2)
@@ -92,8 +93,9 @@ def test_both_versions_in_one_system(tmp_path: Path) -> None:
 
 
 def test_the_command_replays_what_its_page_says(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.chdir(ROOT)  # commands of pages are for the project's folder
     file = write(tmp_path, changes=[("seed = 3", 'seed = 3\nworst = ["maximum(dq1)"]')])
     tables = [
         completed(file, tmp_path / name, "--workers", 1, "--fmu", fmu)
