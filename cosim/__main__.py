@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
+from typing import NoReturn
 
 from cosim import project
 from cosim.command_line import make_parser
@@ -71,6 +72,8 @@ def _as_program() -> int:
     received = handle_endings()
     try:
         return main()
+    except SystemExit as ending:
+        return ending.code
     except Exception:
         if not received:
             raise
@@ -79,5 +82,15 @@ def _as_program() -> int:
         return 128 + received[0]
 
 
+def _end(code: int) -> NoReturn:
+    """End the process, but not HELICS, which may wait for ever for a process that is gone."""
+    if "helics" in sys.modules:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError, AttributeError):  # closed, full, or not there
+                stream.flush()
+        os._exit(code or 0)
+    sys.exit(code)
+
+
 if __name__ == "__main__":
-    sys.exit(_as_program())
+    _end(_as_program())
