@@ -8,38 +8,28 @@ import socket
 from cosim.errors import UserError, reason
 
 LOCAL = "127.0.0.1"
-PORTS = 2  # of a broker, one after the other
 
 
 def free() -> str:
     """An address on this machine at which nothing listens."""
-    while True:
-        with socket.socket() as probe:
-            probe.bind((LOCAL, 0))
-            port = probe.getsockname()[1]
-        if port + PORTS <= 65536 and not any(map(_refusal, [LOCAL] * PORTS, _ports(port))):
-            return f"tcp://{LOCAL}:{port}"
+    with socket.socket() as probe:
+        probe.bind((LOCAL, 0))
+        return f"tcp://{LOCAL}:{probe.getsockname()[1]}"
 
 
 def check_form(address: str) -> tuple[str, int]:
-    """Host and first port; UserError if `address` is none."""
+    """Host and port; UserError if `address` is none."""
     found = re.fullmatch(r"tcp://([^/\s]+):([1-9]\d{0,4})", address)
-    if not found or int(found[2]) + PORTS > 65536:
+    if not found or int(found[2]) > 65535:
         raise UserError(f"{address}: expected an address as tcp://192.168.0.1:23404")
     return found[1], int(found[2])
 
 
 def check_free(address: str) -> None:
     """UserError if no broker can listen at `address`."""
-    host, first = check_form(address)
-    for port in _ports(first):
-        refusal = _refusal(host, port)
-        if refusal:
-            raise UserError(f"nothing can listen at {address}: {refusal}")
-
-
-def _ports(first: int) -> range:
-    return range(first, first + PORTS)
+    refusal = _refusal(*check_form(address))
+    if refusal:
+        raise UserError(f"nothing can listen at {address}: {refusal}")
 
 
 def _refusal(host: str, port: int) -> str:
@@ -52,12 +42,12 @@ def _refusal(host: str, port: int) -> str:
             flags=socket.AI_PASSIVE,
         )[0]
         with socket.socket(family) as probe:
-            if os.name == "posix":  # as ZeroMQ does: connections that have ended do not count
+            if os.name == "posix":  # as HELICS does: connections that have ended do not count
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(place)
     except OSError as error:
         known = {
-            errno.EADDRINUSE: f"port {port} is in use (a federation takes {PORTS} in a row)",
+            errno.EADDRINUSE: f"port {port} is in use",
             errno.EADDRNOTAVAIL: f"{host} is no address of this machine",
         }
         return known.get(error.errno, f"{host}, port {port}: {reason(error)}")

@@ -15,12 +15,10 @@ from cosim import project
 from cosim.errors import UserError
 from cosim.federation import SILENCE, watching
 from cosim.federation.network import ABSENT, ENDED, Broker, Federate
-from cosim.federation.parts import Part, parts
+from cosim.federation.parts import RECORDER, Part, parts
 from cosim.federation.watching import LEAVE, Silence
 from cosim.interruption import temporary_folder, uninterrupted
 from cosim.system.ssp import Ssp
-
-RECORDER = "recorder"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,26 +71,27 @@ def run(
         c: [*command(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
         for c in local
     }
-    recorder = Federate(RECORDER, address, list(made), publishes=False)
+    recorder = Federate(RECORDER, address, list(made))
     with (
         temporary_folder() as folder,
-        Broker(len(made) + 1, address, whole) as broker,
-        _joined(recorder),
+        _opened(len(made) + 1, address, whole, recorder) as broker,
         _processes(started, folder) as processes,
     ):
-        still = Silence(recorder, silence)
+        still, stuck = Silence(recorder, silence), Silence(recorder, 2.0 * silence)
 
         def look() -> None:
-            if any(process.poll() not in (None, 0) for process in processes.values()):
-                broker.end("a process has failed")
+            failed = _texts(processes, folder)
+            if failed:
+                broker.end(failed[0])
             if still.too_long():
-                # one without inputs may be far ahead, and at the end
                 there = [c for c in made if c in elsewhere or processes[c].poll() is None]
                 silent = broker.silent(there, elsewhere)
                 if silent:
                     verb = "have" if len(silent) > 1 else "has"
                     names = ", ".join(silent)
                     raise UserError(f"{names} {verb} been silent for {silence:g} s (--silence)")
+            if stuck.too_long() and recorder.exchanges > 0:  # so nobody is still to come
+                raise UserError(f"all answer, but nothing has moved for {2.0 * silence:g} s")
 
         def end(error: BaseException) -> None:
             broker.end(str(error) if isinstance(error, UserError) else "it was interrupted")
@@ -105,10 +104,12 @@ def run(
 
 
 @contextmanager
-def _joined(recorder: Federate) -> Iterator[None]:
-    """Join before all others: what one of them refuses is heard by those that have joined."""
-    recorder.join()
-    yield
+def _opened(count: int, address: str, system: str, recorder: Federate) -> Iterator[Broker]:
+    """A federation that the recorder has joined: only then may another one refuse to step it."""
+    with Broker(count, address) as broker:
+        recorder.join()
+        broker.announce(system)
+        yield broker
 
 
 def _recorded(
@@ -120,7 +121,7 @@ def _recorded(
     rows = np.empty((len(first.times), len(names)))
 
     def read(point: int) -> None:
-        published = recorder.read()
+        published = recorder.read(made)
         rows[point] = [value for component in made for value in published[component]]
 
     recorder.enter_initialization()
@@ -135,7 +136,7 @@ def _recorded(
         if point % 100 == 0:
             progress(100)
     wall_time = time.perf_counter() - begin
-    recorder.leave()
+    recorder.leave(len(rows) - 1)
     return Record(names, first.times, rows, wall_time)
 
 
@@ -183,14 +184,20 @@ def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
 
 def _first_failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
     """What the process here says that failed first: others only say that the federation ended."""
+    texts = _texts(processes, folder)
+    first = (text for text in texts if ENDED not in text and ABSENT not in text)
+    return next(map(UserError, first), None)
+
+
+def _texts(processes: Mapping[str, subprocess.Popen], folder: Path) -> list[str]:
+    """What processes that have failed say last."""
     texts = []
     for component, process in processes.items():
-        if process.returncode in (None, 0):
+        if process.poll() in (None, 0):
             continue
         lines = (folder / component).read_text(encoding="utf-8", errors="replace").splitlines()
         text = lines[-1].removeprefix("error: ") if lines else f"{component}: failed silently"
         if process.returncode < 0:
             text = f"{component}: its process was ended by signal {-process.returncode}"
         texts.append(text)
-    first = (text for text in texts if ENDED not in text and ABSENT not in text)
-    return next(map(UserError, first), None)
+    return texts

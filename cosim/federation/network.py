@@ -2,12 +2,15 @@
 
 HELICS counts communication points: its time k is the k-th of them, whatever its time in s. So no
 time is rounded to HELICS's own resolution, and every process calculates it from its own counter.
+
+Every process waits for every other one at each point, needed or not: none runs ahead, and none
+leaves while another one still waits for its last values.
 """
 
 import re
 import time
 import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from threading import Thread
@@ -20,8 +23,11 @@ from cosim.errors import UserError, one_line
 ENDED = "the federation ended"  # in what processes say that others have stopped
 ABSENT = "no federation at"  # the same of one that comes later
 ANSWER = 5.0  # s, for another process to answer
+PAUSE = 0.05  # s, before the same question
+NOT_FOUND = 404  # HELICS's code of an answer
 SYSTEM = "system"  # what all must step, a global value of the federation
 QUIET = "--loglevel=none"
+NETWORK = "tcp_ss"  # one port, the broker's; with "zmq" each process needs one, by its number
 
 
 def helics() -> Any:
@@ -46,22 +52,19 @@ class Broker:
         Of processes.
     address : str
         Where it listens.
-    system : str
-        What all must step.
     """
 
-    def __init__(self, count: int, address: str, system: str) -> None:
+    def __init__(self, count: int, address: str) -> None:
         h = self._h = helics()
         self._questions = _Questions()
         options = f"-f {count} --local_interface={address} {QUIET}"
         try:
-            self._broker = h.helicsCreateBroker("zmq", "", options)
+            self._broker = h.helicsCreateBroker(NETWORK, "", options)
         except h.HelicsException as error:
             raise UserError(f"no broker at {address}: {one_line(error)}") from error
         if not h.helicsBrokerIsConnected(self._broker):
             self._close()
             raise UserError(f"no broker at {address}: nothing can listen there")
-        h.helicsBrokerSetGlobal(self._broker, SYSTEM, system)
 
     def __enter__(self) -> "Broker":
         return self
@@ -73,6 +76,10 @@ class Broker:
         self._h.helicsBrokerDisconnect(self._broker)
         if self._questions.ended():  # else they still use it
             self._h.helicsBrokerFree(self._broker)
+
+    def announce(self, system: str) -> None:
+        """Say what all must step."""
+        self._h.helicsBrokerSetGlobal(self._broker, SYSTEM, system)
 
     def end(self, text: str) -> None:
         """End the federation for all, and say why."""
@@ -121,24 +128,24 @@ class _Questions:
 class Federate:
     """A process in a federation: publishes one vector, and reads those of others.
 
+    All federates make the same exchanges. The first number of a vector is the count of exchanges
+    before it: what is read is of the present exchange, or an error.
+
     Parameters
     ----------
     name : str
         Also of what it publishes.
     address : str
         Of the broker.
-    sources : sequence of str
-        Names of federates whose values it reads.
-    publishes : bool
+    others : sequence of str
+        Names of all other federates.
     """
 
-    def __init__(
-        self, name: str, address: str, sources: Sequence[str], publishes: bool = True
-    ) -> None:
+    def __init__(self, name: str, address: str, others: Sequence[str]) -> None:
         self._h = helics()
-        self._name, self._address, self._sources = name, address, sources
-        self._publishes = publishes
+        self._name, self._address, self._others = name, address, others
         self._federate: Any = None  # before it has joined
+        self.exchanges = 0  # made so far
         self.waits = False  # for others
         self.calls = 0  # changes of `waits`
 
@@ -157,7 +164,7 @@ class Federate:
         """Connect to the broker."""
         h = self._h
         info = h.helicsCreateFederateInfo()
-        h.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
+        h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
         h.helicsFederateInfoSetCoreInitString(
             info, f"--federates=1 --broker_address={self._address} {QUIET}"
         )
@@ -167,37 +174,56 @@ class Federate:
         )
         with self._waiting(f"{ABSENT} {self._address}"):
             self._federate = h.helicsCreateValueFederate(self._name, info)
-        if self._publishes:
-            self._publication = h.helicsFederateRegisterGlobalPublication(
-                self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
-            )
+        self._publication = h.helicsFederateRegisterGlobalPublication(
+            self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
+        )
         self._subscriptions = {
-            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
-            for source in self._sources
+            other: h.helicsFederateRegisterSubscription(self._federate, other, "")
+            for other in self._others
         }
 
     def system(self) -> str:
-        """What all must step, as the broker knows it."""
+        """What all must step, as soon as the broker has announced it."""
         with self._waiting(f"at the start {ENDED}"):
-            return str(self._ask("global_value", SYSTEM))
+            while True:
+                answer = self._ask("global_value", SYSTEM)
+                if isinstance(answer, str) and not answer.startswith("#"):  # as #disconnected
+                    return answer
+                if isinstance(answer, str) or answer["error"]["code"] != NOT_FOUND:
+                    raise UserError(f"at the start {ENDED}")
+                time.sleep(PAUSE)
 
     def has_broker(self) -> bool:
         """Whether the broker answers."""
         ask = partial(self._ask, about="federates")
         return self._federate is None or bool(_Questions().answers(ask, ["root"]))
 
-    def _ask(self, target: str, about: str) -> object:
+    def _ask(self, target: str, about: str) -> Any:
         query = self._h.helicsCreateQuery(target, about)
         return self._h.helicsQueryExecute(query, self._federate)
 
     def publish(self, values: np.ndarray) -> None:
-        """Publish the values of the next communication point, (values,)."""
-        self._h.helicsPublicationPublishVector(self._publication, values.tolist())
+        """Publish the values that others read after the next exchange, (values,)."""
+        vector = [float(self.exchanges), *values.tolist()]
+        self._h.helicsPublicationPublishVector(self._publication, vector)
 
-    def read(self) -> Mapping[str, Sequence[float]]:
-        """The values of the present communication point, by source."""
-        get = self._h.helicsInputGetVector
-        return {source: get(place) for source, place in self._subscriptions.items()}
+    def read(self, sources: Iterable[str]) -> Mapping[str, Sequence[float]]:
+        """What `sources` published before the last exchange.
+
+        Raises
+        ------
+        UserError
+            If HELICS has not passed it on.
+        """
+        values = {}
+        for source in sources:
+            count, *values[source] = self._h.helicsInputGetVector(self._subscriptions[source])
+            if count != self.exchanges - 1:
+                raise UserError(
+                    f"after exchange {self.exchanges} {ENDED}: HELICS has not passed on to "
+                    f"{self._name} what {source} published"
+                )
+        return values
 
     def enter_initialization(self) -> None:
         """Wait for all others; what is published before is read after the first `exchange`."""
@@ -213,11 +239,13 @@ class Federate:
             )
         if result != h.HELICS_ITERATION_RESULT_ITERATING:
             raise UserError(f"in initialization {ENDED}")
+        self.exchanges += 1
 
     def begin(self) -> None:
         """To the first communication point."""
         with self._waiting(f"in initialization {ENDED}"):
             self._h.helicsFederateEnterExecutingMode(self._federate)
+        self.exchanges += 1
 
     def go_to(self, point: int) -> None:
         """Wait until all others have published the values of communication point `point`."""
@@ -225,9 +253,11 @@ class Federate:
             granted = self._h.helicsFederateRequestTime(self._federate, float(point))
         if granted != point:
             raise UserError(f"before communication point {point} {ENDED}")
+        self.exchanges += 1
 
-    def leave(self) -> None:
-        """Leave at the end."""
+    def leave(self, last: int) -> None:
+        """Wait until all others have reached communication point `last` too, and leave."""
+        self.go_to(last + 1)
         self._h.helicsFederateDisconnect(self._federate)
 
     def fail(self, text: str) -> None:

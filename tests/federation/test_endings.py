@@ -91,6 +91,11 @@ def components(process: Process, count: int) -> list[psutil.Process]:
     raise AssertionError(f"the components have not started: {process.communicate()[0]}")
 
 
+def connected(process: Process) -> bool:
+    found = psutil.Process(process.pid).net_connections()
+    return any(c.status == psutil.CONN_ESTABLISHED for c in found)
+
+
 def gone(children: list[psutil.Process]) -> bool:
     _, left = psutil.wait_procs(children, timeout=30.0)
     return not left
@@ -165,9 +170,9 @@ def test_a_broker_that_is_silent_is_named(start) -> None:
     components(here, 1)
     there = start("federate", str(SSP), "nominal", "arm", "--broker", address, "--silence", SILENCE)
     until = time.monotonic() + LIMIT
-    while psutil.Process(there.pid).num_threads() < 5 and time.monotonic() < until:
+    while not connected(there) and time.monotonic() < until:
         time.sleep(0.05)
-    time.sleep(1.0)
+    time.sleep(3.0)  # for it to register
     here.send_signal(signal.SIGSTOP)
     text, _ = there.communicate(timeout=LIMIT)
     assert there.returncode == 2
@@ -183,8 +188,9 @@ def test_an_fmu_that_does_not_return_is_named() -> None:
         part = parts(system, "nominal")["arm"]
     begin = time.monotonic()
     with (
-        Broker(2, address, part.system),
+        Broker(2, address) as broker,
         pytest.raises(UserError, match="arm: its FMU has not returned for 1 s"),
     ):
+        broker.announce(part.system)
         component.run(part, SimpleNamespace(instance=hang), address, 1.0)
     assert time.monotonic() - begin < LIMIT, "it was waited for"

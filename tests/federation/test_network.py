@@ -1,0 +1,119 @@
+"""What federates of HELICS give each other at an exchange."""
+
+import socket
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
+
+import numpy as np
+import pytest
+
+from cosim.errors import UserError
+from cosim.federation import addresses
+from cosim.federation.network import Broker, Federate
+
+LIMIT = 30.0  # s
+
+
+@pytest.fixture
+def pool() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(2) as made:
+        yield made
+
+
+def joined(address: str) -> tuple[Federate, Federate]:
+    both = Federate("one", address, ["two"]), Federate("two", address, ["one"])
+    for federate in both:
+        federate.join()
+    return both
+
+
+def at_once(pool: ThreadPoolExecutor, *calls) -> None:
+    for call in [pool.submit(call) for call in calls]:
+        call.result(timeout=LIMIT)
+
+
+def begun(pool: ThreadPoolExecutor, one: Federate, two: Federate) -> None:
+    at_once(pool, one.enter_initialization, two.enter_initialization)
+    one.publish(np.array([0.5]))
+    at_once(pool, one.begin, two.begin)
+
+
+def test_a_vector_is_read_after_the_next_exchange(pool: ThreadPoolExecutor) -> None:
+    address = addresses.free()
+    with Broker(2, address):
+        one, two = joined(address)
+        begun(pool, one, two)
+        assert two.read(["one"]) == {"one": [0.5]}
+        one.publish(np.array([0.1, -0.2]))
+        assert two.read(["one"]) == {"one": [0.5]}
+        at_once(pool, lambda: one.go_to(1), lambda: two.go_to(1))
+        assert two.read(["one"]) == {"one": [0.1, -0.2]}
+        at_once(pool, lambda: one.leave(1), lambda: two.leave(1))
+
+
+def test_values_of_another_exchange_are_no_values(pool: ThreadPoolExecutor) -> None:
+    """`one` publishes nothing before the exchange, which looks like a message that is late."""
+    address = addresses.free()
+    with Broker(2, address):
+        one, two = joined(address)
+        begun(pool, one, two)
+        at_once(pool, lambda: one.go_to(1), lambda: two.go_to(1))
+        words = "after exchange 2 the federation ended: HELICS has not passed on to two what one"
+        with pytest.raises(UserError, match=words):
+            two.read(["one"])
+        with pytest.raises(UserError, match="what two published"):  # never anything
+            one.read(["two"])
+        at_once(pool, lambda: one.leave(1), lambda: two.leave(1))
+
+
+def test_none_runs_ahead_or_leaves_early(pool: ThreadPoolExecutor) -> None:
+    """Not one that reads nothing either."""
+    address = addresses.free()
+    with Broker(2, address):
+        one, two = joined(address)
+        begun(pool, one, two)
+        for last in (False, True):
+            first = pool.submit(one.leave, 1) if last else pool.submit(one.go_to, 1)
+            with pytest.raises(TimeoutError):
+                first.result(timeout=0.5)
+            two.leave(1) if last else two.go_to(1)
+            first.result(timeout=LIMIT)
+
+
+def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
+    address = addresses.free()
+    _, port = addresses.check_form(address)
+    with ExitStack() as stack:
+        for other in range(port + 1, port + 20):
+            with suppress(OSError, OverflowError):  # in use already, or no port
+                stack.enter_context(socket.create_server(("", other)))
+        stack.enter_context(Broker(2, address))
+        one, two = joined(address)
+        begun(pool, one, two)
+        at_once(pool, lambda: one.leave(0), lambda: two.leave(0))
+
+
+def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:
+    """Or one could refuse it, and end the federation, before those have joined who must hear it."""
+    address = addresses.free()
+    with Broker(1, address) as broker:
+        one = Federate("one", address, [])
+        one.join()
+        asked = pool.submit(one.system)
+        with pytest.raises(TimeoutError):
+            asked.result(timeout=0.5)
+        broker.announce("variant hash")
+        assert asked.result(timeout=LIMIT) == "variant hash"
+        one.begin()
+        one.leave(0)
+
+
+def test_a_federation_that_ended_steps_nothing() -> None:
+    address = addresses.free()
+    with Broker(1, address):
+        one = Federate("one", address, [])
+        one.join()
+        one.fail("for a test")
+        with pytest.raises(UserError, match="at the start the federation ended"):
+            one.system()
