@@ -8,14 +8,17 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Thread
 from types import SimpleNamespace
 
+import numpy as np
 import psutil
 import pytest
 
 from cosim.errors import UserError
 from cosim.federation import addresses, component
-from cosim.federation.network import Broker
+from cosim.federation.federation import run
+from cosim.federation.network import Broker, Federate
 from cosim.federation.parts import parts
 from cosim.system import ssp
 from tests.support.paths import ROOT
@@ -177,6 +180,24 @@ def test_a_broker_that_is_silent_is_named(start) -> None:
     text, _ = there.communicate(timeout=LIMIT)
     assert there.returncode == 2
     assert f"arm: the broker at {address} has been silent for 10 s" in text
+
+
+def test_a_standstill_is_ended() -> None:
+    """The arm, here, takes part in one exchange only; what answers for it is HELICS."""
+    address = addresses.free()
+    with ssp.unpacked(SSP) as system:
+        part = parts(system, "nominal")["arm"]
+        arm = Federate("arm", address, part.others)
+
+        def begin_only() -> None:
+            arm.join()
+            arm.enter_initialization()
+            arm.publish(np.zeros(len(part.published)))
+            arm.exchange()
+
+        Thread(target=begin_only, daemon=True).start()
+        with pytest.raises(UserError, match="all answer, but nothing has moved for 10 s"):
+            run(system, "nominal", address, elsewhere=["arm"], silence=5.0)
 
 
 def test_an_fmu_that_does_not_return_is_named() -> None:
