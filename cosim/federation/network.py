@@ -23,6 +23,7 @@ from cosim.errors import UserError, one_line
 ENDED = "the federation ended"  # in what processes say that others have stopped
 ABSENT = "no federation at"  # the same of one that comes later
 ANSWER = 5.0  # s, for another process to answer
+JOIN = 25.0  # s, for the broker to listen
 PAUSE = 0.05  # s, before the same question
 NOT_FOUND = 404  # HELICS's code of an answer
 SYSTEM = "system"  # what all must step, a global value of the federation
@@ -161,12 +162,13 @@ class Federate:
             self.waits, self.calls = False, self.calls + 1
 
     def join(self) -> None:
-        """Connect to the broker."""
+        """Connect to the broker, which may have to be waited for."""
         h = self._h
         info = h.helicsCreateFederateInfo()
         h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
         h.helicsFederateInfoSetCoreInitString(
-            info, f"--federates=1 --broker_address={self._address} {QUIET}"
+            info,
+            f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s {QUIET}",
         )
         h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
         h.helicsFederateInfoSetIntegerProperty(

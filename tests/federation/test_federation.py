@@ -65,11 +65,12 @@ def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
 
 
 def test_a_component_may_be_stepped_elsewhere(short: Ssp) -> None:
-    """By a command of its own, as on another machine."""
+    """By a command of its own, as on another machine, and started first."""
     address = addresses.free()
     arguments = federation.command(short.path, "nominal", "arm", address)
     other = subprocess.Popen([sys.executable, *arguments], cwd=ROOT)
     try:
+        time.sleep(8.0)  # HELICS tries 4 s of its own accord
         record = federation.run(short, "nominal", address, elsewhere=["arm"])
         assert other.wait(timeout=30) == 0
     finally:
