@@ -42,7 +42,7 @@ def run(
         must not.
     """
     name = part.component
-    federate = Federate(name, address, part.others)
+    federate = Federate(name, address, sorted({s.component for s in part.sources}))
     still = Silence(federate, silence)
 
     def work() -> None:
@@ -50,7 +50,7 @@ def run(
         part.check_same(federate.system())
         with fmu.instance(name) as instance:
             _Stepper(part, instance, federate).run()
-        federate.leave(len(part.times) - 1)
+        federate.leave()
 
     def look() -> None:
         if is_gone():
@@ -115,7 +115,7 @@ class _Stepper:
     def _take(self) -> None:
         """Set the inputs to what their sources have published."""
         if self._part.inputs:
-            values = self._federate.read({s.component for s in self._part.sources})
+            values = self._federate.read()
             self._inputs.view[:] = [values[s.component][s.index] for s in self._part.sources]
             self._inputs.set()
 

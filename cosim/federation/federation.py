@@ -15,10 +15,12 @@ from cosim import project
 from cosim.errors import UserError
 from cosim.federation import SILENCE, watching
 from cosim.federation.network import ABSENT, ENDED, Broker, Federate
-from cosim.federation.parts import RECORDER, Part, parts
+from cosim.federation.parts import Part, parts
 from cosim.federation.watching import LEAVE, Silence
 from cosim.interruption import temporary_folder, uninterrupted
 from cosim.system.ssp import Ssp
+
+RECORDER = "recorder"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +73,7 @@ def run(
         c: [*command(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
         for c in local
     }
-    recorder = Federate(RECORDER, address, list(made))
+    recorder = Federate(RECORDER, address, list(made), publishes=False)
     with (
         temporary_folder() as folder,
         _opened(len(made) + 1, address, whole, recorder) as broker,
@@ -84,13 +86,14 @@ def run(
             if failed:
                 broker.end(failed[0])
             if still.too_long():
+                # one without inputs may be far ahead, and at the end
                 there = [c for c in made if c in elsewhere or processes[c].poll() is None]
                 silent = broker.silent(there, elsewhere)
                 if silent:
                     verb = "have" if len(silent) > 1 else "has"
                     names = ", ".join(silent)
                     raise UserError(f"{names} {verb} been silent for {silence:g} s (--silence)")
-            if stuck.too_long() and recorder.exchanges > 0:  # so nobody is still to come
+            if stuck.too_long() and recorder.all_here:
                 raise UserError(f"all answer, but nothing has moved for {2.0 * silence:g} s")
 
         def end(error: BaseException) -> None:
@@ -121,7 +124,7 @@ def _recorded(
     rows = np.empty((len(first.times), len(names)))
 
     def read(point: int) -> None:
-        published = recorder.read(made)
+        published = recorder.read()
         rows[point] = [value for component in made for value in published[component]]
 
     recorder.enter_initialization()
@@ -136,7 +139,7 @@ def _recorded(
         if point % 100 == 0:
             progress(100)
     wall_time = time.perf_counter() - begin
-    recorder.leave(len(rows) - 1)
+    recorder.leave()
     return Record(names, first.times, rows, wall_time)
 
 

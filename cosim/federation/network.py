@@ -2,15 +2,12 @@
 
 HELICS counts communication points: its time k is the k-th of them, whatever its time in s. So no
 time is rounded to HELICS's own resolution, and every process calculates it from its own counter.
-
-Every process waits for every other one at each point, needed or not: none runs ahead, and none
-leaves while another one still waits for its last values.
 """
 
 import re
 import time
 import warnings
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from threading import Thread
@@ -28,7 +25,9 @@ PAUSE = 0.05  # s, before the same question
 NOT_FOUND = 404  # HELICS's code of an answer
 SYSTEM = "system"  # what all must step, a global value of the federation
 QUIET = "--loglevel=none"
-NETWORK = "tcp_ss"  # one port, the broker's; with "zmq" each process needs one, by its number
+# One port, the broker's: with "zmq" each process needs one, by its number, and "zmq_ss" drops
+# messages when a process runs ahead.
+NETWORK = "tcp_ss"
 
 
 def helics() -> Any:
@@ -138,15 +137,20 @@ class Federate:
         Also of what it publishes.
     address : str
         Of the broker.
-    others : sequence of str
-        Names of all other federates.
+    sources : sequence of str
+        Names of federates whose values it reads.
+    publishes : bool
     """
 
-    def __init__(self, name: str, address: str, others: Sequence[str]) -> None:
+    def __init__(
+        self, name: str, address: str, sources: Sequence[str], publishes: bool = True
+    ) -> None:
         self._h = helics()
-        self._name, self._address, self._others = name, address, others
+        self._name, self._address, self._sources = name, address, sources
+        self._publishes = publishes
         self._federate: Any = None  # before it has joined
         self.exchanges = 0  # made so far
+        self.all_here = False  # whether all others have joined
         self.waits = False  # for others
         self.calls = 0  # changes of `waits`
 
@@ -176,12 +180,13 @@ class Federate:
         )
         with self._waiting(f"{ABSENT} {self._address}"):
             self._federate = h.helicsCreateValueFederate(self._name, info)
-        self._publication = h.helicsFederateRegisterGlobalPublication(
-            self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
-        )
+        if self._publishes:
+            self._publication = h.helicsFederateRegisterGlobalPublication(
+                self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
+            )
         self._subscriptions = {
-            other: h.helicsFederateRegisterSubscription(self._federate, other, "")
-            for other in self._others
+            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
+            for source in self._sources
         }
 
     def system(self) -> str:
@@ -209,8 +214,8 @@ class Federate:
         vector = [float(self.exchanges), *values.tolist()]
         self._h.helicsPublicationPublishVector(self._publication, vector)
 
-    def read(self, sources: Iterable[str]) -> Mapping[str, Sequence[float]]:
-        """What `sources` published before the last exchange.
+    def read(self) -> Mapping[str, Sequence[float]]:
+        """What the sources published before the last exchange.
 
         Raises
         ------
@@ -218,8 +223,8 @@ class Federate:
             If HELICS has not passed it on.
         """
         values = {}
-        for source in sources:
-            count, *values[source] = self._h.helicsInputGetVector(self._subscriptions[source])
+        for source, place in self._subscriptions.items():
+            count, *values[source] = self._h.helicsInputGetVector(place)
             if count != self.exchanges - 1:
                 raise UserError(
                     f"after exchange {self.exchanges} {ENDED}: HELICS has not passed on to "
@@ -231,6 +236,7 @@ class Federate:
         """Wait for all others; what is published before is read after the first `exchange`."""
         with self._waiting(f"at the start {ENDED}"):
             self._h.helicsFederateEnterInitializingMode(self._federate)
+        self.all_here = True
 
     def exchange(self) -> None:
         """Give and take values in initialization."""
@@ -257,9 +263,8 @@ class Federate:
             raise UserError(f"before communication point {point} {ENDED}")
         self.exchanges += 1
 
-    def leave(self, last: int) -> None:
-        """Wait until all others have reached communication point `last` too, and leave."""
-        self.go_to(last + 1)
+    def leave(self) -> None:
+        """Leave at the end."""
         self._h.helicsFederateDisconnect(self._federate)
 
     def fail(self, text: str) -> None:

@@ -11,8 +11,6 @@ from cosim.model import Value
 from cosim.system.ssp import Ssp
 from cosim.system.structure import Connection
 
-RECORDER = "recorder"  # takes part beside the components
-
 
 @dataclass(frozen=True)
 class Source:
@@ -27,7 +25,6 @@ class Part:
     """A component of a system, as one process steps it."""
 
     component: str
-    others: tuple[str, ...]  # that take part beside it
     parameters: dict[str, Value]
     published: tuple[str, ...]  # Real outputs, in the order of the FMU
     inputs: tuple[str, ...]  # connected Real inputs
@@ -77,7 +74,6 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
         others = [c for c in system.connections if c not in real_connections(ssp)]
         made[name] = Part(
             component=name,
-            others=(*(c.name for c in system.components if c.name != name), RECORDER),
             parameters=system.parameter_sets[variant].get(name, {}),
             published=tuple(published[name]),
             inputs=tuple(c.end_connector for c in incoming),

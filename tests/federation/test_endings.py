@@ -187,7 +187,7 @@ def test_a_standstill_is_ended() -> None:
     address = addresses.free()
     with ssp.unpacked(SSP) as system:
         part = parts(system, "nominal")["arm"]
-        arm = Federate("arm", address, part.others)
+        arm = Federate("arm", address, ["controller"])
 
         def begin_only() -> None:
             arm.join()

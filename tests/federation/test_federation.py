@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -91,11 +92,12 @@ def test_a_process_that_is_killed_ends_the_federation(tmp_path: Path) -> None:
 
 def processes_of(component: str) -> list[psutil.Process]:
     """Processes that this one has started to step the component."""
-    return [
-        child
-        for child in psutil.Process().children(recursive=True)
-        if "federate" in child.cmdline() and component in child.cmdline()
-    ]
+    found = []
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.NoSuchProcess):  # it has just ended
+            if {"federate", component} <= set(child.cmdline()):
+                found.append(child)
+    return found
 
 
 def kill_soon(component: str) -> None:

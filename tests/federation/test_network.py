@@ -44,12 +44,12 @@ def test_a_vector_is_read_after_the_next_exchange(pool: ThreadPoolExecutor) -> N
     with Broker(2, address):
         one, two = joined(address)
         begun(pool, one, two)
-        assert two.read(["one"]) == {"one": [0.5]}
+        assert two.read() == {"one": [0.5]}
         one.publish(np.array([0.1, -0.2]))
-        assert two.read(["one"]) == {"one": [0.5]}
+        assert two.read() == {"one": [0.5]}
         at_once(pool, lambda: one.go_to(1), lambda: two.go_to(1))
-        assert two.read(["one"]) == {"one": [0.1, -0.2]}
-        at_once(pool, lambda: one.leave(1), lambda: two.leave(1))
+        assert two.read() == {"one": [0.1, -0.2]}
+        at_once(pool, one.leave, two.leave)
 
 
 def test_values_of_another_exchange_are_no_values(pool: ThreadPoolExecutor) -> None:
@@ -61,24 +61,10 @@ def test_values_of_another_exchange_are_no_values(pool: ThreadPoolExecutor) -> N
         at_once(pool, lambda: one.go_to(1), lambda: two.go_to(1))
         words = "after exchange 2 the federation ended: HELICS has not passed on to two what one"
         with pytest.raises(UserError, match=words):
-            two.read(["one"])
+            two.read()
         with pytest.raises(UserError, match="what two published"):  # never anything
-            one.read(["two"])
-        at_once(pool, lambda: one.leave(1), lambda: two.leave(1))
-
-
-def test_none_runs_ahead_or_leaves_early(pool: ThreadPoolExecutor) -> None:
-    """Not one that reads nothing either."""
-    address = addresses.free()
-    with Broker(2, address):
-        one, two = joined(address)
-        begun(pool, one, two)
-        for last in (False, True):
-            first = pool.submit(one.leave, 1) if last else pool.submit(one.go_to, 1)
-            with pytest.raises(TimeoutError):
-                first.result(timeout=0.5)
-            two.leave(1) if last else two.go_to(1)
-            first.result(timeout=LIMIT)
+            one.read()
+        at_once(pool, one.leave, two.leave)
 
 
 def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
@@ -91,7 +77,7 @@ def test_one_port_is_enough(pool: ThreadPoolExecutor) -> None:
         stack.enter_context(Broker(2, address))
         one, two = joined(address)
         begun(pool, one, two)
-        at_once(pool, lambda: one.leave(0), lambda: two.leave(0))
+        at_once(pool, one.leave, two.leave)
 
 
 def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:
@@ -106,7 +92,7 @@ def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:
         broker.announce("variant hash")
         assert asked.result(timeout=LIMIT) == "variant hash"
         one.begin()
-        one.leave(0)
+        one.leave()
 
 
 def test_a_federation_that_ended_steps_nothing() -> None:
