@@ -13,6 +13,7 @@
 #   ./run.sh playground            builds build/playground/index.html, the plant in a browser; --open opens it
 #   ./run.sh campaign FILE.toml    many runs over parameters, on all cores: cosim/campaign/README.md
 #   ./run.sh federation            the closed loop with each FMU in its own process: models/closed_loop/federation.md
+#   ./run.sh federate              one of these processes, on another machine; builds nothing
 #   ./run.sh --fmi 3               only FMUs of FMI 3.0; also after system and coupling
 #   ./run.sh run --help            all options; also after system and coupling
 set -euo pipefail
@@ -42,7 +43,7 @@ fi
 
 case "${1-}" in
   campaign) "$root/setup.sh" --campaign ;;
-  federation) "$root/setup.sh" --federation ;;
+  federation | federate) "$root/setup.sh" --federation ;;
   *) "$root/setup.sh" ;;
 esac
 python="$root/build/venv/bin/python"
@@ -56,6 +57,9 @@ build() {
 export PYTHONPATH="$root"
 if [ "${1-}" = --list ]; then
   exec "$python" -P -m cosim list "${@:2}"
+fi
+if [ "${1-}" = federate ]; then
+  exec "$python" -P -m cosim "$@"
 fi
 build >"$log" 2>&1 || { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
 case "${1-}" in

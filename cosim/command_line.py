@@ -162,9 +162,9 @@ def _count(text: str) -> int:
 
 def _seconds(text: str) -> float:
     with suppress(ValueError):
-        if 0 < float(text) < math.inf:
+        if 1 <= float(text) < math.inf:
             return float(text)
-    raise argparse.ArgumentTypeError(f"expected a positive number of seconds, got {text!r}")
+    raise argparse.ArgumentTypeError(f"expected a number of seconds, 1 or more, got {text!r}")
 
 
 def _add_federation(commands: argparse._SubParsersAction) -> None:
@@ -192,7 +192,7 @@ def _add_federation(commands: argparse._SubParsersAction) -> None:
         nargs="+",
         default=[],
         metavar="COMPONENT",
-        help="components that are not started here: prints the command that steps each",
+        help="components that are not started here, in one variant: prints the command for each",
     )
     _add_silence(federation, "processes that do not answer for so long end the federation")
     federation.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")

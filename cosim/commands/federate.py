@@ -22,6 +22,12 @@ def run(options: argparse.Namespace) -> int:
             )
         with Fmu(system.fmu(options.component)) as fmu:
             fmu.path = options.ssp / system.system.component(options.component).source
+            if not options.owned:
+                addresses.wait_for(
+                    options.broker,
+                    options.silence,
+                    lambda: print(f"waiting for a federation at {options.broker}", flush=True),
+                )
             is_gone = watching.end_of_input().is_set if options.owned else lambda: False
             component.run(made[options.component], fmu, options.broker, options.silence, is_gone)
     return 0

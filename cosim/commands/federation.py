@@ -27,15 +27,18 @@ def run(options: argparse.Namespace) -> int:
     if path is None:
         folder, _ = study.of_coupling()
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
-    address = options.listen or addresses.free()
+    address = addresses.free() if options.listen is None else options.listen
     addresses.check_free(address)
     with ssp.unpacked(path) as system:
         _check_names(system, options)
         names = options.names or list(system.system.parameters)
         for name in names:
             for component in options.elsewhere:
-                arguments = federation.command(path, name, component, address)
-                print(f"waiting for: python {shlex.join(arguments)}", flush=True)
+                place = path.resolve()
+                if place.is_relative_to(project.ROOT):
+                    place = place.relative_to(project.ROOT)
+                arguments = federation.arguments(place, name, component, address)
+                print(f"waiting for: ./run.sh {shlex.join(arguments)}", flush=True)
         table = console.FederationTable(names)
         failed = []
         for name in names:
@@ -64,6 +67,8 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
                 raise UserError(
                     f"{system.path}: has no {kind} {name!r}{hint} (there are: {', '.join(known)})"
                 )
+    if options.elsewhere and len(options.names) != 1:
+        raise UserError("--elsewhere: name one variant, which the other machine steps too")
 
 
 def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:

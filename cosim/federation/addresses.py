@@ -1,13 +1,16 @@
-"""Addresses of federations, as tcp://192.168.0.1:23404: of the right form, free to listen at."""
+"""Addresses of federations, as tcp://192.168.0.1:23404: right, free, or listened at."""
 
 import errno
 import os
 import re
 import socket
+import time
+from collections.abc import Callable
 
 from cosim.errors import UserError, reason
 
 LOCAL = "127.0.0.1"
+PAUSE = 0.2  # s, before the next attempt to connect
 
 
 def free() -> str:
@@ -18,10 +21,13 @@ def free() -> str:
 
 
 def check_form(address: str) -> tuple[str, int]:
-    """Host and port; UserError if `address` is none."""
-    found = re.fullmatch(r"tcp://([^/\s]+):([1-9]\d{0,4})", address)
-    if not found or int(found[2]) > 65535:
-        raise UserError(f"{address}: expected an address as tcp://192.168.0.1:23404")
+    """Host and port; UserError if `address` is none that a process can connect to.
+
+    Neither is one of IPv6: HELICS waits for ever where it shall listen there.
+    """
+    found = re.fullmatch(r"tcp://([\w.-]+):([1-9]\d{0,4})", address)
+    if not found or int(found[2]) > 65535 or found[1] == "0.0.0.0":
+        raise UserError(f"{address!r}: expected an address as tcp://192.168.0.1:23404")
     return found[1], int(found[2])
 
 
@@ -32,14 +38,39 @@ def check_free(address: str) -> None:
         raise UserError(f"nothing can listen at {address}: {refusal}")
 
 
+def wait_for(address: str, seconds: float, say: Callable[[], object]) -> None:
+    """Wait until something listens at `address`; `say` so, if it does not yet.
+
+    HELICS would wait too, but print that it does, several times a second.
+
+    Raises
+    ------
+    UserError
+        If nothing listens there for `seconds`, or the host is unknown.
+    """
+    place = check_form(address)
+    latest = time.monotonic() + seconds
+    is_said = False
+    while True:
+        try:
+            socket.create_connection(place, timeout=1.0).close()
+            return
+        except socket.gaierror as error:
+            raise UserError(f"{address}: {reason(error)}") from error
+        except OSError as error:
+            if time.monotonic() > latest:
+                raise UserError(f"nothing has listened at {address} for {seconds:g} s") from error
+        if not is_said:
+            say()
+            is_said = True
+        time.sleep(PAUSE)
+
+
 def _refusal(host: str, port: int) -> str:
     """Why nothing can listen there; empty if it can."""
     try:
         family, *_, place = socket.getaddrinfo(
-            None if host == "*" else host.strip("[]"),
-            port,
-            type=socket.SOCK_STREAM,
-            flags=socket.AI_PASSIVE,
+            host, port, family=socket.AF_INET, type=socket.SOCK_STREAM
         )[0]
         with socket.socket(family) as probe:
             if os.name == "posix":  # as HELICS does: connections that have ended do not count

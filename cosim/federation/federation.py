@@ -5,7 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,9 +33,9 @@ class Record:
     wall_time: float  # s, of all steps
 
 
-def command(ssp: Path, variant: str, component: str, address: str) -> list[str]:
-    """The command that steps a component, on this machine or on another one with the same files."""
-    return ["-m", "cosim", "federate", str(ssp), variant, component, "--broker", address]
+def arguments(ssp: Path, variant: str, component: str, address: str) -> list[str]:
+    """Of the command line, to step a component on this machine or on another one."""
+    return ["federate", ssp.as_posix(), variant, component, "--broker", address]
 
 
 def run(
@@ -70,25 +70,25 @@ def run(
     whole = next(iter(made.values())).system
     local = [component for component in made if component not in elsewhere]
     started = {
-        c: [*command(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
+        c: [*arguments(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
         for c in local
     }
     recorder = Federate(RECORDER, address, list(made), publishes=False)
     with (
         temporary_folder() as folder,
-        _opened(len(made) + 1, address, whole, recorder) as broker,
+        _opened(len(made) + 1, address, whole, recorder, silence) as broker,
         _processes(started, folder) as processes,
     ):
         still, stuck = Silence(recorder, silence), Silence(recorder, 2.0 * silence)
 
         def look() -> None:
-            failed = _texts(processes, folder)
-            if failed:
-                broker.end(failed[0])
+            failure = _failure(processes, folder)
+            if failure:
+                raise failure
             if still.too_long():
                 # one without inputs may be far ahead, and at the end
                 there = [c for c in made if c in elsewhere or processes[c].poll() is None]
-                silent = broker.silent(there, elsewhere)
+                silent = broker.silent(there, () if recorder.all_here else elsewhere)
                 if silent:
                     verb = "have" if len(silent) > 1 else "has"
                     names = ", ".join(silent)
@@ -103,15 +103,29 @@ def run(
             return watching.run(lambda: _recorded(recorder, made, progress), look, end)
         except UserError as error:
             _wait(processes)
-            raise _first_failure(processes, folder) or error from error
+            raise _failure(processes, folder) or error from error
 
 
 @contextmanager
-def _opened(count: int, address: str, system: str, recorder: Federate) -> Iterator[Broker]:
+def _opened(
+    count: int, address: str, system: str, recorder: Federate, silence: float
+) -> Iterator[Broker]:
     """A federation that the recorder has joined: only then may another one refuse to step it."""
-    with Broker(count, address) as broker:
-        recorder.join()
-        broker.announce(system)
+    still = Silence(recorder, silence)
+
+    def work() -> Broker:
+        with ExitStack() as stack:
+            broker = stack.enter_context(Broker(count, address))
+            recorder.join()
+            broker.announce(system)
+            stack.pop_all()
+            return broker
+
+    def look() -> None:
+        if still.too_long():
+            raise UserError(f"no broker at {address}: HELICS has not returned for {silence:g} s")
+
+    with watching.run(work, look, lambda _: None) as broker:
         yield broker
 
 
@@ -158,10 +172,10 @@ def _processes(
     environment = os.environ | places | {"PYTHONPATH": str(project.ROOT)}
     processes: dict[str, subprocess.Popen] = {}
     try:
-        for component, arguments in commands.items():
+        for component, command in commands.items():
             with (folder / component).open("wb") as log, uninterrupted():
                 processes[component] = subprocess.Popen(
-                    [sys.executable, "-P", *arguments],
+                    [sys.executable, "-P", "-m", "cosim", *command],
                     stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=subprocess.STDOUT,
@@ -185,11 +199,11 @@ def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
             process.wait(max(0.0, latest - time.monotonic()))
 
 
-def _first_failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
-    """What the process here says that failed first: others only say that the federation ended."""
+def _failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
+    """What a process here says that has failed: others only say that the federation ended."""
     texts = _texts(processes, folder)
-    first = (text for text in texts if ENDED not in text and ABSENT not in text)
-    return next(map(UserError, first), None)
+    causes = (text for text in texts if ENDED not in text and ABSENT not in text)
+    return next(map(UserError, causes), None)
 
 
 def _texts(processes: Mapping[str, subprocess.Popen], folder: Path) -> list[str]:

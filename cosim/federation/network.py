@@ -20,7 +20,7 @@ from cosim.errors import UserError, one_line
 ENDED = "the federation ended"  # in what processes say that others have stopped
 ABSENT = "no federation at"  # the same of one that comes later
 ANSWER = 5.0  # s, for another process to answer
-JOIN = 25.0  # s, for the broker to listen
+JOIN = 25.0  # s, for the broker to answer
 PAUSE = 0.05  # s, before the same question
 NOT_FOUND = 404  # HELICS's code of an answer
 SYSTEM = "system"  # what all must step, a global value of the federation
@@ -64,7 +64,7 @@ class Broker:
             raise UserError(f"no broker at {address}: {one_line(error)}") from error
         if not h.helicsBrokerIsConnected(self._broker):
             self._close()
-            raise UserError(f"no broker at {address}: nothing can listen there")
+            raise UserError(f"no broker at {address}: nothing can listen there any more")
 
     def __enter__(self) -> "Broker":
         return self
@@ -85,8 +85,11 @@ class Broker:
         """End the federation for all, and say why."""
         self._h.helicsBrokerGlobalError(self._broker, 1, text.encode())  # takes no str
 
-    def silent(self, names: Sequence[str], elsewhere: Collection[str]) -> list[str]:
-        """Processes that do not answer; one `elsewhere` may still have to be started."""
+    def silent(self, names: Sequence[str], to_come: Collection[str]) -> list[str]:
+        """Processes that do not answer; if all do, those that are unknown and not `to_come`.
+
+        HELICS forgets a process that has not answered for some time, and one that has left.
+        """
 
         def ask(name: str) -> object:
             query = self._h.helicsCreateQuery(name, "current_time")
@@ -94,7 +97,8 @@ class Broker:
 
         answers = self._questions.answers(ask, names)
         unknown = {n for n, a in answers.items() if isinstance(a, dict) and "error" in a}
-        return [n for n in names if n not in answers or (n in unknown and n not in elsewhere)]
+        silent = [n for n in names if n not in answers]
+        return silent or [n for n in names if n in unknown and n not in to_come]
 
 
 class _Questions:
@@ -166,7 +170,7 @@ class Federate:
             self.waits, self.calls = False, self.calls + 1
 
     def join(self) -> None:
-        """Connect to the broker, which may have to be waited for."""
+        """Connect to the broker."""
         h = self._h
         info = h.helicsCreateFederateInfo()
         h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)

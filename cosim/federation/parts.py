@@ -81,7 +81,9 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
                 Source(c.start_component, published[c.start_component].index(c.start_connector))
                 for c in incoming
             ),
-            constant=tuple({c.start_connector for c in others if c.start_component == name}),
+            constant=tuple(
+                dict.fromkeys(c.start_connector for c in others if c.start_component == name)
+            ),
             rounds=len(system.components) + 1,
             times=times,
             system=whole,

@@ -1,6 +1,7 @@
 """How a federation ends that does not come to its end: by signals, silence or different systems."""
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -158,6 +159,17 @@ def test_a_component_that_is_killed_leaves_no_files(start, tmp_path: Path) -> No
     assert not list((tmp_path / "temporary").iterdir())
 
 
+def test_the_command_that_is_printed_steps_the_component(start) -> None:
+    address = addresses.free()
+    here = federation(start, "--listen", address, "--elsewhere", "arm")
+    program, *arguments = shlex.split(here.stdout.readline().removeprefix("waiting for: "))
+    assert program == "./run.sh"
+    there = start(*arguments)
+    for process in (here, there):
+        text, _ = process.communicate(timeout=LIMIT)
+        assert process.returncode == 0, text
+
+
 def test_a_component_that_is_silent_is_named(start) -> None:
     here = federation(start, "--silence", SILENCE)
     silent = next(c for c in components(here, 3) if "controller" in c.cmdline())
@@ -198,6 +210,14 @@ def test_a_standstill_is_ended() -> None:
         Thread(target=begin_only, daemon=True).start()
         with pytest.raises(UserError, match="all answer, but nothing has moved for 10 s"):
             run(system, "nominal", address, elsewhere=["arm"], silence=5.0)
+
+
+def test_a_broker_that_does_not_open_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("cosim.federation.federation.Broker", lambda *_: time.sleep(LIMIT))
+    address = addresses.free()
+    words = f"no broker at {address}: HELICS has not returned for 1 s"
+    with ssp.unpacked(SSP) as system, pytest.raises(UserError, match=words):
+        run(system, "nominal", address, silence=1.0)
 
 
 def test_an_fmu_that_does_not_return_is_named() -> None:

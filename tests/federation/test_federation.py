@@ -68,14 +68,22 @@ def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
 def test_a_component_may_be_stepped_elsewhere(short: Ssp) -> None:
     """By a command of its own, as on another machine, and started first."""
     address = addresses.free()
-    arguments = federation.command(short.path, "nominal", "arm", address)
-    other = subprocess.Popen([sys.executable, *arguments], cwd=ROOT)
+    arguments = federation.arguments(short.path, "nominal", "arm", address)
+    other = subprocess.Popen(
+        [sys.executable, "-m", "cosim", *arguments],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
     try:
         time.sleep(8.0)  # HELICS tries 4 s of its own accord
         record = federation.run(short, "nominal", address, elsewhere=["arm"])
-        assert other.wait(timeout=30) == 0
+        text, _ = other.communicate(timeout=30)
     finally:
         other.kill()
+    assert other.returncode == 0
+    assert text == f"waiting for a federation at {address}\n"
     together = federation.run(short, "nominal", addresses.free())
     assert np.array_equal(record.values, together.values)
 
@@ -128,10 +136,15 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
     [
         (["nominall"], "no variant 'nominall', did you mean 'nominal'?"),
         (["nominal", "--elsewhere", "arn"], "no component 'arn', did you mean 'arm'?"),
+        (["--elsewhere", "arm"], "--elsewhere: name one variant"),
         (["nominal", "--listen", "tcp://192.0.2.1:23404"], "192.0.2.1 is no address of this"),
         (["nominal", "--listen", "192.168.0.1:23404"], "expected an address as tcp://"),
         (["nominal", "--listen", "tcp://127.0.0.1:65536"], "expected an address as tcp://"),
-        (["nominal", "--silence", "0"], "expected a positive number of seconds"),
+        (["nominal", "--listen", "tcp://[::1]:23404"], "expected an address as tcp://"),
+        (["nominal", "--listen", "tcp://*:23404"], "expected an address as tcp://"),
+        (["nominal", "--listen", "tcp://0.0.0.0:23404"], "expected an address as tcp://"),
+        (["nominal", "--listen", ""], "expected an address as tcp://"),
+        (["nominal", "--silence", "0"], "expected a number of seconds, 1 or more"),
     ],
 )
 def test_wrong_use(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -147,3 +160,19 @@ def test_a_port_that_is_in_use_is_named() -> None:
         port = server.getsockname()[1]
         with pytest.raises(UserError, match=f"port {port} is in use"):
             addresses.check_free(f"tcp://127.0.0.1:{port}")
+
+
+def test_one_that_listens_is_waited_for() -> None:
+    address = addresses.free()
+    said = []
+    with pytest.raises(UserError, match=f"nothing has listened at {address} for 1 s"):
+        addresses.wait_for(address, 1.0, lambda: said.append("wait"))
+    assert said == ["wait"]
+    with socket.create_server(addresses.check_form(address)):
+        addresses.wait_for(address, 1.0, lambda: pytest.fail("nothing to wait for"))
+
+
+def test_an_unknown_host_is_not_waited_for() -> None:
+    address = "tcp://no-such-host.invalid:23404"
+    with pytest.raises(UserError, match=address):
+        addresses.wait_for(address, 60.0, lambda: pytest.fail("it is waited for"))

@@ -95,6 +95,15 @@ def test_what_is_stepped_is_waited_for(pool: ThreadPoolExecutor) -> None:
         one.leave()
 
 
+def test_who_is_unknown_may_be_to_come() -> None:
+    address = addresses.free()
+    with Broker(2, address) as broker:
+        one = Federate("one", address, [])
+        one.join()
+        assert broker.silent(["one", "two"], to_come=["two"]) == []
+        assert broker.silent(["one", "two"], to_come=[]) == ["two"]
+
+
 def test_a_federation_that_ended_steps_nothing() -> None:
     address = addresses.free()
     with Broker(1, address):
