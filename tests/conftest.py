@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from tests.support.paths import ROOT
 if TYPE_CHECKING:
     from cosim.fmu_file import Fmu
     from tests.support.browser import Browser
+    from tests.support.hosts import Network
 
 
 @pytest.fixture(scope="session")
@@ -56,3 +58,20 @@ def browser() -> Iterator["Browser"]:
 
     with opened() as browser:
         yield browser
+
+
+@pytest.fixture
+def apart() -> Iterator["Network"]:
+    """Two hosts; skipped where the kernel permits none."""
+    from tests.support.hosts import NotPermittedError, network
+
+    with ExitStack() as stack:
+        try:
+            made = stack.enter_context(network())
+        except FileNotFoundError as error:
+            if os.environ.get("CI"):
+                pytest.fail(str(error))
+            pytest.skip(str(error))
+        except NotPermittedError as error:
+            pytest.skip(f"no network namespaces: {error}")
+        yield made

@@ -18,7 +18,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.campaign.files import write
-from tests.campaign.hosts import LOOPBACK, Network, NotPermittedError, network
 from tests.campaign.processes import (
     blocks,
     cluster,
@@ -31,6 +30,7 @@ from tests.campaign.processes import (
     wait_for,
     workers,
 )
+from tests.support.hosts import LOOPBACK, Network, NotPermittedError, network
 
 RUNS, KILLS = 2400, 20
 PAUSE = 0.5  # s, between two kills

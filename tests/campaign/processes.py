@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.campaign.hosts import LOOPBACK, Host
+from tests.support.hosts import LOOPBACK, Host
 from tests.support.paths import ROOT
 
 PATIENCE = 900  # s; a busy machine is slow

@@ -21,7 +21,6 @@ from cosim.campaign.results import Results
 from cosim.campaign.worker import Plugin
 from cosim.errors import UserError
 from tests.campaign.files import write
-from tests.campaign.hosts import LOOPBACK
 from tests.campaign.processes import (
     blocks,
     cluster,
@@ -34,6 +33,7 @@ from tests.campaign.processes import (
     wait_for,
     workers,
 )
+from tests.support.hosts import LOOPBACK
 
 Made = tuple[engine.Engine, Results]
 

@@ -7,14 +7,11 @@ short here.
 
 import os
 import signal
-from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from tests.campaign.files import write
-from tests.campaign.hosts import LOOPBACK, Host, Network, NotPermittedError, network
 from tests.campaign.processes import (
     ENVIRONMENT,
     blocks,
@@ -26,6 +23,7 @@ from tests.campaign.processes import (
     table,
     wait_for,
 )
+from tests.support.hosts import LOOPBACK, Host, Network
 
 CHANGES = [("runs = 40", "runs = 160"), ("block = 8", "block = 4")]
 CHANGES += [("time = { stop = 1.0 }\n", "")]
@@ -39,20 +37,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def undisturbed(file: Path) -> str:
     return completed(file, file.parent / "undisturbed", "--workers", 1)
-
-
-@pytest.fixture
-def apart() -> Iterator[Network]:
-    with ExitStack() as stack:
-        try:
-            made = stack.enter_context(network())
-        except FileNotFoundError as error:
-            if os.environ.get("CI"):
-                pytest.fail(str(error))
-            pytest.skip(str(error))
-        except NotPermittedError as error:
-            pytest.skip(f"no network namespaces: {error}")
-        yield made
 
 
 @pytest.fixture

@@ -1,11 +1,22 @@
-"""Ends the process of the tests as the command ends: HELICS's own end may wait for ever."""
+"""What these tests share, and their end, that of the command: HELICS's own may wait for ever."""
 
 import os
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from tests.federation.processes import Start, starting
+
 _status = [0]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Starts commands; their temporary files are in the folder `temporary` of the test."""
+    with starting(tmp_path / "temporary") as start:
+        yield start
 
 
 def pytest_sessionfinish(exitstatus: int) -> None:

@@ -1,13 +1,8 @@
 """How a federation ends that does not come to its end: by signals, silence or different systems."""
 
-import os
 import shlex
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from threading import Thread
 from types import SimpleNamespace
@@ -22,63 +17,14 @@ from cosim.federation.federation import run
 from cosim.federation.network import Broker, Federate
 from cosim.federation.parts import parts
 from cosim.system import ssp
-from tests.support.paths import ROOT
+from tests.federation.processes import Process, Start, federation
 from tests.support.ssp_files import SSP, edited, replace
 
 LIMIT = 60.0  # s, far above what an end takes
 SILENCE = "10"  # s, above what a step takes on a busy machine
 
-Process = subprocess.Popen
 
-
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator:
-    """Starts commands in sessions of their own; none is left.
-
-    Their temporary files are in the folder `temporary` of the test.
-    """
-    (tmp_path / "temporary").mkdir()
-    environment = os.environ | {"TMPDIR": str(tmp_path / "temporary")}
-    started: list[Process] = []
-
-    def do(*arguments: str) -> Process:
-        made = subprocess.Popen(
-            [sys.executable, "-m", "cosim", *arguments],
-            cwd=ROOT,
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
-        started.append(made)
-        return made
-
-    yield do
-    for process in started:
-        with left_of(process) as children:
-            process.kill()
-            process.communicate()
-        for child in children:
-            child.kill()
-
-
-@contextmanager
-def left_of(process: Process) -> Iterator[list[psutil.Process]]:
-    """Children of a process, of which the list keeps those that are still there at the end."""
-    try:
-        children = psutil.Process(process.pid).children(recursive=True)
-    except psutil.NoSuchProcess:
-        children = []
-    yield children
-    children[:] = [c for c in children if c.is_running() and c.status() != psutil.STATUS_ZOMBIE]
-
-
-def federation(start, *arguments: str) -> Process:
-    return start("federation", "nominal", "--ssp", str(SSP), *arguments)
-
-
-def federate(start, system: Path, variant: str, address: str) -> Process:
+def federate(start: Start, system: Path, variant: str, address: str) -> Process:
     return start("federate", str(system), variant, "arm", "--broker", address)
 
 
@@ -105,7 +51,7 @@ def gone(children: list[psutil.Process]) -> bool:
     return not left
 
 
-def test_another_variant_elsewhere_is_refused_by_both(start) -> None:
+def test_another_variant_elsewhere_is_refused_by_both(start: Start) -> None:
     address = addresses.free()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     there = federate(start, SSP, "heavy_payload", address)
@@ -116,7 +62,7 @@ def test_another_variant_elsewhere_is_refused_by_both(start) -> None:
         assert words in text
 
 
-def test_another_ssp_elsewhere_is_refused_by_both(start, tmp_path: Path) -> None:
+def test_another_ssp_elsewhere_is_refused_by_both(start: Start, tmp_path: Path) -> None:
     """Of another tolerance of the arm."""
     change = {"resources/arm_nominal.ssv": replace("1e-11", "1e-10")}
     other = edited(SSP, tmp_path / "Other.ssp", change)
@@ -131,7 +77,7 @@ def test_another_ssp_elsewhere_is_refused_by_both(start, tmp_path: Path) -> None
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_one_that_waits_for_others_can_be_stopped(
-    start, number: int, code: int, tmp_path: Path
+    start: Start, number: int, code: int, tmp_path: Path
 ) -> None:
     here = federation(start, "--listen", addresses.free(), "--elsewhere", "arm")
     children = components(here, 2)
@@ -142,14 +88,14 @@ def test_one_that_waits_for_others_can_be_stopped(
     assert not list((tmp_path / "temporary").iterdir())
 
 
-def test_components_end_with_the_process_that_is_killed(start) -> None:
+def test_components_end_with_the_process_that_is_killed(start: Start) -> None:
     here = federation(start, "--listen", addresses.free(), "--elsewhere", "arm")
     children = components(here, 2)
     here.kill()
     assert gone(children), "HELICS notices it after a minute"
 
 
-def test_a_component_that_is_killed_leaves_no_files(start, tmp_path: Path) -> None:
+def test_a_component_that_is_killed_leaves_no_files(start: Start, tmp_path: Path) -> None:
     here = federation(start)
     components(here, 3)[0].kill()
     text, _ = here.communicate(timeout=LIMIT)
@@ -159,7 +105,7 @@ def test_a_component_that_is_killed_leaves_no_files(start, tmp_path: Path) -> No
     assert not list((tmp_path / "temporary").iterdir())
 
 
-def test_the_command_that_is_printed_steps_the_component(start) -> None:
+def test_the_command_that_is_printed_steps_the_component(start: Start) -> None:
     address = addresses.free()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     program, *arguments = shlex.split(here.stdout.readline().removeprefix("waiting for: "))
@@ -170,7 +116,7 @@ def test_the_command_that_is_printed_steps_the_component(start) -> None:
         assert process.returncode == 0, text
 
 
-def test_a_component_that_is_silent_is_named(start) -> None:
+def test_a_component_that_is_silent_is_named(start: Start) -> None:
     here = federation(start, "--silence", SILENCE)
     silent = next(c for c in components(here, 3) if "controller" in c.cmdline())
     silent.suspend()
@@ -179,7 +125,7 @@ def test_a_component_that_is_silent_is_named(start) -> None:
     assert text.splitlines()[-1] == "error: controller has been silent for 10 s (--silence)"
 
 
-def test_a_broker_that_is_silent_is_named(start) -> None:
+def test_a_broker_that_is_silent_is_named(start: Start) -> None:
     address = addresses.free()
     here = federation(start, "--listen", address, "--elsewhere", "arm", "controller")
     components(here, 1)

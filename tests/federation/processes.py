@@ -1,0 +1,66 @@
+"""Processes of federations, as users start them."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+
+from tests.support.hosts import LOOPBACK, Host
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP
+
+Process = subprocess.Popen
+Start = Callable[..., Process]  # by arguments of the command line, and the host
+
+
+@contextmanager
+def starting(temporary: Path) -> Iterator[Start]:
+    """Starts commands in sessions of their own, here or on another host; none is left.
+
+    Their temporary files are in the folder `temporary`.
+    """
+    temporary.mkdir()
+    started: list[Process] = []
+
+    def start(*arguments: str, host: Host = LOOPBACK) -> Process:
+        made = subprocess.Popen(
+            [*host.enter, sys.executable, "-m", "cosim", *arguments],
+            cwd=ROOT,
+            env=os.environ | {"TMPDIR": str(temporary)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+        started.append(made)
+        return made
+
+    try:
+        yield start
+    finally:
+        for process in started:
+            with _left_of(process) as children:
+                process.kill()
+                process.communicate()
+            for child in children:
+                child.kill()
+
+
+@contextmanager
+def _left_of(process: Process) -> Iterator[list[psutil.Process]]:
+    """Children of a process, of which the list keeps those that are still there at the end."""
+    try:
+        children = psutil.Process(process.pid).children(recursive=True)
+    except psutil.NoSuchProcess:
+        children = []
+    yield children
+    children[:] = [c for c in children if c.is_running() and c.status() != psutil.STATUS_ZOMBIE]
+
+
+def federation(start: Start, *arguments: str, system: Path = SSP, host: Host = LOOPBACK) -> Process:
+    """The nominal variant, with its broker."""
+    return start("federation", "nominal", "--ssp", str(system), *arguments, host=host)
