@@ -168,6 +168,12 @@ def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0
     raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
 
 
+def from_root(path: Path) -> Path:
+    """`path` as it is given in commands that run in the project's folder."""
+    path = path.absolute()
+    return path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
+
+
 def report_folder(part: str = "") -> Path:
     """Where the commands write if no other folder is given."""
     return ROOT / "build" / "report" / part

@@ -76,16 +76,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _command(options: argparse.Namespace) -> str:
     """What to type for the campaign, in the project's folder."""
-    parts = ["./run.sh", "campaign", _from_root(options.file)]
+    parts = ["./run.sh", "campaign", str(project.from_root(options.file))]
     for name in ("fmu", "output"):
         value = getattr(options, name)
-        parts += [] if value is None else [f"--{name}", _from_root(value)]
+        parts += [] if value is None else [f"--{name}", str(project.from_root(value))]
     return shlex.join(parts)
-
-
-def _from_root(path: Path) -> str:
-    path = path.absolute()
-    return str(path.relative_to(project.ROOT) if path.is_relative_to(project.ROOT) else path)
 
 
 def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:

@@ -4,6 +4,7 @@ import argparse
 import shlex
 import time
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 
@@ -32,13 +33,8 @@ def run(options: argparse.Namespace) -> int:
     with ssp.unpacked(path) as system:
         _check_names(system, options)
         names = options.names or list(system.system.parameters)
-        for name in names:
-            for component in options.elsewhere:
-                place = path.resolve()
-                if place.is_relative_to(project.ROOT):
-                    place = place.relative_to(project.ROOT)
-                arguments = federation.arguments(place, name, component, address)
-                print(f"waiting for: ./run.sh {shlex.join(arguments)}", flush=True)
+        for component in options.elsewhere:
+            print(f"waiting for: {_command(path, names[0], component, address)}", flush=True)
         table = console.FederationTable(names)
         failed = []
         for name in names:
@@ -54,6 +50,12 @@ def run(options: argparse.Namespace) -> int:
             table.row(name, steps, difference, BOUND, times, passed)
             failed += [] if passed else [name]
     return console.summary(failed, names, "variant")
+
+
+def _command(path: Path, variant: str, component: str, address: str) -> str:
+    """What steps a component on another machine, in the folder of the project there."""
+    place = project.from_root(path)
+    return f"./run.sh {shlex.join(federation.arguments(place, variant, component, address))}"
 
 
 def _check_names(system: Ssp, options: argparse.Namespace) -> None:

@@ -23,7 +23,7 @@ def free() -> str:
 def check_form(address: str) -> tuple[str, int]:
     """Host and port; UserError if `address` is none that a process can connect to.
 
-    Neither is one of IPv6: HELICS waits for ever where it shall listen there.
+    Addresses of IPv6 are refused too: HELICS would listen there and never return.
     """
     found = re.fullmatch(r"tcp://([\w.-]+):([1-9]\d{0,4})", address)
     if not found or int(found[2]) > 65535 or found[1] == "0.0.0.0":
@@ -69,13 +69,10 @@ def wait_for(address: str, seconds: float, say: Callable[[], object]) -> None:
 def _refusal(host: str, port: int) -> str:
     """Why nothing can listen there; empty if it can."""
     try:
-        family, *_, place = socket.getaddrinfo(
-            host, port, family=socket.AF_INET, type=socket.SOCK_STREAM
-        )[0]
-        with socket.socket(family) as probe:
+        with socket.socket() as probe:
             if os.name == "posix":  # as HELICS does: connections that have ended do not count
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind(place)
+            probe.bind((host, port))
     except OSError as error:
         known = {
             errno.EADDRINUSE: f"port {port} is in use",

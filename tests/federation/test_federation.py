@@ -1,8 +1,6 @@
 """The closed loop as a federation: each FMU in its own process, coupled by HELICS."""
 
 import socket
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -21,7 +19,7 @@ from cosim.federation.parts import parts, real_connections
 from cosim.fmu_file import Fmu
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
-from tests.support.paths import ROOT
+from tests.federation.processes import Start
 from tests.support.ssp_files import SSP, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -65,23 +63,14 @@ def test_values_are_those_of_the_master(short: Ssp, variant: str) -> None:
     assert np.abs(rows[-1] - rows[0]).max() > 1e-3, "nothing has moved"
 
 
-def test_a_component_may_be_stepped_elsewhere(short: Ssp) -> None:
-    """By a command of its own, as on another machine, and started first."""
+def test_a_component_may_be_stepped_elsewhere(short: Ssp, start: Start) -> None:
+    """By a command that is started first, as on another machine."""
     address = addresses.free()
     arguments = federation.arguments(short.path, "nominal", "arm", address)
-    other = subprocess.Popen(
-        [sys.executable, "-m", "cosim", *arguments],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    try:
-        time.sleep(8.0)  # HELICS tries 4 s of its own accord
-        record = federation.run(short, "nominal", address, elsewhere=["arm"])
-        text, _ = other.communicate(timeout=30)
-    finally:
-        other.kill()
+    other = start(*arguments)
+    time.sleep(8.0)  # longer than HELICS itself would wait, 4 s
+    record = federation.run(short, "nominal", address, elsewhere=["arm"])
+    text, _ = other.communicate(timeout=30)
     assert other.returncode == 0
     assert text == f"waiting for a federation at {address}\n"
     together = federation.run(short, "nominal", addresses.free())
