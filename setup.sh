@@ -7,7 +7,7 @@
 #   ./setup.sh --federation for ./run.sh federation too
 #   ./setup.sh --release    for ./release.sh too
 #   ./setup.sh --dev        for ./test.sh too
-#   ./setup.sh --platforms  all of it, and what runs FMUs of other platforms and pages in ./test.sh
+#   ./setup.sh --platforms  for ./test.sh --all too: clang, analysers, other platforms, browsers
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -55,20 +55,18 @@ need python3-venv has_venv
 # Ecos links to the first and unpacks FMUs by the command of the second
 need libtbb12 has_libtbb
 need unzip command -v unzip
-if [ "$dev" = yes ]; then
-  # what a user's own loop of CVODE links, to compare with: for the benchmark only
-  need libsundials-dev test -e /usr/include/cvode/cvode.h
-  need clang command -v clang
-  need libclang-rt-dev has_clang_runtime
-  need clang-tidy-14 command -v clang-tidy-14
-  need cppcheck command -v cppcheck
-  need valgrind command -v valgrind
-fi
 if [ "$release" = yes ]; then
   need llvm-14 command -v llvm-lipo-14
   need llvm command -v llvm-ar
 fi
 if [ "$platforms" = yes ]; then
+  need clang command -v clang
+  need libclang-rt-dev has_clang_runtime
+  need clang-tidy-14 command -v clang-tidy-14
+  need cppcheck command -v cppcheck
+  need valgrind command -v valgrind
+  # what a user's own loop of CVODE links, to compare with: for the benchmark only
+  need libsundials-dev test -e /usr/include/cvode/cvode.h
   need wine64 test -e /usr/lib/wine/wine64
   need wine command -v wine
   need qemu-user-static command -v qemu-aarch64-static
@@ -80,6 +78,7 @@ if [ "$platforms" = yes ]; then
   # of the tests of pages
   need chromium command -v chromium
   need chromium-driver command -v chromedriver
+  need firefox-esr command -v firefox-esr
 fi
 
 if [ "${#missing[@]}" -gt 0 ]; then
@@ -96,24 +95,39 @@ fi
 # ---- Python environment, filled again when what it must hold has changed
 
 if ! build/venv/bin/python -c 'import pip' 2>/dev/null; then
+  echo "setup.sh: making a Python environment in build/venv"
   python3 -m venv --clear build/venv
 fi
-install_requirements() {
-  local stamp="build/venv/$1.installed"
-  cmp -s "$1" "$stamp" && return
-  echo "setup.sh: installing $1 into build/venv"
-  build/venv/bin/python -m pip install --quiet --disable-pip-version-check -r "$1" || return 1
-  cp "$1" "$stamp"
+# count_packages OF: how many pip has looked at, on a terminal
+count_packages() {
+  local line done=0
+  while IFS= read -r line; do
+    [ -t 1 ] || continue
+    case "$line" in
+      Collecting* | Requirement*) done=$((done + 1)); printf '\r%d of %d packages' "$done" "$1" ;;
+      Installing*) printf '\r%-40s' "unpacking" ;;
+    esac
+  done
+  [ ! -t 1 ] || printf '\r%40s\r' ''
 }
-install_requirements requirements.txt
+install_requirements() {
+  local lock="requirements/$1.txt" stamp="build/venv/$1.installed" count
+  cmp -s "$lock" "$stamp" && return
+  count=$(grep -c '^[[:alnum:]].*==' "$lock")
+  echo "setup.sh: installing the $count packages of $lock into build/venv"
+  build/venv/bin/python -m pip install --progress-bar off --disable-pip-version-check --require-hashes -r "$lock" |
+    count_packages "$count" || return 1
+  cp "$lock" "$stamp"
+}
+install_requirements run
 # the wheel of Ecos has its programs without their run bits
 for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu}; do
   [ -x "$program" ] || chmod +x "$program"
 done
-[ "$campaign" = no ] || install_requirements requirements-campaign.txt
-[ "$federation" = no ] || install_requirements requirements-federation.txt
-[ "$release" = no ] || install_requirements requirements-release.txt
-[ "$dev" = no ] || install_requirements requirements-dev.txt
+[ "$campaign" = no ] || install_requirements campaign
+[ "$federation" = no ] || install_requirements federation
+[ "$release" = no ] || install_requirements release
+[ "$dev" = no ] || install_requirements dev
 
 # ---- sources, by an apt of this folder's own: nothing of them is installed
 
@@ -147,12 +161,17 @@ CONF
   apt-get -c "$root/apt.conf" update -qq
 }
 
+# known ARCHIVE SHA256
+known() {
+  echo "$2  $1" | sha256sum --check --status || { echo "setup.sh: $1 is not the known one" >&2; return 1; }
+}
+
 # get_sources NAME PACKAGE ARCHIVE SHA256 FOLDER PART ...: parts of a source package, which unpacks
 # to FOLDER, become build/deps/NAME
 get_sources() (
   cd build/deps/apt/got
   apt-get -c ../apt.conf source -qq --download-only --tar-only "$2" || return 1
-  echo "$4  $3" | sha256sum --check --status || { echo "setup.sh: $3 is not the known one" >&2; return 1; }
+  known "$3" "$4" || return 1
   cmake -E tar xf "$3" -- "${@:6}" || return 1
   rm -rf "../../$1"
   mv "$5" "../../$1"
@@ -162,6 +181,7 @@ get_sources() (
 get_unity() (
   cd build/deps/apt/got
   apt-get -c ../apt.conf download -qq cmock || return 1
+  known cmock_*.deb 166e45090937251892363d10860b5e7aa5353d5553fde2cbaba514760ba3785e || return 1
   dpkg-deb -x cmock_*.deb . || return 1
   mkdir -p ../../unity && cp -r usr/share/cmock/vendor/unity/src ../../unity/
 )
