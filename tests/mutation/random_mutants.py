@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from samples import Chosen, Places, Renames, order, read_sample, write_sample
+from samples import Chosen, Places, order, read_sample, write_sample
 from sites import sources
 from workshop import Processes, Record, Workshop
 
@@ -186,14 +186,13 @@ def chosen_mutants(arguments: argparse.Namespace) -> tuple[list[Chosen], list[st
         mutants = order(texts, arguments.seed)
         print(f"seed {arguments.seed}: {len(mutants)} places", flush=True)
         return [Chosen(mutant) for mutant in mutants], []
-    renames = Renames.read(arguments.renames)
     places = Places(texts)
     here, gone = [], []
     for chosen in read_sample(arguments.sample):
-        renamed = renames.mutant(chosen.mutant)
-        found = places.find(renamed)
+        found = places.find(chosen.mutant)
         if found is None:
-            gone.append(f"{renamed.told()}; most like it: {places.nearest(renamed)}")
+            nearest = places.nearest(chosen.mutant)
+            gone.append(f"{chosen.mutant.told()}; most like it: {nearest}")
         else:
             here.append(Chosen(found, chosen.equivalent, chosen.lives))
     return here, gone
@@ -207,7 +206,6 @@ def main() -> int:
     parser.add_argument("--count", type=int, metavar="N", help="mutants of the sample, else all")
     parser.add_argument("--jobs", type=int, default=2, metavar="N")
     parser.add_argument("--sample", type=Path, help="stored sample to take instead of a seed")
-    parser.add_argument("--renames", type=Path, help="TOML table: what is renamed since the sample")
     parser.add_argument("--store", type=Path, help="write the sample that was judged to this file")
     parser.add_argument("--results", type=Path, help="write all verdicts to this file")
     parser.add_argument(

@@ -1,28 +1,15 @@
-"""Samples of mutants: drawn by a seed, stored, and found again in sources that have changed.
-
-A table of renames is a TOML file with up to three parts::
-
-    [files]  # where sources have moved; others are searched by their name
-    "src/slave.c" = "src/instance/instance.c"
-    [parts]  # of names, between their underscores
-    slave = "instance"
-    [names]  # whole names, before their parts
-    two_sum = "exact_sum"
-"""
+"""Samples of mutants: drawn by a seed, stored, and found again in sources that have changed."""
 
 import difflib
 import json
 import random
 import re
-import tomllib
 from collections import defaultdict
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
 from c_source import Statement, statements_of, tokenized
 from sites import REMOVED, Mutant, mutants_of
-
-NAME = re.compile(r"[A-Za-z_]\w*")
 
 
 @dataclass(frozen=True)
@@ -40,51 +27,6 @@ class Chosen:
     mutant: Mutant
     equivalent: str = ""
     lives: str = ""
-
-
-@dataclass
-class Renames:
-    """What has other names in the sources than in a stored sample."""
-
-    files: dict[str, str] = field(default_factory=dict)
-    parts: dict[str, str] = field(default_factory=dict)
-    names: dict[str, str] = field(default_factory=dict)
-
-    @classmethod
-    def read(cls, path: Path | None) -> "Renames":
-        """The table in a file."""
-        return cls() if path is None else cls(**tomllib.loads(path.read_text(encoding="utf-8")))
-
-    def name(self, name: str) -> str:
-        """A name as it is now."""
-        if name in self.names:
-            return self.names[name]
-        parts = dict(self.parts)
-        parts |= {old.upper(): new.upper() for old, new in self.parts.items()}
-        return "_".join(parts.get(part, part) for part in name.split("_"))
-
-    def text(self, text: str) -> str:
-        """Code with the names as they are now."""
-        return NAME.sub(lambda match: self.name(match[0]), text)
-
-    def file(self, path: str) -> str:
-        """The path of a source as it is now, as far as it is known."""
-        if path in self.files:
-            return self.files[path]
-        old = PurePosixPath(path)
-        return str(old.with_name(self.name(old.stem) + old.suffix))
-
-    def mutant(self, mutant: Mutant) -> Mutant:
-        """A mutant with the names as they are now."""
-        keyword = mutant.after == REMOVED or mutant.after.endswith(" not")
-        return replace(
-            mutant,
-            file=self.file(mutant.file),
-            function=self.name(mutant.function),
-            statement=self.text(mutant.statement),
-            before=self.text(mutant.before),
-            after=mutant.after if keyword else self.text(mutant.after),
-        )
 
 
 def order(texts: dict[str, str], seed: int) -> list[Mutant]:
