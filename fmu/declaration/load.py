@@ -1,33 +1,16 @@
-"""Reads a variables.toml with what it includes, and checks all of it together."""
+"""Checks all that a variables.toml and its included files declare, together."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pydantic import ValidationError
+from declaration.files import DeclarationError, files_of, read
+from declaration.schema import Experiment, Float64, Model, Terminal, Unit, Variable
 
-from declaration.schema import (
-    TYPES,
-    Experiment,
-    File,
-    Float64,
-    Item,
-    Model,
-    Table,
-    Terminal,
-    Unit,
-    Variable,
-)
-
-
-class DeclarationError(Exception):
-    """A variables.toml that cannot be used: file, place and reason in one line."""
+UNITS = Path(__file__).with_name("units.toml")  # of all models
 
 
 @dataclass(frozen=True)
@@ -71,10 +54,10 @@ def load(path: Path) -> Declaration:
     DeclarationError
         where something in them is wrong.
     """
-    units: dict[str, Unit] = {}
+    units = dict(read(UNITS).units)
     variables: dict[str, Variable] = {}
     places: dict[str, str] = {}
-    for source, file in files_of(path, including=()):
+    for source, file in files_of(path):
         for name, unit in file.units.items():
             if units.setdefault(name, unit) != unit:
                 raise DeclarationError(f"{source}: unit {name}: is declared otherwise elsewhere")
@@ -93,97 +76,8 @@ def load(path: Path) -> Declaration:
     check_indicators(file.model.event_indicators, variables, f"{path}: [model]")
     check_terminals(file.terminals, variables, f"{path}: terminal ")
     by_reference = sorted(variables.items(), key=lambda item: item[1].reference)
-    return Declaration(path, file.model, file.experiment, units, dict(by_reference), file.terminals)
-
-
-def files_of(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[Path, File]]:
-    """What a file includes, and the file itself at the end; `including`: the files on the way."""
-    file = read(path)
-    if path.resolve() in including:
-        raise DeclarationError(f"{path}: includes itself")
-    for name in file.include:
-        yield from files_of(path.parent / name, (*including, path.resolve()))
-    yield path, file
-
-
-def read(path: Path) -> File:
-    """Read one file and check each of its tables."""
-    try:
-        return File.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except ValidationError as error:
-        raise DeclarationError(f"{path}: {first_mistake(error)}") from None
-    except OSError as error:
-        raise DeclarationError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:  # of the parser, and of reading as UTF-8
-        raise DeclarationError(f"{path}: is not valid TOML: {error}") from None
-
-
-def first_mistake(error: ValidationError) -> str:
-    """Place and reason of one mistake; a misspelt key comes before what is then missing."""
-    mistakes = error.errors(include_url=False)
-    mistake = min(mistakes, key=lambda m: m["type"] != "extra_forbidden")
-    words, table, key = place_of(list(mistake["loc"]))
-    return ": ".join([*words, reason(mistake, table, key)])
-
-
-def place_of(location: list[str | int]) -> tuple[list[str], type[Table], str]:
-    """Words for a table of the file, its class, and the path of the value within it."""
-    match location:
-        case ["model", *keys]:
-            words, table = ["[model]"], Model
-        case ["experiment", *keys]:
-            words, table = ["[experiment]"], Experiment
-        case ["units", name, *keys]:
-            words, table = [f"unit {name}"], Unit
-        case ["variables", name, kind, "items", item, *keys] if kind in TYPES:
-            words, table = [f"variable {name}", f"item {item}"], Item
-        case ["variables", name, kind, *keys] if kind in TYPES:
-            words, table = [f"variable {name}"], TYPES[kind]
-        case ["variables", name, *keys]:
-            words, table = [f"variable {name}"], Variable
-        case ["terminals", name, *keys]:
-            while len(keys) > 1 and keys[0] == "terminals":
-                name, keys = f"{name}.{keys[1]}", keys[2:]
-            words, table = [f"terminal {name}"], Terminal
-        case keys:
-            words, table = [], File
-    path = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
-    return words, table, path.removeprefix(".")
-
-
-def reason(mistake: Any, table: type[Table], key: str) -> str:
-    """Say why the value of a key is wrong, or why the table is, if `key` is empty."""
-    context = mistake.get("ctx", {})
-    subject = f"{key} = {shown(mistake['input'])} " if key else ""
-    match mistake["type"]:
-        case "missing":
-            return f"{key} is missing"
-        case "extra_forbidden":
-            for kind, of_kind in TYPES.items():
-                if table is of_kind and any(key in keys_of(other) for other in TYPES.values()):
-                    return f"{kind} variables have no {key}"
-            return f"unknown key '{key}', expected one of {', '.join(keys_of(table))}"
-        case "model_type" | "dict_type":
-            return f"{subject}is not a table"
-        case "union_tag_invalid":
-            return f"type = {shown(context['tag'])} should be one of {', '.join(TYPES)}"
-        case "value_error":
-            subject = "the name " if mistake["loc"][-1] == "[key]" else subject
-            return f"{subject}{context['error']}"
-    return subject + mistake["msg"].removeprefix("Input ")
-
-
-def keys_of(table: type[Table]) -> list[str]:
-    """Keys that a table of the file may have."""
-    return [field.alias or name for name, field in table.model_fields.items()]
-
-
-def shown(value: object) -> str:
-    """Short form of a value; an integer may have more digits than Python writes."""
-    try:
-        return f"{value!r:.40}"
-    except ValueError:
-        return "a very large number"
+    used = {v.unit: units[v.unit] for v in variables.values() if isinstance(v, Float64)}
+    return Declaration(path, file.model, file.experiment, used, dict(by_reference), file.terminals)
 
 
 def check_references(variables: dict[str, Variable], places: dict[str, str]) -> None:
@@ -206,7 +100,8 @@ def check_names(
     """Check that units and variables that are referred to are declared."""
     for name, variable in variables.items():
         if isinstance(variable, Float64) and variable.unit not in units:
-            raise DeclarationError(f"{places[name]}: unit '{variable.unit}' is not among [units]")
+            where = f"neither in {UNITS.name} nor among [units]"
+            raise DeclarationError(f"{places[name]}: unit '{variable.unit}' is {where}")
         listed = [*(variable.dependencies or []), *variable.parameters]
         listed += [variable.derivative_of] if variable.derivative_of is not None else []
         for other in listed:

@@ -1,12 +1,20 @@
 """The tables of a variables.toml, and the checks that need one table only.
 
-include       further files, relative to this one, whose [variables] and [units] count too
+include       further files, relative to this one, whose [variables] and [units] count too. A file
+              that declares another model is { file, only, fields, description }: the names of the
+              variables to include (default: all), { "old" = "new" } for how their C fields begin,
+              and their description, with {} for the declared one
+[changes.NAME]
+    description, reinit
+                  of an included variable, in place of the declared ones
+    more_dependencies, more_parameters
+                  beside the declared ones
 [model]       name (also the identifier), description, header, values (C type of the value
               structure), symbol (the C object of type struct model), event_indicators (names of
               local continuous variables, in the order of the model's indicators; default: none),
               time_events (true: the model has time events)
 [experiment]  start, stop, tolerance, step: the default experiment
-[units]       "name" = { exponents of the SI base units, display.NAME = factor }
+[units]       "name" = { exponents of the SI base units, display.NAME = factor }, beside units.toml
 [variables.NAME]
     reference     value reference, unique, 0 to 9999
     owner         "model" (default) or "instance": the structure that holds the value
@@ -349,10 +357,35 @@ class Terminal(Table):
         return self
 
 
+class Include(Table):
+    """Variables of another file that count here, too."""
+
+    file: str
+    only: list[str] | None = None
+    fields: dict[str, str] = {}
+    description: str = "{}"
+
+    @model_validator(mode="before")
+    @classmethod
+    def check_path(cls, value: Any) -> Any:
+        """Take a path alone."""
+        return {"file": value} if isinstance(value, str) else value
+
+
+class Change(Table):
+    """What is other here than in the file that declares a variable."""
+
+    description: str = ""
+    reinit: bool = False
+    more_dependencies: list[str] = []
+    more_parameters: list[str] = []
+
+
 class File(Table):
     """One file: a variables.toml, or what it includes."""
 
-    include: list[str] = []
+    include: list[Include] = []
+    changes: dict[VariableName, Change] = {}
     model: Model | None = None
     experiment: Experiment | None = None
     units: dict[str, Unit] = {}
