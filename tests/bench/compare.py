@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import shutil
 import statistics
 import subprocess
 import sys
@@ -37,7 +36,7 @@ from peers import (
     run_mujoco,
 )
 from plots import draw
-from table import markdown
+from table import markdown, summary
 
 ROOT = Path(__file__).resolve().parents[2]
 FREE = {
@@ -225,8 +224,8 @@ def drift_rows(steps: int) -> list[dict]:
 
 
 def with_figures(page: str, tables: str) -> str:
-    """Replace the text under the heading Figures of the page, up to the next heading."""
-    before, heading, after = page.partition("\n## Figures\n")
+    """Replace the text under the heading Ratios of the page, up to the next heading."""
+    before, heading, after = page.partition("\n## Ratios\n")
     _, following, after = after.partition("\n## ")
     return f"{before}{heading}\n{tables}{following}{after}"
 
@@ -249,7 +248,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=build / "report/benchmark")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
-    parser.add_argument("--readme", action="store_true", help="put it all into the page")
+    parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
     libraries = (
@@ -261,7 +260,7 @@ def main() -> None:
     for path in (options.bench, *libraries, options.fmu):
         if not path.exists():
             sys.exit(f"{path}: no such file. Build it and run this with\n"
-                     "    ./setup.sh --dev && cmake --preset default && "
+                     "    ./setup.sh --platforms && cmake --preset default && "
                      "cmake --build build --target benchmark")  # fmt: skip
     options.output.mkdir(parents=True, exist_ok=True)
     program = [str(path) for path in (options.bench, *libraries)]
@@ -291,12 +290,10 @@ def main() -> None:
     (options.output / "benchmark.md").write_text(text)
     if options.readme:
         page = Path(__file__).with_name("README.md")
-        page.write_text(with_figures(page.read_text(), text))
+        page.write_text(with_figures(page.read_text(), summary(result)))
     print(text)
     for path in draw(result["rows"], options.output):
         print(path)
-        if options.readme:
-            shutil.copy(path, Path(__file__).parent)
 
 
 if __name__ == "__main__":

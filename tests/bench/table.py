@@ -1,4 +1,4 @@
-"""The figures of the benchmark as Markdown, as tests/bench/README.md shows them."""
+"""The figures of the benchmark as Markdown: all tables, and the one of tests/bench/README.md."""
 
 from __future__ import annotations
 
@@ -153,3 +153,33 @@ def markdown(report: dict) -> str:
     ]
     parts = (steps, instances, threads, energy, instance, plant, calls, life)
     return "\n".join(head + [line for part in parts for line in part(rows)])
+
+
+# columns of the table of ratios: heading and work
+WORKS = {
+    "1 ms": "1 ms steps, inputs changing",
+    "10 ms": "10 ms steps, inputs changing",
+    "0.1 s": "0.1 s steps, inputs changing",
+    "1 ms, constant": "1 ms steps, inputs constant",
+    "10 ms, constant": "10 ms steps, inputs constant",
+    "2 s": "one step of 2 s, free motion, error <= 1e-8",
+}
+
+
+def miss(row: dict) -> str:
+    """Name a target that is missed, with what was measured."""
+    count = f", {row['instances']:.0f} of them" if "instances" in row else ""
+    return f"- {row['work']}{count}, {row['run']}: {number(row[row['judged']])} ({result(row)})"
+
+
+def summary(report: dict) -> str:
+    """The table of ratios to the plain loop, and a list of the targets that are missed."""
+    rows = [row for row in report["rows"] if row["group"] == "steps" and "us" in row]
+    ratios = {(row["run"], row["work"]): row["ratio"] for row in rows}
+    cells = [
+        [run, *(number(ratios.get((run, work))) for work in WORKS.values())]
+        for run in dict.fromkeys(run for run, _ in ratios)
+    ]
+    missed = [miss(row) for row in report["rows"] if "judged" in row and not row["met"]]
+    head = f"{len(missed)} targets are missed:"
+    return "\n".join([*lines(["", *WORKS], cells), head, "", *missed, ""])
