@@ -33,7 +33,7 @@ DIAGRAMS = (
 )
 
 
-def study_coupling(ssp: Path, report: Path) -> bool:
+def study_coupling(ssp: Path, report: Path) -> dict[str, dict[str, object]]:
     """Study what the coupling costs; see coupling.md."""
     from models.closed_loop.coupling.run_study import run  # only `coupling` needs it
 

@@ -39,7 +39,7 @@ def direct(connections: Iterable[Connection]) -> list[Connection]:
 def fmus_of(opened: Ssp) -> Iterator[dict[str, Fmu]]:
     """The FMUs of the machine but the sensor, in their order: its outputs have no slopes."""
     with ExitStack() as stack:
-        yield {name: stack.enter_context(Fmu(opened.fmu(name))) for name in SEQUENCE}
+        yield {name: stack.enter_context(opened.unpacked_fmu(name)) for name in SEQUENCE}
 
 
 def write_system(

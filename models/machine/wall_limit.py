@@ -53,7 +53,7 @@ def pressed(stiffness: float, damping: float) -> dict[str, dict[str, float]]:
         "trajectory": aim,
         "controller": straight | {"m2": MASS, "Kp2": PUSH / (FAR * MASS), "Kd2": 0.0},
         "actuator": {"current2": PUSH / (0.05 * 200 * math.pi)},
-        "plant": straight | {"m2": MASS, "q2": MOVED, "relative_tolerance": 1e-13},
+        "plant": straight | {"m2": MASS, "q2": MOVED, "relative_tolerance": 5e-12},
         "sensor": {"sample_time": 1.0001e-3},
         "environment": {
             "stiffness": stiffness,

@@ -59,7 +59,7 @@ struct rp_plant_parameters {
                                      above 0 where breakaway_friction is above coulomb_friction */
     double lower[2];              /* rad, m: where the stops are */
     double upper[2];              /* rad, m, > lower */
-    double restitution[2];        /* 0 .. 1: velocity after an impact by that before it */
+    double restitution[2];        /* 0 .. 1: ratio of the velocities after and before */
     double payload_mass;          /* kg, >= 0 */
     double payload_inertia;       /* kg.m2, >= 0: about its center of mass, along z0 */
     double payload_x;             /* m: its center of mass in frame 2, along x2 */

@@ -295,12 +295,14 @@ static void describe_joint(const struct rp_plant_values *values, const struct rp
         of_joint[k]->kind = INDICATOR_UNUSED;
     }
     if (mode == RP_PLANT_STUCK) {
+        const struct indicator of_force = {.kind = INDICATOR_OF_MODEL,
+                                           .offset = rp_plant_breakaway(p, joint)};
         const int closed = rp_plant_closed_stop(p, joint, values->q[joint]);
         if (closed >= 0) {
-            of_joint[SLIP_FORWARD]->kind = INDICATOR_OF_MODEL;
+            *of_joint[SLIP_FORWARD] = of_force;
         }
         if (closed <= 0) {
-            of_joint[SLIP_BACKWARD]->kind = INDICATOR_OF_MODEL;
+            *of_joint[SLIP_BACKWARD] = of_force;
         }
         return;
     }

@@ -101,16 +101,23 @@ static const struct model_events events = {
 
 /* ---- Calculated values ---------------------------------------------------------------------- */
 
+/* Counts of joint i that are shown now and were shown a tick before. */
+static void find_shown(const struct rp_sensor_values *values, int i, int *now, int *before) {
+    const double last = values->ticks - 1.0;
+    // before the end of the initialization what the start will show
+    const bool has_started = values->ticks > 0.0;
+    *now = has_started ? shown(values, i, last) : sampled(values, i, 0.0);
+    *before = has_started ? shown(values, i, last - 1.0) : *now;
+}
+
 static enum status outputs(void *values_pointer, double t) {
     struct rp_sensor_values *values = values_pointer;
     const struct rp_sensor_parameters *p = &values->parameters;
     (void)t;
-    const bool has_started = values->ticks > 0.0;
-    const double last = values->ticks - 1.0;
     for (int i = 0; i < 2; i++) {
-        // before the end of the initialization what the start will show
-        const int now = has_started ? shown(values, i, last) : sampled(values, i, 0.0);
-        const int before = has_started ? shown(values, i, last - 1.0) : now;
+        int now;
+        int before;
+        find_shown(values, i, &now, &before);
         values->counts[i] = now;
         values->q_measured[i] = now * p->resolution[i];
         values->dq_measured[i] = ((double)now - before) * p->resolution[i] / p->sample_time;
@@ -118,19 +125,31 @@ static enum status outputs(void *values_pointer, double t) {
     return STATUS_OK;
 }
 
-static void rest(struct rp_sensor_values *derivatives) {
-    memset(derivatives->q_measured, 0, sizeof derivatives->q_measured);
-    memset(derivatives->dq_measured, 0, sizeof derivatives->dq_measured);
-}
-
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    // outputs rest between two ticks
-    (void)values;
+/* Between two ticks the counts rest: only resolution and sample time count. */
+static enum status propagate(const void *values_pointer, double t, double dt, void *first_pointer,
+                             void *second_pointer) {
+    const struct rp_sensor_values *values = values_pointer;
+    struct rp_sensor_values *first = first_pointer;
+    struct rp_sensor_values *second = second_pointer;
+    const double period = values->parameters.sample_time;
+    const double dperiod = first->parameters.sample_time;
     (void)t;
     (void)dt;
-    rest(first);
-    if (second != NULL) {
-        rest(second);
+    for (int i = 0; i < 2; i++) {
+        int now;
+        int before;
+        find_shown(values, i, &now, &before);
+        const double counts = (double)now - before; // dq T = counts resolution
+        first->q_measured[i] = now * first->parameters.resolution[i];
+        first->dq_measured[i] =
+            (counts * first->parameters.resolution[i] - values->dq_measured[i] * dperiod) / period;
+        if (second != NULL) {
+            second->q_measured[i] = now * second->parameters.resolution[i];
+            second->dq_measured[i] =
+                (counts * second->parameters.resolution[i] - 2.0 * first->dq_measured[i] * dperiod -
+                 values->dq_measured[i] * second->parameters.sample_time) /
+                period;
+        }
     }
     return STATUS_OK;
 }

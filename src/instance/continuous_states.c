@@ -12,12 +12,16 @@ enum status instance_enter_continuous_time(struct instance *instance) {
     const enum status status = instance_check_parameters(instance);
     if (status == STATUS_OK) {
         instance->state.phase = PHASE_CONTINUOUS_TIME;
+        instance_forget_due(instance);
     }
     return status;
 }
 
 void instance_enter_event_mode(struct instance *instance) {
     instance->state.phase = PHASE_STEPPING;
+    if (instance->is_integrated_outside) {
+        instance_note_due(instance);
+    }
 }
 
 static enum status update_discrete_states(struct instance *instance, bool *states_changed) {

@@ -5,8 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-/* The variable, or NULL with a message that says what it is needed for. Discrete variables jump:
- * they have no derivatives. */
+/* The variable, or NULL with a message that says what it is needed for. */
 static const struct variable *
 find_as(const struct instance *instance, unsigned reference,
         bool (*serves)(const struct instance *, const struct variable *), const char *expected) {
@@ -21,11 +20,10 @@ find_as(const struct instance *instance, unsigned reference,
                       variable->name, reference, variable_type_name(variable->type), expected);
         return NULL;
     }
-    const bool is_discrete = variable->variability == VARIABILITY_DISCRETE;
-    if (is_discrete || !serves(instance, variable)) {
+    if (!serves(instance, variable)) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
-                      "%s (value reference %u) is refused: %s%s is expected", variable->name,
-                      reference, is_discrete ? "it is discrete, " : "", expected);
+                      "%s (value reference %u) is refused: %s is expected", variable->name,
+                      reference, expected);
         return NULL;
     }
     return variable;
@@ -130,8 +128,13 @@ static enum status derive_by_time(struct instance *instance) {
     return propagate(instance, 1.0, instance->second_derivatives);
 }
 
-static double double_in(const char *structure, const struct variable *variable) {
-    return *(const double *)(const void *)(structure + variable->offset);
+/* In a value structure of derivatives. Discrete values are held between events: those of the
+ * instance are in no structure, those of the model stay 0 unless parameters decide how they read.
+ */
+static double derivative_in(const char *structure, const struct variable *variable) {
+    return variable->owner == VARIABLE_OF_MODEL
+               ? *(const double *)(const void *)(structure + variable->offset)
+               : 0.0;
 }
 
 enum status instance_get_output_derivatives(struct instance *instance, const unsigned references[],
@@ -153,9 +156,9 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < count; i++) {
             const struct variable *variable = variable_of(instance->description, references[i]);
-            const double value = double_in(orders[i] == 1 ? instance->first_derivatives
-                                                          : instance->second_derivatives,
-                                           variable);
+            const double value = derivative_in(orders[i] == 1 ? instance->first_derivatives
+                                                              : instance->second_derivatives,
+                                               variable);
             if (!isfinite(value)) {
                 return instance_not_finite(instance, variable->name);
             }
@@ -171,7 +174,8 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
 
 static bool is_unknown(const struct instance *instance, const struct variable *variable) {
     (void)instance;
-    return variable->owner == VARIABLE_OF_MODEL &&
+    return (variable->owner == VARIABLE_OF_MODEL ||
+            variable->variability == VARIABILITY_DISCRETE) &&
            (variable->causality == CAUSALITY_OUTPUT || variable->causality == CAUSALITY_LOCAL);
 }
 
@@ -180,11 +184,10 @@ static bool is_time(const struct variable *variable) {
 }
 
 static bool is_moving(const struct instance *instance, const struct variable *variable) {
-    if (variable->owner != VARIABLE_OF_MODEL) {
+    if (variable->owner != VARIABLE_OF_MODEL || variable->variability == VARIABILITY_DISCRETE) {
         return false;
     }
-    const size_t from_states = variable->offset - instance->model->states.offset;
-    return variable->causality == CAUSALITY_INPUT || from_states < instance->model->states.size ||
+    return variable->causality == CAUSALITY_INPUT || instance_is_state(instance, variable) ||
            (variable->causality == CAUSALITY_PARAMETER &&
             instance->state.phase == PHASE_INITIALIZATION);
 }
@@ -247,7 +250,7 @@ enum status instance_get_directional_derivative(struct instance *instance, enum 
     for (int writing = 0; writing < 2; writing++) {
         for (size_t i = 0; i < unknown_count; i++) {
             const struct variable *variable = variable_of(instance->description, unknowns[i]);
-            const double value = double_in(instance->first_derivatives, variable);
+            const double value = derivative_in(instance->first_derivatives, variable);
             if (!isfinite(value)) {
                 return instance_not_finite(instance, variable->name);
             }
@@ -273,7 +276,7 @@ static enum status multiply_column(struct instance *instance, const unsigned unk
     *product = 0.0;
     for (size_t i = 0; i < unknown_count; i++) {
         const struct variable *unknown = variable_of(instance->description, unknowns[i]);
-        *product += v[i] * double_in(instance->first_derivatives, unknown);
+        *product += v[i] * derivative_in(instance->first_derivatives, unknown);
     }
     return isfinite(*product) ? STATUS_OK : instance_not_finite(instance, known->name);
 }
@@ -297,7 +300,7 @@ enum status instance_get_adjoint_derivative(struct instance *instance, enum know
     }
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
         const struct variable *known = variable_of(instance->description, knowns[i]);
-        result[i] = is_time(known) ? by_time : double_in(instance->second_derivatives, known);
+        result[i] = is_time(known) ? by_time : *place_in(instance->second_derivatives, known);
     }
     return status;
 }

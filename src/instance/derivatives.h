@@ -1,4 +1,5 @@
-/* Derivatives of an instance's values with respect to time and to other variables. */
+/* Derivatives of an instance's values with respect to time and to other variables. Those of
+ * discrete values, which are held between events, are 0. */
 #ifndef INSTANCE_DERIVATIVES_H
 #define INSTANCE_DERIVATIVES_H
 
@@ -23,7 +24,7 @@ enum known_kinds {
 };
 
 /* Writes J v: J the derivatives of unknowns (Real variables of the model that are not parameters or
- * inputs) with respect to knowns of these kinds. */
+ * inputs, and discrete ones of the instance) with respect to knowns of these kinds. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_get_directional_derivative(struct instance *instance, enum known_kinds kinds,
                                         const unsigned unknowns[], size_t unknown_count,

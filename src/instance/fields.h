@@ -26,6 +26,12 @@ static inline void *instance_field(struct instance *instance, const struct varia
     return structure + variable->offset;
 }
 
+static inline bool instance_is_state(const struct instance *instance,
+                                     const struct variable *variable) {
+    return variable->owner == VARIABLE_OF_MODEL &&
+           variable->offset - instance->model->states.offset < instance->model->states.size;
+}
+
 /* Index of an input of type float64 among the inputs. */
 static inline size_t instance_input_index(const struct instance *instance,
                                           const struct variable *variable) {
@@ -52,6 +58,10 @@ static inline void instance_write_field(struct instance *instance, const struct 
 }
 
 NONNULL void instance_set_clock(struct instance *instance, struct clock_time time);
+
+/* Writes the variables that show totals of the integrator. */
+NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
+                                       struct instance_values *own);
 
 /* Brings the calculated values up to date; a message says why that fails. */
 MUST_CHECK NONNULL enum status instance_update_outputs(struct instance *instance);

@@ -107,6 +107,17 @@ void instance_end_history(struct instance *instance) {
     instance->history_is_lost = false;
 }
 
+/* Polynomials end with this step, held inputs at the stop time. */
+double instance_span(const struct instance_state *state, struct clock_time restart, double target,
+                     bool inputs_move) {
+    if (inputs_move) {
+        return target;
+    }
+    const struct clock_time stop = {.s = state->experiment.stop_time};
+    return state->experiment.stop_time_defined ? fmax(clock_difference(stop, restart), target)
+                                               : INFINITY;
+}
+
 static inline void hold_all(struct instance *instance, struct clock_time end,
                             const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
@@ -124,15 +135,8 @@ static inline void hold_all(struct instance *instance, struct clock_time end,
     memcpy(memory->running, inputs, count_of(model->inputs) * sizeof *inputs);
     instance_prepare_inputs(instance);
 
-    // polynomials end with this step, held inputs at the stop time
     const double target = clock_difference(end, state->time);
-    state->span = INFINITY;
-    if (instance->inputs_move) {
-        state->span = target;
-    } else if (state->experiment.stop_time_defined) {
-        const struct clock_time stop = {.s = state->experiment.stop_time};
-        state->span = fmax(clock_difference(stop, state->time), target);
-    }
+    state->span = instance_span(state, state->time, target, instance->inputs_move);
     state->first_time = target;
     instance_end_history(instance); // until the first advance has succeeded
 }
@@ -184,7 +188,7 @@ enum status instance_replay_history(struct instance *instance) {
     }
     integrator_set_statistics(instance->integrator, &state->statistics);
     instance->history_is_lost = false;
-    if (status != STATUS_OK) {
+    if (status != STATUS_OK || integrator_passed_time(instance->integrator) != state->passed_time) {
         message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
                       "the restored state cannot be continued: it contradicts itself");
         return STATUS_INVALID_ARGUMENT;

@@ -31,6 +31,11 @@ NONNULL int64_t instance_longest_history(const struct instance *instance);
 NONNULL void instance_hold(struct instance *instance, struct clock_time end,
                            const struct polynomial inputs[]);
 
+/* How far from a restart the integrator may go, s: to target where inputs move, otherwise to the
+ * stop time. */
+NONNULL double instance_span(const struct instance_state *state, struct clock_time restart,
+                             double target, bool inputs_move);
+
 /* The history is over; times since the restart count from the present time on. */
 NONNULL void instance_end_history(struct instance *instance);
 

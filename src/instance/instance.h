@@ -66,7 +66,7 @@ MUST_CHECK NONNULL enum status instance_exit_initialization(struct instance *ins
 /* Integration from outside (Model Exchange): no integrator is set up, so that none is refused. */
 NONNULL void instance_integrate_outside(struct instance *instance);
 
-/* From now on states may be set after initialization, too, as inputs are. */
+/* From now on states may be set in event mode, too, as they may while the time is continuous. */
 NONNULL void instance_allow_setting_states(struct instance *instance);
 
 /* Time that the instance has reached, s. */

@@ -80,7 +80,7 @@ struct instance {
     struct instance_place *places; /* by value reference */
 
     bool is_integrated_outside;
-    bool states_are_settable;  /* after initialization, too */
+    bool states_are_settable;  /* in event mode, too */
     bool step_met_event;       /* the last one */
     bool outputs_are_valid;    /* the calculated values belong to the others */
     bool parameters_are_valid; /* they are consistent; false: not known */

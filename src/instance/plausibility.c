@@ -1,5 +1,7 @@
 #include "plausibility.h"
 
+#include "fields.h"
+#include "history.h"
 #include "settings.h"
 
 #include <limits.h>
@@ -37,32 +39,39 @@ static bool is_step(double value) {
 }
 
 /* Time, phase and the settings of the integrator. */
+/* s is the whole time, rounded. */
+static bool is_rest_of(struct clock_time time) {
+    return clock_two_sum(time.s, time.rest).s == time.s;
+}
+
 static bool has_possible_settings(const struct instance *instance,
                                   const struct instance_state *state) {
     const struct instance_values *own = &state->own;
-    const double tolerance = own->effective_relative_tolerance;
     const int phase = (int)state->phase;
+    // an integrator outside may go back, before the start too
+    const bool only_advances = phase == PHASE_STEPPING && !instance->is_integrated_outside;
+    const double start = state->experiment.start_time;
     const struct named_value values[] = {
         {"phase", phase, phase >= 0 && phase < PHASE_COUNT},
-        {"time", state->time.s, isfinite(state->time.s)},
-        {"the rest of time", state->time.rest, isfinite(state->time.rest)},
-        {"the variable time", own->time, isfinite(own->time)},
+        {"time", state->time.s,
+         isfinite(state->time.s) && (!only_advances || state->time.s >= start)},
+        {"the rest of time", state->time.rest, is_rest_of(state->time)},
         {"relative_tolerance", own->relative_tolerance, is_step(own->relative_tolerance)},
-        {"effective_relative_tolerance", tolerance,
-         tolerance >= INSTANCE_FINEST_TOLERANCE && tolerance <= INSTANCE_COARSEST_TOLERANCE},
         {"max_step", own->max_step, is_step(own->max_step)},
         {"max_internal_steps", own->max_internal_steps, own->max_internal_steps >= 1},
         {"max_events", own->max_events, own->max_events >= 1},
         {"event_count", own->event_count, own->event_count >= 0},
-        {"last_event_time", own->last_event_time, isfinite(own->last_event_time)},
+        {"last_event_time", own->last_event_time,
+         isfinite(own->last_event_time) &&
+             (!only_advances ||
+              (own->last_event_time >= start && own->last_event_time <= state->time.s))},
         {"solver_method", own->solver_method,
          own->solver_method > INTEGRATOR_NO_METHOD && own->solver_method < INTEGRATOR_METHODS &&
              (!instance_has_integrator(instance) ||
               integrator_is_possible((enum integrator_method)own->solver_method, &instance->ode))},
     };
     return are_possible(instance, values, COUNT(values)) &&
-           (!state->experiment_defined ||
-            instance_check_experiment(instance, &state->experiment) == STATUS_OK);
+           instance_check_experiment(instance, &state->experiment) == STATUS_OK;
 }
 
 static bool has_possible_statistics(const struct instance *instance,
@@ -75,7 +84,6 @@ static bool has_possible_statistics(const struct instance *instance,
         {"solver_failed_steps", (double)totals->failed_steps, is_count(totals->failed_steps)},
         {"solver_restarts", (double)totals->restarts, is_count(totals->restarts)},
         {"last_step", totals->last_step, isfinite(totals->last_step)},
-        {"solver_last_step", state->own.solver_last_step, isfinite(state->own.solver_last_step)},
         {"the steps before the restart", (double)state->steps_before_restart,
          state->steps_before_restart >= 0 && state->steps_before_restart <= totals->steps},
     };
@@ -93,9 +101,11 @@ static bool has_possible_history(const struct instance *instance,
     const bool exists = state->has_history;
     const struct named_value values[] = {
         {"restart_time", state->restart_time.s, isfinite(state->restart_time.s)},
-        {"the rest of restart_time", state->restart_time.rest, isfinite(state->restart_time.rest)},
+        {"the rest of restart_time", state->restart_time.rest, is_rest_of(state->restart_time)},
         {"restart_step", state->restart_step, is_step(state->restart_step)},
         {"next_step", state->next_step, is_step(state->next_step)},
+        {"solver_restarts", (double)state->statistics.restarts,
+         !exists || state->statistics.restarts > 0},
         {"the steps since the restart", (double)steps,
          !exists || (steps > 0 && steps <= most_steps)},
         {"first_time", state->first_time, !exists || state->first_time > 0.0},
@@ -219,18 +229,137 @@ static bool is_possible_event_point(const struct instance *instance,
         count += due[i];
     }
     const bool is_due = state->event_point == EVENT_DUE;
-    const bool is_stepping = state->phase == PHASE_STEPPING && !instance->is_integrated_outside &&
-                             instance->model->events != NULL;
+    const bool is_stepping = state->phase == PHASE_STEPPING && instance->model->events != NULL;
+    const bool is_passed = state->event_point == EVENT_PASSED && !instance->is_integrated_outside;
     const struct clock_time end = state->cut_end;
     const struct named_value values[] = {
         {"event_point", state->event_point,
-         state->event_point == NO_EVENT ||
-             (is_stepping && (is_due || state->event_point == EVENT_PASSED))},
+         state->event_point == NO_EVENT || (is_stepping && (is_due || is_passed))},
         {"the number of causes of the event that is due", count, is_due == (count > 0)},
         {"the end of the step cut short", end.s, isfinite(end.s)},
-        {"the rest of the end of the step cut short", end.rest, isfinite(end.rest)},
+        {"the rest of the end of the step cut short", end.rest,
+         is_rest_of(end) && (state->event_point == NO_EVENT ||
+                             clock_difference(end, state->time) >= -clock_spacing(state->time.s))},
     };
     return are_possible(instance, values, COUNT(values));
+}
+
+/* ---- What stands twice ---------------------------------------------------------------------- */
+
+/* A value by its name, and what the rest of the state says that it is. */
+struct twin {
+    const char *name;
+    double value;
+    double expected;
+};
+
+static bool do_agree(const struct instance *instance, const struct twin twins[], size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        if (twins[i].value != twins[i].expected) {
+            message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                          "the serialized state is refused: %s = %.17g contradicts the rest of it, "
+                          "which gives %.17g",
+                          twins[i].name, twins[i].value, twins[i].expected);
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Variables of the instance follow from its clock, its settings and the integrator's totals. */
+static bool has_true_variables(const struct instance *instance,
+                               const struct instance_state *state) {
+    const struct instance_values *own = &state->own;
+    struct instance_values counted = {0};
+    instance_write_statistics(&state->statistics, &counted);
+    const struct twin twins[] = {
+        {"the variable time", own->time, state->time.s},
+        {"effective_relative_tolerance", own->effective_relative_tolerance,
+         instance_tolerance(instance, state)},
+        {"solver_steps", own->solver_steps, counted.solver_steps},
+        {"solver_rhs_evaluations", own->solver_rhs_evaluations, counted.solver_rhs_evaluations},
+        {"solver_restarts", own->solver_restarts, counted.solver_restarts},
+        {"solver_failed_steps", own->solver_failed_steps, counted.solver_failed_steps},
+        {"solver_last_step", own->solver_last_step, counted.solver_last_step},
+        {"solver_last_order", own->solver_last_order, counted.solver_last_order},
+    };
+    return do_agree(instance, twins, COUNT(twins));
+}
+
+/* The start is the one of the experiment; nothing has been counted before it. */
+static bool has_true_start(const struct instance *instance, const struct instance_state *state) {
+    const struct instance_values *own = &state->own;
+    const bool has_started = state->phase >= PHASE_STEPPING;
+    // of the other kind: the adapter says so
+    const bool is_foreign =
+        state->phase == PHASE_CONTINUOUS_TIME && !instance->is_integrated_outside;
+    const double start = state->experiment.start_time;
+    const struct twin of_start[] = {
+        {"time", state->time.s, start},
+        {"the rest of time", state->time.rest, 0.0},
+        {"has_history", state->has_history, false},
+        {"solver_steps", (double)state->statistics.steps, 0.0},
+        {"event_count", own->event_count, 0.0},
+    };
+    const struct twin of_events[] = {
+        {"last_event_time", own->last_event_time, has_started ? start : 0.0},
+    };
+    const struct twin of_experiment[] = {
+        {"experiment_defined", state->experiment_defined, true},
+    };
+    const struct twin of_no_experiment[] = {
+        {"start_time", start, 0.0},
+        {"stop_time_defined", state->experiment.stop_time_defined, false},
+        {"tolerance_defined", state->experiment.tolerance_defined, false},
+    };
+    return (has_started || do_agree(instance, of_start, COUNT(of_start))) &&
+           (own->event_count > 0 || do_agree(instance, of_events, COUNT(of_events))) &&
+           (state->phase == PHASE_INSTANTIATED || is_foreign ||
+            do_agree(instance, of_experiment, COUNT(of_experiment))) &&
+           (state->experiment_defined ||
+            do_agree(instance, of_no_experiment, COUNT(of_no_experiment)));
+}
+
+/* The integrator's history ends at the present time, and its span follows from what is held. */
+static bool has_true_history(const struct instance *instance, const struct instance_state *state,
+                             const struct polynomial running[]) {
+    const struct twin twins[] = {
+        {"latest_time", state->latest_time, clock_difference(state->time, state->restart_time)},
+        {"span", state->span,
+         instance_span(state, state->restart_time, state->first_time,
+                       polynomials_move(running, count_of(instance->model->inputs)))},
+        {"event_point", state->event_point, NO_EVENT},
+    };
+    return !state->has_history || do_agree(instance, twins, COUNT(twins));
+}
+
+/* Inputs at the current time are among the values, too; fixed parameters also among those that the
+ * integrator runs with. */
+static bool has_true_values(const struct instance *instance, const struct instance_state *state,
+                            const char *values, const char *held,
+                            const struct polynomial current[]) {
+    for (size_t i = 0; i < instance->description->variable_count; i++) {
+        const struct variable *variable = &instance->description->variables[i];
+        const bool is_real = variable->type == VARIABLE_FLOAT64;
+        const char *field = values + variable->offset;
+        const void *twin = field;
+        if (variable->owner != VARIABLE_OF_MODEL) {
+            continue;
+        }
+        if (variable->causality == CAUSALITY_INPUT && is_real) {
+            twin = &current[instance_input_index(instance, variable)].d[0];
+        } else if (variable->causality == CAUSALITY_PARAMETER && state->has_history &&
+                   variable->variability == VARIABILITY_FIXED) {
+            twin = held + variable->offset;
+        }
+        if (memcmp(field, twin, is_real ? sizeof(double) : sizeof(int)) != 0) {
+            message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
+                          "the serialized state is refused: it has two values of %s",
+                          variable->name);
+            return false;
+        }
+    }
+    return true;
 }
 
 enum status instance_check_plausible(const struct instance *instance,
@@ -240,9 +369,10 @@ enum status instance_check_plausible(const struct instance *instance,
     const char *values = block + (memory->values - memory->block);
     const char *held = block + (memory->held - memory->block);
     const char *pending = block + ((const char *)memory->pending - memory->block);
+    const char *current = block + ((const char *)memory->current - memory->block);
     const char *running = block + ((const char *)memory->running - memory->block);
 
-    // inputs at the current time are not checked: they may have overflowed on their way
+    // derivatives of inputs at the current time are not checked: they may have overflowed
     const bool is_plausible =
         has_possible_settings(instance, state) && has_possible_statistics(instance, state) &&
         has_possible_history(instance, state) &&
@@ -253,6 +383,9 @@ enum status instance_check_plausible(const struct instance *instance,
         has_possible_modes(instance, state, values, held) &&
         has_possible_next_time(instance, state, values) &&
         is_possible_event_point(
-            instance, state, (const void *)(block + ((const char *)memory->due - memory->block)));
+            instance, state, (const void *)(block + ((const char *)memory->due - memory->block))) &&
+        has_true_variables(instance, state) && has_true_start(instance, state) &&
+        has_true_history(instance, state, (const void *)running) &&
+        has_true_values(instance, state, values, held, (const void *)current);
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

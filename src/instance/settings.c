@@ -57,19 +57,21 @@ static void write_absolute_tolerances(const struct instance *instance, double ab
 }
 
 /* The parameter wins over the experiment, which wins over the default. */
-void instance_update_tolerance(struct instance *instance) {
-    struct instance_state *state = &instance->state;
+double instance_tolerance(const struct instance *instance, const struct instance_state *state) {
+    const enum integrator_method method = (enum integrator_method)state->own.solver_method;
     double tolerance = instance->description->default_tolerance;
     if (state->own.relative_tolerance > 0.0) {
         tolerance = state->own.relative_tolerance;
     } else if (state->experiment.tolerance_defined) {
         tolerance = fmin(state->experiment.tolerance, INSTANCE_COARSEST_EXPERIMENT_TOLERANCE);
     }
-    state->own.effective_relative_tolerance =
-        fmin(fmax(integrator_tolerance_fraction((enum integrator_method)state->own.solver_method) *
-                      tolerance,
-                  INSTANCE_FINEST_TOLERANCE),
-             INSTANCE_COARSEST_TOLERANCE);
+    return fmin(fmax(integrator_tolerance_fraction(method) * tolerance, INSTANCE_FINEST_TOLERANCE),
+                INSTANCE_COARSEST_TOLERANCE);
+}
+
+void instance_update_tolerance(struct instance *instance) {
+    struct instance_state *state = &instance->state;
+    state->own.effective_relative_tolerance = instance_tolerance(instance, state);
     if (instance->absolute_tolerances != NULL) {
         write_absolute_tolerances(instance, instance->absolute_tolerances);
     }

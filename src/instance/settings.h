@@ -20,7 +20,11 @@ MUST_CHECK NONNULL enum status instance_check_parameters(struct instance *instan
  */
 MUST_CHECK NONNULL enum status instance_check_method(const struct instance *instance);
 
-/* Computes the tolerance that the integrator runs at. */
+/* The relative tolerance that the integrator runs at, by the settings in state. */
+NONNULL double instance_tolerance(const struct instance *instance,
+                                  const struct instance_state *state);
+
+/* Writes it where users read it, and the absolute tolerances. */
 NONNULL void instance_update_tolerance(struct instance *instance);
 
 /* Says so in a message if the experiment's tolerance is too coarse to be used as it is. */

@@ -36,8 +36,8 @@ static inline int64_t instance_steps_left(const struct step *step) {
 
 /* ---- Inputs (step_inputs.c) ----------------------------------------------------------------- */
 
-/* Those at the beginning of a step. One whose derivatives ended with the last step is until then
- * where these have led it. */
+/* Those at the beginning of a step. An input whose derivatives ended with the last step keeps the
+ * value they led to until then. */
 NONNULL void instance_begin_inputs(struct instance *instance);
 
 /* Those at the time of the instance, elapsed s after the beginning of the step. */

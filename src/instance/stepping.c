@@ -7,7 +7,6 @@
 #include "snapshot_contents.h"
 #include "step.h"
 
-#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -46,22 +45,6 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
         return STATUS_INVALID_TIME;
     }
     return STATUS_OK;
-}
-
-static int saturated(int64_t count) {
-    return count > INT_MAX ? INT_MAX : (int)count;
-}
-
-static void update_statistics(struct instance *instance) {
-    struct instance_values *own = &instance->state.own;
-    struct integrator_statistics *statistics = &instance->state.statistics;
-    integrator_get_statistics(instance->integrator, statistics);
-    own->solver_steps = saturated(statistics->steps);
-    own->solver_rhs_evaluations = saturated(statistics->rhs_evaluations);
-    own->solver_restarts = saturated(statistics->restarts);
-    own->solver_failed_steps = saturated(statistics->failed_steps);
-    own->solver_last_step = statistics->last_step;
-    own->solver_last_order = statistics->last_order;
 }
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
@@ -179,6 +162,9 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
         return status;
     }
     status = advance(step);
+    if (status != STATUS_OK) {
+        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
+    }
 
     // a step that ended early cannot be replayed: its end was not known when it began
     const bool is_whole = !step->is_early && !step->meets_time_event && !is_at_event(instance);
@@ -187,7 +173,8 @@ ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation
     if (!state->has_history) {
         state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
     }
-    update_statistics(instance);
+    integrator_get_statistics(instance->integrator, &state->statistics);
+    instance_write_statistics(&state->statistics, &state->own);
     return status;
 }
 
@@ -208,8 +195,7 @@ static enum status integrate(struct step *step) {
     const enum status status = instance->model->events == NULL
                                    ? move(step, continuation)
                                    : instance_move_over_events(step, continuation);
-    arrive(step,
-           status == STATUS_OK ? step->end : clock_add(state->restart_time, state->latest_time));
+    arrive(step, status == STATUS_OK ? step->end : state->time);
     return status;
 }
 

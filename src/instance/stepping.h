@@ -13,9 +13,9 @@ MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
                                                 double communication_point, double step);
 
 /* What a step does at an event. Where that is at its beginning, it passes it, so that every step
- * gets on. */
+ * makes progress. */
 enum event_handling {
-    EVENTS_PASSED, /* it passes the event and goes on */
+    EVENTS_PASSED, /* it passes the event and continues */
     EVENTS_END,    /* it passes the event and ends there */
     EVENTS_LEFT,   /* it ends there. The event is due: instance_update_discrete_states passes it, or
                       the next step does first */

@@ -50,9 +50,10 @@ ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum 
 }
 
 static inline bool is_settable(const struct instance *instance, const struct variable *variable) {
-    return variable_is_settable(variable, instance->state.phase) ||
-           (instance->states_are_settable && variable->owner == VARIABLE_OF_MODEL &&
-            variable->offset - instance->model->states.offset < instance->model->states.size);
+    const enum phase phase = instance->state.phase;
+    return variable_is_settable(variable, phase) ||
+           ((phase == PHASE_CONTINUOUS_TIME || instance->states_are_settable) &&
+            instance_is_state(instance, variable));
 }
 
 ALWAYS_INLINE const struct variable *find_settable(const struct instance *instance,
@@ -61,7 +62,8 @@ ALWAYS_INLINE const struct variable *find_settable(const struct instance *instan
         [PHASE_INSTANTIATED] = "at all: only start values and inputs can",
         [PHASE_INITIALIZATION] = "at all: only start values and inputs can",
         [PHASE_STEPPING] = "after initialization: only inputs and tunable parameters can",
-        [PHASE_CONTINUOUS_TIME] = "while the time is continuous: only continuous inputs can",
+        [PHASE_CONTINUOUS_TIME] =
+            "while the time is continuous: only continuous inputs and states can",
     };
     const struct variable *variable = instance_find(instance, reference, type);
     if (variable != NULL && !is_settable(instance, variable)) {

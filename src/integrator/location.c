@@ -89,14 +89,14 @@ enum status location_restart(struct location *location, const struct indicator *
         location->used_count++;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
         location->is_armed[i] = false;
+        const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
+        location->noise[i] = fmax(2.0 * rounding, DBL_MIN);
         if (indicator->kind == INDICATOR_OF_STATE) {
             const double z = at_state(indicator, x);
-            const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
-            location->noise[i] =
-                is_sure ? rounding
-                        : fabs(indicator->factor) * location->tolerances[indicator->state];
+            const double miss = fabs(indicator->factor) * location->tolerances[indicator->state];
+            location->noise[i] = is_sure ? rounding : fmax(rounding, miss);
         }
     }
     if (!needs_model) {
@@ -167,11 +167,19 @@ static double first_fall_from_zero(const struct roots_polynomial *p, double nois
     return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
 }
 
-/* The first s at which an indicator falls to 0; INFINITY: it does not. Where it is armed it has
- * been above 0 before the step: where it rises from below 0, that is the error of the polynomial.
- */
-static double first_fall(const struct roots_polynomial *p, double noise, bool *is_armed) {
+/* The first s at which indicator i, represented up to an error, falls to 0; INFINITY: it does not.
+ * Where it is armed it has been above 0 before the step: where it rises from below 0, that is the
+ * error of the polynomial. Where a restart finds it below its noise it has not fallen yet, as the
+ * modes have just been found valid; otherwise an event could come again and again. */
+static double first_fall(struct location *location, size_t i, const struct roots_polynomial *p,
+                         double error) {
+    bool *is_armed = &location->is_armed[i];
     if (!*is_armed) {
+        double noise = fmax(error, location->noise[i]);
+        if (p->c[0] <= -noise) {
+            noise = -2.0 * p->c[0];
+            location->noise[i] = noise;
+        }
         return first_fall_from_zero(p, noise, is_armed);
     }
     const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
@@ -198,15 +206,16 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
-static double first_of_state(const struct step_polynomial *step, const struct indicator *indicator,
-                             double noise, bool *is_armed) {
+static double first_of_state(struct location *location, size_t i) {
+    const struct step_polynomial *step = &location->step;
+    const struct indicator *indicator = &location->indicators[i];
     double c[ROOTS_LENGTH];
     c[0] = indicator->offset + indicator->factor * step->row[indicator->state][0];
     if (step->is_from_end) {
         // backwards in time a proof needs no shift
         expand(step, indicator, -1.0, c);
         if (roots_is_above(&(struct roots_polynomial){c, step->degree, -1.0})) {
-            *is_armed = true;
+            location->is_armed[i] = true;
             return INFINITY;
         }
     }
@@ -214,7 +223,8 @@ static double first_of_state(const struct step_polynomial *step, const struct in
     if (step->is_from_end) {
         shift(c, step->degree);
     }
-    return first_fall(&(struct roots_polynomial){c, step->degree, -1.0}, noise, is_armed);
+    const struct roots_polynomial p = {c, step->degree, -1.0};
+    return first_fall(location, i, &p, 0.0);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -223,13 +233,14 @@ static double first_of_state(const struct step_polynomial *step, const struct in
 static const double representation = 1e-12;
 
 /* One whose polynomial is given. */
-static double first_of_model(const struct step_polynomial *step, size_t i, bool *is_armed) {
+static double first_of_model(struct location *location, size_t i) {
+    const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
     double size = 0.0;
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return first_fall(&p, representation * size, is_armed);
+    return first_fall(location, i, &p, representation * size);
 }
 
 /* Writes all indicators at s, of the whole step, to column k of samples. */
@@ -309,8 +320,8 @@ static bool search_piece(struct location *location, const struct piece *piece, s
         location->is_armed[i] |= is_above;
         return is_above;
     }
-    const double s =
-        first_fall(&(struct roots_polynomial){c, degree, -1.0}, noise, &location->is_armed[i]);
+    const struct roots_polynomial p = {c, degree, -1.0};
+    const double s = first_fall(location, i, &p, noise);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -357,10 +368,9 @@ enum status location_search(struct location *location) {
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            location->first[i] =
-                first_of_state(step, indicator, location->noise[i], &location->is_armed[i]);
+            location->first[i] = first_of_state(location, i);
         } else if (indicator->kind == INDICATOR_OF_MODEL && step->has_indicators) {
-            location->first[i] = first_of_model(step, i, &location->is_armed[i]);
+            location->first[i] = first_of_model(location, i);
         }
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !step->has_indicators;
     }

@@ -29,8 +29,8 @@ struct indicator {
     /* of INDICATOR_OF_STATE */
     size_t state;
     double factor;
-    double offset;
-    bool rises; /* it may be 0 now, and its slope is above 0 */
+    double offset; /* of INDICATOR_OF_MODEL: the size of the limit that it is the distance to */
+    bool rises;    /* of INDICATOR_OF_STATE: it may be 0 now, and its slope is above 0 */
 };
 
 struct event {

@@ -3,6 +3,7 @@
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static bool is_in_word(char c) {
@@ -40,6 +41,57 @@ static void write_nan_alike(char *text) {
     *to = '\0';
 }
 
+/* Length of the decimal fraction in front of text if it has more digits than 15; 0 if not. */
+static size_t long_fraction_length(const char *text) {
+    const size_t whole = strspn(text, "0123456789");
+    if (whole == 0 || text[whole] != '.') {
+        return 0;
+    }
+    size_t length = whole + 1 + strspn(text + whole + 1, "0123456789");
+    const size_t zeros = strspn(text, "0.");
+    const bool is_long = length > zeros + 15;
+    if (text[length] == 'e') {
+        const size_t sign = text[length + 1] == '-' || text[length + 1] == '+';
+        length += 1 + sign + strspn(text + length + 1 + sign, "0123456789");
+    }
+    return is_long ? length : 0;
+}
+
+/* %.17g writes 0.80000000000000004 for 0.8: numbers get the fewest digits that are read as the same
+ * double. */
+static void shorten_numbers(char *text) {
+    char *to = text;
+    const char *from = text;
+    bool after_word = false;
+    while (*from != '\0') {
+        const size_t length = after_word ? 0 : long_fraction_length(from);
+        const double number = length > 0 ? strtod(from, NULL) : 0.0;
+        char shorter[32] = "";
+        for (int digits = 15; digits < 17 && length > 0; digits++) {
+            (void)snprintf(shorter, sizeof shorter, "%.*g", digits, number);
+            if (strtod(shorter, NULL) == number) {
+                break;
+            }
+            shorter[0] = '\0';
+        }
+        if (shorter[0] != '\0' && strlen(shorter) <= length) {
+            memcpy(to, shorter, strlen(shorter));
+            to += strlen(shorter);
+            from += length;
+        } else {
+            *to++ = *from++;
+        }
+        after_word = is_in_word(to[-1]) || to[-1] == '.';
+    }
+    *to = '\0';
+}
+
+void message_format(char *text, size_t size, const char *format, va_list arguments) {
+    (void)vsnprintf(text, size, format, arguments);
+    write_nan_alike(text);
+    shorten_numbers(text);
+}
+
 void message_write(const struct message_sink *sink, enum status status, const char *format, ...) {
     if (sink->write == NULL) {
         return;
@@ -48,8 +100,7 @@ void message_write(const struct message_sink *sink, enum status status, const ch
     char text[512];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(text, sizeof text, format, arguments);
+    message_format(text, sizeof text, format, arguments);
     va_end(arguments);
-    write_nan_alike(text);
     sink->write(sink->context, status, text);
 }

@@ -24,7 +24,7 @@ struct series_origin {
 struct series {
     /* Rows that extend writes: the states in their order, then other quantities: what it needs
      * itself, and functions of the motion that others want to follow over a step. It may leave out
-     * rows that play no role. */
+     * unused rows. */
     size_t row_count;
 
     /* Of each event indicator (events.h) the row that is this indicator while its kind is

@@ -128,9 +128,9 @@ def opened(path: Path) -> Iterator[ClosedLoop]:
     with ExitStack() as stack:
         unpacked = stack.enter_context(ssp.unpacked(path))
         system = unpacked.system
-        fmus = {c.name: stack.enter_context(Fmu(unpacked.fmu(c.name))) for c in system.components}
-        for component in system.components:
-            fmus[component.name].path = path / component.source  # for messages
+        fmus = {
+            c.name: stack.enter_context(unpacked.unpacked_fmu(c.name)) for c in system.components
+        }
         # the master connects Reals; that the payload is attached never changes
         real = [
             c

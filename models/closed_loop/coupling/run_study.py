@@ -5,6 +5,8 @@ The page ../coupling.md says which results are expected.
 
 from pathlib import Path
 
+import numpy as np
+
 from cosim.output_files import from_here, written
 from cosim.report.style import save
 from models.closed_loop.coupling import tables
@@ -13,13 +15,13 @@ from models.closed_loop.coupling.figure import figure
 from models.closed_loop.coupling.loop import opened
 from models.closed_loop.coupling.payload import study_payload
 from models.closed_loop.coupling.step_doubling import study_doubling
-from models.closed_loop.coupling.step_errors import study_step_errors
+from models.closed_loop.coupling.step_errors import StepErrors, study_step_errors
 
 FILE = "coupling.png"
 
 
-def run(report: Path, ssp: Path) -> bool:
-    """Make the study, print its tables, write its picture; whether all verdicts are good.
+def run(report: Path, ssp: Path) -> dict[str, dict[str, object]]:
+    """Make the study, print its tables, write its picture; the numbers of each part.
 
     Raises
     ------
@@ -41,8 +43,36 @@ def run(report: Path, ssp: Path) -> bool:
     with written(path):
         save(figure(step_errors, tracking, doubling), path)
     print(f"\npicture: {from_here(path)}")
-    good = all(d.passed for d in doubling)
-    return step_errors.passed and tracking_passed(tracking) and payload.passed and good
+    return {
+        "step errors": {
+            "steps": step_errors.steps.tolist(),
+            "errors": _by_method(step_errors, step_errors.errors),
+            "energies": _by_method(step_errors, step_errors.energies),
+            "passed": step_errors.passed,
+        },
+        "tracking": {
+            "errors": {t.method.name: t.largest for t in tracking},
+            "predicted": {t.method.name: float(t.predicted.max()) for t in tracking},
+            "passed": tracking_passed(tracking),
+        },
+        "payload": {
+            "errors": payload.largest,
+            "held": {name: held.tolist() for name, held in payload.held.items()},
+            "passed": payload.passed,
+        },
+        "step doubling": {
+            "tolerances": [d.tolerance for d in doubling],
+            "errors": [d.error for d in doubling],
+            "steps": [d.run.accepted for d in doubling],
+            "fixed_steps": [d.fixed_steps for d in doubling],
+            "passed": all(d.passed for d in doubling),
+        },
+    }
+
+
+def _by_method(study: StepErrors, values: np.ndarray) -> dict[str, list[float]]:
+    names = (method.name for method in study.methods)
+    return dict(zip(names, values.tolist(), strict=True))
 
 
 def _print(lines: list[str]) -> None:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosim.texts import short, verdict
+from cosim.texts import brief, short, verdict
 from models.closed_loop.coupling.delays import LARGEST_ERROR, Tracking, tracking_passed
 from models.closed_loop.coupling.payload import Payload
 from models.closed_loop.coupling.step_doubling import Doubling
@@ -11,7 +11,7 @@ from models.closed_loop.coupling.step_errors import StepErrors
 
 def step_error_lines(study: StepErrors) -> list[str]:
     """Errors, calls and energies over the step."""
-    steps = "".join(f"{1e3 * step:>8g} ms" for step in study.steps)
+    steps = "".join(f"{1e3 * step:>5g} ms" for step in study.steps)
     width = max(len(method.name) for method in study.methods)
     blocks = (
         ("error of the arm's states", study.errors),
@@ -19,16 +19,16 @@ def step_error_lines(study: StepErrors) -> list[str]:
     )
     lines = []
     for title, values in blocks:
-        head = f"{title:<{width}} {steps}  slope  result"
-        lines += [head, "-" * len(head)]
+        head = f"{'':<{width}}{steps} slope  result"
+        lines += [title, head, "-" * len(head)]
         for i, (method, row) in enumerate(zip(study.methods, values, strict=True)):
-            cells = "".join(f"{value:>11.2e}" for value in row)
+            cells = "".join(f"{brief(value):>8}" for value in row)
             slope = study.slopes(values)[i]
             good = verdict(method.expects(slope))
-            lines.append(f"{method.name:<{width}}  {cells}  {slope:>5.2f}  {good}")
+            lines.append(f"{method.name:<{width}}{cells} {slope:>5.2f}  {good}")
         lines.append("")
-    calls = "".join(f"{count:>11}" for count in study.calls[0])
-    return [*lines, f"{'calls of DoStep':<{width}}  {calls}"]
+    calls = "".join(f"{count:>8}" for count in study.calls[0])
+    return [*lines, f"{'calls of DoStep':<{width}}{calls}"]
 
 
 def tracking_lines(tracking: list[Tracking]) -> list[str]:
@@ -62,19 +62,20 @@ def payload_lines(payload: Payload) -> list[str]:
 
 def doubling_lines(doubling: list[Doubling]) -> list[str]:
     """Step doubling against fixed steps."""
-    head = (
-        "step doubling, tolerance  accepted  rejected  calls  largest/median local error  "
-        "global error  fixed: steps   calls  fewer steps, calls  result"
-    )
-    lines = [head, "-" * len(head)]
+    head = "tolerance  accepted  rejected  calls  largest, median local error  global error"
+    lines = ["step doubling; local errors in tolerances", head, "-" * len(head)]
     for d in doubling:
         local = d.local.max() / d.tolerance, np.median(d.local[~d.run.limited]) / d.tolerance
-        fewer = d.fixed_steps / d.run.accepted, d.fixed_calls / d.run.do_steps
-        ratio = f"{local[0]:.2f} / {local[1]:.2f} tolerance"
         lines.append(
-            f"{short(d.tolerance):>24}  {d.run.accepted:>8}  {d.run.rejected:>8}"
-            f"  {d.run.do_steps:>5}  {ratio:>26}  {d.error:>12.2e}"
-            f"  {d.fixed_steps:>12}  {d.fixed_calls:>6}  {fewer[0]:>11.1f}, {fewer[1]:>5.1f}"
-            f"  {verdict(d.passed)}"
+            f"{short(d.tolerance):>9}  {d.run.accepted:>8}  {d.run.rejected:>8}"
+            f"  {d.run.do_steps:>5}  {local[0]:>19.2f}, {local[1]:>6.2f}  {d.error:>12.2e}"
+        )
+    head = "tolerance  fixed steps   calls  times as many steps, calls  result"
+    lines += ["", "fixed steps with the same error", head, "-" * len(head)]
+    for d in doubling:
+        more = d.fixed_steps / d.run.accepted, d.fixed_calls / d.run.do_steps
+        lines.append(
+            f"{short(d.tolerance):>9}  {d.fixed_steps:>11}  {d.fixed_calls:>6}"
+            f"  {more[0]:>19.1f}, {more[1]:>5.1f}  {verdict(d.passed)}"
         )
     return lines
