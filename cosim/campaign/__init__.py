@@ -9,10 +9,11 @@ From what a user writes to the page, a module each; a module imports only from l
     loop, measures                 the compiled loop; what is kept of a run
     job                            all that workers need, picklable
     points                         parameters of a block, and what follows from them
-    bases, planning                the scenario or system; the file checked against it
+    bases, quantities, planning    the scenario or system; the file checked against it, its units
     runs, worker                   rows of a block, on a worker
     results                        Parquet files and the manifest
-    engine                         hands blocks to workers of Dask
+    credentials, cluster           certificates; workers of Dask, here or elsewhere
+    engine                         hands blocks to them
     analysis, figures, page        what the table says
     replay                         one run again
 """

@@ -8,29 +8,20 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from zipfile import ZipFile
 
-import fmpy
 import numpy as np
-from lxml import etree
 
 from cosim import project, scenario
 from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Component, Held
 from cosim.campaign.loop import Part
 from cosim.coupling.connected_instance import start_value
-from cosim.errors import UserError, did_you_mean
-from cosim.fmu_file import Fmu, read_model
-from cosim.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable, WrongValueError
+from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.fmu_file import describe, read_model
+from cosim.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
 from cosim.scenario import MAX_STEPS, Scenario
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
-
-# attribute of a model description, by version of FMI
-PROVIDES_DERIVATIVES = {
-    "2.0": "providesDirectionalDerivative",
-    "3.0": "providesDirectionalDerivatives",
-}
 
 
 class Base(ABC):
@@ -41,6 +32,12 @@ class Base(ABC):
     archives: dict[str, bytes]  # FMUs by their hash
     times: np.ndarray  # (n + 1,) communication points in s
     tolerance: float | None
+    questions: tuple[str, ...] = ()  # to ask the user about the scenario
+
+    @property
+    @abstractmethod
+    def models(self) -> list[Model]:
+        """What the FMU of each component declares."""
 
     @abstractmethod
     def variable(self, name: str) -> tuple[int, Variable]:
@@ -92,9 +89,14 @@ class ScenarioBase(Base):
         self.path, self.folder, self.archives = path, given.model, {digest: content}
         self._hash, self._scenario, self._model = digest, given, model
         self.times, self.tolerance = given.times, given.tolerance
+        self.questions = tuple(f"scenario {given.name}: {text}" for text in given.questions)
         kinds = {name: values.dtype == bool for name, values in given.inputs.items()}
         self._reals = {n: v for n, v in given.inputs.items() if not kinds[n]}
         self._switches = {n: v for n, v in given.inputs.items() if kinds[n]}
+
+    @property
+    def models(self) -> list[Model]:
+        return [self._model]
 
     def variable(self, name: str) -> tuple[int, Variable]:
         if name not in self._model.variables:
@@ -157,21 +159,15 @@ class ScenarioBase(Base):
     @property
     def hashes(self) -> dict[str, str]:
         file = self._scenario.path
-        return {file.name: _sha256(file.read_bytes()), self._model.name: self._hash}
+        own = {file.name: _sha256(file.read_bytes()), self._model.name: self._hash}
+        return own | self._scenario.logs
 
     def derivatives(self) -> list[tuple[int, int]]:
         """Value references of each state's derivative and of the state."""
-        if not self._gives_derivatives():
+        if not self._model.gives_directional_derivatives:
             raise WrongValueError("the FMU gives no directional derivatives")
-        found = [x.variable for x in fmpy.read_model_description(self.path).derivatives]
+        found = [x.variable for x in describe(self.path).description.derivatives]
         return [(v.valueReference, v.derivative.valueReference) for v in found]
-
-    def _gives_derivatives(self) -> bool:
-        """What fmpy does not read of FMI 3.0."""
-        with ZipFile(self.path) as archive:
-            root = etree.fromstring(archive.read("modelDescription.xml"))
-        attribute = PROVIDES_DERIVATIVES[self._model.fmi_version]
-        return root.find("CoSimulation").get(attribute) in ("true", "1")
 
 
 class SystemBase(Base):
@@ -187,6 +183,10 @@ class SystemBase(Base):
             content = opened.fmu(name).read_bytes()
             self._hashes[name] = _sha256(content)
             self.archives[self._hashes[name]] = content
+
+    @property
+    def models(self) -> list[Model]:
+        return [self._ssp.models[name] for name in self._names]
 
     def variable(self, name: str) -> tuple[int, Variable]:
         component, _, variable = name.partition(".")
@@ -249,7 +249,7 @@ class SystemBase(Base):
         return [name for name in found if name in self.real_outputs()]
 
     def _started(self, component: str) -> dict[str, Value]:
-        with Fmu(self._ssp.fmu(component)) as fmu:
+        with self._ssp.unpacked_fmu(component) as fmu:
             return {
                 name: start_value(fmu, component, name, value)
                 for name, value in self._parameters.get(component, {}).items()

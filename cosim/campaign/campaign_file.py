@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     FiniteFloat,
@@ -21,8 +22,9 @@ from pydantic import (
 )
 
 from cosim.campaign.expressions import Expression, parsed
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, WrongValueError, did_you_mean
 from cosim.input_files import read_toml, show
+from cosim.units import SECONDS, quantity
 
 MAX_RUNS = 10**9
 WHOLE = ("latin", "indices")  # samplings whose points are made at once
@@ -35,8 +37,19 @@ LONGEST_NAME = 100
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME)]
 Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
-Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
+Quantity = FiniteFloat | str  # a text has a unit: `cosim.campaign.quantities` makes numbers of all
+Pair = Annotated[list[Quantity], Field(min_length=2, max_length=2)]
 Number = FiniteFloat | bool | str
+
+
+def _seconds(given: Any) -> Any:
+    try:
+        return quantity(given, SECONDS) if isinstance(given, str) else given
+    except WrongValueError as error:
+        raise ValueError(str(error)) from None
+
+
+Seconds = Annotated[FiniteFloat, BeforeValidator(_seconds)]
 
 
 class _Table(BaseModel):
@@ -49,7 +62,7 @@ class Distribution(_Table):
     uniform: Pair | None = None  # lower and upper limit
     log_uniform: Pair | None = None  # the same, both positive
     normal: Pair | None = None  # mean and standard deviation
-    values: Annotated[list[FiniteFloat], Field(min_length=1, max_length=1_000_000)] | None = None
+    values: Annotated[list[Quantity], Field(min_length=1, max_length=1_000_000)] | None = None
     points: PositiveInt | None = None  # of a grid between the limits
 
     @property
@@ -59,7 +72,7 @@ class Distribution(_Table):
 
     @property
     def numbers(self) -> list[float]:
-        """What is given for it."""
+        """What is given for it, once no text with a unit is left."""
         return getattr(self, self.kind)
 
     @property
@@ -73,6 +86,8 @@ class Distribution(_Table):
         if len(given) != 1:
             raise ValueError(f"expected exactly one of {', '.join(KINDS)}, got {len(given)}")
         numbers = self.numbers
+        if any(isinstance(number, str) for number in numbers):
+            return self  # is checked as numbers
         if self.kind in ("uniform", "log_uniform"):
             if not numbers[0] < numbers[1] or not math.isfinite(numbers[1] - numbers[0]):
                 raise ValueError(f"{self.kind}: expected a lower and an upper limit, got {numbers}")
@@ -90,15 +105,15 @@ class Settling(_Table):
     """When a variable comes to stay within a band."""
 
     variable: Name
-    target: FiniteFloat
-    band: Annotated[FiniteFloat, Field(gt=0)]
+    target: Quantity
+    band: Annotated[FiniteFloat, Field(gt=0)] | str
 
 
 class Crossings(_Table):
     """How often a variable crosses a level upwards."""
 
     variable: Name
-    level: FiniteFloat
+    level: Quantity
 
 
 class Tracking(_Table):
@@ -137,9 +152,9 @@ class Map(_Table):
 class Time(_Table):
     """Times that replace those of the scenario or system, s."""
 
-    start: FiniteFloat | None = None
-    stop: FiniteFloat | None = None
-    step: Annotated[FiniteFloat, Field(gt=0)] | None = None
+    start: Seconds | None = None
+    stop: Seconds | None = None
+    step: Annotated[Seconds, Field(gt=0)] | None = None
 
 
 class Campaign(_Table):
@@ -257,11 +272,15 @@ def read(path: Path) -> Campaign:
     UserError
         If it cannot be read or anything in it is wrong: the first mistake, with its place.
     """
-    content = read_toml(path)
+    return checked(_as_tuples(read_toml(path)), path)
+
+
+def checked(content: Mapping[str, Any], where: object) -> Campaign:
+    """A campaign of its content; UserError if anything in it is wrong, beginning with `where`."""
     try:
-        return Campaign.model_validate(_as_tuples(content))
+        return Campaign.model_validate(content)
     except ValidationError as error:
-        raise UserError(f"{path}: {_explained(error)}") from None
+        raise UserError(f"{where}: {_explained(error)}") from None
 
 
 def _as_tuples(content: Mapping[str, Any]) -> dict[str, Any]:

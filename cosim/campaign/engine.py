@@ -5,113 +5,37 @@ one task. Few are under way at a time, so that the scheduler's memory does not g
 campaign. Only this process writes results: workers need no common disk.
 """
 
-import logging
-import multiprocessing.resource_tracker
-import signal
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
-from pathlib import Path
 from uuid import uuid4
 from weakref import WeakSet
 
-import dask
 import numpy as np
-from dask.system import CPU_COUNT
-from distributed import Client, Future, LocalCluster, as_completed
+from distributed import Client, Future, as_completed
 from distributed.client import ClosedClientError, FutureCancelledError, WorkerStartTimeoutError
-from distributed.core import Status
 from distributed.scheduler import KilledWorker
 from tornado.ioloop import PeriodicCallback
 
 from cosim.campaign.campaign_file import Campaign
+from cosim.campaign.cluster import WAIT
 from cosim.campaign.job import Job
 from cosim.campaign.points import Points
 from cosim.campaign.results import GOES_ON, Results
 from cosim.campaign.runs import Rows
 from cosim.campaign.worker import Plugin, run_block
 from cosim.errors import UserError, one_line
-from cosim.interruption import uninterrupted
 
 AHEAD = 3  # blocks under way for each thread of a worker
 COUNT_EVERY = 5000  # ms, between two looks at how many threads there are
-KILLS = 5  # so many workers may die over a task
-RESTART_EVERY = 2000  # ms
 ATTEMPTS = 3  # to reach all workers: the scheduler may count one whose host is gone
-WAIT = 60  # s, for the first worker
 PATIENCE = 120  # s, without any worker later on
 FAREWELL = 5  # s, for workers to remove what they have got
 CONNECTION = (OSError, FutureCancelledError, ClosedClientError)
 GONE = "the scheduler is gone"
 DIED = "the worker died in this run"
-
-SETTINGS = {
-    "distributed.scheduler.allowed-failures": KILLS,
-    "distributed.comm.timeouts.connect": "20s",
-    # what watches workers many times a second takes three per cent of a core, for nothing here
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "500ms",
-    "distributed.worker.memory.monitor-interval": "1s",
-    "distributed.worker.memory.terminate": False,  # the system decides when memory is short
-}
-
-
-@contextmanager
-def local_cluster(workers: int | None, folder: Path) -> Iterator[Client]:
-    """A cluster on this machine, one process a core, whose files are in `folder`."""
-    count = workers or CPU_COUNT
-    with ExitStack() as stack:
-        with uninterrupted():  # a cluster that is half made cannot be closed
-            # without workers at first: one that dies while it starts would end the cluster
-            made = LocalCluster(
-                n_workers=0,
-                threads_per_worker=1,
-                memory_limit=1 / count,  # of what there is
-                processes=True,
-                dashboard_address=":0",
-                local_directory=str(folder),
-                silence_logs=logging.CRITICAL,
-            )
-            client = stack.enter_context(Client(stack.enter_context(made)))
-        made.sync(_keep_signals_from_children)
-        keeper = PeriodicCallback(partial(_keep_workers, made, count), RESTART_EVERY)
-        stack.callback(made.loop.add_callback, keeper.stop)
-        made.loop.add_callback(keeper.start)
-        made.scale(count)
-        with suppress(TimeoutError):  # the campaign begins with those that are there
-            client.wait_for_workers(count, timeout=WAIT)
-        yield client
-
-
-async def _keep_signals_from_children() -> None:
-    """Block signals of the terminal in this thread, for all processes that it will start."""
-    if hasattr(signal, "pthread_sigmask"):
-        block = partial(signal.pthread_sigmask, signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
-        block()
-        multiprocessing.resource_tracker.ensure_running()  # unblocks SIGINT again
-        block()
-
-
-def _keep_workers(made: LocalCluster, count: int) -> None:
-    """Make workers again that died while they started; nannies take care of the others."""
-    for name, nanny in list(made.workers.items()):
-        if nanny.status in (Status.failed, Status.closed):
-            del made.workers[name]
-    made.scale(count)
-
-
-@contextmanager
-def connected(address: str) -> Iterator[Client]:
-    """The cluster of a scheduler that runs elsewhere; UserError if it cannot be reached."""
-    try:
-        client = Client(address, timeout=20)
-    except (TimeoutError, OSError, ValueError) as error:
-        raise UserError(f"{address}: the scheduler cannot be reached: {one_line(error)}") from None
-    with client:
-        yield client
 
 
 @dataclass(frozen=True)
@@ -271,16 +195,3 @@ def _joined(parts: Sequence[Rows]) -> Rows:
         [failure for part in parts for failure in part.failures],
         {run: record for part in parts for run, record in part.trajectories.items()},
     )
-
-
-@contextmanager
-def cluster(scheduler: str | None, workers: int | None, folder: Path) -> Iterator[Client]:
-    """A scheduler that runs elsewhere, or a cluster on this machine with files in `folder`."""
-    logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
-    try:
-        with dask.config.set(SETTINGS):
-            start = connected(scheduler) if scheduler else local_cluster(workers, folder)
-            with start as client:
-                yield client
-    finally:
-        logging.disable(logging.NOTSET)

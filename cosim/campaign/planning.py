@@ -9,7 +9,7 @@ import numpy as np
 from cosim.campaign.bases import Base, ScenarioBase
 from cosim.campaign.campaign_file import Campaign, Distribution
 from cosim.campaign.expressions import Expression
-from cosim.campaign.job import Job, Target
+from cosim.campaign.job import Component, Job, Target
 from cosim.campaign.measures import (
     FINAL_INTEGER,
     LYAPUNOV,
@@ -18,8 +18,8 @@ from cosim.campaign.measures import (
     final_integer,
     plain,
 )
-from cosim.errors import UserError, did_you_mean, one_line
-from cosim.model import INPUTS, Value, Variable, WrongValueError
+from cosim.errors import UserError, WrongValueError, did_you_mean, one_line
+from cosim.model import INPUTS, TOLERANCE, Value, Variable
 from cosim.texts import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table
@@ -57,6 +57,7 @@ class _Planner:
             self.fail("keep", f"{len(watched)} variables at {len(base.times)} times are too many")
         read = self.read(watched)
         components = tuple(base.components(list(read), fixed))
+        self.check_tolerances(components, targets)
         reals, switches = base.held
         first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
         places = [
@@ -155,6 +156,32 @@ class _Planner:
                 variable.check_range(min(numbers), max(numbers))
         except WrongValueError as error:
             self.fail(f"{place} {distribution.kind}", error)
+
+    def check_tolerances(
+        self, components: Sequence[Component], targets: Mapping[str, Target]
+    ) -> None:
+        """Refuse tolerances that the methods of integration cannot reach.
+
+        Derived values and normal distributions are not known before the runs.
+        """
+        varied = {
+            (target.component, target.variable): name
+            for name, target in targets.items()
+            if name in self.campaign.parameters
+        }
+        for i, (model, component) in enumerate(zip(self.base.models, components, strict=True)):
+            name = varied.get((i, TOLERANCE))
+            if name is None:
+                place = f"{component.name}: {TOLERANCE}"
+                numbers = [component.values.get(TOLERANCE) or self.base.tolerance]
+            else:
+                place, distribution = f"[parameters.{name}]", self.campaign.parameters[name]
+                numbers = [] if distribution.kind == "normal" else distribution.numbers
+            for number in filter(None, numbers):  # 0: that of the scenario
+                try:
+                    model.check_tolerance(number, component.values)
+                except WrongValueError as error:
+                    self.fail(place, error)
 
     def constants(self) -> dict[str, float]:
         """Numbers that expressions may name."""

@@ -4,6 +4,7 @@ import dataclasses
 import multiprocessing
 import signal
 from collections.abc import Mapping
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -22,18 +23,38 @@ from cosim.report import assets, motion, pages
 from cosim.report.motion import Recorded
 from cosim.report.overview import RAN
 from cosim.report.pages import INDEX, RunPage, Table
-from cosim.report.run_data import Curve, Plot, RunData, thinned
+from cosim.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from cosim.texts import unit
 
 FOLDER = "replays"
 DIED = "the run takes its process down"
 
 
+@dataclass(frozen=True)
+class Replay:
+    """What came out of a run."""
+
+    parameters: dict[str, float]
+    kept: dict[str, float]
+    files: list[Path]  # values and page, if it ended
+    failure: str  # why it did not, or nothing
+
+    @property
+    def lines(self) -> list[str]:
+        """It as text, a number or a file each."""
+        values = (*self.parameters.items(), *self.kept.items())
+        return [*(f"{name} = {value!r}" for name, value in values), *map(str, self.files)]
+
+    @property
+    def document(self) -> dict[str, object]:
+        """It for programs."""
+        return dataclasses.asdict(self)
+
+
 def replay(
     campaign: Campaign, base: Base, points: Points, run: int, folder: Path, command: str
-) -> tuple[list[str], bool]:
-    """Run again; lines that say what came out, files among them, and whether it ended.
-
-    The page shows `command`, which does it again.
+) -> Replay:
+    """Run again. The page shows `command`, which does it again.
 
     Raises
     ------
@@ -49,7 +70,7 @@ def replay(
     given = dict(zip(points.names, values[0].tolist(), strict=True))
     failure = rows.failures[0] if rows else DIED
     if failure:
-        return [*_lines(given), f"failed: {failure}"], False
+        return Replay(given, {}, [], failure)
     columns = [measure.column for measure in job.measures]
     kept = dict(zip(columns, rows.measures[0].tolist(), strict=True))
     record = rows.trajectories[run]
@@ -73,7 +94,7 @@ def replay(
         overview=(folder / INDEX).exists(),
     )
     written = pages.write_run(table.with_suffix(".html"), page)
-    return [*_lines(given), *_lines(kept), str(table), str(written)], True
+    return Replay(given, kept, [table, written], "")
 
 
 def _apart(job: Job, archives: Mapping[str, bytes], run: int, targets: np.ndarray) -> Rows | None:
@@ -112,18 +133,14 @@ def _serve(connection: Connection) -> None:
     connection.send(rows)
 
 
-def _lines(named: dict[str, float]) -> list[str]:
-    return [f"{name} = {value!r}" for name, value in named.items()]
-
-
 def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> RunData:
     """Plots of the states, and the motion; record: (n + 1, watched)."""
-    rows = thinned(len(job.times))
     outputs = dict(zip(job.watched, record.T, strict=True))
-    shown = base.states() or list(outputs)
+    curves = [Curve(x, without_rounding(outputs[x])) for x in base.states() or list(outputs)]
+    rows = thinned([curve.values for curve in curves])
     plots = [
-        Plot(name, base.variable(name)[1].unit or "", [Curve(name, outputs[name][rows])])
-        for name in shown
+        Plot(curve.name, unit(base.variable(curve.name)[1].unit), [curve.at(rows)])
+        for curve in curves
     ]
     moving = motion.of_recorded(base.folder, _recorded(base, job, given, outputs), rows)
     return RunData("run", "", job.times[rows], plots, motion=moving)

@@ -9,34 +9,91 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosim import project
+from cosim import console, project
+from cosim.commands import Ended
 from cosim.errors import UserError, one_line
 from cosim.interruption import arrived
+from cosim.options import count, number
 from cosim.output_files import from_here, written
 from cosim.progress import Progress
 
 if TYPE_CHECKING:
+    from distributed import Security
+
     from cosim.campaign.bases import Base
     from cosim.campaign.campaign_file import Campaign
     from cosim.campaign.job import Job
     from cosim.campaign.points import Points
     from cosim.campaign.results import Results
 
-NEEDED = ("SALib", "distributed", "numba", "pyarrow", "scipy")
+DESCRIPTION = (
+    "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a page. A "
+    "campaign that was stopped resumes. Exit code: 0 all runs are there, 1 the run of --replay "
+    "fails, 2 wrong use or stopped."
+)
+NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
 
-def run(options: argparse.Namespace) -> int:
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which campaign, and where it runs."""
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
+    parser.add_argument(
+        "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for the results (default: that in the file, or in build/campaigns/)",
+    )
+    parser.add_argument(
+        "--replay",
+        type=number,
+        metavar="N",
+        help="run only run N again; writes all its Real outputs and a page",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="a scheduler that runs elsewhere, as tls://192.168.0.1:8786; with tcp://, whoever "
+        "reaches it or its workers runs code there",
+    )
+    where.add_argument(
+        "--workers",
+        type=count,
+        metavar="N",
+        help="processes on this machine (default: one per core)",
+    )
+    for name, text in (
+        ("ca", "certificate of the authority that signs those of scheduler, workers and client"),
+        ("cert", "certificate of the client"),
+        ("key", "its private key"),
+    ):
+        parser.add_argument(f"--tls-{name}", type=Path, metavar="PEM", help=f"for tls://: {text}")
+    parser.add_argument(
+        "--no-dashboard",
+        action="store_true",
+        help="no pages of Dask on this machine, which all its users can read",
+    )
+
+
+def run(options: argparse.Namespace) -> Ended:
     """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
     # imported here: what a campaign needs may not be installed
-    from cosim.campaign import bases, campaign_file, page, planning, replay, runs
+    from cosim.campaign import bases, campaign_file, page, planning, quantities, replay, runs
     from cosim.campaign.points import Points
     from cosim.campaign.results import Results
 
+    security = _security(options)
     campaign = campaign_file.read(options.file)
     with bases.opened(campaign, options.fmu, options.file) as base:
+        texts = (*base.questions, *quantities.questions(campaign, base))
+        console.messages(f"warning: {options.file}", texts)
+        campaign = quantities.in_si(campaign, base, options.file)
         job = planning.plan(campaign, base, options.file)
         points = Points(campaign, planning.constants(campaign, base))
         folder = _folder(options, campaign)
@@ -45,20 +102,22 @@ def run(options: argparse.Namespace) -> int:
         if options.replay is not None:
             results.check()
             again = f"{_command(options)} --replay {options.replay}"
-            lines, ended = replay.replay(campaign, base, points, options.replay, folder, again)
-            print(*lines, sep="\n")
-            return 0 if ended else 1
+            made = replay.replay(campaign, base, points, options.replay, folder, again)
+            print(*made.lines, sep="\n")
+            verdict = f"failed: {made.failure}" if made.failure else f"ran: run {options.replay}"
+            return Ended(1 if made.failure else 0, verdict, made.document)
         runs.check(job, base.archives, base.path)
         results.begin()
-        _run_missing(options, _Plan(campaign, base, job, points, results))
+        _run_missing(options, _Plan(campaign, base, job, points, results, security))
         failed = results.failed()
-        if failed:
-            print(f"failed: {failed} of {campaign.count} runs")
         digest = results.digest()
         print(f"table: {digest}")
+        document = {"runs": campaign.count, "failed": failed, "table": digest}
+        document["results"] = folder.absolute()
+        verdict = f"complete: {campaign.count} runs" + (f", {failed} of them failed" * bool(failed))
         if campaign.count > page.MOST:
             print(f"results: {from_here(folder)}, no page of more than {page.MOST} runs")
-            return 0
+            return Ended(0, verdict, document)
         units = planning.units(campaign, base, job.measures)
         try:
             with written(folder):
@@ -71,7 +130,21 @@ def run(options: argparse.Namespace) -> int:
                 "the results are complete"
             ) from error
     print(f"page: {from_here(index)}")
-    return 0
+    return Ended(0, verdict, {**document, "page": index.absolute()})
+
+
+def _security(options: argparse.Namespace) -> "Security | None":
+    """Certificates for a scheduler elsewhere; refuses options of another kind of cluster."""
+    certificates = options.tls_ca, options.tls_cert, options.tls_key
+    if options.scheduler is None:
+        if any(path is not None for path in certificates):
+            raise UserError("--tls-ca, --tls-cert, --tls-key: are for a --scheduler")
+        return None
+    if options.no_dashboard:
+        raise UserError("--no-dashboard: that of a --scheduler is switched off where it starts")
+    from cosim.campaign import credentials  # takes long
+
+    return credentials.of(options.scheduler, *certificates)
 
 
 def _command(options: argparse.Namespace) -> str:
@@ -100,6 +173,7 @@ class _Plan:
     job: "Job"
     points: "Points"
     results: "Results"
+    security: "Security | None"
 
 
 def _run_missing(options: argparse.Namespace, plan: _Plan) -> None:
@@ -107,18 +181,26 @@ def _run_missing(options: argparse.Namespace, plan: _Plan) -> None:
     blocks = plan.results.missing()
     if not blocks:
         return
-    from cosim.campaign import engine  # takes long
+    from cosim.campaign import cluster, engine  # takes long
 
     count = plan.campaign.count
     ahead = sum(len(plan.campaign.block_range(block)) for block in blocks)
+    console.stage("starting workers" if options.scheduler is None else "calling the scheduler")
     if ahead < count:
         print(f"goes on: {count - ahead} of {count} runs are there")
     try:
         with (
             plan.results.workers_folder() as files,
-            engine.cluster(options.scheduler, options.workers, files) as client,
+            cluster.opened(
+                options.scheduler,
+                options.workers,
+                files,
+                plan.security,
+                not options.no_dashboard,
+            ) as client,
         ):
-            print(f"dashboard: {client.dashboard_link}", flush=True)
+            if not options.no_dashboard:
+                print(f"dashboard: {client.dashboard_link}", flush=True)
             made = engine.Engine(
                 client, plan.campaign, plan.job, plan.base.archives, plan.points, plan.results
             )

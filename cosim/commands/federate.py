@@ -1,17 +1,41 @@
 """`federate`: step one component of a system in a federation that runs elsewhere."""
 
 import argparse
+import os
+from pathlib import Path
 
+from cosim.commands import Ended
 from cosim.errors import UserError, did_you_mean
-from cosim.federation import addresses, component, watching
+from cosim.federation import SILENCE, addresses, component, screen, watching
+from cosim.federation.network import KEY, key
 from cosim.federation.parts import parts
-from cosim.fmu_file import Fmu
+from cosim.options import add_silence
 from cosim.system import ssp
 
+DESCRIPTION = "Steps one component of a system until the federation has come to the end."
 
-def run(options: argparse.Namespace) -> int:
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which component, and where the federation is."""
+    parser.add_argument("ssp", type=Path, metavar="SSP", help="the system")
+    parser.add_argument("variant", metavar="VARIANT")
+    parser.add_argument("component", metavar="COMPONENT")
+    parser.add_argument(
+        "--broker", required=True, metavar="ADDRESS", help="of the federation, as --listen there"
+    )
+    text = "most that a call of the FMU may take, or the broker be silent"
+    add_silence(parser, SILENCE, text)
+    # for processes that a federation starts: they end with their standard input
+    parser.add_argument("--owned", action="store_true", help=argparse.SUPPRESS)
+
+
+def run(options: argparse.Namespace) -> Ended:
     """Step the component to the end."""
+    screen.apart()
     addresses.check_form(options.broker)
+    if KEY not in os.environ:
+        raise UserError(f"{KEY}: not in the environment, copy the whole line of the federation")
+    key()
     with ssp.unpacked(options.ssp) as system:
         made = parts(system, options.variant)
         if options.component not in made:
@@ -20,8 +44,7 @@ def run(options: argparse.Namespace) -> int:
                 f"{options.ssp}: has no component {options.component!r}{hint} (there are: "
                 f"{', '.join(made)})"
             )
-        with Fmu(system.fmu(options.component)) as fmu:
-            fmu.path = options.ssp / system.system.component(options.component).source
+        with system.unpacked_fmu(options.component) as fmu:
             if not options.owned:
                 addresses.wait_for(
                     options.broker,
@@ -30,4 +53,4 @@ def run(options: argparse.Namespace) -> int:
                 )
             is_gone = watching.end_of_input().is_set if options.owned else lambda: False
             component.run(made[options.component], fmu, options.broker, options.silence, is_gone)
-    return 0
+    return Ended(0, "", {"component": options.component})

@@ -1,5 +1,6 @@
 """A federation: the broker, a process for each component, and the one that records."""
 
+import itertools
 import os
 import subprocess
 import sys
@@ -14,9 +15,9 @@ import numpy as np
 from cosim import project
 from cosim.errors import UserError
 from cosim.federation import SILENCE, watching
-from cosim.federation.network import ABSENT, ENDED, Broker, Federate
+from cosim.federation.network import ABSENT, ANSWER, ENDED, Broker, Federate
 from cosim.federation.parts import Part, parts
-from cosim.federation.watching import LEAVE, Silence
+from cosim.federation.watching import LEAVE, POLL, Silence
 from cosim.interruption import temporary_folder, uninterrupted
 from cosim.system.ssp import Ssp
 
@@ -45,6 +46,7 @@ def run(
     elsewhere: Collection[str] = (),
     silence: float = SILENCE,
     progress: Callable[[int], object] = lambda _: None,
+    connected: Callable[[], object] = lambda: None,
 ) -> Record:
     """Run a variant, each component in its own process.
 
@@ -60,6 +62,8 @@ def run(
         s, after which a process that is silent ends the federation.
     progress : callable, optional
         Called with the number of steps made.
+    connected : callable, optional
+        Called when all components have been initialized and the first step begins.
 
     Raises
     ------
@@ -80,9 +84,15 @@ def run(
         _processes(started, folder) as processes,
     ):
         still, stuck = Silence(recorder, silence), Silence(recorder, 2.0 * silence)
+        ended = (
+            itertools.count()
+        )  # looks since a process here has failed, perhaps as the federation ended
 
         def look() -> None:
             failure = _failure(processes, folder)
+            texts = _texts(processes, folder)
+            if texts and not failure and next(ended) * POLL > ANSWER:
+                failure = UserError(texts[0])  # it has not
             if failure:
                 raise failure
             if still.too_long():
@@ -100,7 +110,7 @@ def run(
             broker.end(str(error) if isinstance(error, UserError) else "it was interrupted")
 
         try:
-            return watching.run(lambda: _recorded(recorder, made, progress), look, end)
+            return watching.run(lambda: _recorded(recorder, made, progress, connected), look, end)
         except UserError as error:
             _wait(processes)
             raise _failure(processes, folder) or error from error
@@ -116,7 +126,8 @@ def _opened(
     def work() -> Broker:
         with ExitStack() as stack:
             broker = stack.enter_context(Broker(count, address))
-            recorder.join()
+            with broker.shielded():
+                recorder.join()
             broker.announce(system)
             stack.pop_all()
             return broker
@@ -130,7 +141,10 @@ def _opened(
 
 
 def _recorded(
-    recorder: Federate, made: Mapping[str, Part], progress: Callable[[int], object]
+    recorder: Federate,
+    made: Mapping[str, Part],
+    progress: Callable[[int], object],
+    connected: Callable[[], object],
 ) -> Record:
     """Follow the federation to its end, and record what is published."""
     first = next(iter(made.values()))
@@ -146,6 +160,7 @@ def _recorded(
         recorder.exchange()
     recorder.begin()
     read(0)
+    connected()
     begin = time.perf_counter()
     for point in range(1, len(rows)):
         recorder.go_to(point)

@@ -4,7 +4,9 @@ HELICS counts communication points: its time k is the k-th of them, whatever its
 time is rounded to HELICS's own resolution, and every process calculates it from its own counter.
 """
 
+import os
 import re
+import secrets
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -21,9 +23,12 @@ ENDED = "the federation ended"  # in what processes say that others have stopped
 ABSENT = "no federation at"  # the same of one that comes later
 ANSWER = 5.0  # s, for another process to answer
 JOIN = 25.0  # s, for the broker to answer
+JOINS = 5  # attempts, because a stranger who is refused may end one of them
+TOO_EARLY = "already moved to operating state"  # what HELICS says then
 PAUSE = 0.05  # s, before the same question
 NOT_FOUND = 404  # HELICS's code of an answer
 SYSTEM = "system"  # what all must step, a global value of the federation
+KEY = "COSIM_FEDERATION_KEY"  # variable of the environment, which only its user can read
 QUIET = "--loglevel=none"
 # One port, the broker's: with "zmq" each process needs one, by its number, and "zmq_ss" drops
 # messages when a process runs ahead.
@@ -43,6 +48,20 @@ def helics() -> Any:
     return package
 
 
+def key() -> str:
+    """What processes must know to join the federation; made if this one does not know any.
+
+    Raises
+    ------
+    UserError
+        If it could be guessed, or HELICS would not take it.
+    """
+    found = os.environ.setdefault(KEY, secrets.token_hex(16))
+    if not re.fullmatch(r"[0-9A-Za-z]{16,128}", found):
+        raise UserError(f"{KEY}: expected 16 to 128 letters and digits in the environment")
+    return found
+
+
 class Broker:
     """What all processes of a federation are connected to.
 
@@ -57,7 +76,11 @@ class Broker:
     def __init__(self, count: int, address: str) -> None:
         h = self._h = helics()
         self._questions = _Questions()
-        options = f"-f {count} --local_interface={address} {QUIET}"
+        self._address = address
+        options = (
+            f"-f {count} --maxfederates={count} --brokerkey={key()} --local_interface={address} "
+            f"{QUIET}"
+        )
         try:
             self._broker = h.helicsCreateBroker(NETWORK, "", options)
         except h.HelicsException as error:
@@ -76,6 +99,25 @@ class Broker:
         self._h.helicsBrokerDisconnect(self._broker)
         if self._questions.ended():  # else they still use it
             self._h.helicsBrokerFree(self._broker)
+
+    @contextmanager
+    def shielded(self) -> Iterator[None]:
+        """Where the first process joins; then those that are refused end nothing.
+
+        They take leave without a number, which HELICS 3.6 reads as that of the first that joined:
+        so that is one which has left.
+        """
+        h = self._h
+        options = f"--federates=1 --brokerkey={key()} --broker_address={self._address} {QUIET}"
+        try:
+            first = h.helicsCreateCore(NETWORK, f"first-{secrets.token_hex(8)}", options)
+            h.helicsCoreConnect(first)
+        except h.HelicsException as error:
+            raise UserError(f"no broker at {self._address}: {one_line(error)}") from error
+        try:
+            yield
+        finally:
+            h.helicsCoreDisconnect(first)
 
     def announce(self, system: str) -> None:
         """Say what all must step."""
@@ -172,18 +214,14 @@ class Federate:
     def join(self) -> None:
         """Connect to the broker."""
         h = self._h
-        info = h.helicsCreateFederateInfo()
-        h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
-        h.helicsFederateInfoSetCoreInitString(
-            info,
-            f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s {QUIET}",
-        )
-        h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
-        h.helicsFederateInfoSetIntegerProperty(
-            info, h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
-        )
-        with self._waiting(f"{ABSENT} {self._address}"):
-            self._federate = h.helicsCreateValueFederate(self._name, info)
+        for left in reversed(range(JOINS)):
+            try:
+                with self._waiting(f"{ABSENT} {self._address}"):
+                    self._federate = h.helicsCreateValueFederate(self._name, self._information())
+                break
+            except UserError as error:
+                if TOO_EARLY not in str(error) or not left:
+                    raise
         if self._publishes:
             self._publication = h.helicsFederateRegisterGlobalPublication(
                 self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
@@ -192,6 +230,24 @@ class Federate:
             source: h.helicsFederateRegisterSubscription(self._federate, source, "")
             for source in self._sources
         }
+
+    def _information(self) -> Any:
+        """What HELICS needs to make the federate."""
+        h = self._h
+        info = h.helicsCreateFederateInfo()
+        h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
+        # not one that another federate of this process has
+        h.helicsFederateInfoSetCoreName(info, f"{self._name}-{secrets.token_hex(8)}")
+        h.helicsFederateInfoSetCoreInitString(
+            info,
+            f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s {QUIET}",
+        )
+        h.helicsFederateInfoSetBrokerKey(info, key())
+        h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
+        h.helicsFederateInfoSetIntegerProperty(
+            info, h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
+        )
+        return info
 
     def system(self) -> str:
         """What all must step, as soon as the broker has announced it."""

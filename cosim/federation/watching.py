@@ -4,13 +4,16 @@ The work runs in a thread, so the main thread can end it at any time.
 """
 
 import os
+import signal
 import sys
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from threading import Event, Thread
 from typing import TypeVar
 
+from cosim.federation import screen
 from cosim.federation.network import Federate
+from cosim.interruption import ENDINGS
 
 Result = TypeVar("Result")
 
@@ -25,6 +28,9 @@ def run(
     outcome: Future[Result] = Future()
 
     def do() -> None:
+        if hasattr(signal, "pthread_sigmask"):  # also for the threads of HELICS that begin here
+            endings = {getattr(signal, name) for name in ENDINGS if hasattr(signal, name)}
+            signal.pthread_sigmask(signal.SIG_BLOCK, endings)
         try:
             outcome.set_result(work())
         except BaseException as error:
@@ -36,6 +42,7 @@ def run(
             look()
         return outcome.result()
     except BaseException as error:
+        screen.mute()
         end(error)
         wait([outcome], LEAVE)
         raise

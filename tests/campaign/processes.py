@@ -19,10 +19,11 @@ WITH_PARENT = ("setpriv", "--pdeathsig", "KILL")  # nothing is left of tests tha
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
-def python(*arguments: object, host: Host = LOOPBACK) -> subprocess.Popen:
+def python(*arguments: object, host: Host = LOOPBACK, input: bool = False) -> subprocess.Popen:
     """A Python program in another process group, which ends with this program."""
     return subprocess.Popen(
         [*host.enter, *WITH_PARENT, sys.executable, "-P", "-m", *map(str, arguments)],
+        stdin=subprocess.PIPE if input else None,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -110,14 +111,20 @@ def workers(process: subprocess.Popen) -> list[int]:
 
 @contextmanager
 def cluster(
-    scheduler: Host, workers: Sequence[Host]
+    scheduler: Host, workers: Sequence[Host], certificates: Sequence[Path] = ()
 ) -> Iterator[tuple[str, subprocess.Popen, list[subprocess.Popen]]]:
-    """Address of a scheduler, its process and those of workers, a process group each."""
+    """Address of a scheduler, its process and those of workers, a process group each.
+
+    They talk by TLS if there are `certificates`: files of the authority's, their own, and its key.
+    """
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    address = f"tcp://{scheduler.address}:{port}"
-    common = ("--no-dashboard",)
+    protocol = "tls" if certificates else "tcp"
+    address = f"{protocol}://{scheduler.address}:{port}"
+    common = ["--no-dashboard", "--protocol", protocol]
+    for name, path in zip(("ca-file", "cert", "key"), certificates, strict=False):
+        common += [f"--tls-{name}", path]
     place = ("--host", scheduler.address, "--port", port)
     made = [python("dask", "scheduler", *place, *common, host=scheduler)]
     options = (address, "--nthreads", 1, "--no-nanny", *common)

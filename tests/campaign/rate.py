@@ -23,7 +23,7 @@ from tempfile import TemporaryDirectory
 
 import psutil
 
-from cosim.campaign import bases, campaign_file, engine, planning
+from cosim.campaign import bases, campaign_file, cluster, engine, planning
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
 from cosim.campaign.runs import open_fmus
@@ -82,7 +82,7 @@ def _process() -> int:
 @contextmanager
 def campaigns(workers: int, work: str, folder: Path) -> Iterator[Campaigns]:
     """A cluster with workers that have compiled their loop."""
-    with engine.cluster(None, workers, folder / f"workers_{workers}") as client:
+    with cluster.opened(None, workers, folder / f"workers_{workers}") as client:
         made = Campaigns(client, work, folder / f"campaigns_{workers}")
         made.run(100 * workers)
         yield made

@@ -107,6 +107,21 @@ def test_an_error_of_the_page_loses_no_results(
     assert table(capsys.readouterr().out) == (done / "hash").read_text()
 
 
+def test_it_is_a_document(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    output = copied(done, tmp_path)
+    assert in_this_process(done, output, "--json") == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert (found["exit_code"], found["runs"]) == (0, 32)
+    assert found["table"] == (done / "hash").read_text() and Path(found["page"]).is_file()
+    assert err.splitlines()[-1].startswith("complete: 32 runs")
+    assert in_this_process(done, output, "--json", "--quiet", "--replay", "17") == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert err == "" and set(found["parameters"]) >= {"m2", "q1"} and found["failure"] == ""
+    assert all(Path(file).is_file() for file in found["files"])
+
+
 def test_pictures_have_so_many_columns_at_most(
     done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

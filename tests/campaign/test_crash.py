@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cosim import __main__ as cli
-from cosim.campaign import bases, campaign_file, engine, planning
+from cosim.campaign import bases, campaign_file, cluster, engine, planning
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
 from tests.campaign.files import HEAD
@@ -64,7 +64,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_run_that_takes_its_worker_down(
     crashing: Path, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(engine.SETTINGS, "distributed.scheduler.allowed-failures", 1)
+    monkeypatch.setitem(cluster.SETTINGS, "distributed.scheduler.allowed-failures", 1)
     campaign = campaign_file.read(file)
     with bases.opened(campaign, crashing) as base:
         job = planning.plan(campaign, base, file)
@@ -73,7 +73,7 @@ def test_a_run_that_takes_its_worker_down(
         results.begin()
         with (
             results.workers_folder() as folder,
-            engine.cluster(None, 1, folder) as client,
+            cluster.opened(None, 1, folder) as client,
         ):
             made = engine.Engine(client, campaign, job, base.archives, points, results)
             made.run(range(campaign.blocks), lambda _: None)

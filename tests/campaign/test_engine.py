@@ -15,15 +15,15 @@ from types import SimpleNamespace
 import pytest
 from distributed import Client
 
-from cosim.campaign import bases, campaign_file, engine, planning
+from cosim.campaign import bases, campaign_file, cluster, engine, planning
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
 from cosim.campaign.worker import Plugin
 from cosim.errors import UserError
+from tests.campaign import processes
 from tests.campaign.files import write
 from tests.campaign.processes import (
     blocks,
-    cluster,
     completed,
     finish,
     kill_group,
@@ -90,8 +90,8 @@ def test_a_campaign_whose_workers_are_gone_ends(
     monkeypatch.setattr(engine, "PATIENCE", 1)
     monkeypatch.setattr(engine, "COUNT_EVERY", 100)
     with (
-        cluster(LOOPBACK, [LOOPBACK]) as (address, _, arms),
-        engine.cluster(address, None, tmp_path) as client,
+        processes.cluster(LOOPBACK, [LOOPBACK]) as (address, _, arms),
+        cluster.opened(address, None, tmp_path) as client,
     ):
         registered(arms[0])
         with (
@@ -125,7 +125,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Client, Path]]:
     """A cluster of one worker, and the folder of its files."""
     folder = tmp_path_factory.mktemp("workers")
-    with engine.cluster(None, 1, folder) as client:
+    with cluster.opened(None, 1, folder) as client:
         yield client, folder
 
 
@@ -187,7 +187,7 @@ def test_what_is_wrong_at_a_worker_is_said(
     small: tuple[Path, Path], local: tuple[Client, Path], tmp_path: Path
 ) -> None:
     client, folder = local
-    (there,) = (path for path in folder.glob("dask-scratch-space/worker-*") if path.is_dir())
+    (there,) = (path for path in folder.glob("dask-scratch-space/*worker-*") if path.is_dir())
     away = there.rename(folder / "away")
     try:
         with (

@@ -227,22 +227,28 @@ def test_results_of_another_campaign_are_refused(key: str, folder: Folder) -> No
             folder.results.begin()
 
 
-def test_results_of_an_edited_scenario_are_refused(
-    folder: Folder, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+@pytest.mark.parametrize("is_log", [False, True])
+def test_results_of_an_edited_scenario_or_log_are_refused(
+    is_log: bool, folder: Folder, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     known = project.scenario_file(folder.given.scenario)
-    edited = tmp_path / known.name
-    monkeypatch.setattr(project, "scenario_file", lambda _: edited)
+    scenario = tmp_path / known.name
+    monkeypatch.setattr(project, "scenario_file", lambda _: scenario)
     text = f'model = "rp_manipulator"\n{known.read_text(encoding="utf-8")}'
+    assert "tau1" not in text
+    scenario.write_text(f"{text}\n[inputs.tau1]\nfile = 'log.csv'\n", encoding="utf-8")
+    log = tmp_path / "log.csv"
+    log.write_text("time,tau1\n0,1\n1,2\n", encoding="utf-8")
 
     def begin() -> None:
         with bases.opened(folder.given, FMUS["rp_manipulator"]) as base:
             job = dataclasses.replace(folder.job, hashes=base.hashes)
         Results(tmp_path / "edited", folder.given, job, "text").begin()
 
-    edited.write_text(text, encoding="utf-8")
     begin()
-    edited.write_text(f"# edited\n{text}", encoding="utf-8")
+    begin()
+    edited, added = (log, "2,2\n") if is_log else (scenario, "# edited\n")
+    edited.write_text(edited.read_text(encoding="utf-8") + added, encoding="utf-8")
     with pytest.raises(UserError, match="has another sha256"):
         begin()
 

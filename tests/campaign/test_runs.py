@@ -202,7 +202,7 @@ def test_an_input_can_be_a_parameter(tmp_path: Path) -> None:
 
 def test_the_exponent_is_the_growth_of_a_small_deviation(tmp_path: Path) -> None:
     text = ARM[: ARM.index("[parameters.m2]")] + (
-        "[set]\nrelative_tolerance = 1e-13\n[parameters.q1]\nvalues = [-1.0]\n"
+        "[set]\nrelative_tolerance = 5e-12\n[parameters.q1]\nvalues = [-1.0]\n"
         "[keep]\nlyapunov = true\nfinal = ['q1', 'q2', 'dq1', 'dq2']\n"
     )
     changes = [("stop = 1.0", "stop = 2.0, step = 0.001"), ("runs = 40", "runs = 1"),

@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from cosim.federation.network import KEY
 from tests.federation.processes import Start, starting
 
 _status = [0]
+os.environ[KEY] = "known2all0processes"
 
 
 @pytest.fixture

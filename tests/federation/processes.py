@@ -64,3 +64,8 @@ def _left_of(process: Process) -> Iterator[list[psutil.Process]]:
 def federation(start: Start, *arguments: str, system: Path = SSP, host: Host = LOOPBACK) -> Process:
     """The nominal variant, with its broker."""
     return start("federation", "nominal", "--ssp", str(system), *arguments, host=host)
+
+
+def wait_for_steps(process: Process) -> None:
+    """Read what a federation with components elsewhere prints, until it steps them."""
+    assert any(line.startswith("connected: ") for line in process.stdout), "no steps"

@@ -2,6 +2,8 @@
 
 import shlex
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 from threading import Thread
@@ -12,12 +14,13 @@ import psutil
 import pytest
 
 from cosim.errors import UserError
-from cosim.federation import addresses, component
+from cosim.federation import addresses, component, watching
 from cosim.federation.federation import run
-from cosim.federation.network import Broker, Federate
+from cosim.federation.network import KEY, Broker, Federate
 from cosim.federation.parts import parts
 from cosim.system import ssp
 from tests.federation.processes import Process, Start, federation
+from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
 
 LIMIT = 60.0  # s, far above what an end takes
@@ -105,11 +108,16 @@ def test_a_component_that_is_killed_leaves_no_files(start: Start, tmp_path: Path
     assert not list((tmp_path / "temporary").iterdir())
 
 
-def test_the_command_that_is_printed_steps_the_component(start: Start) -> None:
+def test_the_command_that_is_printed_steps_the_component(
+    start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its key in the environment: other users see command lines."""
+    monkeypatch.delenv(KEY)
     address = addresses.free()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
-    program, *arguments = shlex.split(here.stdout.readline().removeprefix("waiting for: "))
+    key, program, *arguments = shlex.split(here.stdout.readline().removeprefix("waiting for: "))
     assert program == "./run.sh"
+    monkeypatch.setenv(*key.split("="))
     there = start(*arguments)
     for process in (here, there):
         text, _ = process.communicate(timeout=LIMIT)
@@ -158,6 +166,14 @@ def test_a_standstill_is_ended() -> None:
             run(system, "nominal", address, elsewhere=["arm"], silence=5.0)
 
 
+def test_a_component_that_cannot_join_ends_the_federation(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also if what it says is what others say when the federation has ended."""
+    monkeypatch.setattr("cosim.federation.federation.ABSENT", "(--help explains)")
+    monkeypatch.setattr("cosim.federation.federation.arguments", lambda *_: ["no-command"])
+    with ssp.unpacked(SSP) as system, pytest.raises(UserError, match="--help explains"):
+        run(system, "nominal", addresses.free(), elsewhere=["arm"])
+
+
 def test_a_broker_that_does_not_open_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cosim.federation.federation.Broker", lambda *_: time.sleep(LIMIT))
     address = addresses.free()
@@ -181,3 +197,27 @@ def test_an_fmu_that_does_not_return_is_named() -> None:
         broker.announce(part.system)
         component.run(part, SimpleNamespace(instance=hang), address, 1.0)
     assert time.monotonic() - begin < LIMIT, "it was waited for"
+
+
+def test_what_helics_writes_as_it_ends_is_nobodys_message() -> None:
+    """Such as "asio system error in context loop", now and then after Ctrl-C."""
+    code = (
+        "import os, sys, threading;"
+        "from cosim.federation import screen, watching;"
+        "screen.apart();"
+        "wait, noise = threading.Event().wait, lambda _: os.write(2, b'asio\\n');"
+        "os.write(2, b'library\\n'); print('ours', file=sys.stderr)\n"
+        "try: watching.run(wait, lambda: 1 / 0, noise)\n"
+        "except ZeroDivisionError as error: print(error, file=sys.stderr)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT)
+    assert run.returncode == 0, run.stderr
+    assert run.stderr.splitlines() == ["library", "ours", "division by zero"]
+
+
+def test_signals_come_to_the_thread_that_watches() -> None:
+    """HELICS's threads begin in that of the work, and would be interrupted."""
+    blocked = watching.run(
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()), lambda: None, lambda _: None
+    )
+    assert {signal.SIGINT, signal.SIGTERM, signal.SIGHUP} <= blocked

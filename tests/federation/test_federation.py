@@ -1,6 +1,10 @@
 """The closed loop as a federation: each FMU in its own process, coupled by HELICS."""
 
+import json
+import os
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -20,6 +24,7 @@ from cosim.fmu_file import Fmu
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from tests.federation.processes import Start
+from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -120,6 +125,24 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
         federation.run(system, "nominal", addresses.free())
 
 
+def test_it_is_a_document(short: Ssp) -> None:
+    """Whatever the processes of the components print."""
+    command = [sys.executable, "-P", "-m", "cosim", "federation", "nominal", "--json"]
+    done = subprocess.run(
+        [*command, "--ssp", str(short.path)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (variant,) = json.loads(done.stdout)["variants"]
+    assert variant["passed"] and set(variant["microseconds_per_step"]) == {
+        "helics", "ecos", "master",
+    }  # fmt: skip
+    assert max(map(len, done.stderr.splitlines())) <= 80
+    assert done.stderr.endswith("passed: 1 variant\n")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -133,7 +156,7 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
         (["nominal", "--listen", "tcp://*:23404"], "expected an address as tcp://"),
         (["nominal", "--listen", "tcp://0.0.0.0:23404"], "expected an address as tcp://"),
         (["nominal", "--listen", ""], "expected an address as tcp://"),
-        (["nominal", "--silence", "0"], "expected a number of seconds, 1 or more"),
+        (["nominal", "--silence", "0"], "expected 1 s or more: a number, or one with s, ms"),
     ],
 )
 def test_wrong_use(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:

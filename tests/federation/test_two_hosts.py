@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tests.federation.processes import Process, Start, federation
+from tests.federation.processes import Process, Start, federation, wait_for_steps
 from tests.support.hosts import Network
 from tests.support.ssp_files import SSP, edited, replace
 
@@ -35,7 +35,7 @@ def test_a_lost_link_ends_both(start: Start, apart: Network, tmp_path: Path) -> 
         {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="600"')},
     )
     here, there = apart_from_the_arm(start, apart, long, "--silence", "10")
-    assert any("nominal by HELICS:" in line for line in here.stdout), "no steps"
+    wait_for_steps(here)
     apart.cut()
     for process, words in ((here, "arm has been silent"), (there, "23404 has been silent")):
         text, _ = process.communicate(timeout=LIMIT)

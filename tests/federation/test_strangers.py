@@ -1,0 +1,99 @@
+"""Other programs of the machine, of any user, that speak HELICS to the port of a federation."""
+
+import os
+import subprocess
+import sys
+from contextlib import suppress
+
+import psutil
+import pytest
+
+from cosim.federation import addresses
+from cosim.federation.network import KEY
+from tests.federation.processes import Start, federation, wait_for_steps
+from tests.support.paths import ROOT
+from tests.support.ssp_files import SSP
+
+LIMIT = 120.0  # s
+
+
+def said(address: str, user: int | None, *arguments: str) -> str:
+    """What a stranger says."""
+    _, port = addresses.check_form(address)
+    environment = {name: value for name, value in os.environ.items() if name != KEY}
+    return subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "tests.federation.stranger",
+            str(port),
+            str(-1 if user is None else user),
+            *arguments,
+        ],
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=LIMIT,
+        check=True,
+    ).stdout
+
+
+def test_strangers_change_nothing(start: Start, user: int | None) -> None:
+    """Neither one that takes the place of the arm, nor one that only wants to see."""
+    address = addresses.free()
+    here = federation(start, "--listen", address, "--elsewhere", "arm")
+    assert here.stdout.readline().startswith("waiting for: ")
+    addresses.wait_for(address, LIMIT, lambda: None)
+    for arguments in (["arm"], ["arm", "--brokerkey=**"], ["other", "--observer"]):
+        assert said(address, user, *arguments).startswith("refused: "), arguments
+    there = start("federate", str(SSP), "nominal", "arm", "--broker", address)
+    wait_for_steps(here)
+    for arguments in (["arm"], ["other", "--observer"]):
+        assert said(address, user, *arguments).startswith("refused: "), arguments
+    for process in (here, there):
+        text, _ = process.communicate(timeout=LIMIT)
+        assert process.returncode == 0, text  # the values are those of the master
+
+
+def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
+    address = addresses.free()
+    here = federation(start, "--listen", address, "--elsewhere", "arm")
+    there = start("federate", str(SSP), "nominal", "arm", "--broker", address)
+    wait_for_steps(here)
+    whole = [
+        process
+        for started in (here, there)
+        for process in (
+            psutil.Process(started.pid),
+            *psutil.Process(started.pid).children(recursive=True),
+        )
+    ]
+    found = []
+    for process in whole:
+        with suppress(psutil.NoSuchProcess):  # the trajectory runs ahead, and may have ended
+            assert os.environ[KEY] not in " ".join(process.cmdline())
+            found += [
+                connection.laddr.ip
+                for connection in process.net_connections(kind="inet")
+                if connection.status in (psutil.CONN_LISTEN, psutil.CONN_NONE)  # that of UDP
+            ]
+    assert found == ["127.0.0.1"]
+
+
+@pytest.mark.parametrize("wrong", ["", "short", "with blanks and more", "**"])
+def test_keys_that_can_be_guessed_are_refused(start: Start, wrong: str) -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv(KEY, wrong)
+        here = federation(start)
+    text, _ = here.communicate(timeout=LIMIT)
+    assert here.returncode == 2
+    assert text == f"error: {KEY}: expected 16 to 128 letters and digits in the environment\n"
+
+
+def test_a_component_elsewhere_needs_the_key(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY)
+    there = start("federate", str(SSP), "nominal", "arm", "--broker", "tcp://127.0.0.1:1")
+    text, _ = there.communicate(timeout=LIMIT)
+    assert there.returncode == 2
+    assert text == f"error: {KEY}: not in the environment, copy the whole line of the federation\n"
