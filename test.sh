@@ -1,73 +1,81 @@
 #!/usr/bin/env bash
-# Sets up, builds with gcc, with clang and with sanitizers, and runs all tests through ctest. What
-# ./setup.sh --platforms installs is used where it is installed.
-#   ./test.sh [--long] [ARGUMENTS]
-# --long: then also the long campaigns (an hour and a half), with a table of their figures at the end.
-# ARGUMENTS go to the ctest that runs everything: ./test.sh -R instance
+# Sets up, builds and runs the tests, all by ctest.
+#
+#   ./test.sh               optimized, and with gcc's sanitizers; C and Python
+#   ./test.sh --all         then clang, fuzzing, analysers, mutants, other platforms, other importers, browsers
+#   ./test.sh --long        all, then the long campaigns, an hour and a half, with a table of their figures
+#   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
+#
+# Each installs what it needs. Tests for which something is missing nevertheless are skipped and named; in CI they fail.
 set -euo pipefail
 unset PYTHONPATH PYTHONHOME  # they may lead to other modules than those tested here
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-if [ "${1-}" = --help ] || [ "${1-}" = -h ]; then
-  sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
-  exit
-fi
-long=no
-if [ "${1-}" = --long ]; then
-  long=yes
-  shift
-fi
-
-./setup.sh --dev
-
 step() { printf '\n== %s\n' "$*"; }
-build() { cmake --preset "$1" >build/"$1".log && cmake --build --preset "$1" >>build/"$1".log || {
-  cat build/"$1".log; return 1; }; }
+build() { # build PRESET [TARGET]
+  local log="build/${2-$1}.log"
+  { cmake --preset "$1" && cmake --build --preset "$1" ${2+--target "$2"}; } >"$log" 2>&1 || { cat "$log"; return 1; }
+}
 
-step "clang, all warnings are errors; C tests"
-build clang
-ctest --preset clang --progress -j 2
+short() {
+  ./setup.sh --dev
 
-step "AddressSanitizer and UndefinedBehaviorSanitizer; C tests"
-build asan
-ctest --preset asan --progress -j 2
+  step "AddressSanitizer and UndefinedBehaviorSanitizer; C tests"
+  build asan
+  ctest --preset asan --progress -j 2
 
-step "ThreadSanitizer; the test with many threads"
-build tsan
-ctest --preset tsan --progress
+  step "ThreadSanitizer; the test with many threads"
+  build tsan
+  ctest --preset tsan --progress
 
-step "libFuzzer, ten seconds a target"
-build fuzz
-ctest --preset fuzz --progress -j 2
+  step "gcc, optimized; all tests but those that --all adds"
+  build default
+  ctest --preset default -j 2 -LE '^more$'
+}
 
-if command -v qemu-aarch64-static >/dev/null && command -v aarch64-linux-gnu-gcc >/dev/null; then
+more() {
+  ./setup.sh --platforms
+
+  step "clang, all warnings are errors; C tests"
+  build clang
+  ctest --preset clang --progress -j 2
+
+  step "libFuzzer, ten seconds a target"
+  build fuzz
+  ctest --preset fuzz --progress -j 2
+
   step "64-bit Arm in qemu; C tests of src and models"
   build qemu
   ctest --preset qemu --progress -j 2
-else
-  step "64-bit Arm: skipped, ./setup.sh --platforms installs what it needs"
-fi
 
-step "other importers, each in its own environment"
-# without network the tests of those that are missing are skipped; CI must have them
-tests/importers/install.sh || [ -z "${CI-}" ]
+  step "other importers, each in its own environment"
+  # without network the tests of those that are missing are skipped; CI must have them
+  tests/importers/install.sh || [ -z "${CI-}" ]
 
-step "gcc, optimized; all tests"
-build default
-if build/venv/bin/python -c 'import ziglang' 2>/dev/null; then
-  cmake --build --preset default --target release >build/release.log 2>&1 || { cat build/release.log; exit 1; }
-  cmake --build --preset default --target playground >build/playground.log 2>&1 || { cat build/playground.log; exit 1; }
-else
-  echo "release and playground: skipped, ./setup.sh --platforms installs what it needs"
-fi
-ctest --preset default -j 2 "$@"
+  step "releases, playground, analysers, mutants, importers, browsers"
+  build default
+  build default release
+  build default playground
+  ctest --preset default -j 2 -L '^more$'
+}
 
-if [ "$long" = yes ]; then
+long() {
   step "long campaigns"
-  failed=0
+  local failed=0
   ctest --preset tsan -C Long || failed=1
   ctest --preset fuzz -C Long -L long -j 2 || failed=1
   ctest --preset default -C Long -R '^(long_|test_faults_)' || failed=1
   python3 tests/robustness/figures.py build/{tsan/,fuzz/,}Testing/Temporary/LastTest.log
-  exit "$failed"
-fi
+  return "$failed"
+}
+
+case "${1-}" in
+  "") short ;;
+  --all) short; more ;;
+  --long) short; more; long ;;
+  --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}" ;;
+  *)
+    ./setup.sh --dev
+    build default
+    ctest --preset default -j 2 "$@" ;;
+esac

@@ -34,7 +34,7 @@ find_sources(MUSL FILE src/math/sincos.c
 include(ElementaryFunctions)
 include(Sundials)
 
-# The environment that setup.sh makes, or any Python that has what requirements.txt lists.
+# The environment that setup.sh makes, or any Python that has what requirements/run.txt lists.
 if(NOT Python3_EXECUTABLE AND EXISTS ${PROJECT_SOURCE_DIR}/build/venv/bin/python)
   set(Python3_EXECUTABLE ${PROJECT_SOURCE_DIR}/build/venv/bin/python)
 endif()

@@ -1,4 +1,4 @@
-"""Runs a command of the command line, a module of cosim.commands each, and ends as it ends."""
+"""Runs a command, a module of cosim.commands each, and ends as it ends."""
 
 import os
 import signal
@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
-from cosim import project
-from cosim.command_line import make_parser
+from cosim import command_line, project, streams
+from cosim.commands import Ended
 from cosim.errors import UserError, reason
 from cosim.interruption import handle_endings
 
@@ -26,15 +26,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")
     # keeps matplotlib's font cache in the project
     os.environ.setdefault("MPLCONFIGDIR", str(project.ROOT / "build" / "matplotlib"))
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = given[: given.index("--")] if "--" in given else given
+    as_json = "--json" in options  # a mistake in the arguments is a document, too
     try:
-        options = make_parser().parse_args(arguments)
-        # imported here because it takes long: so Ctrl-C during the import leaves no traceback
-        code = import_module(f"cosim.commands.{options.command}").run(options)
-        if sys.stdout is not None:
-            sys.stdout.flush()
-        return code
-    except UserError as error:
-        return _refuse(str(error))
+        if not given:
+            print(command_line.overview(), file=sys.stderr)
+            return 2
+        with streams.of_results(as_json, "--quiet" in options) as results:
+            return _say(_ended(given), as_json, results)
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
@@ -46,6 +46,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(f"{error.filename or 'output or temporary files'}: {reason(error)}")
     except MemoryError:
         return _refuse("out of memory")
+
+
+def _ended(arguments: Sequence[str]) -> Ended:
+    """Run a command to its end."""
+    try:
+        options = command_line.parsed(arguments)
+        # imported here because it takes long: so Ctrl-C during the import leaves no traceback
+        return import_module(f"cosim.commands.{options.command}").run(options)
+    except UserError as error:
+        return Ended(2, "", error=error)
+
+
+def _say(ended: Ended, as_json: bool, results: TextIO | None) -> int:
+    """Print how a command has ended; the exit code."""
+    document = {"exit_code": ended.code, **ended.document}
+    if ended.error is not None:
+        document["error"] = str(ended.error)
+        _refuse(document["error"])
+    if ended.verdict:
+        print(ended.verdict, file=sys.stdout if as_json else results)
+    if as_json:
+        print(streams.document(document), file=results)
+    for stream in (sys.stdout, results):
+        if stream is not None:
+            stream.flush()
+    return ended.code
 
 
 def _refuse(text: str) -> int:

@@ -11,8 +11,9 @@ from cosim.fmu_file import Fmu
 from cosim.reference import Reference
 from cosim.scenario import Scenario
 from cosim.simulation import Result, StoppedError
+from cosim.texts import short
 
-ESTIMATE_TOLERANCE = 1e-11
+ESTIMATE_TOLERANCE = 1e-11  # of the run that errors are estimated from, or a tighter one
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Run:
     reference: Reference
     errors: dict[str, float]  # relative, per Real output
     twin: Twin | None = None
-    compared: bool = True  # False: the reference is the same FMU at a tighter tolerance
+    compared: bool = True  # False: the reference is the same FMU at another tolerance
 
     @property
     def worst(self) -> str:
@@ -60,11 +61,16 @@ class Run:
         return within and not (self.twin and self.twin.differing)
 
     @property
-    def failure(self) -> str:
-        """Which variable is wrong."""
-        if self.error <= self.bound and self.twin and self.twin.differing:
-            return f"FMI {self.twin.fmi_version}: {self.twin.differing[0]}"
-        return self.worst
+    def problem(self) -> str:
+        """What is wrong with it, or nothing."""
+        place = f"tolerance {short(self.result.tolerance)}:"
+        if self.twin is not None and self.twin.differing:
+            others = ", ".join(self.twin.differing)
+            return f"{place} other bits in FMI {self.twin.fmi_version}: {others}"
+        if not self.passed:
+            bound = f"above its bound {short(self.bound)}"
+            return f"{place} error {self.error:.1e} of {self.worst}, {bound}"
+        return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,19 +158,25 @@ class Runs:
         tolerance: float,
         progress: Callable[[int], object] | None = None,
     ) -> Run:
-        """`scenario`, which has no reference, compared with itself at a tighter tolerance."""
+        """`scenario`, which has no reference, compared with itself at another tolerance."""
         fmu = self._fmus[scenario.model]
         result = simulation.simulate(fmu, scenario, tolerance, progress)
-        exact = simulation.simulate(fmu, scenario, tighter(tolerance), progress)
+        other = estimated_from(tolerance, scenario.smallest_tolerance)
+        exact = simulation.simulate(fmu, scenario, other, progress)
         summed = reference.read_summed(project.models()[scenario.model])
         expected = Reference(scenario.path, exact.times, exact.names, exact.values, summed)
         errors = reference.errors(result, expected)
         return Run(scenario, fmu, result, expected, errors, compared=False)
 
 
-def tighter(tolerance: float) -> float:
-    """Tolerance of the run that a run at `tolerance` is compared with if there is no reference."""
-    return min(ESTIMATE_TOLERANCE, tolerance / 10)
+def estimated_from(tolerance: float, smallest: float) -> float:
+    """Tolerance of the run that a run at `tolerance` is compared with if there is no reference.
+
+    A tighter one, unless it would be below the `smallest` that makes a difference. Then it is a
+    looser one, whose own error is what the runs differ by: more than that of the run.
+    """
+    tighter = min(ESTIMATE_TOLERANCE, tolerance / 10)
+    return tighter if tighter >= smallest else 10 * tolerance
 
 
 def differing(one: Result, other: Result) -> tuple[str, ...]:

@@ -3,21 +3,23 @@
 import re
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
 
 import fmpy
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import ModelDescription, ValidationError
+from lxml import etree
 
-from cosim.archives import check_archive, check_library
+from cosim.archives import check_library, read_xml, unpack
 from cosim.errors import UserError, one_line, reason
 from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmi3_instance import Fmi3Instance
 from cosim.fmi_instance import Instance
-from cosim.input_files import UnreadableError
+from cosim.input_files import UnreadableError, show
 from cosim.interruption import temporary_folder
-from cosim.model import VERSIONS, Model, described, is_known
+from cosim.model import VERSIONS, Model, described
 
+DESCRIPTION = "modelDescription.xml"
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
 INSTANCES: dict[str, type[Instance]] = {"2.0": Fmi2Instance, "3.0": Fmi3Instance}
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
@@ -28,31 +30,29 @@ class Fmu:
 
     Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs
     on this platform. The copy is made in the folder `within`, or where temporary files are.
+    Messages name the FMU by `shown`, where it lies in another archive.
     """
 
-    def __init__(self, path: Path, within: Path | None = None) -> None:
-        self.path = Path(path)
-        description, self.model, platform = _read(self.path)
+    def __init__(self, path: Path, within: Path | None = None, shown: Path | None = None) -> None:
+        self.path = Path(shown or path)  # for messages
+        found, platform = _for_this_platform(Path(path), self.path)
+        description, self.model = found.description, found.model
         self.guid = description.guid  # in FMI 3.0, the instantiationToken
         self.log_categories = [category.name for category in description.logCategories]
         self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
-        self._unpacked = ExitStack()
-        self.folder = self._unpacked.enter_context(temporary_folder(within))
-        try:
-            fmpy.extract(self.path, self.folder)
-        except OSError as error:
-            self.close()
-            raise UserError(f"{self.path}: cannot be unpacked: {reason(error)}") from error
-        except Exception as error:  # fmpy raises bare exceptions, zlib its own
-            self.close()
-            raise UserError(f"{self.path}: cannot be unpacked: {one_line(error)}") from error
-        self.library = self.folder / "binaries" / platform / f"{self.identifier}{LIBRARY_SUFFIX}"
-        try:
-            check_library(self.library)
-        except (OSError, UnreadableError) as error:
-            self.close()
-            text = error if isinstance(error, UnreadableError) else reason(error)
-            raise UserError(f"{self.path}: {self.library.name}: {text}") from error
+        with ExitStack() as unpacked:
+            self.folder = unpacked.enter_context(temporary_folder(within))
+            library = f"{self.identifier}{LIBRARY_SUFFIX}"
+            self.library = self.folder / "binaries" / platform / library
+            try:
+                unpack(Path(path), self.folder, "FMU")
+            except UnreadableError as error:
+                raise UserError(f"{self.path}: {error}") from error
+            try:
+                check_library(self.library)
+            except (OSError, UnreadableError) as error:
+                raise UserError(f"{self.path}: {library}: {reason(error)}") from error
+            self._unpacked = unpacked.pop_all()
 
     def __enter__(self) -> "Fmu":
         return self
@@ -74,46 +74,87 @@ class Fmu:
 
 def read_model(path: Path) -> Model:
     """What the FMU at `path` declares; UserError if it cannot be run here."""
-    return _read(Path(path))[1]
+    return _for_this_platform(Path(path), Path(path))[0].model
 
 
-def _read(path: Path) -> tuple[ModelDescription, Model, str]:
-    """Model description of an FMU that can be run here, and the folder of its binary."""
-    if path.is_dir():
-        raise UserError(f"{path}: is a folder, expected an FMU")
+@dataclass(frozen=True)
+class Described:
+    """What is known of an FMU for co-simulation without its binary."""
+
+    description: ModelDescription
+    model: Model
+    sizes: dict[str, int]  # of the files inside in bytes, by name
+
+
+def describe(path: Path) -> Described:
+    """Read what an FMU of a known version of FMI, for co-simulation, declares.
+
+    Raises
+    ------
+    UnreadableError
+    """
+    with temporary_folder() as folder:
+        sizes = unpack(path, folder, "FMU", DESCRIPTION)
+        if DESCRIPTION not in sizes:
+            raise UnreadableError(f"not an FMU, it has no {DESCRIPTION}")
+        try:
+            description = _read(folder)
+            return Described(description, described(description), sizes)
+        except _WrongKindError:
+            raise
+        except (UnreadableError, ValidationError, ValueError) as error:
+            raise UnreadableError(f"wrong {DESCRIPTION}: {one_line(error)}") from error
+        except Exception as error:  # fmpy raises bare exceptions, and others where it is surprised
+            kind = "" if type(error) is Exception else f"fmpy fails with {type(error).__name__}: "
+            raise UnreadableError(f"wrong {DESCRIPTION}: {kind}{one_line(error)}") from error
+
+
+class _WrongKindError(UnreadableError):
+    """An FMU of another version of FMI, or for other uses than co-simulation."""
+
+    def __init__(self, root: etree._Element) -> None:
+        found = f"FMI {root.get('fmiVersion')}"
+        found += " for model exchange" if root.find("ModelExchange") is not None else ""
+        super().__init__(
+            f"expected an FMU of FMI {' or '.join(VERSIONS)} for co-simulation, found {found}"
+        )
+
+
+def _read(folder: Path) -> ModelDescription:
+    """Model description in a folder, which fmpy reads once it is known to be one."""
+    root = read_xml(folder / DESCRIPTION).getroot()
+    if root.tag != "fmiModelDescription" or "fmiVersion" not in root.attrib:
+        expected = "expected fmiModelDescription with an fmiVersion"
+        raise UnreadableError(f"line {root.sourceline}: {expected}, found {show(root.tag)}")
+    if root.get("fmiVersion") not in VERSIONS:
+        raise _WrongKindError(root)
+    description = fmpy.read_model_description(folder)
+    if description.coSimulation is None:
+        raise _WrongKindError(root)
+    if description.fmiVersion == "3.0":  # fmpy does not read it
+        given = root.find("CoSimulation").get("providesDirectionalDerivatives")
+        description.coSimulation.providesDirectionalDerivative = given in ("true", "1")
+    return description
+
+
+def _for_this_platform(path: Path, shown: Path) -> tuple[Described, str]:
+    """What an FMU declares that can be run here, and the folder of its binary."""
     try:
-        check_archive(path)
-        description = fmpy.read_model_description(path)
-        with ZipFile(path) as archive:
-            names = archive.namelist()
+        found = describe(path)
     except UnreadableError as error:
-        raise UserError(f"{path}: {error}") from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read: {reason(error)}") from error
-    except BadZipFile:
-        raise UserError(f"{path}: not an FMU, which is a zip archive") from None
-    except KeyError:
-        raise UserError(f"{path}: not an FMU, it has no modelDescription.xml") from None
-    except Exception as error:  # fmpy, lxml and zlib raise what they like for damaged content
-        raise UserError(f"{path}: wrong modelDescription.xml: {one_line(error)}") from error
-    if not is_known(description):
-        found = f"FMI {description.fmiVersion}"
-        found += " for model exchange" if description.modelExchange else ""
-        known = " or ".join(VERSIONS)
-        raise UserError(f"{path}: expected an FMU of FMI {known} for co-simulation, found {found}")
-    identifier = description.coSimulation.modelIdentifier
+        raise UserError(f"{shown}: {error}") from error
+    identifier = found.description.coSimulation.modelIdentifier
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
-        raise UserError(f"{path}: expected a C identifier as modelIdentifier, found {identifier!r}")
-    platforms = sorted({name.split("/")[1] for name in names if BINARY.fullmatch(name)})
-    wanted = INSTANCES[description.fmiVersion].PLATFORMS
+        raise UserError(
+            f"{shown}: expected a C identifier as modelIdentifier, found {show(identifier)}"
+        )
+    platforms = sorted({name.split("/")[1] for name in found.sizes if BINARY.fullmatch(name)})
+    wanted = INSTANCES[found.model.fmi_version].PLATFORMS
     here = [platform for platform in wanted if platform in platforms]
     if not here:
-        way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, names)) else ""
+        way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, found.sizes)) else ""
         raise UserError(
-            f"{path}: has no binary for {' or '.join(wanted)} "
+            f"{shown}: has no binary for {' or '.join(wanted)} "
             f"(has: {', '.join(platforms) or 'none'}){way_out}"
         )
-    try:
-        return description, described(description), here[0]
-    except ValueError as error:
-        raise UserError(f"{path}: wrong modelDescription.xml: {one_line(error)}") from error
+    return found, here[0]

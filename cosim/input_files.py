@@ -43,6 +43,19 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def read_bytes(path: Path, largest: int) -> bytes:
+    """Content of a file of at most `largest` bytes; UnreadableError if it cannot be read."""
+    check_regular(path)
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(largest + 1)
+    except OSError as error:
+        raise UnreadableError(f"cannot be read: {reason(error)}") from None
+    if len(content) > largest:
+        raise UnreadableError(f"is larger than {largest / 1e6:g} MB")
+    return content
+
+
 def read_text(path: Path, largest: int) -> str:
     """Text of a file of at most `largest` bytes in UTF-8, without a byte order mark.
 
@@ -52,14 +65,11 @@ def read_text(path: Path, largest: int) -> str:
     UnicodeDecodeError
         With the position in the file.
     """
-    check_regular(path)
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(largest + 1)
-    except OSError as error:
-        raise UnreadableError(f"cannot be read: {reason(error)}") from None
-    if len(content) > largest:
-        raise UnreadableError(f"is larger than {largest / 1e6:g} MB")
+    return decoded(read_bytes(path, largest))
+
+
+def decoded(content: bytes) -> str:
+    """Text of what is in UTF-8, without a byte order mark; or else UnicodeDecodeError."""
     return content.decode("utf-8").removeprefix(codecs.BOM_UTF8.decode("utf-8"))
 
 
@@ -86,10 +96,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise UserError(f"{path}: not valid TOML: {error}") from None
 
 
-def show(value: Any) -> str:
-    """Short, one-line form of a value from a TOML file."""
+def show(value: Any, longest: int = 40) -> str:
+    """Short, one-line form of a value from a file, of at most `longest` characters."""
     try:
         text = str(value).lower() if isinstance(value, bool) else repr(value)
     except ValueError:  # an integer of more digits than Python writes
         text = "a very large number"
-    return text if len(text) <= 40 else f"{text[:37]}..."
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."

@@ -2,15 +2,20 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable, SimpleType
 
-from cosim.errors import did_you_mean
+from cosim.errors import WrongValueError, did_you_mean
 from cosim.input_files import show
+from cosim.texts import number as short_number
+from cosim.texts import short
+from cosim.units import ANGLE, Displays, Units, display_unit, finite_number, quantity, units_of
 
 Value = float | int | bool | str
+TURN = 2 * math.pi
 
 VERSIONS = ("2.0", "3.0")  # of FMI
 INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 and an Int32 of FMI 3.0 hold
@@ -19,9 +24,10 @@ INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 and an Int32 of FM
 PARAMETERS, INITIAL, INPUTS = "parameters", "initial", "inputs"
 KINDS = {PARAMETERS: "a parameter", INITIAL: "a state", INPUTS: "an input"}
 
-
-class WrongValueError(Exception):
-    """Why a variable does not take a value, or is not of a kind, in one line."""
+# parameters of FMUs that bring their own integrator as those of this project do
+METHOD, TOLERANCE = "solver_method", "relative_tolerance"
+# smallest relative tolerance of each method: below it, FMUs integrate as at this one
+SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "taylor": 1e-13}
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,7 @@ class Variable:
     least: float  # -inf: no limit
     greatest: float  # inf: no limit
     items: Mapping[str, int] = field(default_factory=dict)  # numbers of an Enumeration, by name
+    units: Units = field(default_factory=dict)  # in which a Real may be given; empty: has none
     description: str = ""
 
     def is_a(self, kind: str) -> bool:
@@ -47,7 +54,9 @@ class Variable:
         return self.causality == {PARAMETERS: "parameter", INPUTS: "input"}[kind]
 
     def checked(self, given: Any) -> Value:
-        """Value to set, from what a user gives: a number, or the name of an Enumeration's item.
+        """Value to set, from what a user gives.
+
+        That is a number, a text with a number and its unit, or the name of an Enumeration's item.
 
         Raises
         ------
@@ -62,13 +71,24 @@ class Variable:
             if not isinstance(given, bool):
                 raise WrongValueError(f"expected true or false, got {show(given)}")
             return given
-        number = finite_number(given)
-        if self.type == "Integer":
+        if self.type == "Real":
+            number = quantity(given, self.units)
+        else:
+            number = finite_number(given)
             if not number.is_integer():
                 raise WrongValueError(f"expected a whole number, got {show(given)}")
             number = int(number)
         self.check_range(number, number)
         return number
+
+    def question(self, given: Any) -> str:
+        """What to ask about a start value in rad without a unit: one beyond a turn; or nothing."""
+        is_number = isinstance(given, int | float) and not isinstance(given, bool)
+        if self.unit != ANGLE or self.initial != "exact" or not is_number or abs(given) <= TURN:
+            return ""
+        way_out = f' In degrees it is "{short_number(given)} deg".' if "deg" in self.units else ""
+        turns = f"{short_number(given)} rad is {given / TURN:.3g} turns"
+        return f"{turns}, is that meant?{way_out}"
 
     def written(self, value: Value) -> Value:
         """A value as a user gives it: an Enumeration's item by its name."""
@@ -91,19 +111,6 @@ class Variable:
             raise WrongValueError(f"expected at most {self.greatest!r}{unit}, got {high!r}")
 
 
-def finite_number(given: Any) -> float:
-    """`given` as a float; WrongValueError if it is not a finite number."""
-    if isinstance(given, bool) or not isinstance(given, int | float):
-        raise WrongValueError(f"expected a number, got {show(given)}")
-    try:
-        number = float(given)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise WrongValueError(f"expected a finite number, got {show(given)}")
-    return number
-
-
 @dataclass(frozen=True)
 class Model:
     """What an FMU declares."""
@@ -115,6 +122,7 @@ class Model:
     interpolates_inputs: bool  # takes inputs that are polynomials over a step
     gives_output_derivatives: bool
     saves_states: bool  # so that an instance can go back to an earlier point
+    gives_directional_derivatives: bool
 
     @property
     def asks_for_inputs(self) -> bool:
@@ -131,6 +139,32 @@ class Model:
     def start_values(self) -> dict[str, Value]:
         """Start values of all variables that have one."""
         return {v.name: v.start for v in self.variables.values() if v.start is not None}
+
+    def method(self, values: Mapping[str, Value]) -> str:
+        """Method of integration by its name, with `values` for start values; "" if unknown."""
+        variable = self.variables.get(METHOD)
+        if variable is None or variable.start is None:
+            return ""
+        return str(variable.written(values.get(METHOD, variable.start)))
+
+    def smallest_tolerance(self, values: Mapping[str, Value]) -> float:
+        """Smallest relative tolerance that makes a difference; 0 if none is known."""
+        return SMALLEST_TOLERANCES.get(self.method(values), 0.0)
+
+    def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
+        """Check a relative tolerance to run at, with `values` for start values.
+
+        Raises
+        ------
+        WrongValueError
+            If the method that integrates cannot be so exact.
+        """
+        smallest = self.smallest_tolerance(values)
+        if tolerance < smallest:
+            method = self.method(values)
+            raise WrongValueError(
+                f"expected at least {short(smallest)}, the smallest of {method}, got {tolerance!r}"
+            )
 
     def find(self, name: str, kind: str) -> Variable:
         """Variable called `name`.
@@ -151,13 +185,8 @@ class Model:
         raise WrongValueError(f"{name!r} is not {KINDS[kind]} of the model (known: {known})")
 
 
-def is_known(description: ModelDescription) -> bool:
-    """Whether a description as fmpy reads it is of a known version of FMI and for co-simulation."""
-    return description.fmiVersion in VERSIONS and description.coSimulation is not None
-
-
 def described(description: ModelDescription) -> Model:
-    """Model that a description declares that `is_known`.
+    """Model that a description of one of `VERSIONS`, for co-simulation, declares.
 
     Raises
     ------
@@ -165,17 +194,22 @@ def described(description: ModelDescription) -> Model:
         If a start value or a limit is not a number.
     """
     capabilities = description.coSimulation
+    displays = {
+        unit.name: {x.name: display_unit(x.factor, x.offset) for x in unit.displayUnits}
+        for unit in description.unitDefinitions
+    }
     derivatives = (unknown.variable.derivative for unknown in description.derivatives)
     return Model(
         name=description.modelName,
         fmi_version=description.fmiVersion,
-        variables={variable.name: _variable(variable) for variable in description.modelVariables},
+        variables={v.name: _variable(v, displays) for v in description.modelVariables},
         states=tuple(dict.fromkeys(state.name for state in derivatives if state is not None)),
         interpolates_inputs=bool(
             capabilities.canInterpolateInputs or capabilities.providesIntermediateUpdate
         ),
         gives_output_derivatives=(capabilities.maxOutputDerivativeOrder or 0) >= 1,
         saves_states=bool(capabilities.canGetAndSetFMUstate),
+        gives_directional_derivatives=bool(capabilities.providesDirectionalDerivative),
     )
 
 
@@ -200,7 +234,7 @@ CONVERT = {
 NUMBERS = ("Real", "Integer", "Enumeration")
 
 
-def _variable(variable: ModelVariable) -> Variable:
+def _variable(variable: ModelVariable, displays: Displays) -> Variable:
     kind = TYPES.get(variable.type, variable.type)
     if variable.dimensions:
         kind = f"array of {variable.type}"
@@ -208,16 +242,21 @@ def _variable(variable: ModelVariable) -> Variable:
     low, high = (x or y for x, y in ((variable.min, declared.min), (variable.max, declared.max)))
     least, greatest = INTEGER if kind == "Integer" else (-math.inf, math.inf)
     convert = CONVERT.get(kind, lambda _: None)
+    unit = variable.unit or declared.unit
+    units = units_of(unit, displays) if kind == "Real" else {}
+    if variable.relativeQuantity or declared.relativeQuantity:  # a difference
+        units = {name: replace(other, offset=Fraction(0)) for name, other in units.items()}
     return Variable(
         name=variable.name,
         reference=variable.valueReference,
         type=kind,
         causality=variable.causality,
         initial=variable.initial,
-        unit=variable.unit or declared.unit,
+        unit=unit,
         start=None if variable.start is None else convert(variable.start),
         least=convert(low) if low and kind in NUMBERS else least,
         greatest=convert(high) if high and kind in NUMBERS else greatest,
         items={item.name: int(item.value) for item in declared.items},
+        units=units,
         description=variable.description or "",
     )

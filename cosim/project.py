@@ -47,11 +47,11 @@ def scenario_files() -> dict[str, Path]:
 
 
 def scenario_file(name: str) -> Path:
-    """The scenario called `name`; if there is none, a UserError lists the known ones."""
+    """The scenario called `name`; UserError if there is none."""
     found = scenario_files()
     if name not in found:
-        known = ", ".join(found) or "none"
-        raise UserError(f"no scenario {name!r}{did_you_mean(name, found)} (known: {known})")
+        guess = did_you_mean(name, found)
+        raise UserError(f"no scenario {name!r}{guess} (./run.sh --list names them)")
     return found[name]
 
 

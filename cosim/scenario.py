@@ -5,27 +5,21 @@ checked against the description of the model's FMU.
 """
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from cosim import project
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, WrongValueError, did_you_mean
 from cosim.input_files import read_toml, show
-from cosim.model import (
-    INITIAL,
-    INPUTS,
-    PARAMETERS,
-    Model,
-    Value,
-    Variable,
-    WrongValueError,
-    finite_number,
-)
-from cosim.signals import Constant, Signal, Sines, Switches, Table
+from cosim.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
+from cosim.scenario_inputs import MEASURED, InputReader
+from cosim.scenario_reader import Reader
+from cosim.signals import Logged, Signal
+from cosim.units import SECONDS
 
 MODEL = "model"  # key of a file that is in no model's folder
 MAX_STEPS = 10_000_000
@@ -58,6 +52,12 @@ class Scenario:
     reference_every: int  # every k-th communication point is in the reference
     defaults: dict[str, Value]  # start values in the FMU
     panels: tuple[tuple[str, ...], ...] = ()  # variables to draw beside the states, by diagram
+    measured: dict[str, Logged] = field(default_factory=dict)  # outputs to compare with logs
+    logs: dict[str, str] = field(
+        default_factory=dict
+    )  # SHA-256 of logs of inputs, by file as given
+    questions: tuple[str, ...] = ()  # to ask the user: values that are hardly meant so
+    smallest_tolerance: float = 0.0  # relative; a smaller one makes no difference
 
     @property
     def start_values(self) -> dict[str, Value]:
@@ -85,7 +85,7 @@ class Scenario:
 def title(path: Path) -> str:
     """Title of the scenario at `path`; the rest of the file is not checked."""
     content = read_toml(path)
-    reader = _Reader(path)
+    reader = Reader(path)
     if "title" not in content:
         reader.fail("missing key 'title'")
     return reader.text(content["title"], "title")
@@ -99,7 +99,7 @@ def folder_of(path: Path) -> Path:
     UserError
         If the file cannot be read, or names no model.
     """
-    content, reader = read_toml(path), _Reader(path)
+    content, reader = read_toml(path), Reader(path)
     if MODEL not in content:
         if project.is_in_model(path):
             return project.model_folder(path)
@@ -136,7 +136,7 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
         content,
         "",
         required=("title", "description", "tolerance", "time"),
-        optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS),
+        optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED),
     )
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
@@ -148,8 +148,11 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     start, stop, steps = reader.time(reader.table(content["time"], "[time]") | dict(times or {}))
     times = reader.communication_points(start, stop, steps)
     parameters = reader.values(content, PARAMETERS, model)
+    reader.tolerances(tolerance, parameters, model)
     initial = reader.values(content, INITIAL, model)
-    signals = reader.signals(content, model)
+    inputs = InputReader(reader, model, times)
+    signals = inputs.inputs(content)
+    logs = inputs.hashes  # without those of measurements, which no run follows from
     return Scenario(
         name=path.stem,
         model=folder.name,
@@ -164,62 +167,28 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
         tolerance=tolerance,
         times=times,
         signals=signals,
-        inputs=reader.sampled(signals, times - start, model),
+        inputs=inputs.sampled(signals),
         reference_every=min(every, MAX_STEPS),
         defaults=model.start_values,
         panels=reader.panels(content, model),
+        measured=inputs.measured(content),
+        logs=logs,
+        questions=tuple(reader.questions),
+        smallest_tolerance=model.smallest_tolerance(parameters),
     )
 
 
-class _Reader:
-    """Takes checked values from one file; errors name the file and the key."""
+class _Reader(Reader):
+    """Takes the sections of a scenario but its inputs."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def fail(self, message: str) -> NoReturn:
-        raise UserError(f"{self.path}: {message}")
-
-    # plain values
-
-    def number(self, value: Any, key: str) -> float:
-        try:
-            return finite_number(value)
-        except WrongValueError as error:
-            self.fail(f"{key}: {error}")
-
-    def text(self, value: Any, key: str) -> str:
-        if not isinstance(value, str) or not value.strip():
-            self.fail(f"{key}: expected a text, got {show(value)}")
-        return value.strip()
-
-    def table(self, value: Any, key: str) -> dict[str, Any]:
-        if not isinstance(value, dict):
-            self.fail(f"{key}: expected a table, got {show(value)}")
-        return value
-
-    def array(self, value: Any, key: str, of: str) -> list[Any]:
-        if not isinstance(value, list) or not value:
-            self.fail(f"{key}: expected a list of {of}, got {show(value)}")
-        return value
-
-    def keys(
-        self, table: dict, where: str, required: Iterable[str] = (), optional: Iterable[str] = ()
-    ) -> None:
-        known = [*required, *optional]
-        place = f"{where}: " if where else ""
-        for key in table:
-            if key not in known:
-                guess = did_you_mean(key, known)
-                self.fail(f"{place}unknown key {key!r}{guess} (known: {', '.join(known)})")
-        for key in required:
-            if key not in table:
-                self.fail(f"{place}missing key {key!r}")
+        super().__init__(path)
+        self.questions: list[str] = []
 
     # parameters and initial states
 
     def values(self, content: dict[str, Any], section: str, model: Model) -> dict[str, Value]:
-        """Section [parameters] or [initial]: name = value, or an Enumeration's item as a text."""
+        """Section [parameters] or [initial]: name = value, as `Variable.checked` takes it."""
         result = {}
         for name, given in self.table(content.get(section, {}), f"[{section}]").items():
             where = f"[{section}]"
@@ -227,9 +196,22 @@ class _Reader:
                 variable = model.find(name, section)
                 where = f"[{section}] {name}"
                 result[name] = variable.checked(given)
+                if question := variable.question(given):
+                    self.questions.append(f"{where}: {question}")
             except WrongValueError as error:
                 self.fail(f"{where}: {error}")
         return result
+
+    def tolerances(self, tolerance: float, parameters: dict[str, Value], model: Model) -> None:
+        """Refuse what the method of integration cannot reach."""
+        given = [("tolerance", tolerance)]
+        if parameters.get(TOLERANCE):  # 0: that of the scenario
+            given.append((f"[{PARAMETERS}] {TOLERANCE}", parameters[TOLERANCE]))
+        for key, value in given:
+            try:
+                model.check_tolerance(value, parameters)
+            except WrongValueError as error:
+                self.fail(f"{key}: {error}")
 
     # pictures
 
@@ -263,8 +245,8 @@ class _Reader:
     def time(self, content: Any) -> tuple[float, float, tuple[float, ...]]:
         table = self.table(content, "[time]")
         self.keys(table, "[time]", required=("start", "stop", "step"))
-        start = self.number(table["start"], "[time] start")
-        stop = self.number(table["stop"], "[time] stop")
+        start = self.quantity(table["start"], "[time] start", SECONDS)
+        stop = self.quantity(table["stop"], "[time] stop", SECONDS)
         if stop <= start or not math.isfinite(stop - start):
             self.fail(f"[time] stop: expected a time after start = {start!r}, got {stop!r}")
         given = table["step"]
@@ -275,7 +257,7 @@ class _Reader:
                 self.fail(f"[time] step: has {count} lengths, expected at most {MAX_PATTERN}")
         else:
             given = [given]
-        steps = tuple(self.number(step, "[time] step") for step in given)
+        steps = tuple(self.quantity(step, "[time] step", SECONDS) for step in given)
         for step in steps:
             if step <= 0:
                 self.fail(f"[time] step: expected more than 0 s, got {step!r}")
@@ -305,105 +287,3 @@ class _Reader:
             self.fail("[time] step: too short, communication points coincide")
         times.setflags(write=False)
         return times
-
-    # inputs
-
-    def signals(self, content: dict[str, Any], model: Model) -> dict[str, Signal]:
-        """Section [inputs] as functions of time."""
-        result = {}
-        for name, given in self.table(content.get(INPUTS, {}), f"[{INPUTS}]").items():
-            try:
-                variable = model.find(name, INPUTS)
-            except WrongValueError as error:
-                self.fail(f"[{INPUTS}]: {error}")
-            where = f"[{INPUTS}.{name}]"
-            if variable.type == "Boolean":
-                result[name] = self.switches(given, where, variable)
-            elif variable.type == "Real":
-                result[name] = self.signal(given, where)
-            else:
-                self.fail(f"{where}: is of type {variable.type}, expected Real or Boolean")
-        return result
-
-    def switches(self, content: Any, where: str, variable: Variable) -> Switches:
-        """A Boolean input: constant, or a table of times and values."""
-        table = self.table(content, where)
-        self.keys(table, where, optional=("constant", "table"))
-        if len(table) != 1:
-            self.fail(f"{where}: expected exactly one of constant, table, got {len(table)}")
-        if "constant" in table:
-            return Switches(
-                ((0.0, self.boolean(table["constant"], f"{where} constant", variable)),)
-            )
-        rows = self.rows(table, where)
-        return Switches(tuple((t, self.boolean(v, key, variable)) for t, v, key in rows))
-
-    def boolean(self, given: Any, key: str, variable: Variable) -> bool:
-        try:
-            return bool(variable.checked(given))
-        except WrongValueError as error:
-            self.fail(f"{key}: {error}")
-
-    def signal(self, content: Any, where: str) -> Signal:
-        table = self.table(content, where)
-        shapes = {"constant": self.constant, "sines": self.sines, "table": self.points}
-        self.keys(table, where, optional=(*shapes, "offset"))
-        given = [shape for shape in shapes if shape in table]
-        if len(given) != 1:
-            self.fail(f"{where}: expected exactly one of {', '.join(shapes)}, got {len(given)}")
-        if "offset" in table and given != ["sines"]:
-            self.fail(f"{where} offset: goes with sines only")
-        return shapes[given[0]](table, where)
-
-    def constant(self, table: dict[str, Any], where: str) -> Constant:
-        return Constant(self.number(table["constant"], f"{where} constant"))
-
-    def sines(self, table: dict[str, Any], where: str) -> Sines:
-        offset = self.number(table.get("offset", 0.0), f"{where} offset")
-        terms = []
-        for i, sine in enumerate(self.array(table["sines"], f"{where} sines", "tables")):
-            key = f"{where} sines[{i}]"
-            self.keys(self.table(sine, key), key, ("amplitude", "frequency"), ("phase",))
-            amplitude = self.number(sine["amplitude"], f"{key} amplitude")
-            frequency = self.number(sine["frequency"], f"{key} frequency")
-            phase = self.number(sine.get("phase", 0.0), f"{key} phase")
-            terms.append((amplitude, frequency, phase))
-        return Sines(offset, tuple(terms))
-
-    def points(self, table: dict[str, Any], where: str) -> Table:
-        rows = self.rows(table, where)
-        return Table(tuple((time, self.number(value, key)) for time, value, key in rows))
-
-    def rows(self, table: dict[str, Any], where: str) -> list[tuple[float, Any, str]]:
-        """Times in s, values as they stand in the file, and their keys."""
-        rows: list[tuple[float, Any, str]] = []
-        for i, row in enumerate(
-            self.array(table["table"], f"{where} table", "[time, value] pairs")
-        ):
-            key = f"{where} table[{i}]"
-            if not isinstance(row, list) or len(row) != 2:
-                self.fail(f"{key}: expected [time, value], got {show(row)}")
-            time = self.number(row[0], key)
-            if i and time <= rows[-1][0]:
-                self.fail(f"{key}: expected a time after {rows[-1][0]!r} s, got {show(row)}")
-            rows.append((time, row[1], key))
-        return rows
-
-    def sampled(
-        self, signals: dict[str, Signal], elapsed: np.ndarray, model: Model
-    ) -> dict[str, np.ndarray]:
-        """Values of the inputs at `elapsed` seconds after the start, (n + 1,) each."""
-        result = {}
-        for name, signal in signals.items():
-            where = f"[{INPUTS}.{name}]"
-            with np.errstate(all="ignore"):
-                values = signal.values(elapsed)
-            if not np.all(np.isfinite(values)):
-                self.fail(f"{where}: expected finite values, got an overflow")
-            try:
-                model.variables[name].check_range(float(values.min()), float(values.max()))
-            except WrongValueError as error:
-                self.fail(f"{where}: {error}")
-            values.setflags(write=False)
-            result[name] = values
-        return result

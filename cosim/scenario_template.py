@@ -10,7 +10,8 @@ from cosim.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
 WIDTH = 100
 
 HEAD = """\
-# A scenario. Run it by ./run.sh FILE.toml; all values are in SI units.
+# A scenario. Run it by ./run.sh FILE.toml. Numbers are in SI units; in quotation marks a value may
+# have another one: "90 deg", "300 mm", "2kN".
 # "# name = value" is a start value as it is: remove the "# " to change it.
 model = {model}
 title = {title}
@@ -30,6 +31,9 @@ INPUT_HELP = """\
 #   constant = 1.5
 #   table = [[0.0, 0.0], [1.0, 1.5]]  # [time in s from start, value], linear in between
 #   sines = [{ amplitude = 1.5, frequency = 0.5, phase = 0.0 }]  # Hz, rad; `offset = 1.0` beside it
+#   file = "log.csv"  # of measurements, beside this file; `column = "tau"`, `time = "t"`,
+#                     # `scale = "1 kN"`, `hold = true` beside it
+# What was measured of an output is compared with it: [measured.NAME], with the keys of a file.
 # A Boolean one is `constant = true`, or a table that holds from each time on. An input that is not
 # here has its start value.
 """

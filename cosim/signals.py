@@ -74,4 +74,25 @@ class Switches:
         return np.array(values)[np.maximum(rows, 0)]
 
 
-Signal = Constant | Sines | Table | Switches
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """A column of a log: linear between its rows, or held from each row on."""
+
+    times: np.ndarray  # (rows,) s since the start, in order
+    numbers: np.ndarray  # (rows,) values; Booleans of a Boolean input
+    is_held: bool
+    source: str  # file and column
+
+    def values(self, elapsed: np.ndarray) -> np.ndarray:
+        """Values at `elapsed` seconds after the start, (n,); beyond the ends those there."""
+        if self.is_held:
+            rows = np.searchsorted(self.times, elapsed + EARLY, side="right") - 1
+            return self.numbers[np.maximum(rows, 0)]
+        return np.interp(elapsed, self.times, self.numbers)
+
+    def covers(self, elapsed: np.ndarray) -> np.ndarray:
+        """Which of the times are within the log, (n,)."""
+        return (self.times[0] - EARLY <= elapsed) & (elapsed <= self.times[-1] + EARLY)
+
+
+Signal = Constant | Sines | Table | Switches | Logged

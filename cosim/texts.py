@@ -1,13 +1,42 @@
 """Numbers and verdicts as text, the same on the console, on pages and in pictures."""
 
+import math
 import re
 from collections.abc import Sequence, Sized
+
+SMALLEST = 1e-99  # number that is written as it is
+GAP = ".."  # in a text that is shortened
 
 
 def short(number: float) -> str:
     """1e-8 for 1e-08."""
+    if not math.isfinite(number):
+        return f"{number:g}"
     mantissa, exponent = f"{number:.3e}".split("e")
     return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
+
+
+def brief(number: float, digits: int = 1) -> str:
+    """1.2e-8 for 1.234e-08, with so many digits behind the point; 0 for 0, ~0 for tiny numbers."""
+    if not number or not math.isfinite(number):
+        return f"{number:g}"
+    if abs(number) < SMALLEST:
+        return "~0"
+    mantissa, exponent = f"{number:.{digits}e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
+
+
+def shortened(text: str, width: int) -> str:
+    """A text of at most `width` characters: begin and end of a longer one."""
+    if len(text) <= width:
+        return text
+    begin = (width - len(GAP) + 1) // 2
+    return text[:begin] + GAP + text[len(text) - (width - len(GAP) - begin) :]
+
+
+def seconds(time: float) -> str:
+    """0.123 s, 12.3 s, 1234 s."""
+    return f"{time:.3f} s" if time < 10 else f"{time:.1f} s" if time < 100 else f"{time:.0f} s"
 
 
 def milliseconds(seconds: float) -> str:
@@ -40,6 +69,11 @@ def counted(things: Sized, name: str) -> str:
 def bits(differing: Sequence[str]) -> str:
     """How the outputs of two FMUs compare, of which some may differ."""
     return "other bits" if differing else "same bits"
+
+
+def sentence(text: str) -> str:
+    """A text with a capital letter at its beginning."""
+    return text[:1].upper() + text[1:]
 
 
 def verdict(passed: bool) -> str:

@@ -36,8 +36,8 @@ void component_make_harmless(const char *text, char out[LOG_TEXT_SIZE]) {
     out[length] = '\0';
 }
 
-static void send_text(const struct component *component, enum component_status status,
-                      enum log_category category, const char *raw) {
+static void send_one(const struct component *component, enum component_status status,
+                     enum log_category category, const char *raw) {
     if (component->is_logged[category]) {
         char text[LOG_TEXT_SIZE];
         component_make_harmless(raw, text);
@@ -45,7 +45,29 @@ static void send_text(const struct component *component, enum component_status s
     }
 }
 
-void component_log(const struct component *component, enum component_status status,
+static void send_text(struct component *component, enum component_status status,
+                      enum log_category category, const char *raw) {
+    component->is_logging = true;
+    component->call_in_logger = NULL;
+    send_one(component, status, category, raw);
+    if (component->call_in_logger != NULL) { // once: the logger may do it each time
+        char refusal[LOG_TEXT_SIZE];
+        (void)snprintf(refusal, sizeof refusal,
+                       "%s is refused inside the logger: the instance is in the middle of a call",
+                       component->call_in_logger);
+        send_one(component, COMPONENT_ERROR, LOG_STATUS_ERROR, refusal);
+    }
+    component->is_logging = false;
+}
+
+bool component_is_logging(struct component *component, const char *call) {
+    if (component->is_logging) {
+        component->call_in_logger = call;
+    }
+    return component->is_logging;
+}
+
+void component_log(struct component *component, enum component_status status,
                    enum log_category category, const char *format, ...) {
     char raw[LOG_TEXT_SIZE];
     if (!component->is_logged[category]) {
@@ -53,7 +75,7 @@ void component_log(const struct component *component, enum component_status stat
     }
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(raw, sizeof raw, format, arguments);
+    message_format(raw, sizeof raw, format, arguments);
     va_end(arguments);
     send_text(component, status, category, raw);
 }
@@ -133,10 +155,13 @@ enum component_status component_failure(struct component *component, enum status
 }
 
 enum component_status component_fail(struct component *component, const char *format, ...) {
+    if (component_is_logging(component, "a call")) {
+        return COMPONENT_ERROR;
+    }
     char raw[LOG_TEXT_SIZE];
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(raw, sizeof raw, format, arguments);
+    message_format(raw, sizeof raw, format, arguments);
     va_end(arguments);
     send_text(component, COMPONENT_ERROR, LOG_STATUS_ERROR, raw);
     note_error(component);
@@ -187,6 +212,9 @@ bool component_enter(struct component *component, unsigned call) {
         return false;
     }
     const struct call_rule *rule = &component->adapter->rules[call];
+    if (component_is_logging(component, rule->name)) {
+        return false;
+    }
     if (component->is_logged[LOG_ALL]) {
         component_log(component, COMPONENT_OK, LOG_ALL, "%s", rule->name);
     }

@@ -54,6 +54,8 @@ struct component {
     enum fmi_kind kind;
     bool has_failed_inside; /* an error in intermediate update mode, which leads to the state after
                                errors when the step returns: until then nothing may free it */
+    bool is_logging;        /* the importer's logger is running, inside another call */
+    const char *call_in_logger; /* a call that came from there; NULL: none */
     bool is_logged[LOG_CATEGORY_COUNT];
 };
 
@@ -80,6 +82,10 @@ NONNULL void component_end(struct component *component);
  * rule allows. Otherwise it fails as component_fail. */
 MUST_CHECK bool component_enter(struct component *component, unsigned call);
 
+/* True if the call comes from inside the importer's logger. It is refused and changes nothing: the
+ * instance is in the middle of another call. A message says so after that of the logger. */
+MUST_CHECK NONNULL bool component_is_logging(struct component *component, const char *call);
+
 /* Fails as component_fail, for the reason that component_has_arrays finds; false. */
 NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
 
@@ -104,7 +110,7 @@ NONNULL static inline enum component_status component_result(struct component *c
 }
 
 /* An error that the adapter finds: logs it, leads to where component_result does, returns
- * COMPONENT_ERROR. */
+ * COMPONENT_ERROR. Inside the importer's logger it changes nothing. */
 NONNULL PRINTF_FORMAT(2, 3) enum component_status
     component_fail(struct component *component, const char *format, ...);
 
@@ -113,7 +119,7 @@ const char *component_kind_name(unsigned kinds);
 
 /* ---- Log ------------------------------------------------------------------------------------ */
 
-NONNULL PRINTF_FORMAT(4, 5) void component_log(const struct component *component,
+NONNULL PRINTF_FORMAT(4, 5) void component_log(struct component *component,
                                                enum component_status status,
                                                enum log_category category, const char *format, ...);
 

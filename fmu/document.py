@@ -1,9 +1,10 @@
 """Makes the page documentation/index.html of an FMU.
 
-The page is the model's README.md as HTML, followed by tables of the variables that
-modelDescription.xml declares. It is one file with its style sheet inside, without scripts, and
-needs no network: formulas become MathML, local images are copied next to the page, and links to
-files that are not in the FMU become plain text. Equal input gives equal bytes.
+The page is the model's README.md and further pages as HTML with a list of their contents, followed
+by tables of the variables that modelDescription.xml declares. It is one file with its style sheet
+inside, without scripts, and needs no network: formulas become MathML, local images are copied next
+to the page, and links to files that are not in the FMU become plain text. Equal input gives equal
+bytes.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import shutil
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from itertools import chain, pairwise
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -42,6 +44,10 @@ COLUMNS += ("start", "min", "max", "description")
 NUMBERS = ("valueReference", "start", "min", "max")
 
 
+# identifier and text of their heading
+VARIABLES = ("variables", "Variables of the FMU")
+
+
 class DocumentError(Exception):
     """A page that cannot be made: file and reason in one line."""
 
@@ -67,13 +73,38 @@ def without_local_links(tokens: Iterable[Token]) -> list[Token]:
     return kept
 
 
-def readme_page(readme: Path) -> tuple[str, list[Path]]:
+def scroller(kind: str, name: str) -> str:
+    """Start of a box for what may be wider than the page: keys scroll it, so it takes the focus."""
+    return f'<div class="{kind}" tabindex="0" role="group" aria-label="{html.escape(name)}">'
+
+
+def prepare_tables(tokens: Iterable[Token]) -> None:
+    """Name each table by its heading; its cells without a text are no headers."""
+    heading, header, opened = "", None, None
+    for token in tokens:
+        if token.type == "inline" and opened == "heading_open":
+            heading = token.content
+        elif token.type == "table_open":
+            token.meta["heading"] = heading
+        elif token.type == "th_open":
+            header = token
+            token.attrs["scope"] = "col"
+        elif token.type == "inline" and opened == "th_open" and not token.content:
+            header.attrs.clear()
+            header.tag = "td"
+        elif token.type == "th_close":
+            token.tag = header.tag
+        opened = token.type
+
+
+def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
     """Convert README.md to the inside of an HTML body.
 
     Returns
     -------
-    tuple of str and list of Path
-        the HTML, and the local images, which it refers to by their names.
+    tuple of str, list of Path and list of tuple of str and str
+        the HTML; the local images, which it refers to by their names; identifier and text (HTML)
+        of each heading of level 2.
     """
 
     def formula(latex: str, options: dict[str, bool]) -> str:
@@ -87,10 +118,18 @@ def readme_page(readme: Path) -> tuple[str, list[Path]]:
     markdown.use(dollarmath_plugin, allow_space=False, allow_labels=False, renderer=formula)
     markdown.use(anchors_plugin, max_level=3)
     renderers = markdown.renderer.rules
-    renderers["table_open"] = lambda *_: '<div class="table"><table>\n'
+    formula_block, code = renderers["math_block"], renderers["fence"]
+    renderers["math_block"] = lambda *parts: formula_block(*parts).replace(
+        '<div class="math block">', scroller("math block", "Formula")
+    )
+    renderers["fence"] = lambda *parts: code(*parts).replace("<pre>", '<pre tabindex="0">')
+    renderers["table_open"] = lambda tokens, i, *_: (
+        scroller("table", f"Table: {tokens[i].meta['heading']}") + "<table>\n"
+    )
     renderers["table_close"] = lambda *_: "</table></div>\n"
 
     tokens = markdown.parse(read_text(readme))
+    prepare_tables(tokens)
     images: list[Path] = []
     for block in tokens:
         block.children = without_local_links(block.children or [])
@@ -103,7 +142,12 @@ def readme_page(readme: Path) -> tuple[str, list[Path]]:
                 raise DocumentError(f"{readme}: the image {address} does not exist")
             token.attrs["src"] = image.name
             images.append(image)
-    return markdown.renderer.render(tokens, markdown.options, {}), images
+    headings = [
+        (str(token.attrs["id"]), markdown.renderer.render([text], markdown.options, {}))
+        for token, text in pairwise(tokens)
+        if token.type == "heading_open" and token.tag == "h2"
+    ]
+    return markdown.renderer.render(tokens, markdown.options, {}), images, headings
 
 
 def read_text(path: Path) -> str:
@@ -150,7 +194,7 @@ def variable_cell(row: dict[str, str], key: str) -> str:
 
 def variable_tables(root: ET.Element) -> str:
     """Describe the default experiment and list the variables, one table per causality."""
-    lines = ['<section class="variables">', '<h2 id="variables">Variables of the FMU</h2>']
+    lines = ['<section class="variables">', f'<h2 id="{VARIABLES[0]}">{VARIABLES[1]}</h2>']
     experiment = root.find("DefaultExperiment")
     if experiment is not None:
         units = {"startTime": " s", "stopTime": " s", "stepSize": " s"}
@@ -158,11 +202,12 @@ def variable_tables(root: ET.Element) -> str:
         lines.append(f"<p>Default experiment: {', '.join(values)}.</p>")
     rows = [variable_row(v) for v in root.iterfind("ModelVariables/ScalarVariable")]
     titles = {"valueReference": "VR"}
-    head = "".join(f"<th>{titles.get(key, key.capitalize())}</th>" for key in COLUMNS)
+    head = "".join(f'<th scope="col">{titles.get(key, key.capitalize())}</th>' for key in COLUMNS)
     for causality, heading in GROUPS.items():
         group = [row for row in rows if row["causality"] == causality]
         if group:
-            lines += [f"<h3>{heading}</h3>", '<div class="table"><table>']
+            box = scroller("table", f"Variables: {heading}")
+            lines += [f"<h3>{heading}</h3>", f"{box}<table>"]
             lines += [f"<thead><tr>{head}</tr></thead>", "<tbody>"]
             lines += [f"<tr>{''.join(variable_cell(row, key) for key in COLUMNS)}</tr>"
                       for row in group]  # fmt: skip
@@ -170,9 +215,11 @@ def variable_tables(root: ET.Element) -> str:
     return "\n".join([*lines, "</section>"])
 
 
-def document(readme: Path, model_description: Path, output: Path) -> None:
-    """Write output/index.html and copy the images of the page next to it."""
-    content, images = readme_page(readme)
+def document(pages: list[Path], model_description: Path, output: Path) -> None:
+    """Write output/index.html and copy the images of the pages next to it."""
+    contents, all_images, all_headings = zip(*map(readme_page, pages), strict=True)
+    images, headings = chain(*all_images), chain(*all_headings, [VARIABLES])
+    entries = "\n".join(f'<li><a href="#{name}">{text}</a></li>' for name, text in headings)
     root = read_model_description(model_description)
     title = ": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib)
     page = f"""<!DOCTYPE html>
@@ -185,8 +232,13 @@ def document(readme: Path, model_description: Path, output: Path) -> None:
 {read_text(STYLE_SHEET)}</style>
 </head>
 <body>
+<nav aria-label="Contents">
+<ul>
+{entries}
+</ul>
+</nav>
 <main>
-{content}{variable_tables(root)}
+{"".join(contents)}{variable_tables(root)}
 </main>
 </body>
 </html>
@@ -202,7 +254,7 @@ def document(readme: Path, model_description: Path, output: Path) -> None:
 def main() -> int:
     """Make the page; 2 with a line on standard error where that is not possible."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--readme", type=Path, required=True, help="README.md of the model")
+    parser.add_argument("--readme", type=Path, nargs="+", required=True, help="pages of the model")
     parser.add_argument("--model-description", type=Path, required=True)
     parser.add_argument("--output", type=Path, required=True, help="folder for the page")
     arguments = parser.parse_args()

@@ -15,14 +15,17 @@ include(${FMU_SOURCE_DIR}/release.cmake)
 include(${FMU_SOURCE_DIR}/source_code.cmake)
 
 # An adapter of FMI is a folder beside this file and a word here, with the suffix of its targets, the part of
-# paths in the build that tells its files from those of others, and the names of the icon in the archive.
+# paths in the build that tells its files from those of others, the name of the icon in the archive, and whether
+# that holds terminalsAndIcons.xml: importers of FMI 2.0 refuse its version, which has to be 3.0.
 set(FMI_VERSIONS fmi2 fmi3)
 set(fmi2_suffix "")
 set(fmi2_below "")
-set(fmi2_icons model.png terminalsAndIcons/icon.png)
+set(fmi2_icon model.png)
+set(fmi2_has_terminals OFF)
 set(fmi3_suffix _fmi3)
 set(fmi3_below fmi3/)
-set(fmi3_icons terminalsAndIcons/icon.png)
+set(fmi3_icon terminalsAndIcons/icon.png)
+set(fmi3_has_terminals ON)
 
 file(GLOB FMU_SHARED_SOURCES CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/*.c)
 foreach(version IN LISTS FMI_VERSIONS)
@@ -61,13 +64,14 @@ function(add_fmu name)
   file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
 
   # tables and model descriptions, again whenever a declaration changes
-  file(GLOB shared_variables CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
-  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/fmi*/*.py)
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/declaration/*.toml ${FMU_SOURCE_DIR}/fmi*/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
                         ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/atomic_write.py)
   set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
-  set(declaration ${folder}/variables.toml ${icon} ${shared_variables} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
+  file(GLOB declarations CONFIGURE_DEPENDS
+    ${PROJECT_SOURCE_DIR}/src/instance/*.toml ${PROJECT_SOURCE_DIR}/models/*/variables.toml) # they include each other
+  set(declaration ${folder}/variables.toml ${icon} ${declarations} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
   add_custom_command(
     OUTPUT ${generated}
     COMMAND ${generate} --output ${out}
@@ -86,14 +90,15 @@ function(add_fmu name)
 
   # the page inside the FMU
   file(GLOB pictures CONFIGURE_DEPENDS ${folder}/*.svg ${folder}/*.png)
+  file(GLOB derivation CONFIGURE_DEPENDS ${folder}/derivation.md)
   add_custom_command(
     OUTPUT ${out}/documentation/index.html
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
-            --readme ${folder}/README.md --model-description ${out}/modelDescription.xml
+            --readme ${folder}/README.md ${derivation} --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
             ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py
-            ${folder}/README.md ${pictures} ${out}/modelDescription.xml
+            ${folder}/README.md ${derivation} ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
@@ -124,7 +129,6 @@ function(add_fmu name)
   # what the archives of all versions and platforms have in common
   set(entries
       ${reference_entries}
-      terminalsAndIcons/terminalsAndIcons.xml=${out}/terminalsAndIcons.xml
       documentation=${out}/documentation
       documentation/licenses/license.txt=${PROJECT_SOURCE_DIR}/LICENSE
       documentation/licenses/sundials.txt=${SUNDIALS_LICENSE}
@@ -138,9 +142,10 @@ function(add_fmu name)
     add_fmu_library(${name} ${target} ${version} ${name}_description ${out}/${below})
     set(own_entries ${entries})
     if(icon)
-      foreach(place IN LISTS ${version}_icons)
-        list(APPEND own_entries ${place}=${icon})
-      endforeach()
+      list(APPEND own_entries ${${version}_icon}=${icon})
+    endif()
+    if(${version}_has_terminals)
+      list(APPEND own_entries terminalsAndIcons/terminalsAndIcons.xml=${out}/terminalsAndIcons.xml)
     endif()
 
     set(fmu ${CMAKE_CURRENT_BINARY_DIR}/${below}${name}.fmu)

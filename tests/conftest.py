@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
@@ -60,6 +61,33 @@ def browser() -> Iterator["Browser"]:
         yield browser
 
 
+@pytest.fixture(scope="session")
+def firefox() -> Iterator["Browser"]:
+    """The same with Firefox."""
+    from tests.support.firefox import opened
+
+    with opened() as browser:
+        yield browser
+
+
+@pytest.fixture(params=["browser", "firefox"], ids=["chromium", "firefox"])
+def each_browser(request: pytest.FixtureRequest) -> "Browser":
+    """Chromium, then Firefox."""
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(params=["same user", "another user"])
+def user(request: pytest.FixtureRequest) -> int | None:
+    """Id of another user, nobody's, or None: only root can become one."""
+    if request.param == "same user":
+        return None
+    if not hasattr(os, "getuid") or os.getuid() != 0:
+        if os.environ.get("CI"):
+            pytest.fail("needs root, to become another user")
+        pytest.skip("needs root, to become another user")
+    return 65534
+
+
 @pytest.fixture
 def apart() -> Iterator["Network"]:
     """Two hosts; skipped where the kernel permits none."""
@@ -69,9 +97,7 @@ def apart() -> Iterator["Network"]:
         try:
             made = stack.enter_context(network())
         except FileNotFoundError as error:
-            if os.environ.get("CI"):
-                pytest.fail(str(error))
-            pytest.skip(str(error))
+            missing(str(error))
         except NotPermittedError as error:
             pytest.skip(f"no network namespaces: {error}")
         yield made

@@ -1,14 +1,31 @@
 """`list`: name the scenarios, without any FMU."""
 
 import argparse
+import textwrap
 
-from cosim import project, scenario
+from cosim import console, project, scenario
+from cosim.commands import Ended
+from cosim.texts import shortened
+
+DESCRIPTION = "Prints the name and the title of every scenario."
 
 
-def run(_: argparse.Namespace) -> int:
+def add_options(_: argparse.ArgumentParser) -> None:
+    """It has none."""
+
+
+def run(_: argparse.Namespace) -> Ended:
     """Print the name and the title of every scenario."""
-    titles = {name: scenario.title(path) for name, path in project.scenario_files().items()}
-    width = max(map(len, titles), default=0)
-    for name, title in titles.items():
-        print(f"{name:<{width}}  {title}")
-    return 0
+    files = project.scenario_files()
+    found = [
+        {"name": name, "title": scenario.title(path), "model": project.model_folder(path).name}
+        for name, path in files.items()
+    ]
+    room = console.width()
+    width = min(max(map(len, files), default=0), room // 2)
+    lines = []
+    for entry in found:
+        title = textwrap.wrap(entry["title"], room - width - 2) or [""]
+        lines.append(f"{shortened(entry['name'], width):<{width}}  {title[0]}")
+        lines += [" " * (width + 2) + more for more in title[1:]]
+    return Ended(0, "\n".join(lines), {"scenarios": found})

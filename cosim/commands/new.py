@@ -4,17 +4,32 @@ import argparse
 from pathlib import Path
 
 from cosim import project, scenario_template
+from cosim.commands import Ended
 from cosim.errors import UserError, reason
 from cosim.fmu_file import read_model
 from cosim.output_files import whole
 
+DESCRIPTION = (
+    "Writes NAME.toml, a scenario with comments that runs as it is: ./run.sh NAME.toml. Exit code: "
+    "0 written, 2 the file exists or cannot be written."
+)
 SUFFIX = ".toml"
 # what no file can be called on Windows, with any suffix
 RESERVED = {"CON", "PRN", "AUX", "NUL"} | {f"{x}{i}" for x in ("COM", "LPT") for i in range(1, 10)}
 
 
-def run(options: argparse.Namespace) -> int:
-    """Write the file; 0 if it is there then."""
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which scenario."""
+    parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
+    parser.add_argument(
+        "--model",
+        metavar="MODEL",
+        help="what to simulate (default: the model with the most scenarios)",
+    )
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Write the file."""
     path = _path(options.name)
     folder = project.model(options.model) if options.model else _usual_model()
     model = read_model(project.built(folder, ".fmu"))
@@ -31,8 +46,8 @@ def run(options: argparse.Namespace) -> int:
     except OSError as error:
         path.unlink(missing_ok=True)
         raise UserError(f"{path}: cannot be written: {reason(error)}") from error
-    print(f"{path}: written; run it by ./run.sh '{path}'")
-    return 0
+    verdict = f"{path}: written; run it by ./run.sh '{path}'"
+    return Ended(0, verdict, {"file": path.absolute(), "model": folder.name})
 
 
 def _path(name: str) -> Path:

@@ -4,33 +4,82 @@ Files of users are run in the same way; they have no references.
 """
 
 import argparse
+import os
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from cosim import console, convergence, project
+from cosim import console, convergence, project, results
 from cosim import scenario as scenarios
+from cosim.command_line import COMMANDS, PROGRAM
+from cosim.commands import Ended
+from cosim.commands import list as scenario_list
 from cosim.comparison import Failure, Run, Runs
 from cosim.convergence import Convergence
-from cosim.errors import UserError, together
+from cosim.errors import UserError, WrongValueError, did_you_mean, together
 from cosim.fmu_file import Fmu
 from cosim.model import VERSIONS
+from cosim.options import add_fmi, add_open, add_report, relative_tolerance
 from cosim.output_files import check_writable, from_here, written
 from cosim.progress import Progress
 from cosim.report import pages
 from cosim.report.browser import show
 from cosim.report.writer import ReportWriter
+from cosim.result_tables import RunTable, SweepTable, measured
+from cosim.result_tables import convergence as convergence_table
 from cosim.scenario import Scenario
+from cosim.texts import counted, short
 from cosim.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
 
+DESCRIPTION = (
+    "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "
+    "1e-11; compares all outputs with the reference, and prints the largest errors. Without names, "
+    "measures the order of convergence in the communication step too. The FMUs are of FMI 2.0; "
+    "those of FMI 3.0 must give the same bits. Exit code: 0 all as it should be, 1 not, 2 wrong "
+    "use."
+)
+SUFFIX = ".toml"
 FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
 QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
-def run(options: argparse.Namespace) -> int:
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which scenarios, on which FMUs, and where the report goes."""
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="scenarios, or files FILE.toml of your own (default: all scenarios)",
+    )
+    parser.add_argument("--list", action="store_true", help="name the scenarios, run nothing")
+    parser.add_argument(
+        "--fmu",
+        type=Path,
+        metavar="PATH",
+        help="the FMU, for the scenarios of its model (default: that of each model, in build/)",
+    )
+    add_fmi(parser, None, "run only FMUs of this version of FMI")
+    add_report(parser)
+    add_open(parser)
+    parser.add_argument(
+        "--tolerance",
+        type=relative_tolerance,
+        metavar="X",
+        help="run at this relative tolerance only, without the sweep",
+    )
+
+
+def run(options: argparse.Namespace) -> Ended:
     """Run the scenarios and files that the options name, or all scenarios."""
+    if options.list:
+        return scenario_list.run(options)
     with ExitStack() as stack:
         chosen, own, fmus, twins = _open(options, stack)
+        _check(options, chosen, own, fmus)
+        for scenario in (*chosen, *own):
+            texts = (f"{from_here(scenario.path)}: {x}" for x in scenario.questions)
+            console.messages("warning", texts)
         runs = Runs(fmus, twins)
         for scenario in chosen:
             runs.reference(scenario)  # so that a missing reference is reported before anything runs
@@ -40,30 +89,73 @@ def run(options: argparse.Namespace) -> int:
             writer.begin()
             if chosen:
                 writer.forget({scenario.name for scenario in chosen} if options.names else None)
-        sweeps: list[Sweep] = []
-        studies: list[Convergence] = []
-        failures: list[Failure] = []
+        done = _Done(chosen, own)
         if options.tolerance is not None:
-            done = _runs(runs, chosen, bool(twins), failures, options.tolerance)
+            done.runs = _runs(runs, chosen, bool(twins), done.failures, options.tolerance)
         else:
-            done = _runs(runs, chosen, bool(twins), failures, None, TIGHTEST)
-            sweeps = _sweeps(runs, _ended(_quick(done) if options.names else chosen, failures))
-            studies = [] if options.names else _convergence(fmus, twins)
-        estimated = _estimated(runs, own, failures, options.tolerance)
-        groups = writer.grouped([*done, *estimated])
+            done.runs = _runs(runs, chosen, bool(twins), done.failures, None, TIGHTEST)
+            swept = _quick(done.runs) if options.names else chosen
+            done.sweeps = _sweeps(runs, _finished(swept, done.failures), bool(options.names))
+            done.studies = [] if options.names else _convergence(fmus, twins)
+        done.runs += _estimated(runs, own, done.failures, options.tolerance)
+        console.stage("writing the report")
+        groups = writer.grouped(done.runs)
+        for group in groups.values():
+            measured(group[0])
         with written(options.report), Progress("report", len(groups), "pages") as progress:
-            page = writer.write(groups, sweeps, studies, progress, failures)
+            page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
+    print()
     for name, file in writer.files.items():
-        print(f"\n{name}: {from_here(file)}", end="")
-    print(f"\nreport: {from_here(options.report / pages.INDEX)}")
+        print(f"{name}: {from_here(file)}")
+    index = options.report / pages.INDEX
+    print(f"report: {from_here(index)}")
     if options.open:
         show(page)
-    if failures:
-        raise together([UserError(failure.text) for failure in failures])
-    failed = (x.scenario.name for x in (*done, *sweeps, *studies) if not x.passed)
-    if not chosen:  # files of users are not compared with anything
-        return 0
-    return console.summary(failed, chosen, "scenario")
+    return done.ended({"report": index.absolute()})
+
+
+@dataclass
+class _Done:
+    """What has been run."""
+
+    chosen: Sequence[Scenario]  # of the project
+    own: Sequence[Scenario]  # of users, which are not compared with anything
+    runs: list[Run] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    sweeps: list[Sweep] = field(default_factory=list)
+    studies: list[Convergence] = field(default_factory=list)
+
+    def ended(self, more: Mapping[str, object]) -> Ended:
+        """The end of the command, `more` in its document."""
+        wrong = [x.scenario.name for x in (*self.runs, *self.sweeps, *self.studies) if not x.passed]
+        wrong += [failure.scenario.name for failure in self.failures]
+        everything = [*self.chosen, *self.own]
+        verdict = console.verdict_line(wrong, everything, "scenario")
+        if not wrong and self.own:
+            verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
+            verdict = f"{verdict} of {len(self.own)}" if self.chosen else verdict
+        document = {"passed": not wrong, **results.document(self), **more}
+        if self.failures:
+            error = together([UserError(failure.text) for failure in self.failures])
+            return Ended(2, verdict, document, error)
+        return Ended(1 if wrong else 0, verdict, document)
+
+
+def _check(
+    options: argparse.Namespace,
+    chosen: Sequence[Scenario],
+    own: Sequence[Scenario],
+    fmus: Mapping[str, Fmu],
+) -> None:
+    """Refuse a tolerance for all scenarios that one of them cannot be run at."""
+    if options.tolerance is None:
+        return
+    for scenario in (*chosen, *own):
+        try:
+            model = fmus[scenario.model].model
+            model.check_tolerance(options.tolerance, scenario.parameters)
+        except WrongValueError as error:
+            raise UserError(f"--tolerance: {scenario.name}: {error}") from None
 
 
 def _open(
@@ -114,14 +206,41 @@ def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
     own: dict[str, Path] = {}
     for name in dict.fromkeys(names):
         path = Path(name)
-        if path.suffix.lower() != ".toml":
-            files[project.scenario_file(name)] = None
+        if path.suffix.lower() != SUFFIX:
+            files[_named(name)] = None
         elif project.is_ours(path):
             files[path.resolve()] = None
+        elif not os.path.lexists(path):
+            guess = did_you_mean(name, map(str, _siblings(path)))
+            raise UserError(f"{path}: no such file{guess}")
         elif own.setdefault(path.stem, path) != path:
             other = own[path.stem]
             raise UserError(f"{path}: its page would have the name of that of {other}")
     return list(files), list(own.values())
+
+
+def _named(name: str) -> Path:
+    """File of a scenario of the project; a UserError guesses what else may be meant."""
+    known = project.scenario_files()
+    if name in known:
+        return known[name]
+    if name in (*COMMANDS, "help"):
+        raise UserError(f"no scenario {name!r}: the command {name} goes first, {PROGRAM} {name}")
+    own = {file.name: file for file in _siblings(Path(name))}
+    file = own.get(f"{Path(name).name}{SUFFIX}")
+    if file is not None:
+        raise UserError(f"no scenario {name!r}, did you mean the file {str(file)!r}?")
+    guess = did_you_mean(name, [*known, *COMMANDS, *map(str, own.values())])
+    raise UserError(
+        f"no scenario or command {name!r}{guess} ({PROGRAM} --list names all scenarios)"
+    )
+
+
+def _siblings(path: Path) -> list[Path]:
+    """Files of the folder of a path that may be scenarios."""
+    with suppress(OSError, ValueError):  # not there, or a name that no folder has
+        return [x for x in sorted(path.parent.iterdir()) if x.suffix.lower() == SUFFIX]
+    return []
 
 
 def _built(
@@ -147,11 +266,15 @@ def _runs(
     """
     if not chosen:
         return []
-    names = (scenario.name for scenario in chosen)
-    table = console.RunTable(names, TWIN if with_twins else None)
+    console.stage(f"simulating {counted(chosen, 'scenario')}")
+    own = {s: [t or s.tolerance for t in dict.fromkeys(tolerances)] for s in chosen}
+    table = RunTable(
+        [s.name for s in chosen], [first for first, *_ in own.values()], len(tolerances) > 1
+    )
     done = []
     for scenario in chosen:
-        for tolerance in dict.fromkeys(t or scenario.tolerance for t in tolerances):
+        ended, why = [], []
+        for tolerance in dict.fromkeys(own[scenario]):
             label = f"{scenario.name} at {tolerance:g}"
             ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
             try:
@@ -159,15 +282,20 @@ def _runs(
                     run = runs.compared(scenario, tolerance, progress)
             except UserError as error:
                 failures.append(runs.failure(scenario, tolerance, error))
-                table.failed(scenario.name, tolerance)
+                why.append(f"tolerance {short(tolerance)}: did not run to its end")
                 continue
-            table.row(run)
             console.messages(f"{label}: the FMU says", run.result.messages)
-            done.append(run)
+            ended.append(run)
+        table.row(scenario.name, own[scenario][0], ended, why)
+        done += ended
+    if with_twins:
+        differ = {run.scenario.name for run in done if run.twin and run.twin.differing}
+        same = {run.scenario.name for run in done} - differ
+        print(f"\nsame bits in FMI {FIRST} and {TWIN}: {counted(same, 'scenario')}")
     return done
 
 
-def _ended(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
+def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
     """Those of `chosen` that did not fail."""
     failed = {failure.scenario.path for failure in failures}
     return [scenario for scenario in chosen if scenario.path not in failed]
@@ -182,20 +310,20 @@ def _estimated(
     """
     if not own:
         return []
-    table = console.RunTable(scenario.name for scenario in own)
+    console.stage(f"simulating {counted(own, 'scenario')} of your own")
+    used = [tolerance or scenario.tolerance for scenario in own]
+    table = RunTable([scenario.name for scenario in own], used)
     done = []
-    for scenario in own:
-        used = tolerance or scenario.tolerance
+    for scenario, at in zip(own, used, strict=True):
+        why = []
         try:
             with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
-                run = runs.estimated(scenario, used, progress)
+                done.append(runs.estimated(scenario, at, progress))
+            console.messages(f"{scenario.name}: the FMU says", done[-1].result.messages)
         except UserError as error:
-            failures.append(runs.failure(scenario, used, error))
-            table.failed(scenario.name, used)
-            continue
-        table.row(run)
-        console.messages(f"{scenario.name}: the FMU says", run.result.messages)
-        done.append(run)
+            failures.append(runs.failure(scenario, at, error))
+            why = ["did not run to its end"]
+        table.row(scenario.name, at, [] if why else done[-1:], why)
     return done
 
 
@@ -210,22 +338,29 @@ def _quick(done: Sequence[Run]) -> list[Scenario]:
         if seconds <= QUICK:
             quick.append(scenario)
         else:
-            print(f"{scenario.name}: no sweep, it would take {seconds:.0f} s (run all: with sweep)")
+            text = f"{scenario.name}: no sweep, it would take {seconds:.0f} s (run all: with sweep)"
+            console.remark(text)
     return quick
 
 
-def _sweeps(runs: Runs, chosen: Sequence[Scenario]) -> list[Sweep]:
-    """Run `chosen` over the tolerances."""
+def _sweeps(runs: Runs, chosen: Sequence[Scenario], in_full: bool) -> list[Sweep]:
+    """Run `chosen` over the tolerances; shows all of them `in_full`, else those that are wrong."""
     if not chosen:
         return []
-    table = console.SweepTable((scenario.name for scenario in chosen), TOLERANCES)
+    console.stage(f"simulating at {counted(TOLERANCES, 'tolerance')}")
     sweeps = []
     for scenario in chosen:
         ahead = runs.steps_ahead(scenario, TOLERANCES)
         with Progress(f"{scenario.name}, all tolerances", ahead) as progress:
             sweeps.append(sweep(runs, scenario, progress))
-        table.row(sweeps[-1])
-    table.violations(sweeps)
+    shown = [x for x in sweeps if in_full or not x.passed]
+    if shown:
+        table = SweepTable((x.scenario.name for x in shown), TOLERANCES)
+        for one in shown:
+            table.row(one)
+    if not in_full:
+        good = counted([x for x in sweeps if x.passed], "scenario")
+        print(f"errors follow the tolerance, {short(TOLERANCES[0])} to {short(TIGHTEST)}: {good}")
     return sweeps
 
 
@@ -243,13 +378,13 @@ def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Conv
         problem = convergence.load(file, fmu.model)
         name = problem.scenario.name
         if not fmu.model.interpolates_inputs:
-            print(f"\n{name}: left out, the FMU does not interpolate inputs")
+            console.remark(f"{name}: left out, the FMU does not interpolate inputs")
             continue
         both = (fmu, twins.get(folder))
         updated = next((x for x in both if x is not None and x.model.asks_for_inputs), None)
         ahead = convergence.steps_ahead(problem, updated is not None)
         with Progress(f"{name}, all steps", ahead) as progress:
             study = convergence.study(fmu, problem, progress, updated)
-        console.convergence(study)
+        convergence_table(study)
         studies.append(study)
     return studies

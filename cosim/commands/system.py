@@ -7,16 +7,26 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim import console, project
+from cosim.command_line import PROGRAM
+from cosim.commands import Ended
 from cosim.errors import UserError, did_you_mean, together
+from cosim.options import add_open, add_report, add_system
 from cosim.output_files import check_writable, from_here, written
 from cosim.report import overview
 from cosim.report.browser import show
 from cosim.report.overview import Entry
+from cosim.result_tables import VariantTable
 from cosim.system import comparison, report, ssp, study
 from cosim.system.comparison import Outcome, Reference
 from cosim.system.report import Section
 from cosim.system.ssp import Ssp
 from cosim.system.study import Study
+from cosim.texts import counted
+
+DESCRIPTION = (
+    "Runs the variants of the systems in Ecos and compares every variable with the reference. Exit "
+    "code: 0 all within the bound, 1 not, 2 wrong use, a wrong system or a component that fails."
+)
 
 
 @dataclass(frozen=True)
@@ -40,7 +50,27 @@ class _Plan:
     references: Mapping[str, Reference]  # by variant
 
 
-def run(options: argparse.Namespace) -> int:
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which variants, and where the report goes."""
+    add_system(parser)
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="variants, or systems with all theirs (default: all)",
+    )
+    add_report(parser)
+    add_open(parser)
+    parser.add_argument(
+        "--pictures",
+        type=Path,
+        metavar="DIR",
+        help="draw each variant into a picture in this folder, too",
+    )
+    parser.add_argument("--list", action="store_true", help="name the systems and their variants")
+
+
+def run(options: argparse.Namespace) -> Ended:
     """Run the variants that the options name, or all; or name them."""
     with ExitStack() as stack:
         try:
@@ -55,15 +85,20 @@ def run(options: argparse.Namespace) -> int:
             raise
         chosen = _choose(systems, options.names)
         if options.list:
-            for system, names in chosen:
-                print(system.folder.name, *(f"  {name}" for name in names), sep="\n")
-            return 0
+            return _listed(chosen)
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
                 report.remove(options.report, system.folder.name, names)
         plans = [_planned(system, names) for system, names in chosen]
         return _run(plans, options)
+
+
+def _listed(chosen: Sequence[tuple[_System, Sequence[str]]]) -> Ended:
+    """The names of systems and variants."""
+    found = {system.folder.name: names for system, names in chosen}
+    lines = [line for name, names in found.items() for line in (name, *(f"  {n}" for n in names))]
+    return Ended(0, "\n".join(lines), {"systems": found})
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
@@ -103,9 +138,8 @@ def _choose(systems: Sequence[_System], names: Sequence[str]) -> list[tuple[_Sys
             owners[variant] = f"a variant of {system.folder.name}"
     for name in names:
         if name not in owners:
-            meant = [s for s in systems if s.folder.name in names] or systems
-            known = "; ".join(f"{s.folder.name}: {', '.join(s.variants)}" for s in meant)
-            raise UserError(f"no variant {name!r}{did_you_mean(name, owners)} (there are: {known})")
+            guess = did_you_mean(name, owners)
+            raise UserError(f"no variant {name!r}{guess} ({PROGRAM} system --list names them)")
     chosen = []
     for system in systems:
         own = [name for name in dict.fromkeys(names) if name in system.variants]
@@ -128,24 +162,29 @@ def _planned(system: _System, names: Sequence[str]) -> _Plan:
     )
 
 
-def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> int:
+def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> Ended:
     """Run the plans; a row appears as a variant ends, and its files are written then."""
     outcomes: list[Outcome] = []
-    failures: list[UserError] = []
+    failures: dict[str, UserError] = {}
     entries: list[Entry] = []
+    rows: list[dict[str, object]] = []
     for plan in plans:
         section = Section(plan.system.folder, plan.system.ssp, plan.study)
-        table = console.VariantTable(plan.references, plan.study.MEASURES)
+        count = counted(plan.references, "variant")
+        console.stage(f"simulating {count} of {plan.system.folder.name} in Ecos")
+        table = VariantTable(plan.references, plan.study.MEASURES)
         for name, reference in plan.references.items():
             try:
                 outcome = comparison.simulate(section.ssp, name, reference)
             except UserError as error:
-                failures.append(error)
+                failures[name] = error
                 table.failed(name)
+                rows.append({"system": plan.system.folder.name, "name": name, "error": str(error)})
                 with written(options.report):
                     entries.append(report.write_failed(options.report, section, name, error))
                 continue
             table.row(outcome)
+            rows.append(_row(plan, outcome))
             console.messages(name, outcome.run.messages)
             with written(options.report):
                 entries.append(report.write_variant(options.report, section, outcome))
@@ -159,10 +198,29 @@ def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> int:
     print(f"report: {from_here(index)}")
     if options.open:
         show(index)
+    failed = [*failures, *(outcome.variant for outcome in outcomes if not outcome.passed)]
+    verdict = console.verdict_line(failed, rows, "variant")
+    document = {"passed": not failed, "variants": rows, "report": index.absolute()}
     if failures:
-        raise together(failures)
-    failed = (outcome.variant for outcome in outcomes if not outcome.passed)
-    return console.summary(failed, outcomes, "variant")
+        return Ended(2, verdict, document, together(list(failures.values())))
+    return Ended(1 if failed else 0, verdict, document)
+
+
+def _row(plan: _Plan, outcome: Outcome) -> dict[str, object]:
+    """A variant for programs."""
+    return {
+        "system": plan.system.folder.name,
+        "name": outcome.variant,
+        "steps": outcome.steps,
+        "error": outcome.error,
+        "worst": outcome.worst,
+        "bound": comparison.BOUND,
+        "measures": {
+            m.name: {"value": m.value(outcome), "unit": m.unit} for m in plan.study.MEASURES
+        },
+        "seconds": outcome.run.wall_time,
+        "passed": outcome.passed,
+    }
 
 
 def _draw(folder: Path, section: Section, outcome: Outcome) -> None:

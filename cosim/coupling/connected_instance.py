@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.errors import UserError
+from cosim.errors import UserError, WrongValueError
 from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
-from cosim.model import INITIAL, INPUTS, PARAMETERS, Value, Variable, WrongValueError
+from cosim.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ def write(report: Path) -> None:
 def _plotly() -> bytes:
     """The library from the installed package, compressed, in a script that unpacks it."""
     found = find_spec("plotly")
-    assert found is not None and found.origin is not None  # requirements.txt has it
+    assert found is not None and found.origin is not None  # requirements/run.in has it
     bundle = (Path(found.origin).parent / "package_data" / "plotly.min.js").read_bytes()
     version = re.search(rb"plotly\.js v(\S+)", bundle[:200])
     assert version is not None

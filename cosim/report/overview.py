@@ -43,6 +43,7 @@ class Entry:
     line_text: str  # what it shows
     line_of: str = ""  # the variable of the sparkline
     source: str = ""  # file of a user
+    line_scale: str = ""  # its smallest and largest value, and its span
 
 
 def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:

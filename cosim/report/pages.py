@@ -63,21 +63,9 @@ class RunPage:
     failures: Sequence[str] = ()
     csv: str = ""  # file name beside the page, if there is one
     csv_note: str = ""
-    warning: str = ""  # what plots and animation do not show
     diagram: tuple[str, str] | None = None  # file name beside the page, and what it shows
     again: str = ""  # the command that runs it again
     overview: bool = True  # whether there is one
-
-
-def thinned(shown: int, count: int) -> str:
-    """Warning beside plots and animation that do not show all of `count` communication points."""
-    if shown >= count:
-        return ""
-    return (
-        f"This page shows {shown} of the run's {count} communication points. What happens "
-        "between them is not seen: a fast oscillation may look like a slow one, a short peak may "
-        "be missing."
-    )
 
 
 def write_run(path: Path, page: RunPage) -> Path:

@@ -4,7 +4,7 @@
 
 The player of the report draws the frames in headless Chromium, so that the picture is what the page
 shows. The file is an animated PNG: a program that knows none shows its first frame. It needs what
-`./setup.sh --platforms` installs, and the packages of requirements-dev.txt.
+`./setup.sh --platforms` installs, and the packages of requirements/dev.txt.
 """
 
 import argparse

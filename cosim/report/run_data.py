@@ -3,13 +3,17 @@
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
+from cosim.reference import SMALLEST_SCALE
+
 MOST_ROWS = 800  # of a page, so that a report stays small
 FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
+ROUNDING = 1e-12  # of a variable's scale: what is smaller is rounding of its computation
+SEEN = 1e-6  # of a column's range: extremes that stand out by less are not seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +26,11 @@ class Curve:
     steps: bool = False  # each row ends an interval of this value
     limit: bool = False  # is not a result but what results stay below
 
+    def at(self, rows: np.ndarray) -> "Curve":
+        """The same at some of its rows."""
+        reference = None if self.reference is None else self.reference[rows]
+        return replace(self, values=self.values[rows], reference=reference)
+
 
 @dataclass(frozen=True, eq=False)
 class Plot:
@@ -33,7 +42,25 @@ class Plot:
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
     note: str = ""  # what its numbers stand for
-    floor: float | None = None  # smaller values, 0 among them, are drawn here
+
+    @property
+    def gaps(self) -> bool:
+        """Whether a value has no place on the axis."""
+        return self.log and any((curve.values == 0).any() for curve in self.curves)
+
+    @property
+    def columns(self) -> list[np.ndarray]:
+        """What is drawn, (rows,) each; logarithms on a logarithmic axis."""
+        drawn = [values for x in self.curves for values in (x.values, x.reference)]
+        found = [values for values in drawn if values is not None]
+        if not self.log:
+            return found
+        tiny = np.finfo(float).tiny
+        return [np.log10(np.maximum(values, tiny)) for values in found]
+
+    def at(self, rows: np.ndarray) -> "Plot":
+        """The same at some of its rows."""
+        return replace(self, curves=[curve.at(rows) for curve in self.curves])
 
     @property
     def text(self) -> str:
@@ -99,10 +126,53 @@ class RunData:
         return packer.packed(self.motion | columns | {"reference": ghost})
 
 
-def thinned(count: int, most: int = MOST_ROWS) -> np.ndarray:
-    """Rows of `count` to show: every k-th and the last, with the smallest k for about `most`."""
-    every = max(1, -(-(count - 1) // most))
-    return np.unique(np.append(np.arange(0, count, every), count - 1))
+def without_rounding(values: np.ndarray) -> np.ndarray:
+    """Values of a variable, with 0 for what is rounding beside its scale, 3e-17 say."""
+    scale = max(np.abs(values[np.isfinite(values)]).max(initial=0.0), SMALLEST_SCALE)
+    return np.where(np.abs(values) < ROUNDING * scale, 0.0, values)
+
+
+def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
+    """Rows to show of a run: at most `most`, unless its columns have more extremes.
+
+    Rows at equal distances, half of `most` at least, and those where a column is smallest and
+    largest in each of many equal intervals: as many intervals as `most` permits, at least one.
+
+    Parameters
+    ----------
+    columns : sequence of ndarray, shape (rows,)
+    most : int, optional
+    """
+    table = np.nan_to_num(np.column_stack(columns).astype(float), posinf=1e300, neginf=-1e300)
+    count = len(table)
+    if count <= most:
+        return np.arange(count)
+    every, widest = -(-count // most), -(-2 * count // most)
+    while True:
+        grid = np.arange(0, count, min(every, widest))
+        rows = np.union1d(grid, _extremes(table, every))
+        if len(rows) <= most or every >= count:
+            return rows
+        every *= 2
+
+
+def _extremes(table: np.ndarray, every: int) -> np.ndarray:
+    """The first of every k rows of a table (rows, columns), the last, the extremes in between."""
+    count = len(table)
+    bins = -(-count // every)
+    padded = np.pad(table, ((0, bins * every - count), (0, 0)), mode="edge")
+    padded = padded.reshape(bins, every, -1)
+    ends = np.append(np.arange(0, count, every), count - 1)
+    margin = SEEN * np.ptp(table, axis=0)
+    found = [ends]
+    for sign in (1, -1):
+        place = np.argmax(sign * padded, axis=1) + ends[:-1, None]  # (bins, columns)
+        place = np.minimum(place, count - 1)
+        value = np.take_along_axis(table, place, axis=0)
+        beside = np.maximum(sign * table[ends[:-1]], sign * table[ends[1:]])
+        found.append(place[sign * value > beside + margin])
+        found.append(np.argmax(sign * table, axis=0))  # of the whole run, however little it is
+    return np.unique(np.concatenate(found))
 
 
 def narrow(values: np.ndarray) -> np.ndarray:
@@ -115,7 +185,6 @@ def narrow(values: np.ndarray) -> np.ndarray:
 
 def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
     content: dict[str, Any] = {"title": plot.title, "unit": plot.unit, "log": plot.log}
-    content["floor"] = plot.floor
     content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
     content["curves"] = curves = []
     for curve in plot.curves:

@@ -7,21 +7,22 @@ from types import MappingProxyType
 import numpy as np
 
 from cosim import trajectory_csv
-from cosim.comparison import Failure, Run, tighter
+from cosim.comparison import Failure, Run, estimated_from
+from cosim.measured import comparisons
 from cosim.model import Model, Variable
 from cosim.report import motion, pages
+from cosim.report.measured_data import measured_tables, with_measured
 from cosim.report.overview import FAILED, PASSED, RAN, Entry
 from cosim.report.pages import RunPage, Table
-from cosim.report.run_data import Curve, Plot, RunData, thinned
+from cosim.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from cosim.report.signal_texts import describe
 from cosim.report.sparkline import path as sparkline
+from cosim.report.sparkline import scale_of
 from cosim.scenario import Scenario
-from cosim.signals import Constant, Signal, Sines, Switches
 from cosim.simulation import Result
-from cosim.texts import bits, milliseconds, number, ordinal, short, unit
+from cosim.texts import bits, milliseconds, number, ordinal, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
-MOST_POINTS = 8  # of a table that is an input, to be listed
-FLOOR = 1e-18  # errors below it, 0 among them, are drawn here; no double is that good
 
 
 def write(
@@ -49,8 +50,8 @@ def write(
     values = np.column_stack([column.astype(float) for column in columns.values()])
     digits = DIGITS if first.compared else None
     trajectory_csv.write_short(folder / csv, first.result.times, list(columns), values, digits)
-    rows = thinned(len(first.result.times))
-    plots = _plots(runs, columns, rows)
+    plots = _plots(runs, columns)
+    rows, plots = _thinned(plots)
     data = RunData(
         scenario.name,
         scenario.title,
@@ -67,12 +68,11 @@ def write(
         tables=_tables(runs),
         notes=_notes(runs),
         failures=[
-            *(text for run in runs if (text := _failure(run))),
+            *(sentence(run.problem) for run in runs if run.problem),
             *(describe_failure(failure) for failure in failures),
         ],
         csv=csv,
-        csv_note=_csv_note(first),
-        warning=pages.thinned(len(rows), len(scenario.times)),
+        csv_note=_csv_note(first, len(rows)),
         again=again,
     )
     pages.write_run(folder / f"{name}.html", page)
@@ -83,7 +83,7 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
     """Write the page of a scenario that did not run to its end: what there is of it."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
-    csv, data, line, text, plots = f"{name}.csv", None, "", "", []
+    csv, data, line, text, scale, plots = f"{name}.csv", None, "", "", "", []
     (folder / csv).unlink(missing_ok=True)  # of an earlier run
     facts = [
         ("model", f"{model.name} (FMI {model.fmi_version})"),
@@ -94,11 +94,11 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
         columns = recorded(scenario, model, result)
         values = np.column_stack([column.astype(float) for column in columns.values()])
         trajectory_csv.write_short(folder / csv, result.times, list(columns), values)
-        rows = thinned(len(result.times))
-        plots = _value_plots(scenario, model, columns, rows)
+        rows, plots = _thinned(_value_plots(scenario, model, result, columns))
         moving = motion.of_result(scenario, result, {}, rows)
         data = RunData(scenario.name, scenario.title, result.times[rows], plots, motion=moving)
         line, text = sparkline(data.x, plots[0].curves[0].values), plots[0].text
+        scale = scale_of(data.x, plots[0], data.axis.unit)
         facts.insert(2, ("results until", f"{number(result.times[-1])} s"))
     page = RunPage(
         title=scenario.title,
@@ -124,6 +124,7 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
         line=line,
         line_text=text,
         line_of=plots[0].curves[0].name if data else "",
+        line_scale=scale,
     )
 
 
@@ -158,23 +159,29 @@ def status(run: Run) -> str:
     return PASSED if run.compared else RAN
 
 
-def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray], rows: np.ndarray) -> list[Plot]:
+def _thinned(plots: Sequence[Plot]) -> tuple[np.ndarray, list[Plot]]:
+    """Rows that are shown, and the plots at these."""
+    rows = thinned([values for plot in plots for values in plot.columns])
+    return rows, [plot.at(rows) for plot in plots]
+
+
+def _plots(runs: Sequence[Run], columns: dict[str, np.ndarray]) -> list[Plot]:
     """States over their references, inputs, what the scenario asks for, and errors."""
     run, references = runs[0], {}
     if run.compared:
         references = {name: run.reference.column(name) for name in run.result.names}
-    values = _value_plots(run.scenario, run.fmu.model, columns, rows, references)
-    return [*values, _error_plot(runs, rows)]
+    values = _value_plots(run.scenario, run.fmu.model, run.result, columns, references)
+    return [*values, _error_plot(runs)]
 
 
 def _value_plots(
     scenario: Scenario,
     model: Model,
+    result: Result,
     columns: dict[str, np.ndarray],
-    rows: np.ndarray,
     references: Mapping[str, np.ndarray] = MappingProxyType({}),
 ) -> list[Plot]:
-    """States, inputs and what the scenario asks for, over the references that there are."""
+    """States, inputs and what the scenario asks for, over references, beside what was measured."""
     variables = model.variables
     states = [name for name in model.states if name in columns]
     panels = [(name,) for name in states or model.real_outputs]
@@ -189,12 +196,12 @@ def _value_plots(
         wanted = references.get(name)
         return Curve(
             name,
-            columns[name][rows].astype(float),
-            None if wanted is None else wanted[rows],
+            without_rounding(columns[name].astype(float)),
+            None if wanted is None else without_rounding(wanted),
             steps=name not in model.real_outputs,
         )
 
-    return [
+    plots = [
         Plot(
             ", ".join(names),
             unit(variables[names[0]].unit),
@@ -203,6 +210,7 @@ def _value_plots(
         )
         for names in panels
     ]
+    return with_measured(plots, list(comparisons(scenario, result)), model)
 
 
 def meanings(variables: Iterable[Variable]) -> str:
@@ -211,18 +219,18 @@ def meanings(variables: Iterable[Variable]) -> str:
     return ". ".join(texts) + "." if texts else ""
 
 
-def _error_plot(runs: Sequence[Run], rows: np.ndarray) -> Plot:
+def _error_plot(runs: Sequence[Run]) -> Plot:
     """Largest error of all outputs at each time; one curve a run."""
     curves, levels = [], []
     for run in runs:
         scales = np.array([run.reference.scale(name) for name in run.result.names])
         expected = np.column_stack([run.reference.column(name) for name in run.result.names])
-        errors = np.max(np.abs(run.result.values - expected) / scales, axis=1)[rows]
+        errors = np.max(np.abs(run.result.values - expected) / scales, axis=1)
         name = f"tolerance {short(run.result.tolerance)}"
         curves.append(Curve(name, errors))
         if run.compared:
             levels.append((f"bound {short(run.bound)}", run.bound))
-    return Plot("largest relative error of all outputs", "", curves, True, levels, floor=FLOOR)
+    return Plot("largest relative error of all outputs", "", curves, True, levels)
 
 
 def _facts(run: Run) -> list[tuple[str, str]]:
@@ -241,41 +249,37 @@ def _lengths(steps: Sequence[float]) -> str:
     return f"of {milliseconds(steps[0])}" if len(steps) == 1 else "of varying length"
 
 
-def _failure(run: Run) -> str:
-    """What is wrong with a run, or nothing."""
-    place = f"Tolerance {short(run.result.tolerance)}:"
-    if run.twin is not None and run.twin.differing:
-        return f"{place} other bits in FMI {run.twin.fmi_version}: {', '.join(run.twin.differing)}"
-    if not run.passed:
-        return f"{place} error {run.error:.1e} of {run.worst}, above its bound {short(run.bound)}"
-    return ""
-
-
 def _notes(runs: Sequence[Run]) -> list[str]:
     messages = (text for run in runs for text in run.result.messages)
     texts = [f"The FMU says: {text}" for text in dict.fromkeys(messages)]
+    texts += runs[0].scenario.questions
     if not runs[0].compared:
-        tight = short(tighter(runs[0].result.tolerance))
+        used = runs[0].result.tolerance, runs[0].scenario.smallest_tolerance
         texts.append(
             f"There is no reference for this scenario. Errors are estimated from a run of the same "
-            f"FMU at tolerance {tight}; they have no bound."
+            f"FMU at tolerance {short(estimated_from(*used))}; they have no bound."
         )
     return texts
 
 
-def _csv_note(run: Run) -> str:
-    every = run.scenario.reference_every
+def _csv_note(run: Run, shown: int) -> str:
+    every, count = run.scenario.reference_every, len(run.result.times)
     texts = []
     if every > 1:
         texts.append(f"The file has every {ordinal(every)} communication point.")
     if run.compared:
         texts.append(f"Its values have {DIGITS} digits.")
+    if shown < count:
+        texts.append(
+            f"This page shows {shown} of its {count} rows, with the extremes of all curves."
+        )
     return " ".join(texts)
 
 
 def _tables(runs: Sequence[Run]) -> list[Table]:
-    run = runs[0]
-    return [*_start_tables(run.scenario, run.fmu.model), _solver(runs), _errors(runs)]
+    scenario, model, result = runs[0].scenario, runs[0].fmu.model, runs[0].result
+    measured = measured_tables(list(comparisons(scenario, result)), model)
+    return [*measured, *_start_tables(scenario, model), _solver(runs), _errors(runs)]
 
 
 def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
@@ -353,32 +357,6 @@ def _errors(runs: Sequence[Run]) -> Table:
     return Table("Errors of all outputs", head, rows, note=note, folded=True)
 
 
-def describe(signal: Signal) -> str:
-    """An input as text."""
-    if isinstance(signal, Constant):
-        return f"constant {number(signal.value)}"
-    if isinstance(signal, Sines):
-        terms = [
-            f"{number(amplitude)} sin(2π {number(frequency)} Hz t"
-            + (f" {'+' if phase > 0 else '−'} {number(abs(phase))})" if phase else ")")
-            for amplitude, frequency, phase in signal.terms
-        ]
-        return " + ".join(([number(signal.offset)] if signal.offset else []) + terms)
-    if isinstance(signal, Switches):
-        if len(signal.points) == 1:
-            return str(signal.points[0][1]).lower()
-        return ", ".join(f"{str(on).lower()} from {number(time)} s" for time, on in signal.points)
-    if len(signal.points) <= MOST_POINTS:
-        points = (f"{number(value)} at {number(time)} s" for time, value in signal.points)
-        return ", ".join(points) + (", linear in between" if len(signal.points) > 1 else "")
-    low, high = (f(value for _, value in signal.points) for f in (min, max))
-    begin, end = signal.points[0][0], signal.points[-1][0]
-    return (
-        f"table of {len(signal.points)} points from {number(begin)} to {number(end)} s, values "
-        f"from {number(low)} to {number(high)}, linear in between"
-    )
-
-
 def _entry(name: str, page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
     first = runs[0]
     model, curve = first.fmu.model, plot.curves[0]
@@ -394,4 +372,5 @@ def _entry(name: str, page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
         line=sparkline(page.data.x, curve.values),
         line_text=plot.text,
         line_of=curve.name,
+        line_scale=scale_of(page.data.x, plot, page.data.axis.unit),
     )

@@ -2,8 +2,22 @@
 
 import numpy as np
 
+from cosim.report.run_data import Plot
+
 WIDTH, HEIGHT, MARGIN = 100.0, 24.0, 2.0  # of the view box
+SPACE = "\N{NO-BREAK SPACE}"  # before a unit
 COLUMNS = 60  # the curve's extremes in each are drawn
+
+
+def scale_of(x: np.ndarray, plot: Plot, unit: str) -> str:
+    """Between which values the first curve of a plot runs, over which span of `x` (`unit`)."""
+    values = plot.curves[0].values[np.isfinite(plot.curves[0].values)]
+    if not len(values):
+        return ""
+    low, high = (f"{value:.3g}" for value in (values.min(), values.max()))
+    between = low if low == high else f"{low} to {high}"
+    parts = (f"{between} {plot.unit}".strip(), f"{x[-1] - x[0]:.3g} {unit}")
+    return ", ".join(SPACE.join(part.rsplit(" ", 1)) for part in parts)
 
 
 def path(x: np.ndarray, y: np.ndarray) -> str:

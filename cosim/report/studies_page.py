@@ -11,7 +11,6 @@ from cosim.report import pages
 from cosim.report.overview import FAILED, PASSED, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Axis, Curve, Plot, RunData
-from cosim.report.scenario_page import FLOOR
 from cosim.report.sparkline import path as sparkline
 from cosim.texts import milliseconds, short, verdict
 from cosim.tolerance_sweep import Sweep
@@ -42,7 +41,6 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
             "",
             [*(Curve(sweep.scenario.name, np.asarray(sweep.errors)) for sweep in own), limit],
             log=True,
-            floor=FLOOR,
         )
         for model, own in models.items()
     ]
@@ -78,7 +76,7 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
         scenario.name,
         "",
         1e3 * steps,
-        [Plot("error of the final state", "", curves, log=True, floor=FLOOR)],
+        [Plot("error of the final state", "", curves, log=True)],
         Axis("communication step", "ms", log=True),
     )
     rows = [
@@ -111,7 +109,10 @@ def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
     name = page.data.name
     pages.write_run(folder / f"{name}.html", page)
     plot = page.data.plots[0]
-    line = sparkline(-np.log10(page.data.x), np.log10(np.maximum(plot.curves[0].values, FLOOR)))
+    x, errors = page.data.x, plot.curves[0].values
+    with np.errstate(divide="ignore"):
+        line = sparkline(-np.log10(x), np.log10(errors))
+    axis = f"{short(x[0])} to {short(x[-1])} {page.data.axis.unit}".strip()
     return Entry(
         name=name,
         title=f"{page.title}: {error:.1e} {detail}",
@@ -124,4 +125,5 @@ def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
         line=line,
         line_text=plot.text,
         line_of=plot.curves[0].name,
+        line_scale=f"{short(errors[0])} to {short(errors[-1])}, {page.data.axis.title} {axis}",
     )

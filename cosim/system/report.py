@@ -15,9 +15,10 @@ from cosim.output_files import whole
 from cosim.report import assets, motion, overview, pages
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
 from cosim.report.pages import RunPage, Table
-from cosim.report.run_data import Curve, Plot, RunData
+from cosim.report.run_data import Curve, Plot, RunData, thinned, without_rounding
 from cosim.report.scenario_page import meanings
 from cosim.report.sparkline import path as sparkline
+from cosim.report.sparkline import scale_of
 from cosim.system import ecos
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
@@ -25,7 +26,7 @@ from cosim.system.structure import System
 from cosim.system.study import Diagram, Study
 from cosim.texts import milliseconds, short, unit
 
-MOST_ROWS = 400  # of a file of values, which has many columns
+MOST_ROWS = 350  # of a file of values, which has many columns
 DIGITS = 12  # there; errors have a bound of 1e-7
 
 
@@ -65,7 +66,7 @@ def remove(report: Path, system: str, variants: Sequence[str]) -> None:
 def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
     run, folder = outcome.run, _folder(report, section)
-    data = _data(section, outcome)
+    rows, data = _data(section, outcome)
     page = RunPage(
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
@@ -80,7 +81,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
             "These numbers are of all steps, also of those that the file leaves out.",
         ],
         failures=[*_failures(outcome), *run.messages],
-        **_values(folder, outcome),
+        **_values(folder, outcome, rows),
         **_texts(section, outcome.variant),
     )
     pages.write_run(folder / f"{outcome.variant}.html", page)
@@ -96,6 +97,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         line=sparkline(data.x, data.plots[0].curves[0].values),
         line_text=data.plots[0].text,
         line_of=data.plots[0].curves[0].name,
+        line_scale=scale_of(data.x, data.plots[0], data.axis.unit),
     )
 
 
@@ -107,7 +109,8 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
     data, values, line, text = None, {}, "", ""
     if run is not None:
         outcome = Outcome(variant, len(run.times) - 1, run, {})
-        data, values = _data(section, outcome), _values(folder, outcome)
+        rows, data = _data(section, outcome)
+        values = _values(folder, outcome, rows)
         line, text = sparkline(data.x, data.plots[0].curves[0].values), data.plots[0].text
         facts.append(("results until", f"{run.times[-1]:g} s"))
     page = RunPage(
@@ -123,7 +126,8 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
     name = f"{variant}.html"
     first = data.plots[0].curves[0].name if data else ""
     known = section.title, name, FAILED, None, None, str(error), line, text, first
-    return Entry(variant, "", *known)
+    scale = scale_of(data.x, data.plots[0], data.axis.unit) if data else ""
+    return Entry(variant, "", *known, line_scale=scale)
 
 
 def _folder(report: Path, section: Section) -> Path:
@@ -147,43 +151,34 @@ def _texts(section: Section, variant: str) -> dict[str, Any]:
     }
 
 
-def _data(section: Section, outcome: Outcome) -> RunData:
-    """Plots and motion, at the rows that the file of values has."""
+def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
+    """Rows of the file of values, and plots and motion at these."""
     times = outcome.run.times
-    rows = kept_rows(len(times))
-    plots = [_plot(section.ssp, outcome, diagram, rows) for diagram in section.study.DIAGRAMS]
+    plots = [_plot(section.ssp, outcome, diagram) for diagram in section.study.DIAGRAMS]
+    rows = thinned([column for plot in plots for column in plot.columns], MOST_ROWS)
+    plots = [plot.at(rows) for plot in plots]
     moving = motion.of_outcome(section.name, section.ssp, outcome, rows)
-    return RunData(outcome.variant, "", times[rows], plots, motion=moving)
+    return rows, RunData(outcome.variant, "", times[rows], plots, motion=moving)
 
 
-def _values(folder: Path, outcome: Outcome) -> dict[str, str]:
+def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     """Write the file of values; what the page says of it."""
     run, csv = outcome.run, f"{outcome.variant}.csv"
-    rows = kept_rows(len(run.times))
     trajectory_csv.write_short(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS)
-    every = np.diff(run.times[rows])[:1].sum()
-    note = f"The file has a row every {milliseconds(every)}, with {DIGITS} digits."
-    return {"csv": csv, "csv_note": note, "warning": pages.thinned(len(rows), len(run.times))}
+    every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
+    note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
+    return {"csv": csv, "csv_note": note}
 
 
-def kept_rows(count: int) -> np.ndarray:
-    """Rows of `count` that the file of values has: every 1, 2, 5, 10, ...th and the last one."""
-    size, every = 1, 0
-    while not every:
-        every = next((x * size for x in (1, 2, 5) if (count - 1) / (x * size) <= MOST_ROWS), 0)
-        size *= 10
-    return np.unique(np.append(np.arange(0, count, every), count - 1))
-
-
-def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram, rows: np.ndarray) -> Plot:
+def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram) -> Plot:
     curves = []
     for name in diagram.curves:
         wanted = diagram.references.get(name)
         curves.append(
             Curve(
                 name,
-                outcome.column(name)[rows],
-                None if wanted is None else outcome.column(wanted)[rows],
+                without_rounding(outcome.column(name)),
+                None if wanted is None else without_rounding(outcome.column(wanted)),
                 steps=ssp.variable(name).type != "Real",
             )
         )

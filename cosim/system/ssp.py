@@ -1,13 +1,13 @@
 """SSP archives: unpacked, read and checked, once."""
 
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.archives import check_archive
-from cosim.errors import UserError, reason
+from cosim.archives import unpack
+from cosim.errors import UserError
+from cosim.fmu_file import Fmu
 from cosim.input_files import UnreadableError
 from cosim.interruption import temporary_folder
 from cosim.model import Model, Variable
@@ -29,6 +29,10 @@ class Ssp:
         """FMU of a component, as a file."""
         return self.folder / self.system.component(component).source
 
+    def unpacked_fmu(self, component: str) -> Fmu:
+        """FMU of a component, unpacked; messages name the SSP."""
+        return Fmu(self.fmu(component), shown=self.path / self.system.component(component).source)
+
     def variable(self, name: str) -> Variable:
         """What the FMU declares of ``component.variable``."""
         component, _, variable = name.partition(".")
@@ -46,19 +50,9 @@ def unpacked(path: Path) -> Iterator[Ssp]:
     """
     path = Path(path)
     with temporary_folder() as folder:
-        _extract(path, folder)
+        try:
+            unpack(path, folder, "SSP")
+        except UnreadableError as error:
+            raise UserError(f"{path}: {error}") from error
         system = SspReader(path, folder).system()
         yield Ssp(path, folder, system, ssp_checks.checked_models(path, folder, system))
-
-
-def _extract(path: Path, folder: Path) -> None:
-    try:
-        check_archive(path)
-        with zipfile.ZipFile(path) as archive:
-            archive.extractall(folder)
-    except UnreadableError as error:
-        raise UserError(f"{path}: {error}") from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be unpacked: {reason(error)}") from error
-    except Exception as error:  # zipfile and its decoders raise many more
-        raise UserError(f"{path}: not an SSP, or a damaged one: {error}") from error

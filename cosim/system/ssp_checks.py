@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NoReturn
 
-from fmpy import read_model_description
-
-from cosim.archives import check_archive
-from cosim.errors import UserError, did_you_mean, one_line
-from cosim.input_files import is_file
-from cosim.model import VERSIONS, Model, Variable, described, is_known
+from cosim.archives import LARGEST_SYSTEM
+from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.fmu_file import describe
+from cosim.input_files import UnreadableError, is_file
+from cosim.model import TOLERANCE, Model, Variable
 from cosim.system.structure import Component, Connector, Parameter, System
 
 # type of a variable -> types of a parameter's value that engines can give it
@@ -55,6 +54,7 @@ class _Checker:
         self.path = path
         self.system = system
         self.models: dict[str, Model] = {}
+        self.bytes = 0  # of the FMUs of all components, unpacked
 
     def fail(self, message: str) -> NoReturn:
         raise UserError(f"{self.path}: {message}")
@@ -69,6 +69,7 @@ class _Checker:
             for component, values in components.items():
                 for name, parameter in values.items():
                     self.parameter(variant, component, name, parameter)
+                self.tolerance(variant, component, values)
 
     def read(self, folder: Path, component: Component) -> Model:
         """What the component's FMU declares."""
@@ -77,13 +78,14 @@ class _Checker:
         if not is_file(path):
             self.fail(f"{where} is missing in the SSP")
         try:
-            check_archive(path)
-            description = read_model_description(path, validate=False)
-            if is_known(description):
-                return described(description)
-        except Exception as error:  # fmpy raises bare exceptions, zipfile its own
-            self.fail(f"{where} is no FMU: {one_line(error)}")
-        self.fail(f"{where} is no FMU of FMI {' or '.join(VERSIONS)} for co-simulation")
+            found = describe(path)
+        except UnreadableError as error:
+            self.fail(f"{where}: {error}")
+        self.bytes += sum(found.sizes.values())
+        if self.bytes > LARGEST_SYSTEM:
+            most = f"{LARGEST_SYSTEM / 1e6:.0f} MB"
+            self.fail(f"the FMUs up to component {component.name!r} have more than {most} inside")
+        return found.model
 
     def connector(self, component: Component, connector: Connector) -> None:
         where = f"component {component.name!r}: connector {connector.name!r}"
@@ -153,6 +155,16 @@ class _Checker:
             least, greatest = variable.least, variable.greatest
             if not least <= parameter.value <= greatest:
                 self.fail(f"{where} is {parameter.value!r}, expected {least:g} to {greatest:g}")
+
+    def tolerance(self, variant: str, component: str, values: Mapping[str, Parameter]) -> None:
+        """Refuse a tolerance that the component's method of integration cannot reach."""
+        given = {name: parameter.value for name, parameter in values.items()}
+        try:
+            if given.get(TOLERANCE):
+                self.models[component].check_tolerance(given[TOLERANCE], given)
+        except WrongValueError as error:
+            where = f"parameter set {variant!r}: component {component!r}: {TOLERANCE!r}"
+            self.fail(f"{where}: {error}")
 
 
 def _unit(unit: str | None) -> str:

@@ -14,8 +14,9 @@ from typing import NoReturn
 import fmpy
 from lxml import etree
 
+from cosim.archives import read_xml, wrong_name
 from cosim.errors import UserError
-from cosim.input_files import is_file
+from cosim.input_files import UnreadableError, is_file
 from cosim.model import Value
 from cosim.project import STRUCTURE
 from cosim.scenario import MAX_STEPS
@@ -62,13 +63,10 @@ class SspReader:
         path = self.folder / file
         if not is_file(path):
             self.fail(file, "is missing in the SSP")
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, remove_comments=True)
         try:
-            tree = etree.parse(path, parser)
-        except etree.XMLSyntaxError as error:
-            self.fail(file, f"not valid XML: {error.msg}")
-        if tree.docinfo.doctype:  # entities would stand in for what is checked here
-            self.fail(file, "has a DOCTYPE, leave it out")
+            tree = read_xml(path)
+        except UnreadableError as error:
+            self.fail(file, str(error))
         validator = _schema(schema)
         if not validator.validate(tree):
             first = validator.error_log[0]
@@ -117,9 +115,7 @@ class SspReader:
         if etree.QName(node).localname != "Component" or node.get("type", FMU_TYPE) != FMU_TYPE:
             self.fail(STRUCTURE, f"element {name!r} is not an FMU", node)
         source = node.get("source")
-        parts = PurePosixPath(source).parts
-        if set(source) & set(":\\") or not parts or parts[0] == "/" or ".." in parts:
-            self.fail(STRUCTURE, f"component {name!r}: {source!r} is no path in the SSP", node)
+        self.check_source(source, name, node)
         connectors: dict[str, Connector] = {}
         for child in node.iterfind("ssd:Connectors/ssd:Connector", NAMESPACES):
             variable = child.get("name")
@@ -132,6 +128,12 @@ class SspReader:
             kind, type_name = child.get("kind"), etree.QName(types[0]).localname
             connectors[variable] = Connector(variable, kind, type_name, types[0].get("unit"))
         return Component(name, str(PurePosixPath(source)), connectors)
+
+    def check_source(self, source: str, component: str, node: etree._Element) -> None:
+        wrong = wrong_name(source)
+        if wrong:
+            where = f"component {component!r}: {source!r} is no path in the SSP"
+            self.fail(STRUCTURE, f"{where}: {wrong}", node)
 
     def connection(self, node: etree._Element) -> Connection:
         ends = ("startElement", "startConnector", "endElement", "endConnector")
@@ -185,6 +187,7 @@ class SspReader:
             if source in sources:  # bound first and last: importers take one or the other
                 continue
             sources.add(source)
+            self.check_source(source, component, binding)
             root = self.parse(source, VALUES_SCHEMA)
             name = root.get("name")
             if not PLAIN_NAME.fullmatch(name):

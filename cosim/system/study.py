@@ -52,8 +52,11 @@ class Study(Protocol):
 class CouplingStudy(Study, Protocol):
     """The module of a system that has a study of what the coupling costs."""
 
-    def study_coupling(self, ssp: Path, report: Path) -> bool:
-        """Study what the coupling costs, print tables, write pictures; whether all is well."""
+    def study_coupling(self, ssp: Path, report: Path) -> dict[str, dict[str, object]]:
+        """Study what the coupling costs, print tables, write pictures.
+
+        Numbers of each part of the study by its name; whether all is well is ``passed``.
+        """
         ...
 
 

@@ -104,7 +104,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 }
 
 void fmi2FreeInstance(fmi2Component c) {
-    if (c != NULL) {
+    if (c != NULL && !component_is_logging(c, "fmi2FreeInstance")) {
         component_log(c, COMPONENT_OK, LOG_ALL, "fmi2FreeInstance");
         component_end(c);
         free(c);

@@ -59,13 +59,15 @@ def with_aliases(declaration: Declaration) -> dict[str, Variable]:
 
     Importers expect each state derivative among the initial unknowns, and no variable that has a
     start value, as states do. So the alias, der_STATE, is the derivative: it has the value
-    reference of the state, and no start value.
+    reference of the state, and no start value. The state is not marked as a derivative: importers
+    take each variable that is for the derivative of a further state.
     """
     variables: dict[str, Variable] = {}
     for name, variable in declaration.variables.items():
         variables[name] = variable
         if variable.derivative_of is None or variable.initial != "exact":
             continue
+        variables[name] = variable.model_copy(update={"derivative_of": None})
         alias = f"der_{variable.derivative_of}"
         if alias in declaration.variables:
             place = f"{declaration.path}: variable {alias}"

@@ -204,7 +204,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(
 
 void fmi3FreeInstance(fmi3Instance instance) {
     struct fmi3_component *component = instance;
-    if (component == NULL) {
+    if (component == NULL || component_is_logging(&component->base, "fmi3FreeInstance")) {
         return;
     }
     if (component->base.state == STATE_INTERMEDIATE_UPDATE) {

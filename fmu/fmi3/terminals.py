@@ -1,7 +1,4 @@
-"""Writes terminalsAndIcons.xml of FMI 3.0 (section 2.4.9 of the specification).
-
-FMUs of FMI 2.0 carry the same file.
-"""
+"""Writes terminalsAndIcons.xml of FMI 3.0 (section 2.4.9 of the specification)."""
 
 from __future__ import annotations
 

@@ -1,28 +1,59 @@
 'use strict';
 
-/** Curves of the energies over the last seconds. */
-class EnergyChart {
+/** Curves of variables of one unit over the last seconds, with their legend. */
+class Chart {
   static SPAN = 10; // s
   static INTERVAL = 0.02; // s between two points
   static TICK = 2; // s between two numbers at the axis of time
-  static ROW = 14; // px between two numbers at the axis of energy
+  static ROW = 14; // px between two numbers at the axis of values
   static FONT = '12px system-ui, sans-serif';
-  static CURVES = [['kinetic', '--curve1'], ['potential', '--curve2'], ['total', '--curve3']];
+  static DASHES = ['solid', 'solid', 'dashed'];
 
-  /** @param {HTMLCanvasElement} canvas @param {Fmu} plant */
-  constructor(canvas, plant) {
-    this.canvas = canvas;
-    this.energies = plant.reals(EnergyChart.CURVES.map(([name]) => `${name}_energy`));
-    /** @type {number[][]} time in s, energies in J */
+  /**
+   * @param {HTMLElement} element the figure is added to it
+   * @param {Fmu} plant
+   * @param {string} title
+   * @param {number} least range of the axis of values
+   * @param {string[]} names of the variables
+   */
+  constructor(element, plant, title, least, names) {
+    this.least = least;
+    this.names = names;
+    this.source = plant.reals(names);
+    /** @type {number[][]} time in s, values */
     this.rows = [];
+    const {unit} = plant.description.find(names[0]);
+    const figure = document.createElement('figure');
+    const caption = document.createElement('figcaption');
+    caption.textContent = `${title} (${unit})`;
+    if (names.length > 1) caption.append(this.#legend());
+    this.canvas = document.createElement('canvas');
+    this.canvas.setAttribute('role', 'img');
+    this.canvas.setAttribute('aria-label',
+      `${names.join(', ')} of the last ${Chart.SPAN} s: the numbers are in the tables`);
+    figure.append(caption, this.canvas);
+    element.append(figure);
   }
 
-  /** Add the energies at `time` (s), unless the last ones are as new; drop what lies after it. */
+  #legend() {
+    const list = document.createElement('ul');
+    this.names.forEach((name, i) => {
+      const item = document.createElement('li');
+      const swatch = document.createElement('span');
+      swatch.className = 'swatch';
+      swatch.style.borderTop = `3px ${Chart.DASHES[i]} var(--curve${i + 1})`;
+      item.append(swatch, name);
+      list.append(item);
+    });
+    return list;
+  }
+
+  /** Add the values at `time` (s), unless the last ones are as new; drop what lies after it. */
   add(time) {
     while (this.rows.length && this.rows.at(-1)[0] > time) this.rows.pop();
-    if (this.rows.length && time - this.rows.at(-1)[0] < EnergyChart.INTERVAL) return;
-    this.rows.push([time, ...this.energies.get()]);
-    const first = this.rows.findIndex(([then]) => then >= time - EnergyChart.SPAN);
+    if (this.rows.length && time - this.rows.at(-1)[0] < Chart.INTERVAL) return;
+    this.rows.push([time, ...this.source.get()]);
+    const first = this.rows.findIndex(([then]) => then >= time - Chart.SPAN);
     this.rows.splice(0, first);
   }
 
@@ -30,11 +61,11 @@ class EnergyChart {
     this.rows.length = 0;
   }
 
-  /** Range of the vertical axis, J. */
+  /** Range of the vertical axis, with 0 in it. */
   #range() {
-    const values = this.rows.flatMap(([, ...energies]) => energies);
-    const lowest = Math.min(0, ...values), highest = Math.max(1, ...values);
-    return [lowest, highest];
+    const values = this.rows.flatMap(([, ...row]) => row);
+    const lowest = Math.min(0, ...values), highest = Math.max(0, ...values);
+    return [lowest, Math.max(highest, lowest + this.least)];
   }
 
   draw() {
@@ -44,7 +75,7 @@ class EnergyChart {
     this.canvas.height = Math.round(height * ratio);
     const context = this.canvas.getContext('2d');
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.font = EnergyChart.FONT;
+    context.font = Chart.FONT;
     const style = getComputedStyle(document.documentElement);
     const axes = this.#axes(context, width, height);
     this.#drawAxes(context, style, axes);
@@ -53,30 +84,30 @@ class EnergyChart {
 
   /**
    * The box of the curves, beside and above the numbers at the axes, in px; the places in it of a
-   * time (s) and an energy (J); the numbers of both axes.
+   * time (s) and a value; the numbers of both axes.
    */
   #axes(context, width, height) {
     const [lowest, highest] = this.#range();
-    const end = Math.max(this.rows.at(-1)?.[0] ?? 0, EnergyChart.SPAN);
+    const {SPAN, TICK, ROW} = Chart;
+    const end = Math.max(this.rows.at(-1)?.[0] ?? 0, SPAN);
     const top = 12, bottom = height - 24;
-    const y = energy => top + (bottom - top) * (highest - energy) / (highest - lowest);
+    const y = value => top + (bottom - top) * (highest - value) / (highest - lowest);
     const room = Math.min(y(0) - top, bottom - y(0));
-    const energies = [lowest, ...(room >= EnergyChart.ROW ? [0] : []), highest].map(
-      energy => [energy, `${Number(energy.toPrecision(3))} J`]);
-    const left = 12 + Math.max(...energies.map(([, text]) => context.measureText(text).width));
+    const values = [lowest, ...(room >= ROW ? [0] : []), highest].map(
+      value => [value, String(Number(value.toPrecision(3))).replace('-', '\u2212')]);
+    const left = 12 + Math.max(...values.map(([, text]) => context.measureText(text).width));
     const right = width - 24;
-    const x = time => right - (right - left) * (end - time) / EnergyChart.SPAN;
-    const {TICK, SPAN} = EnergyChart;
+    const x = time => right - (right - left) * (end - time) / SPAN;
     const first = Math.ceil((end - SPAN) / TICK), last = Math.floor(end / TICK);
     const times = Array.from({length: last - first + 1}, (_, i) => (first + i) * TICK);
-    return {left, right, top, bottom, x, y, energies, times};
+    return {left, right, top, bottom, x, y, values, times};
   }
 
   #drawCurves(context, style, {x, y}) {
-    EnergyChart.CURVES.forEach(([, colour], i) => {
-      context.strokeStyle = style.getPropertyValue(colour);
+    this.names.forEach((_, i) => {
+      context.strokeStyle = style.getPropertyValue(`--curve${i + 1}`);
       context.lineWidth = 2;
-      context.setLineDash(i === 2 ? [6, 3] : []);
+      context.setLineDash(Chart.DASHES[i] === 'dashed' ? [6, 3] : []);
       context.beginPath();
       for (const row of this.rows) context.lineTo(x(row[0]), y(row[1 + i]));
       context.stroke();
@@ -84,7 +115,7 @@ class EnergyChart {
     context.setLineDash([]);
   }
 
-  #drawAxes(context, style, {left, right, top, bottom, x, y, energies, times}) {
+  #drawAxes(context, style, {left, right, top, bottom, x, y, values, times}) {
     context.fillStyle = style.getPropertyValue('--ink');
     context.strokeStyle = style.getPropertyValue('--grid');
     context.lineWidth = 1;
@@ -96,9 +127,9 @@ class EnergyChart {
     context.textAlign = 'right';
     context.textBaseline = 'middle';
     line([left, y(0)], [right, y(0)]);
-    for (const [energy, text] of energies) {
-      line([left, y(energy)], [right, y(energy)]);
-      context.fillText(text, left - 6, y(energy));
+    for (const [value, text] of values) {
+      line([left, y(value)], [right, y(value)]);
+      context.fillText(text, left - 6, y(value));
     }
     context.textAlign = 'center';
     context.textBaseline = 'top';

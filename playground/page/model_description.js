@@ -9,7 +9,7 @@
  * @property {string} causality
  * @property {string} variability
  * @property {string} initial '' where it has none
- * @property {string} unit '' where it has none
+ * @property {string} unit as it is written; '' where it has none
  * @property {string} description
  * @property {number|null} start
  * @property {number|null} min
@@ -52,13 +52,18 @@ class ModelDescription {
       causality: element.getAttribute('causality'),
       variability: element.getAttribute('variability'),
       initial: element.getAttribute('initial') ?? '',
-      unit: of.getAttribute('unit') ?? '',
+      unit: ModelDescription.unit(of.getAttribute('unit') ?? ''),
       description: element.getAttribute('description') ?? '',
       start: of.tagName === 'Boolean' ? Number(of.getAttribute('start') === 'true') : number('start'),
       min: number('min'),
       max: number('max'),
       items: types.get(of.getAttribute('declaredType')) ?? [],
     };
+  }
+
+  /** A unit of FMI as it is written: N·m for N.m, m/s² for m/s2. @param {string} text */
+  static unit(text) {
+    return text.replace(/(?<=[a-z])[23]/g, digit => (digit === '2' ? '²' : '³')).replaceAll('.', '·');
   }
 
   /** @returns {Variable} */

@@ -24,8 +24,8 @@ class Playground {
     this.#addControls();
     this.numbers = new Numbers(document.getElementById('numbers'), plant);
     this.stage = new Stage(document.getElementById('stage'), this.simulation);
-    this.chart = new EnergyChart(document.getElementById('energy'), plant);
-    this.#addLegend();
+    this.charts = Settings.charts.map(
+      chart => new Chart(document.getElementById('charts'), plant, ...chart));
     this.#addButtons();
     this.#addHistory();
     this.#addKeys();
@@ -101,18 +101,6 @@ class Playground {
     this.controls.refreshers.push(show);
   }
 
-  #addLegend() {
-    for (const [name, colour] of EnergyChart.CURVES) {
-      const item = document.createElement('li');
-      const swatch = document.createElement('span');
-      swatch.className = 'swatch';
-      swatch.style.color = `var(${colour})`;
-      if (name === 'total') swatch.style.borderTopStyle = 'dashed';
-      item.append(swatch, name);
-      document.getElementById('legend').append(item);
-    }
-  }
-
   #addButtons() {
     const on = (id, act) => document.getElementById(id).addEventListener('click', act);
     on('play', () => this.play(!this.isRunning));
@@ -156,7 +144,7 @@ class Playground {
   /** Start the chosen scene again at time 0. */
   reset() {
     this.#start();
-    this.chart.clear();
+    this.#clearCharts();
     this.#arrive();
   }
 
@@ -186,7 +174,7 @@ class Playground {
   }
 
   restore() {
-    if (this.saved.run !== this.simulation.run) this.chart.clear();
+    if (this.saved.run !== this.simulation.run) this.#clearCharts();
     this.simulation.restore(this.saved);
     this.#arrive();
   }
@@ -249,7 +237,7 @@ class Playground {
     this.simulation.step();
     if (this.simulation.steps % 10 === 0) {
       this.stage.follow();
-      this.chart.add(this.simulation.time);
+      for (const chart of this.charts) chart.add(this.simulation.time);
     }
   }
 
@@ -261,7 +249,11 @@ class Playground {
     this.say(error.message);
   }
 
-  /** Numbers, history and energies as they are now. */
+  #clearCharts() {
+    for (const chart of this.charts) chart.clear();
+  }
+
+  /** Numbers, history and charts as they are now. */
   show() {
     const {snapshots, time} = this.simulation;
     this.numbers.refresh();
@@ -269,7 +261,7 @@ class Playground {
     this.history.max = Math.max(time, (snapshots.at(-1)?.steps ?? 0) * Simulation.STEP);
     this.history.value = time;
     document.getElementById('time').textContent = `${time.toFixed(2)} s`;
-    this.chart.draw();
+    for (const chart of this.charts) chart.draw();
   }
 
   #measure() {

@@ -90,6 +90,12 @@ const Settings = {
       'solver_last_step', 'solver_last_order', 'effective_relative_tolerance']],
   ],
 
+  /** Plots: title, least range of the values, variables of the plant of one unit. */
+  charts: [
+    ['q1', 1, ['q1']], ['q2', 0.1, ['q2']], ['dq1', 1, ['dq1']], ['dq2', 0.1, ['dq2']],
+    ['Energy', 1, ['kinetic_energy', 'potential_energy', 'total_energy']],
+  ],
+
   /** What mode1 and mode2 mean. */
   modes: {'-1': 'slides backward', 0: 'held', 1: 'slides forward', 2: 'no friction'},
 };

@@ -122,6 +122,6 @@ def test_what_ecos_would_not_set_is_refused(
 def test_another_version_of_fmi_is_refused(tmp_path: Path) -> None:
     change = edited_fmu({"modelDescription.xml": replace('fmiVersion="3.0"', 'fmiVersion="3.1"')})
     path = edited(SSP3, tmp_path / "later.ssp", {"resources/RPController.fmu": change})
-    refused = r"component 'controller': .* is no FMU of FMI 2\.0 or 3\.0 for co-simulation"
+    refused = r"component 'controller': .* an FMU of FMI 2\.0 or 3\.0 .*, found FMI 3\.1"
     with pytest.raises(UserError, match=refused), ssp.unpacked(path):
         pass

@@ -126,7 +126,7 @@ BAD: dict[str, tuple[dict[str, Edit], list[str]]] = {
     ),
     "damaged FMU": (
         {"resources/RPController.fmu": lambda content: content[: len(content) // 2]},
-        ["component 'controller'", "is no FMU"],
+        ["component 'controller'", "not an FMU"],
     ),
     "FMU of another version": (
         {
@@ -302,7 +302,7 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
     path.unlink()
     assert "no such file" in refused(path)
     path.mkdir()
-    assert "cannot be unpacked" in refused(path)
+    assert "is a folder" in refused(path)
 
 
 def test_the_command_line_explains_in_one_line(

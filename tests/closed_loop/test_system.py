@@ -1,4 +1,4 @@
-"""The closed loop in Ecos and in libcosim is what the references say; failures leave nothing."""
+"""The closed loop in Ecos is what the references say; failures leave nothing."""
 
 import functools
 import html
@@ -17,7 +17,6 @@ from cosim.errors import UserError
 from cosim.report import overview
 from cosim.system import comparison, ecos, ssp
 from models.closed_loop.study import EXPERIMENT
-from tests.support.libcosim import libcosim, only_variant
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, replace
 
@@ -42,8 +41,6 @@ def is_built() -> None:
 
 def read_csv(path: Path) -> dict[str, np.ndarray]:
     """Columns of a CSV file by name."""
-    if not path.is_file():
-        pytest.skip(f"{path}: no such file yet")
     with path.open(encoding="utf-8") as file:
         names = [name.strip('"') for name in file.readline().strip().split(",")]
         return dict(zip(names, np.loadtxt(file, delimiter=",").T, strict=True))
@@ -136,40 +133,6 @@ def test_variants_differ_as_they_should() -> None:
     assert distance["limited_effort"][-1] < 1e-4
 
 
-# ---- libcosim ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_libcosim_is_at_the_reference_of_its_order(variant: str, tmp_path: Path) -> None:
-    """libcosim reads before it sets inputs: all variables are those of the sampled system."""
-    path = SSP
-    if variant != "nominal":
-        path = edited(SSP, tmp_path / "one.ssp", {STRUCTURE: only_variant(variant)})
-    expected = reference(variant, "sampled.csv")
-    rows = rows_of(expected)
-    names = [name for name in expected if name != "time"]
-    result = libcosim(path, names, 6000, tmp_path)
-    worst = {name: difference(result[name][rows[1:] - 1], expected[name][1:]) for name in names}
-    assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
-
-
-def test_libcosim_differs_from_ecos_by_the_time_of_reading_alone(tmp_path: Path) -> None:
-    """Efforts without integral action show up one step later, and nothing else differs."""
-    result, steps = run("nominal"), 2000
-    names = [name for name in result if name != "time"]
-    other = libcosim(SSP, names, steps, tmp_path)
-    late = {f"controller.{name}" for name in ("tau1", "f2")}
-    late |= {name for name in names if name.startswith("controller.") and "error" in name}
-    direct = {"arm.ddq1", "arm.ddq2", "arm.actuator_power"}
-    for name in names:
-        if name in late:
-            assert difference(other[name], result[name][:steps]) <= ROUNDING, name
-        elif name not in direct:
-            assert difference(other[name], result[name][1 : steps + 1]) <= ROUNDING, name
-    for name in direct | late:
-        assert difference(other[name], result[name][1 : steps + 1]) > 1e4 * ROUNDING, name
-
-
 # ---- the FMUs ------------------------------------------------------------------------------------
 
 
@@ -194,8 +157,9 @@ def test_the_command_checks_and_reports(tmp_path: Path, capsys: pytest.CaptureFi
     written, result = read_csv(tmp_path / "system/nominal.csv"), run("nominal")
     with ssp.unpacked(SSP) as opened:
         assert list(written) == [*result, *comparison.discrete(opened)]
+    rows = np.rint(written["time"] / result["time"][1]).astype(int)  # those that the page draws
     for name in result:
-        np.testing.assert_allclose(written[name], result[name][::20], rtol=1e-11)
+        np.testing.assert_allclose(written[name], result[name][rows], rtol=1e-11)
     diagram = ROOT / "models" / "closed_loop" / "system.svg"
     assert (tmp_path / "system/closed_loop.svg").read_bytes() == diagram.read_bytes()
     assert 'src="closed_loop.svg"' in (tmp_path / "system/nominal.html").read_text("utf-8")
@@ -208,7 +172,6 @@ def test_an_unknown_variant_is_refused(capsys: pytest.CaptureFixture[str]) -> No
     assert out == ""
     assert err.count("\n") == 1
     assert "no variant 'heavy_playload', did you mean 'heavy_payload'?" in err
-    assert all(name in err for name in VARIANTS)
 
 
 def test_a_run_beyond_the_bound_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -347,7 +310,7 @@ def test_an_interrupted_run_leaves_nothing(tmp_path: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        assert process.stdout.readline().startswith("variant")  # the runs begin
+        assert any(line.startswith("variant") for line in process.stdout)  # the runs begin
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=30)
     assert (process.returncode, err) == (130, "interrupted\n")
@@ -356,8 +319,6 @@ def test_an_interrupted_run_leaves_nothing(tmp_path: Path) -> None:
 
 def test_a_damaged_reference_is_refused(tmp_path: Path) -> None:
     good = ROOT / "models" / "closed_loop" / "references" / "nominal" / "ecos.csv"
-    if not good.is_file():
-        pytest.skip(f"{good}: no such file yet")
     lines = good.read_text(encoding="utf-8").splitlines(keepends=True)
     system = tmp_path / "closed_loop"
     path = system / "references" / "nominal" / "ecos.csv"

@@ -67,13 +67,13 @@ MISTAKES = {
     "no pair": ("table = [[1]]", "[inputs.brake] table[0]: expected [time, value], got [1]"),
     "sines": (
         "sines = []",
-        "[inputs.brake]: unknown key 'sines' (known: constant, table)",
+        "[inputs.brake]: unknown key 'sines' (known: constant, table, file, column, ",
     ),
     "both": (
         "constant = true\ntable = [[0, true]]",
-        "[inputs.brake]: expected exactly one of constant, table, got 2",
+        "[inputs.brake]: expected exactly one of constant, table, file, got 2",
     ),
-    "nothing": ("", "[inputs.brake]: expected exactly one of constant, table, got 0"),
+    "nothing": ("", "[inputs.brake]: expected exactly one of constant, table, file, got 0"),
 }
 
 

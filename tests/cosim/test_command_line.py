@@ -1,6 +1,7 @@
 """The command line: runs, mistakes of the user, interruptions."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -33,14 +34,11 @@ def test_run_passes(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
     code, out, err = call(capsys, "run", "--fmu", fmu, "--report", folder)
     assert code == 0 and err == ""
     rows = [line.split() for line in out.splitlines() if line.endswith("passed")]
-    assert [row[:3] for row in rows[:4]] == [
-        [LONG, "1e-08", "500"],
-        [LONG, "1e-11", "500"],
-        [SHORT, "1e-08", "1"],
-        [SHORT, "1e-11", "1"],
-    ]
-    assert [row[0] for row in rows[4:]] == [LONG, SHORT] and len(rows[4]) == 10
-    assert f"report: {folder / 'index.html'}" in out and "passed: 2 scenarios" in out
+    assert [[*row[:2], row[4]] for row in rows] == [[LONG, "500", "1e-8"], [SHORT, "1", "1e-8"]]
+    for row in rows:  # an error at each tolerance, in rows of one length
+        assert len(row) == len(rows[0]) and float(row[2]) < 1e-6 and float(row[5]) < 1e-8
+    assert "errors follow the tolerance, 1e-4 to 1e-11: 2 scenarios" in out
+    assert out.endswith(f"report: {folder / 'index.html'}\npassed: 2 scenarios\n")
     for page in (f"scenarios/{SHORT}", "studies/accuracy"):
         assert (folder / f"{page}.html").is_file()
 
@@ -52,7 +50,7 @@ def test_run_of_one_scenario_at_one_tolerance(
     arguments = ("run", SHORT, SHORT, "--tolerance", "1e-6", "--fmu", fmu, "--report", folder)
     code, out, _ = call(capsys, *arguments)
     assert code == 0 and "passed: 1 scenario\n" in out
-    assert out.count("1e-06") == 1 and "1e-11" not in out
+    assert out.count("1e-6") == 1 and "1e-11" not in out
     assert not (folder / "studies/accuracy.html").exists()
 
 
@@ -76,8 +74,8 @@ def test_run_with_a_worse_reference_fails(
     file.write_text("\n".join(lines) + "\n")
     code, out, err = call(capsys, "run", "--fmu", fmu, "--report", project / "report")
     assert code == 1 and err == ""
-    assert out.count("FAILED (ee_vy)") == 2
-    assert f"{LONG}: error" in out and out.endswith(f"FAILED: {LONG}\n")
+    assert len(re.findall("(?m)^  tolerance 1e-(8|11): error .* of ee_vy, above its", out)) == 2
+    assert "  FAILED: error" in out and out.endswith(f"\nfailed: 1 scenario: {LONG}\n")
 
 
 @pytest.mark.parametrize(
@@ -90,8 +88,7 @@ def test_run_with_a_worse_reference_fails(
         (["run", "--tolerance", "0"], "between 0 and 1"),
         (["run", "--tolerance", "tight"], "between 0 and 1"),
         (["run", "--fmux", "a"], "--fmux"),
-        (["simulate"], "simulate"),
-        ([], "COMMAND"),
+        (["simulate"], "no scenario or command 'simulate' (./run.sh --list names"),
     ],
 )
 def test_mistakes_of_the_user(

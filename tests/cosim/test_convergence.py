@@ -17,7 +17,7 @@ import pytest
 import sympy as sp
 
 from cosim import __main__ as cli
-from cosim import console, convergence
+from cosim import convergence, result_tables
 from cosim.convergence import (
     FACTORS,
     INTERMEDIATE_UPDATE,
@@ -237,7 +237,7 @@ def test_slopes_from_too_few_errors_fail(
     found = made_up(problem, *coefficients, floor=floor)
     assert not found.passed
     assert any(text.startswith(complaint) for text in found.violations)
-    console.convergence(found)
+    result_tables.convergence(found)
     assert "FAILED" in capsys.readouterr().out
 
 
@@ -389,7 +389,7 @@ def test_run_with_another_exact_state_fails(
     assert cli.main(["run", "--fmu", str(fmu), "--report", str(project / "report")]) == 1
     out = capsys.readouterr().out
     assert "smooth_inputs: 3rd derivatives: slope" in out
-    assert out.endswith("FAILED: smooth_inputs\n")
+    assert out.endswith("\nfailed: 1 scenario: smooth_inputs\n")
 
 
 def test_fmu_that_does_not_interpolate_is_left_out(

@@ -12,12 +12,11 @@ SOURCES = sorted(path for path in (ROOT / "cosim").rglob("*") if path.suffix in 
 # of every model with states
 SOLVER = {"time", "solver_steps", "solver_rhs_evaluations", "solver_restarts"}
 SOLVER |= {"solver_failed_steps", "effective_relative_tolerance"}
+SOLVER |= {"solver_method", "relative_tolerance"}
 # words of English, letters and an argument of Ecos that are names of variables too
 WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency", "a", "g"}
 WORDS |= {"start_time", "position"}
-WORDS |= {"start_time"}
 WORDS |= {"delay"}  # an argument of tqdm
-WORDS |= {"start_time", "position", "delay"}
 WORDS |= {"seed"}  # of random numbers
 
 

@@ -12,9 +12,9 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from cosim import convergence, project, simulation
-from cosim.errors import UserError
+from cosim.errors import UserError, WrongValueError
 from cosim.fmu_file import Fmu, read_model
-from cosim.model import Variable, WrongValueError
+from cosim.model import Variable
 from tests.support.cosim_project import (
     FMUS,
     SHORT,

@@ -74,7 +74,10 @@ MISTAKES = {
     "step is bool": (timed(0, 1, "true"), "[time] step: expected a number, got true"),
     "step 0 in a pattern": (timed(0, 1, [0.1, 0]), "[time] step: expected more than 0 s, got 0.0"),
     "no pattern": (timed(0, 1, []), "[time] step: expected a list of numbers, got []"),
-    "text in a pattern": (timed(0, 1, [0.1, "a"]), "[time] step: expected a number, got 'a'"),
+    "text in a pattern": (
+        timed(0, 1, [0.1, "a"]),
+        "expected a number, or a number and its unit (known: s, ms, cs, ks), got 'a'",
+    ),
     "step lost at start": (
         timed(1e6, 1e6 + 1, 1e-11),
         "[time] step: 1e-11 s is lost in rounding between start and stop",
@@ -115,7 +118,7 @@ MISTAKES = {
     ),
     "parameter is text": (
         f"{HEAD}{TIME}[parameters]\nmass = 'x'",
-        "[parameters] mass: expected a number, got 'x'",
+        "[parameters] mass: expected a number, or a number and its unit (known: kg), got 'x'",
     ),
     "parameter is bool": (f"{HEAD}{TIME}[parameters]\nmass = true", "mass: expected a number"),
     "parameter nan": (f"{HEAD}{TIME}[parameters]\nmass = nan", "mass: expected a finite number"),
@@ -150,11 +153,11 @@ MISTAKES = {
     ),
     "input of no kind": (
         f"{HEAD}{TIME}[inputs.force]\n",
-        "[inputs.force]: expected exactly one of constant, sines, table, got 0",
+        "[inputs.force]: expected exactly one of constant, sines, table, file, got 0",
     ),
     "input of two kinds": (
         f"{HEAD}{TIME}[inputs.force]\nconstant = 1\ntable = [[0, 1]]",
-        "[inputs.force]: expected exactly one of constant, sines, table, got 2",
+        "[inputs.force]: expected exactly one of constant, sines, table, file, got 2",
     ),
     "misspelt kind": (
         f"{HEAD}{TIME}[inputs.force]\nsine = []",

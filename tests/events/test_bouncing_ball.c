@@ -221,8 +221,41 @@ static void test_integrated_from_outside_nothing_happens_elsewhere(void) {
     }
 }
 
+static bool has_no_modes;
+
+static enum status update_or_fail(void *values, const struct event *event) {
+    return has_no_modes ? STATUS_NOT_FINITE : ball_description.model->events->update(values, event);
+}
+
+static void test_a_step_that_fails_at_once_leaves_the_time(void) {
+    struct model_events events = *ball_description.model->events;
+    struct model model = *ball_description.model;
+    struct model_description failing = ball_description;
+    const struct instance_experiment experiment = {.start_time = 5.0};
+    events.update = update_or_fail;
+    model.events = &events;
+    failing.model = &model;
+    create(&failing);
+    ASSERT_OK(instance_setup_experiment(toy, &experiment));
+    set(TOY_POSITION, 10.0);
+    has_no_modes = false;
+    initialize();
+    for (int i = 0; i < 2; i++) { // nothing has been integrated yet; then there is a history
+        const double time = 5.0 + i * 0.125;
+        has_no_modes = true;
+        set(TOY_INPUT, 1.0 + i);
+        TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_do_step(toy, time, 0.125));
+        TEST_ASSERT_EQUAL_DOUBLE(time, instance_time(toy));
+        TEST_ASSERT_EQUAL_DOUBLE(time, get(TOY_TIME));
+        has_no_modes = false;
+        run(time, 0.125, 1);
+    }
+    tearDown();
+}
+
 int main(void) {
     UNITY_BEGIN();
+    RUN_TEST(test_a_step_that_fails_at_once_leaves_the_time);
     RUN_TEST(test_times_of_impacts);
     RUN_TEST(test_it_comes_to_rest_on_the_floor);
     RUN_TEST(test_low_bounces_come_to_rest);

@@ -282,6 +282,32 @@ static void test_an_impossible_value_is_named(void) {
     }
 }
 
+/* Another time in one place only. */
+static void test_an_instance_has_one_time(void) {
+    const double later = 2.0;
+    const fmi2Component c = fmu_used(FMU_CVODE_ADAMS, &messages);
+    const struct fmu_bytes bytes = fmu_save_bytes(c);
+    size_t places = 0;
+    for (size_t at = 0; at + sizeof later <= bytes.size; at++) {
+        if (memcmp(bytes.data + at, &fmu_used_until, sizeof later) != 0) {
+            continue;
+        }
+        struct fmu_bytes forged = fmu_bytes_copy(&bytes, bytes.size);
+        fmi2FMUstate made = NULL;
+        memcpy(forged.data + at, &later, sizeof later);
+        set_checksum(&forged);
+        TEST_ASSERT_EQUAL_INT(fmi2Error,
+                              fmu.DeSerializeFMUstate(c, forged.data, forged.size, &made));
+        fmu_assert_logged(&messages, "contradicts");
+        fmu_bytes_free(&forged);
+        fmu_log_clear(&messages);
+        places++;
+    }
+    TEST_ASSERT_EQUAL_size_t(2, places); // the variable, the clock
+    struct fmu_bytes whole = bytes;
+    fmu_bytes_free(&whole);
+}
+
 /* Times of a history that contradict each other: by name too. */
 static void test_an_impossible_history_is_named(void) {
     const fmi2Component c = fmu_initialized_with(FMU_CVODE_ADAMS, &messages, 0.0);

@@ -1,5 +1,6 @@
 /* What the FMU logs and when. It writes nowhere else. FMI 2.0, sections 2.1.5 and 2.2.4. */
 #define _POSIX_C_SOURCE 200809L
+#include "fmu_calls.h"
 #include "fmu_harness.h"
 
 #include <math.h>
@@ -250,6 +251,70 @@ static long written_while_making_messages(fmi2Component c, FILE *file) {
     close(out);
     close(err);
     return lseek(fileno(file), 0, SEEK_END);
+}
+
+/* ---- Calls from inside ---------------------------------------------------------------------- */
+
+/* A logger that calls a function of the instance whose message it gets. */
+static struct {
+    fmi2Component component;
+    enum fmu_function function;
+    unsigned messages, refused, notes; /* notes: messages that say what was refused */
+} meddler;
+
+static void meddle(fmi2ComponentEnvironment environment, fmi2String instance_name,
+                   fmi2Status status, fmi2String category, fmi2String message, ...) {
+    (void)environment, (void)instance_name, (void)status, (void)category;
+    const bool is_note = strstr(message, "refused inside the logger") != NULL;
+    meddler.messages++;
+    meddler.notes += is_note && strstr(message, fmu_function_names[meddler.function]) != NULL;
+    if (meddler.component == NULL) {
+        return;
+    }
+    if (meddler.function == FMU_FreeInstance) { // nothing is freed
+        fmu.FreeInstance(meddler.component);
+        meddler.refused++;
+    } else {
+        meddler.refused +=
+            fmu_call(meddler.function, meddler.component, 0.0, 0.125) == fmi2Error ? 1 : 0;
+    }
+}
+
+/* Each function, from each message of a run, where every call sends one. */
+static void check_meddling(fmi2Type type) {
+    static struct fmu_run expected;
+    static struct fmu_run run;
+    fmi2CallbackFunctions callbacks = fmu_callbacks(&messages);
+    callbacks.logger = meddle;
+    (void)fmu_run_as(type, fmu_instantiate_as(type, &messages, false), 1, &expected);
+    for (int function = 0; function < FMU_FUNCTION_COUNT; function++) {
+        const char *name = fmu_function_names[function];
+        meddler.component = NULL;
+        const fmi2Component c = fmu.Instantiate("meddled with", type, RP_MANIPULATOR_GUID, "",
+                                                &callbacks, fmi2False, fmi2True);
+        TEST_ASSERT_NOT_NULL(c);
+        memset(&meddler, 0, sizeof meddler);
+        meddler.component = c;
+        meddler.function = (enum fmu_function)function;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu_run_as(type, c, 1, &run), name);
+        TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&expected, &run, sizeof run, name);
+        TEST_ASSERT_GREATER_THAN_UINT(FMU_RUN_STEPS, meddler.messages);
+        if (function != FMU_GetTypesPlatform && function != FMU_GetVersion &&
+            function != FMU_Instantiate) { // these need no instance
+            TEST_ASSERT_EQUAL_UINT_MESSAGE(meddler.messages, meddler.refused, name);
+            TEST_ASSERT_EQUAL_UINT_MESSAGE(meddler.messages, 2 * meddler.notes, name);
+        }
+        meddler.component = NULL;
+        TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.Reset(c), name);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(
+            fmi2OK, fmu.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0), name);
+        fmu.FreeInstance(c);
+    }
+}
+
+static void test_no_call_comes_through_from_the_logger(void) {
+    check_meddling(fmi2CoSimulation);
+    check_meddling(fmi2ModelExchange);
 }
 
 static void test_nothing_is_written_to_the_standard_streams(void) {

@@ -79,7 +79,35 @@ static void test_states_are_the_variables(void) {
     TEST_ASSERT_TRUE(before != dx[2]);
 }
 
-/* As ModelStructure lists them: the attribute derivative= of dq1, dq2, ddq1 and ddq2. */
+/* CasADi sets them by their value references (section 3.2.3, note 6), one or all. */
+static void test_setting_reals_is_setting_states(void) {
+    const fmi2Component c = fmu_me_initialized(&messages, 0.0);
+    for (unsigned chosen = 0; chosen < 1u << FMU_STATES; chosen++) {
+        fmi2ValueReference references[FMU_STATES];
+        double some[FMU_STATES];
+        double x[FMU_STATES];
+        double expected[FMU_STATES];
+        double dx[FMU_STATES];
+        size_t count = 0;
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetContinuousStates(c, x, FMU_STATES));
+        for (size_t i = 0; i < FMU_STATES; i++) {
+            if (chosen >> i & 1u) {
+                x[i] = 0.1 * (double)(chosen + i);
+                references[count] = states[i];
+                some[count] = x[i];
+                count++;
+            }
+        }
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(c, references, count, some));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetDerivatives(c, dx, FMU_STATES));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetContinuousStates(c, x, FMU_STATES));
+        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetDerivatives(c, expected, FMU_STATES));
+        TEST_ASSERT_EQUAL_MEMORY(expected, dx, sizeof dx);
+    }
+    TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu_try_set(c, RP_MANIPULATOR_q2, NAN));
+}
+
+/* As ModelStructure lists them: the attribute derivative= of der_q1, der_q2, ddq1 and ddq2. */
 static void test_the_description_declares_the_states(void) {
     TEST_ASSERT_NOT_NULL(
         strstr(fmu_description, "<ModelExchange modelIdentifier=\"RPManipulator\""));

@@ -20,8 +20,8 @@ static const struct {
     {RP_MANIPULATOR_f2, "IMVN", "f2"},
     {RP_MANIPULATOR_m1, "IMV", "m1"}, // tunable
     {RP_MANIPULATOR_g, "IMV", "g"},
-    {RP_MANIPULATOR_q1, "IM", "q1"}, // a start value
-    {RP_MANIPULATOR_dq2, "IM", "dq2"},
+    {RP_MANIPULATOR_q1, "IMN", "q1"}, // a start value, then a state
+    {RP_MANIPULATOR_dq2, "IMN", "dq2"},
     {RP_MANIPULATOR_relative_tolerance, "IM", "relative_tolerance"}, // fixed
     {RP_MANIPULATOR_ddq1, "", "ddq1"},
     {RP_MANIPULATOR_time, "", "time"},
@@ -29,7 +29,7 @@ static const struct {
     {RP_MANIPULATOR_D11, "", "D11"},
 };
 
-/* FMI 3.0 sets states by this function, too, in any mode. */
+/* FMI 3.0 sets states by this function in event mode, too. */
 static bool is_state(fmi2ValueReference reference) {
     return reference >= RP_MANIPULATOR_q1 && reference <= RP_MANIPULATOR_dq2;
 }

@@ -287,13 +287,91 @@ static void test_intermediate_update_mode(void) {
 
 /* ---- No instance ---------------------------------------------------------------------------- */
 
+static bool needs_no_instance(int function) {
+    return function == FMU3_GetVersion || (function >= FMU3_InstantiateModelExchange &&
+                                           function <= FMU3_InstantiateScheduledExecution);
+}
+
 static void test_no_instance_is_an_error_and_no_crash(void) {
     for (int function = 0; function < FMU3_FUNCTION_COUNT; function++) {
-        const bool needs_none = function == FMU3_GetVersion || function == FMU3_FreeInstance ||
-                                (function >= FMU3_InstantiateModelExchange &&
-                                 function <= FMU3_InstantiateScheduledExecution);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(needs_none ? fmi3OK : fmi3Error,
+        const bool is_fine = function == FMU3_FreeInstance || needs_no_instance(function);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(is_fine ? fmi3OK : fmi3Error,
                                       fmu3_call((enum fmu3_function)function, NULL, 0.0),
                                       fmu3_function_names[function]);
+    }
+}
+
+/* ---- From the logger ------------------------------------------------------------------------ */
+
+static struct {
+    enum fmu3_function function;
+    unsigned messages, refused, notes; /* notes: messages that say what was refused */
+} meddler;
+
+/* A logger that calls a function of the instance whose message it gets. */
+static void meddle(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
+                   fmi3String message) {
+    const fmi3Instance c = ((struct fmu3_importer *)environment)->instance;
+    (void)status, (void)category;
+    meddler.messages++;
+    meddler.notes += strstr(message, "refused inside the logger") != NULL;
+    if (c == NULL) {
+        return;
+    }
+    if (meddler.function == FMU3_FreeInstance) { // nothing is freed
+        fmu3.FreeInstance(c);
+        meddler.refused++;
+    } else {
+        meddler.refused += fmu3_call(meddler.function, c, 0.0) == fmi3Error ? 1 : 0;
+    }
+}
+
+static void get_while_updating(fmi3InstanceEnvironment environment, fmi3Float64 time,
+                               fmi3Boolean set, fmi3Boolean get, fmi3Boolean finished,
+                               fmi3Boolean can_return_early, fmi3Boolean *return_early,
+                               fmi3Float64 *early_time) {
+    const fmi3ValueReference q1 = RP_MANIPULATOR_q1;
+    double value = 0.0;
+    (void)time, (void)set, (void)finished, (void)can_return_early, (void)early_time;
+    *return_early = false;
+    if (get) {
+        (void)fmu3.GetFloat64(((struct fmu3_importer *)environment)->instance, &q1, 1, &value, 1);
+    }
+}
+
+static void run_with(fmi3LogMessageCallback logger, double x[FMU3_STATES]) {
+    const fmi3ValueReference q1 = RP_MANIPULATOR_q1;
+    static struct fmu3_importer here; // callbacks see it by its address
+    here = (struct fmu3_importer){0};
+    const fmi3Instance c = fmu3.InstantiateCoSimulation("meddled with", RP_MANIPULATOR_TOKEN_FMI3,
+                                                        NULL, false, logger != NULL, false, false,
+                                                        &q1, 1, &here, logger, get_while_updating);
+    TEST_ASSERT_NOT_NULL(c);
+    meddler.messages = meddler.refused = meddler.notes = 0;
+    here.instance = c;
+    fmu3_initialize(c, 0.0);
+    for (int i = 0; i < 3; i++) {
+        fmu3_step(c, 0.125 * i, 0.125);
+    }
+    fmu3_get_states(c, x);
+    here.instance = NULL;
+    fmu3.FreeInstance(c);
+}
+
+static void test_no_call_comes_through_from_the_logger(void) {
+    double expected[FMU3_STATES];
+    run_with(NULL, expected);
+    for (int function = 0; function < FMU3_FUNCTION_COUNT; function++) {
+        const char *name = fmu3_function_names[function];
+        double x[FMU3_STATES];
+        meddler.function = (enum fmu3_function)function;
+        run_with(meddle, x);
+        TEST_ASSERT_EQUAL_MEMORY_MESSAGE(expected, x, sizeof x, name);
+        TEST_ASSERT_GREATER_THAN_UINT(10, meddler.messages);
+        if (!needs_no_instance(function)) {
+            // the last message is that of FreeInstance
+            TEST_ASSERT_EQUAL_UINT_MESSAGE(meddler.messages - 1, meddler.refused, name);
+            TEST_ASSERT_EQUAL_UINT_MESSAGE(meddler.messages - 1, 2 * meddler.notes, name);
+        }
     }
 }

@@ -1,15 +1,19 @@
 """Derivatives with respect to all that an FMU of FMI 3.0 lists in its dependencies, in the modes in
 which the importer can change it: against differences. FMI 3.0, sections 2.2.11 and 2.4.8.
+
+In both versions: derivatives of all outputs at once, discrete ones too.
 """
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi3 import FMU3Model
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from tests.support.all_fmus import NAMES
@@ -87,8 +91,8 @@ def test_every_dependency_has_the_derivative_of_differences(
             for known in unknown.dependencies or []:
                 if known.type != "Float64" or unknown.variable.type != "Float64":
                     continue
-                if unknown.variable.variability == "discrete":
-                    continue  # has no derivatives
+                if unknown.variable.variability == "discrete" and mode == "initialization":
+                    continue  # a staircase: differences are not its derivatives
                 if known.name.startswith(("relative_tolerance", "max_step")):
                     continue  # of the solver
                 # every known is accepted, whether it can be changed here or not
@@ -115,4 +119,85 @@ def test_every_dependency_has_the_derivative_of_differences(
                 compared += 1
         # the parameters of the trajectory are fixed, and it has no inputs; all outputs of the
         # sensor are discrete
-        assert (compared > 0) == ((name, mode) != ("RPTrajectory", "event") and name != "RPSensor")
+        none = {("RPTrajectory", "event"), ("RPSensor", "initialization")}
+        assert (compared > 0) == ((name, mode) not in none)
+
+
+# ---- All at once, as linearizers ask -------------------------------------------------------------
+
+ALL_MODES = (*MODES, "step")
+
+
+KINDS = {"fmi2": (FMU2Model, FMU2Slave), "fmi3": (FMU3Model, FMU3Slave)}
+
+
+def in_mode(path: Path, version: str, mode: str) -> tuple[Any, ModelDescription]:
+    """A new instance in this mode."""
+    is_fmi2 = version == "fmi2"
+    description = fmpy.read_model_description(path)
+    model = KINDS[version][mode == "step"](
+        guid=description.guid,
+        modelIdentifier=description.modelExchange.modelIdentifier,
+        unzipDirectory=fmpy.extract(path),
+        instanceName="all at once",
+    )
+    model.instantiate()
+    if is_fmi2:
+        model.setupExperiment()
+    model.enterInitializationMode()
+    for variable in description.modelVariables:
+        is_start = variable.initial == "exact" or variable.causality == "input"
+        if variable.name in MOVED and is_start:
+            set_reals = model.setReal if is_fmi2 else model.setFloat64
+            set_reals([variable.valueReference], [MOVED[variable.name]])
+    if mode != "initialization":
+        model.exitInitializationMode()
+    if mode in ("event", "continuous-time"):
+        (model.newDiscreteStates if is_fmi2 else model.updateDiscreteStates)()
+    if mode == "continuous-time":
+        model.enterContinuousTimeMode()
+    if mode == "step":
+        model.doStep(0.0, 0.01)
+    return model, description
+
+
+@pytest.mark.parametrize("version", list(KINDS))
+@pytest.mark.parametrize("name", NAMES)
+def test_all_at_once_is_one_by_one(fmu: Path, name: str, version: str) -> None:
+    path = (fmu.parent if version == "fmi2" else fmu.parent / version) / f"{name}.fmu"
+    for mode in ALL_MODES:
+        model, description = in_mode(path, version, mode)
+        real = [v for v in description.modelVariables if v.type in ("Real", "Float64")]
+        states = {d.variable.derivative.name for d in description.derivatives}
+        rates = {d.variable.name for d in description.derivatives}
+        knowns = [v.valueReference for v in real if v.causality == "input" or v.name in states]
+        unknowns = [
+            v
+            for v in real
+            if v.causality == "output"
+            or v.name in rates
+            or (v.causality == "local" and v.variability == "discrete")
+        ]
+        references = [v.valueReference for v in unknowns]
+        one_by_one = np.array(
+            [
+                [model.getDirectionalDerivative([u], [k], [1.0])[0] for k in knowns]
+                for u in references
+            ]
+        ).reshape(len(references), len(knowns))
+        seed = np.random.default_rng(1).normal(size=len(knowns))
+        at_once = model.getDirectionalDerivative(references, knowns, list(seed))
+        scale = np.abs(one_by_one) @ np.abs(seed)
+        np.testing.assert_array_less(np.abs(at_once - one_by_one @ seed), 1e-13 * scale + 1e-300)
+        held = [v.variability == "discrete" for v in unknowns]
+        assert not np.any(one_by_one[held])
+        if version == "fmi3":
+            back = np.random.default_rng(2).normal(size=len(references))
+            adjoint = model.getAdjointDerivative(
+                references, knowns, list(back), nSensitivity=len(knowns)
+            )
+            scale = np.abs(back) @ np.abs(one_by_one)
+            np.testing.assert_array_less(
+                np.abs(adjoint - back @ one_by_one), 1e-13 * scale + 1e-300
+            )
+        model.freeInstance()

@@ -55,8 +55,12 @@ MISTAKES = {
     "not_an_identifier": ('name = "RPManipulator"', 'name = "RP arm"', ["C identifier"]),
     "not_toml": ("[model]", "[model", ["is not valid TOML"]),
     "no_such_include": ("time_variable.toml", "thyme.toml", ["thyme.toml", "cannot be read"]),
-    "wrong_base_unit": ('"N" = { kg = 1', '"N" = { pound = 1', ["unit N", "'pound'"]),
-    "include_number": ("include = [", "include = [1, ", ["include[0] = 1 "]),
+    "wrong_base_unit": (
+        "[model]",
+        '[units]\n"lbf" = { pound = 1 }\n[model]',
+        ["unit lbf", "'pound'"],
+    ),
+    "include_number": ("include = [", "include = [1, ", ["include[0]", "not a table"]),
     "dependencies_nested": ('dependencies = ["q1"]', 'dependencies = [["q1"]]', ["q1"]),
     "start_huge": ("start = 2.0", "start = 1" + "0" * 400, ["m1", "start = 1000", "number"]),
     "name_with_space": ("[variables.m1]", '[variables."m 1"]', ["m 1", "C identifier"]),
@@ -67,7 +71,7 @@ MISTAKES = {
     "step_zero": ("step = 0.001", "step = 0.0", ["[experiment]", "step"]),
     "section_missing": (EXPERIMENT, "", ["section [experiment] is missing"]),
     "variable_no_table": ("[variables.m1]", "[variables]\nx = 1\n[variables.m1]", ["x", "table"]),
-    "unit_no_table": ("[units]", "[units]\nx = 1", ["unit x", "not a table"]),
+    "unit_no_table": ("[model]", "[units]\nx = 1\n[model]", ["unit x", "not a table"]),
     "wrong_initial": (
         "start = 2.0",
         'start = 2.0\ninitial = "approx"',
@@ -91,7 +95,11 @@ MISTAKES = {
         ["variable t", "independent variable already"],
     ),
     "step_too_long": ("step = 0.001", "step = 3.0", ["[experiment]", "longer than the experiment"]),
-    "unit_otherwise": ("[units]", '[units]\n"s" = { s = 2 }', ["unit s", "declared otherwise"]),
+    "unit_otherwise": (
+        "[model]",
+        '[units]\n"s" = { s = 2 }\n[model]',
+        ["unit s", "declared otherwise"],
+    ),
     "includes_itself": (
         "time_variable.toml",
         "../../models/rp_manipulator/variables.toml",
@@ -105,6 +113,14 @@ MISTAKES = {
         ["variable n", "an int32 is not continuous"],
     ),
     "name_of_an_alias": ("[variables.D11]", "[variables.der_q1]", ["der_q1", "FMI 2.0", "dq1"]),
+    "include_unknown_key": ("include = [", 'include = [{ path = "a" }, ', ["include[0]", "'path'"]),
+    "change_of_nothing": ("[model]", "[changes.m1]\n[model]", ["change m1", "not included"]),
+    "change_unknown_key": ("[model]", "[changes.time]\nunit = 's'\n[model]", ["time", "'unit'"]),
+    "change_impossible": (
+        "[model]",
+        '[changes.time]\nmore_dependencies = ["q9"]\n[model]',
+        ["variable time", "'q9'"],
+    ),
     "declared_twice": ("[variables.m1]", "[variables.time]", ["time", "declared twice"]),
 }
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 from pathlib import Path
 
 import lxml.html
@@ -17,7 +18,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "models" / "rp_manipulator"
-README = MODEL / "README.md"
+PAGES = (MODEL / "README.md", MODEL / "derivation.md")
 SVG = "{http://www.w3.org/2000/svg}"
 
 sys.path.insert(0, str(ROOT / "fmu"))
@@ -25,9 +26,9 @@ from latex_to_mathml import FormulaError, mathml
 
 
 def run_document(
-    readme: Path, model_description: Path, output: Path
+    pages: Iterable[Path], model_description: Path, output: Path
 ) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, ROOT / "fmu" / "document.py", "--readme", readme]
+    command = [sys.executable, ROOT / "fmu" / "document.py", "--readme", *pages]
     command += ["--model-description", model_description, "--output", output]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
@@ -45,7 +46,7 @@ def model_description(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def folder(model_description: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with the page of the model."""
     output = tmp_path_factory.mktemp("page") / "documentation"
-    done = run_document(README, model_description, output)
+    done = run_document(PAGES, model_description, output)
     assert (done.returncode, done.stderr) == (0, "")
     return output
 
@@ -69,7 +70,7 @@ def table_after(page: lxml.html.HtmlElement, heading: str) -> list[dict[str, str
 def formulas() -> list[str]:
     markdown = MarkdownIt("commonmark").enable("table")
     markdown.use(dollarmath_plugin, allow_space=False, allow_labels=False)
-    blocks = markdown.parse(README.read_text(encoding="utf-8"))
+    blocks = markdown.parse("\n".join(page.read_text(encoding="utf-8") for page in PAGES))
     tokens = [token for block in blocks for token in [block, *(block.children or [])]]
     return [token.content for token in tokens if token.type.startswith("math_")]
 
@@ -122,23 +123,6 @@ def test_every_variable_is_listed_as_declared(
             assert row[key.capitalize()] == kind.get(key, "")
 
 
-def test_functions_of_the_readme_are_those_of_the_header(page: lxml.html.HtmlElement) -> None:
-    header = (MODEL / "rp_manipulator.h").read_text(encoding="utf-8")
-    code = re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
-    declared = re.findall(r"\b(rp_\w+)\(", code)
-    documented = [row["Function"] for row in table_after(page, "Functions")]
-    assert sorted(documented) == sorted(declared)
-
-
-def test_tests_that_the_readme_names_exist() -> None:
-    text = README.read_text(encoding="utf-8")
-    files = [ROOT / name for name in re.findall(r"`(tests/[\w/]+\.\w+)`", text)]
-    sources = "".join(file.read_text(encoding="utf-8") for file in files)
-    names = re.findall(r"`(test_\w+)`", text)
-    assert files
-    assert [name for name in names if f"void {name}(" not in sources] == []
-
-
 def test_parameter_table_is_variables_toml(page: lxml.html.HtmlElement) -> None:
     declared = tomllib.loads((MODEL / "variables.toml").read_text(encoding="utf-8"))["variables"]
     parameters = {n: v for n, v in declared.items() if v["causality"] == "parameter"}
@@ -153,6 +137,14 @@ def test_parameter_table_is_variables_toml(page: lxml.html.HtmlElement) -> None:
             assert float(row["Range"].removeprefix("≥ ")) == parameter["min"]
         else:
             assert row["Range"] == "any"
+
+
+def test_the_contents_lead_to_every_chapter(page: lxml.html.HtmlElement) -> None:
+    headings = page.xpath("//h2")
+    links = page.xpath("//nav//a")
+    assert [link.get("href") for link in links] == [f"#{heading.get('id')}" for heading in headings]
+    assert [x.text_content() for x in links] == [x.text_content() for x in headings]
+    assert len(links) > 10
 
 
 def test_images_lie_next_to_the_page(page: lxml.html.HtmlElement, folder: Path) -> None:
@@ -170,16 +162,16 @@ def test_page_needs_no_script_and_no_network(page: lxml.html.HtmlElement) -> Non
 def test_equal_input_gives_equal_bytes(
     folder: Path, model_description: Path, tmp_path: Path
 ) -> None:
-    run_document(README, model_description, tmp_path)
+    run_document(PAGES, model_description, tmp_path)
     assert (tmp_path / "index.html").read_bytes() == (folder / "index.html").read_bytes()
 
 
 def test_only_links_that_work_in_the_fmu_are_kept(model_description: Path, tmp_path: Path) -> None:
     readme = tmp_path / "README.md"
     readme.write_text("# A\n[code](../code.c) [site](https://fmi-standard.org) [up](#a)\n")
-    assert run_document(readme, model_description, tmp_path / "out").returncode == 0
+    assert run_document([readme], model_description, tmp_path / "out").returncode == 0
     page = lxml.html.fromstring((tmp_path / "out" / "index.html").read_bytes())
-    assert page.xpath("//a/@href") == ["https://fmi-standard.org", "#a"]
+    assert page.xpath("//main//a/@href") == ["https://fmi-standard.org", "#a"]
     assert page.xpath("//h1/@id") == ["a"]
     assert "code site up" in page.text_content()
 
@@ -214,7 +206,9 @@ def test_bad_input_is_named_in_one_line(
         (tmp_path / "README.md").write_text(readme, encoding="utf-8")
     if xml is not None:
         (tmp_path / "modelDescription.xml").write_text(xml, encoding="utf-8")
-    done = run_document(tmp_path / "README.md", tmp_path / "modelDescription.xml", tmp_path / "out")
+    done = run_document(
+        [tmp_path / "README.md"], tmp_path / "modelDescription.xml", tmp_path / "out"
+    )
     assert done.returncode == 2
     assert message in done.stderr
     assert done.stderr.startswith("document.py: ")

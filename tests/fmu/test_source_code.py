@@ -21,6 +21,7 @@ from tests.rp_manipulator.random_motions import random_case, simulate
 from tests.support.all_fmus import FOLDERS, NAMES
 from tests.support.cosim_project import load
 from tests.support.instances import Instance, LoadedFmu
+from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -179,7 +180,7 @@ WINDOWS = [build for build in BUILDS if "mingw" in build.compiler]
 def compiled(compiler: str, options: tuple[str, ...], files: list[Path], folder: Path) -> None:
     """Compile files to objects in the folder, in two processes."""
     if not shutil.which(compiler):
-        pytest.skip(f"{compiler} is not installed")
+        missing(f"{compiler} is not installed: ./setup.sh --platforms installs it")
     command = [compiler, *options, "-c"]
     with ThreadPoolExecutor(2) as executor:
         halves = [executor.submit(run, *command, *files[i::2], folder=folder) for i in (0, 1)]

@@ -1,4 +1,5 @@
-"""terminalsAndIcons.xml of the FMUs, and that equal members are what the closed loop connects."""
+"""terminalsAndIcons.xml of the FMUs of FMI 3.0, and that equal members are what the closed loop
+connects."""
 
 import shutil
 import struct
@@ -11,6 +12,7 @@ import fmpy
 import pytest
 from lxml import etree
 
+from tests.support.all_fmus import NAMES
 from tests.support.generator import change, copied, generate
 from tests.support.paths import ROOT
 
@@ -68,9 +70,8 @@ class Described(NamedTuple):
     causality: dict[str, str]  # of its variables
 
 
-def path_of(fmu: Path, version: str, component: str) -> Path:
-    folder = fmu.parent if version == "fmi2" else fmu.parent / version
-    return folder / f"{COMPONENTS[component]}.fmu"
+def path_of(fmu: Path, component: str) -> Path:
+    return fmu.parent / "fmi3" / f"{COMPONENTS[component]}.fmu"
 
 
 def by_path(parent: ET.Element, above: str = "") -> dict[str, ET.Element]:
@@ -95,23 +96,18 @@ def component(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-@pytest.fixture(params=["fmi2", "fmi3"])
-def version(request: pytest.FixtureRequest) -> str:
-    return request.param
-
-
 # ---- what is in the FMUs -------------------------------------------------------------------------
 
 
-def test_the_file_follows_the_schema(fmu: Path, version: str, component: str) -> None:
-    with zipfile.ZipFile(path_of(fmu, version, component)) as archive:
+def test_the_file_follows_the_schema(fmu: Path, component: str) -> None:
+    with zipfile.ZipFile(path_of(fmu, component)) as archive:
         document = etree.fromstring(archive.read(FILE))
     etree.XMLSchema(etree.parse(SCHEMA)).assertValid(document)
     assert document.get("fmiVersion") == "3.0"
 
 
-def test_the_icon_keeps_its_shape(fmu: Path, version: str, component: str) -> None:
-    with zipfile.ZipFile(path_of(fmu, version, component)) as archive:
+def test_the_icon_keeps_its_shape(fmu: Path, component: str) -> None:
+    with zipfile.ZipFile(path_of(fmu, component)) as archive:
         icon, document = archive.read(ICON), ET.fromstring(archive.read(FILE))
     assert icon.startswith(b"\x89PNG")
     width, height = struct.unpack(">II", icon[16:24])
@@ -124,8 +120,8 @@ def test_the_icon_keeps_its_shape(fmu: Path, version: str, component: str) -> No
         assert (x1, y1) == (-x2, -y2)
 
 
-def test_members_are_variables_of_the_right_kind(fmu: Path, version: str, component: str) -> None:
-    terminals, causality = described(path_of(fmu, version, component))
+def test_members_are_variables_of_the_right_kind(fmu: Path, component: str) -> None:
+    terminals, causality = described(path_of(fmu, component))
     found = {
         path: (
             terminal.get("matchingRule"),
@@ -144,10 +140,10 @@ def test_members_are_variables_of_the_right_kind(fmu: Path, version: str, compon
         assert len(terminal.findall("TerminalMemberVariable")) == len(found[path][1])
 
 
-def test_terminals_of_the_same_name_connect_the_closed_loop(fmu: Path, version: str) -> None:
+def test_terminals_of_the_same_name_connect_the_closed_loop(fmu: Path) -> None:
     ends: dict[tuple[str, str], list[tuple[str, str, str]]] = {}
     for component in COMPONENTS:
-        terminals, causality = described(path_of(fmu, version, component))
+        terminals, causality = described(path_of(fmu, component))
         for path, terminal in terminals.items():
             if terminal.get("matchingRule") == "plug":
                 for member in terminal.iterfind("TerminalMemberVariable"):
@@ -163,6 +159,15 @@ def test_terminals_of_the_same_name_connect_the_closed_loop(fmu: Path, version: 
     connections.add(PAYLOAD)
     in_ssp = ET.parse(SSD).getroot().iter(f"{SSD_NAMESPACE}Connection")
     assert connections == {tuple(c.get(key) for key in keys) for c in in_ssp}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_importers_of_fmi_2_need_not_refuse_it(fmu: Path, name: str) -> None:
+    """FMI Library reads the file and refuses the version that the standard asks for."""
+    with zipfile.ZipFile(fmu.with_name(f"{name}.fmu")) as archive:
+        names = archive.namelist()
+    assert "model.png" in names
+    assert not [entry for entry in names if entry.startswith("terminalsAndIcons/")]
 
 
 # ---- what the generator does ---------------------------------------------------------------------

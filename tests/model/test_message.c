@@ -3,6 +3,8 @@
 
 #include <math.h>
 #include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unity.h>
 
@@ -38,6 +40,39 @@ static void test_other_words_stay(void) {
     };
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         TEST_ASSERT_EQUAL_STRING(texts[i], written(texts[i]));
+    }
+}
+
+static void test_names_and_whole_numbers_stay(void) {
+    static const char *const texts[] = {"v0.80000000000000004", "1.2.80000000000000004", "0.", "1e",
+                                        "18014398509481984"};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
+        TEST_ASSERT_EQUAL_STRING(texts[i], written(texts[i]));
+    }
+}
+
+/* As few digits as are read as the same double, of doubles of all sizes. */
+static void test_numbers_are_short_and_exact(void) {
+    message_write(&last_text_sink, STATUS_OK, "a = %.17g is above b = %.17g, %.17g", 0.8, 0.1 + 0.2,
+                  -1e22);
+    TEST_ASSERT_EQUAL_STRING("a = 0.8 is above b = 0.30000000000000004, -1e+22", last_text);
+    uint64_t bits = 1;
+    for (int i = 0; i < 10000; i++) {
+        bits = bits * 6364136223846793005u + 1442695040888963407u;
+        double number = 0.0;
+        memcpy(&number, &bits, sizeof bits);
+        /* every second one has few digits */
+        number = i % 2 == 0 ? number : (double)(bits >> 44) / 1e3;
+        if (!isfinite(number)) {
+            continue;
+        }
+        message_write(&last_text_sink, STATUS_OK, "%.17g", number);
+        TEST_ASSERT_TRUE(strtod(last_text, NULL) == number);
+        char shorter[32];
+        (void)snprintf(shorter, sizeof shorter, "%.15g", number);
+        if (strtod(shorter, NULL) == number) {
+            TEST_ASSERT_LESS_OR_EQUAL_size_t(strlen(shorter), strlen(last_text));
+        }
     }
 }
 

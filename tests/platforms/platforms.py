@@ -13,9 +13,8 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
-import pytest
-
 from tests.platforms.scripts import Model, Script, read_model
+from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 BUILD = ROOT / "build"
@@ -232,7 +231,5 @@ def runner(
         if recompiled:
             made.recompile()
         return made
-    except Missing as missing:
-        if os.environ.get("CI"):
-            pytest.fail(f"missing: {missing}")
-        pytest.skip(f"missing: {missing}")
+    except Missing as error:
+        missing(f"missing: {error}")

@@ -115,9 +115,9 @@ def test_messages_have_the_values_that_were_refused(native: Runner, name: str) -
     )
     assert found["nan"] > 10 and found["inf"] > 5 and found["-inf"] > 5
     assert not [text for text in texts if "-nan" in text or "nan(" in text]
-    # six digits and seventeen
-    assert any("-1e+300 s from t = 1.0000000000000001e+300" in text for text in texts)
-    assert any("-0.333333 s from t = 0.33333333333333331" in text for text in texts)
+    # six digits, and as many as it takes
+    assert any("-1e+300 s from t = 1e+300" in text for text in texts)
+    assert any("-0.333333 s from t = 0.3333333333333333" in text for text in texts)
 
 
 @each_fmu

@@ -1,6 +1,5 @@
 """The playground in a browser, and the native FMUs beside it."""
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from tests.platforms.platforms import newest_source
 from tests.playground.native import Native
 from tests.playground.opened_page import OpenedPage
 from tests.support.browser import Browser
+from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 
@@ -21,10 +21,7 @@ def page(fmu: Path) -> Path:
     newest = max(newest_source(), *(script.stat().st_mtime for script in scripts))
     if path.is_file() and path.stat().st_mtime >= newest:
         return path
-    reason = f"{path} is missing or older than its sources: ./run.sh playground builds it"
-    if os.environ.get("CI"):
-        pytest.fail(reason)
-    pytest.skip(reason)
+    missing(f"{path} is missing or older than its sources: ./run.sh playground builds it")
 
 
 @pytest.fixture

@@ -25,17 +25,14 @@ class OpenedPage:
     def __init__(self, browser: Browser, path: Path, **view: Any) -> None:
         self.browser = browser
         browser.open(path, **view)
-        begun = browser.driver.execute_async_script("""
-            const done = arguments[0];
-            playground.then(it => {
+        self.was_running = browser.run("""
+            return playground.then(it => {
               window.tested = it;
               const {isRunning} = it;
               it.play(false);
-              done({isRunning});
-            }, error => done({failure: String(error.stack)}));
+              return isRunning;
+            });
         """)
-        assert "failure" not in begun, begun["failure"]
-        self.was_running = begun["isRunning"]
 
     def run(self, script: str, *arguments: Any) -> Any:
         """Value of the body of a function that knows simulation, plant and controller."""

@@ -1,5 +1,6 @@
 """The drawings of the playground: hands that pull at the arm, what is seen, and how it looks."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -152,21 +153,21 @@ def test_keys_of_the_drawing(opened: OpenedPage) -> None:
 
 @pytest.mark.parametrize("reduced", [False, True])
 def test_it_runs_at_once_unless_motion_is_unwanted(
-    browser: Browser, page: Path, reduced: bool
+    each_browser: Browser, page: Path, reduced: bool
 ) -> None:
-    assert OpenedPage(browser, page, reduced_motion=reduced).was_running != reduced
+    assert OpenedPage(each_browser, page, reduced_motion=reduced).was_running != reduced
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 @pytest.mark.parametrize("width", [400, 1200])
-def test_readable(browser: Browser, page: Path, width: int, dark: bool) -> None:
+def test_readable(each_browser: Browser, page: Path, width: int, dark: bool) -> None:
     """No overflow and nothing that axe-core finds, with all groups open and a message shown."""
-    opened = OpenedPage(browser, page, width=width, dark=dark)
+    opened = OpenedPage(each_browser, page, width=width, dark=dark)
     opened.run("document.querySelectorAll('details').forEach(it => { it.open = true; });"
                "window.tested.say('a message '.repeat(30))")  # fmt: skip
-    assert browser.overflow() == 0
-    assert browser.violations() == []
-    browser.check_quiet()
+    assert each_browser.overflow() == 0
+    assert each_browser.violations() == []
+    each_browser.check_quiet()
 
 
 # boxes of the texts that the chart draws, ends and middle of its height; points of its curves; px
@@ -179,9 +180,10 @@ prototype.fillText = function(text, x, y) {
   texts.push([text, x - left, x + right, y - up, y + down]);
 };
 prototype.lineTo = function(x, y) { if (this.lineWidth === 2) points.push([x, y]); };
-window.tested.chart.draw();
+const chart = window.tested.charts[arguments[0]];
+chart.draw();
 Object.assign(prototype, {fillText, lineTo});
-return [texts, points, window.tested.chart.canvas.clientWidth];
+return [texts, points, chart.canvas.clientWidth];
 """
 
 
@@ -193,27 +195,102 @@ def test_the_chart_has_axes(browser: Browser, page: Path, steps: int) -> None:
         "window.tested.reset();"
         "for (let n = 1; n <= arguments[0]; n++) {"
         "  simulation.step();"
-        "  if (n % 20 === 0) window.tested.chart.add(simulation.time);"
+        "  if (n % 20 === 0) window.tested.charts.forEach(chart => chart.add(simulation.time));"
         "}",
         steps,
     )
-    texts, points, width = opened.run(CHART)
-    for _, left, right, top, bottom in texts:
-        assert left >= 0 and right <= width
-        assert not any(left <= x <= right and top <= y <= bottom for x, y in points)
-    middles = {text: (left + right) / 2 for text, left, right, *_ in texts}
-    times = [float(text[:-2]) for text in middles if text.endswith(" s")]
-    assert len(times) >= 5 and max(times) <= max(10, steps / 1000)
-    second = (middles[f"{times[-1]:g} s"] - middles[f"{times[0]:g} s"]) / (times[-1] - times[0])
-    newest = middles[f"{times[0]:g} s"] + second * (steps / 1000 - times[0])
-    assert max(x for x, _ in points) == pytest.approx(newest, abs=2)
-    assert sum(text.endswith(" J") for text in middles) >= 2
+    for chart in range(opened.run("return window.tested.charts.length")):
+        texts, points, width = opened.run(CHART, chart)
+        for _, left, right, top, bottom in texts:
+            assert left >= 0 and right <= width
+            assert not any(left <= x <= right and top <= y <= bottom for x, y in points)
+        middles = {text: (left + right) / 2 for text, left, right, *_ in texts}
+        times = [float(text[:-2]) for text in middles if text.endswith(" s")]
+        assert len(times) >= 5 and max(times) <= max(10, steps / 1000)
+        second = (middles[f"{times[-1]:g} s"] - middles[f"{times[0]:g} s"]) / (times[-1] - times[0])
+        newest = middles[f"{times[0]:g} s"] + second * (steps / 1000 - times[0])
+        assert max(x for x, _ in points) == pytest.approx(newest, abs=2)
+        assert len(middles) - len(times) >= 2
     browser.check_quiet()
+
+
+def test_joints_velocities_and_energies_are_plotted(opened: OpenedPage) -> None:
+    """As the plant has them; each curve of a chart has its colour in the legend."""
+    opened.run(
+        "window.tested.reset(); simulation.step();"
+        "for (const chart of window.tested.charts) chart.add(simulation.time)"
+    )
+    plotted, swatches = opened.run("""
+        const {charts} = window.tested;
+        const swatches = [...document.querySelectorAll('#charts li')].map(item => {
+          const swatch = item.querySelector('.swatch');
+          const style = getComputedStyle(swatch);
+          return [item.textContent, swatch.clientWidth, style.borderTopWidth, style.borderTopStyle,
+            style.borderTopColor];
+        });
+        return [charts.map(chart => [chart.names, chart.rows.at(-1).slice(1)]), swatches];
+    """)
+    values = {name: value for names, row in plotted for name, value in zip(names, row, strict=True)}
+    energies = ["kinetic_energy", "potential_energy", "total_energy"]
+    assert list(values) == ["q1", "q2", "dq1", "dq2", *energies]
+    assert values == {name: opened.value(name) for name in values}
+    assert [name for name, *_ in swatches] == energies
+    assert [swatch[1:4] for swatch in swatches] == [
+        [22, "3px", style] for style in ("solid", "solid", "dashed")
+    ]
+    assert len({colour for *_, colour in swatches}) == 3
+
+
+@pytest.mark.parametrize("width", [400, 900, 1400])
+def test_the_drawing_stays_in_view(each_browser: Browser, page: Path, width: int) -> None:
+    """And whole, whichever control has the focus; it covers none of them."""
+    opened = OpenedPage(each_browser, page, width=width)
+    opened.run("document.querySelectorAll('#groups details').forEach(it => { it.open = true; })")
+    hidden = opened.run("""
+        const stage = document.getElementById('stage');
+        const controls = document.querySelectorAll('#controls input, #controls select');
+        return [...controls].filter(control => {
+          control.focus();
+          const {top, bottom} = stage.getBoundingClientRect();
+          const {x, y, width, height} = control.getBoundingClientRect();
+          const seen = document.elementFromPoint(x + width / 2, y + height / 2);
+          return top < 0 || bottom > innerHeight || bottom - top < 200 || seen !== control;
+        }).map(control => control.id);
+    """)
+    assert hidden == []
+
+
+@pytest.mark.parametrize("width", [400, 900, 1400])
+def test_a_refusal_moves_nothing(browser: Browser, page: Path, width: int) -> None:
+    opened = OpenedPage(browser, page, width=width)
+    choose(opened, "#setting", "Friction and stops")
+    places = (
+        "return [...document.querySelectorAll('main *, footer')].filter(it => !it.closest('#view'))"
+        ".map(it => it.getBoundingClientRect().top + scrollY)"
+    )
+    before = opened.run(places)
+    opened.run("window.tested.change('plant', plant.description.find('coulomb_friction1'), 5)")
+    text = opened.text("#message")
+    assert "breakaway_friction1 = 0.8 is refused" in text
+    seen, after = opened.run(
+        "const stage = document.getElementById('stage').getBoundingClientRect();"
+        "const box = document.getElementById('message').getBoundingClientRect();"
+        "return [box.height > 0 && box.top >= stage.top && box.bottom <= stage.bottom,"
+        f"(() => {{ {places} }})()]"
+    )
+    assert seen and before == after
+
+
+def test_units_are_written_one_way(opened: OpenedPage) -> None:
+    opened.run("document.querySelectorAll('details').forEach(it => { it.open = true; })")
+    text = opened.browser.run("return document.querySelector('main').innerText")
+    assert "N·m" in text and "kg·m²" in text and "m/s²" in text
+    assert not re.search(r"N\.m|kg\.m|/s2", text)
 
 
 def test_the_drawing_follows(opened: OpenedPage) -> None:
     """The picture of the arm and the chart change while it runs, and have more than one colour."""
-    picture = "return ['stage', 'energy'].map(id => document.getElementById(id).toDataURL())"
+    picture = "return [...document.querySelectorAll('canvas')].map(canvas => canvas.toDataURL())"
     opened.run("for (let n = 0; n < 50; n++) simulation.step(); window.tested.stage.draw()")
     first = opened.run(picture)
     choose(opened, "#speed", "4")

@@ -12,7 +12,9 @@ PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Page
 
 
 @pytest.fixture
-def shown(browser: Browser, tmp_path: Path):
+def shown(each_browser: Browser, tmp_path: Path):
+    browser = each_browser
+
     def show(body: str, **view) -> Browser:
         page = tmp_path / "page.html"
         page.write_text(PAGE.format(body), encoding="utf-8")

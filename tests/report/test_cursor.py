@@ -8,6 +8,8 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 
 from cosim import trajectory_csv
+from cosim.reference import SMALLEST_SCALE
+from cosim.report.run_data import ROUNDING
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 
@@ -53,7 +55,9 @@ def test_the_cursor_shows_rows_of_the_values(
         for curve, text in seen.items():
             value = values[curve][found[0]]
             last_digit = 10.0 ** (np.floor(np.log10(abs(value))) - 6) if value else 0.0
-            assert abs(float(text) - value) <= last_digit, curve  # seven digits
+            rounding = ROUNDING * max(np.max(np.abs(values[curve])), SMALLEST_SCALE)
+            assert abs(float(text) - value) <= max(last_digit, rounding), curve  # seven digits
+            assert text == "0" or abs(value) >= rounding
 
 
 def test_cursor_player_and_plots_are_in_step(browser: Browser, report: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from cosim import scenario
 from cosim.report import browser as shown
 from cosim.report.overview import Entry, forget, read, record
-from cosim.report.scenario_page import describe
+from cosim.report.signal_texts import describe
 from cosim.signals import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser

@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -177,86 +176,6 @@ def test_columns_exchanged(model: Path) -> None:
 
 
 # ---- archives ----------------------------------------------------------------------------------
-
-
-def bomb(path: Path, name: str, size: int) -> bytes:
-    """An archive of one file of zeros."""
-    with (
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
-        archive.open(name, "w") as file,
-    ):
-        for _ in range(size // 1_000_000):
-            file.write(bytes(1_000_000))
-    return path.read_bytes()
-
-
-def test_archives_that_grow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    content = bomb(tmp_path / "large.fmu", DESCRIPTION, 65_000_000)
-    refused(lambda: open_fmu(tmp_path / "large.fmu"), "modelDescription.xml has 65 MB")
-    nested: dict[str, Edit] = {"resources/RPManipulator.fmu": lambda _: content}
-    path = edited(SSP, tmp_path / "nested.ssp", nested)
-    refused(lambda: open_ssp(path), "component 'arm'", "modelDescription.xml has 65 MB")
-    monkeypatch.setattr("cosim.archives.LARGEST_CONTENT", 64_000_000)
-    bomb(tmp_path / "large.ssp", "data", 65_000_000)
-    refused(lambda: open_ssp(tmp_path / "large.ssp"), "has 65 MB inside, expected at most 64 MB")
-
-
-def test_an_archive_of_too_many_files(tmp_path: Path) -> None:
-    with zipfile.ZipFile(tmp_path / "many.ssp", "w") as archive:
-        for i in range(10_001):
-            archive.writestr(str(i), b"")
-    refused(lambda: open_ssp(tmp_path / "many.ssp"), "has 10001 files inside")
-
-
-@pytest.mark.parametrize("name", ["../../x", "/x", "resources/../../x"])
-def test_an_archive_that_leads_out_of_its_folder(tmp_path: Path, fmu: Path, name: str) -> None:
-    for source, action in ((SSP, open_ssp), (fmu, open_fmu)):
-        path = tmp_path / source.name
-        shutil.copy(source, path)
-        with zipfile.ZipFile(path, "a") as archive:
-            archive.writestr(name, b"x")
-        refused(lambda path=path, action=action: action(path), "outside of its folder")
-
-
-@pytest.mark.parametrize(
-    "doctype",
-    [
-        '<!DOCTYPE a [<!ENTITY x SYSTEM "file:///etc/hostname">]>',
-        "<!DOCTYPE a []>",
-    ],
-)
-def test_entities_are_refused(tmp_path: Path, doctype: str) -> None:
-    edits = {STRUCTURE: replace("?>", f"?>{doctype}")}
-    refused(lambda: open_ssp(edited(SSP, tmp_path / "a.ssp", edits)), "DOCTYPE, leave it out")
-
-
-def test_entities_that_grow_are_refused(tmp_path: Path, fmu: Path) -> None:
-    levels = "".join(f'<!ENTITY {chr(98 + i)} "{f"&{chr(97 + i)};" * 50}">' for i in range(8))
-    doctype = f'?><!DOCTYPE a [<!ENTITY a "aaaaaaaaaaaaaaaaaaaa">{levels}]>'
-
-    def change(content: bytes) -> bytes:
-        text = content.decode().replace("?>", doctype, 1)
-        return text.replace(' description="', ' description="&i;', 1).encode()
-
-    path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
-    refused(lambda: open_fmu(path), "wrong modelDescription.xml", "entity")
-
-
-def test_a_variant_is_no_path(tmp_path: Path) -> None:
-    """Its name becomes that of files which are written and removed."""
-    rename = replace('name="nominal"', 'name="../../x"')
-    edits = {
-        f"resources/{component}_nominal.ssv": rename
-        for component in ("arm", "controller", "trajectory")
-    }
-    path = edited(SSP, tmp_path / "a.ssp", edits)
-    refused(lambda: open_ssp(path), "name '../../x' of the set is no plain name")
-
-
-def test_a_source_of_an_impossible_name(tmp_path: Path) -> None:
-    edit = replace("resources/RPManipulator.fmu", f"resources/{'9' * 400}.fmu")
-    path = edited(SSP, tmp_path / "a.ssp", {STRUCTURE: edit})
-    refused(lambda: open_ssp(path), "is missing in the SSP")
 
 
 @pytest.mark.parametrize(

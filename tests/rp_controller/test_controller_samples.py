@@ -302,7 +302,7 @@ REFUSED = {
     "too short": ({"sample_time": 5e-7}, "sample_time = 5e-07 s is refused: it must be 0, "),
     "too late": (
         {"sample_time": 0.5, "delay": 0.5 + 2.0**-52},
-        "delay = 0.50000000000000022 s is refused: it must not be above sample_time = 0.5 s",
+        "delay = 0.5000000000000002 s is refused: it must not be above sample_time = 0.5 s",
     ),
     "delay of the continuous form": (
         {"delay": 0.001},

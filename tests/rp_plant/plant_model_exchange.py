@@ -1,7 +1,7 @@
 """RPPlant in Model Exchange: a small importer around fmpy's CVode, which sets discrete inputs and
 parameters in event mode only. fmpy's own loop sets Booleans in continuous-time mode, too."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from ctypes import c_double
 from pathlib import Path
@@ -97,8 +97,19 @@ class PlantModel:
         schedule: Mapping[float, Mapping[str, float | bool]],
         tolerance: float,
         names: tuple[str, ...],
+        efforts: Callable[[float], Mapping[str, float]] | None = None,
     ) -> np.ndarray:
-        """Values of `names` at `times` (s), one row each, before the changes at that time."""
+        """Values of `names` at `times` (s), one row each, before the changes at that time.
+
+        `efforts`: inputs that move with the time (s). fmpy's own loop sets them in its root
+        function only, so that its right-hand side sees old ones.
+        """
+
+        def set_time(time: float) -> None:
+            self.fmu.setTime(time)
+            for name, value in (efforts(time) if efforts else {}).items():
+                self.set(name, value)
+
         solver = CVodeSolver(
             *self.counts,
             self.fmu.getContinuousStates,
@@ -106,18 +117,18 @@ class PlantModel:
             self.fmu.getContinuousStateDerivatives if self.is_fmi3 else self.fmu.getDerivatives,
             self.fmu.getEventIndicators,
             self.fmu.getNominalsOfContinuousStates,
-            self.fmu.setTime,
+            set_time,
             NoInput(),
-            times[0],
+            self.get("time"),
             relativeTolerance=tolerance,
             maxNumSteps=100000,
         )
         rows = []
-        time = times[0]
+        time = self.get("time")
         for point in sorted({*times, *schedule}):
             while time < point:
                 is_event, _, time = solver.step(time, point)
-                self.fmu.setTime(time)
+                set_time(time)
                 if is_event:
                     self.handle_event({})
                     solver.reset(time)

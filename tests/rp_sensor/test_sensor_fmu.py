@@ -40,9 +40,7 @@ def test_values_out_of_range(sensor: Fmu, name: str, value: float, limits: str) 
         with pytest.raises(UserError):
             instance.set(name, value)
         message = instance.messages[-1]
-        assert message.startswith(f"{name} = {value:.17g} is refused: a value from {limits} "), (
-            message
-        )
+        assert message.startswith(f"{name} = {value:g} is refused: a value from {limits} "), message
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])

@@ -2,7 +2,6 @@
 
 import base64
 import json
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import pytest
+from tests.support.missing import missing
 
 PROGRAMS = ("chromium", "chromedriver")
 # what a page may load: files beside it and what it holds itself
@@ -30,7 +29,7 @@ OPTIONS = (
 
 
 class Browser:
-    """A tab of Chromium; `driver` is selenium's, for what is not here."""
+    """A tab of Chromium; `driver` is selenium's, for what is not here. Firefox: firefox.py."""
 
     def __init__(self, driver: Any) -> None:
         self.driver = driver
@@ -53,6 +52,18 @@ class Browser:
 
         `scale` is the number of the screen's pixels for one of CSS.
         """
+        self._show(width, height, dark, reduced_motion, scale)
+        self._go_to("about:blank")
+        self.update()
+        self.errors.clear()
+        self.requests.clear()
+        self.loaded.clear()
+        self._go_to(page.absolute().as_uri() + fragment)
+        self.update()
+
+    def _show(
+        self, width: int, height: int, dark: bool, reduced_motion: bool, scale: float
+    ) -> None:
         self._command(
             "Emulation.setDeviceMetricsOverride",
             {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": False},
@@ -65,13 +76,9 @@ class Browser:
             "Emulation.setEmulatedMedia",
             {"features": [{"name": name, "value": value} for name, value in features.items()]},
         )
-        self.driver.get("about:blank")
-        self.update()
-        self.errors.clear()
-        self.requests.clear()
-        self.loaded.clear()
-        self.driver.get(page.absolute().as_uri() + fragment)
-        self.update()
+
+    def _go_to(self, address: str) -> None:
+        self.driver.get(address)
 
     def update(self) -> None:
         """Take what happened since the last call into `errors`, `loaded` and `requests`."""
@@ -86,7 +93,10 @@ class Browser:
                 self.loaded.append(message["params"]["request"]["url"])
             elif message["method"] == "Network.webSocketCreated":
                 self.loaded.append(message["params"]["url"])
-        self.requests = [url for url in self.loaded if not url.startswith(LOCAL)]
+        self.requests = self._not_local()
+
+    def _not_local(self) -> list[str]:
+        return [url for url in self.loaded if not url.startswith(LOCAL)]
 
     def check_quiet(self) -> None:
         """Fail if the page wrote an error or a warning to the console, or asked the network."""
@@ -119,14 +129,14 @@ class Browser:
             "const root = document.documentElement; return root.scrollWidth - root.clientWidth"
         )
 
-    def violations(self) -> list[str]:
-        """What axe-core finds against the accessibility guidelines (WCAG), contrast included."""
+    def violations(self, contrast: bool = True) -> list[str]:
+        """What axe-core finds against the accessibility guidelines (WCAG).
+
+        Without `contrast`, which takes seconds on a long page, colours are not looked at.
+        """
         self.run((files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8"))
-        result = self.driver.execute_async_script(
-            "const done = arguments[arguments.length - 1];"
-            "axe.run().then(done, error => done({failure: String(error)}))"
-        )
-        assert "failure" not in result, result["failure"]
+        rules = {"color-contrast": {"enabled": contrast}}
+        result = self.run("return axe.run({rules: arguments[0]})", rules)
         return [
             f"{found['id']}: {found['help']}: {node['html'][:200]}: {node.get('failureSummary')}"
             for found in result["violations"]
@@ -144,15 +154,17 @@ class Browser:
         return self.driver.execute_cdp_cmd(name, parameters)
 
 
+def need(*programs: str) -> None:
+    """Skip the test where a program is not installed; fail it in CI."""
+    absent = [program for program in programs if shutil.which(program) is None]
+    if absent:
+        missing(f"missing: {' and '.join(absent)}: ./setup.sh --platforms installs them")
+
+
 @contextmanager
 def opened() -> Iterator[Browser]:
     """A browser; a skipped test where it is not installed, a failed one in CI."""
-    missing = [program for program in PROGRAMS if shutil.which(program) is None]
-    if missing:
-        text = f"missing: {' and '.join(missing)}: ./setup.sh --platforms installs them"
-        if os.environ.get("CI"):
-            pytest.fail(text)
-        pytest.skip(text)
+    need(*PROGRAMS)
 
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service

@@ -2,7 +2,6 @@
 
 import functools
 import os
-import re
 import shutil
 import zipfile
 from collections.abc import Callable
@@ -82,16 +81,11 @@ def repacked(source: Path, target: Path, change: Callable[[str], str], drop: str
     return target
 
 
-def without_progress(error: str) -> str:
-    """Without the lines on progress, which a busy machine makes more of."""
-    return re.sub(r"(?m)^.*: \d+ %, \d+ s\n", "", error)
-
-
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error without progress."""
+    """Exit code, standard output and standard error."""
     code = cli.main([str(argument) for argument in arguments])
     out, err = capsys.readouterr()
-    return code, out, without_progress(err)
+    return code, out, err
 
 
 def assert_one_line(error: str) -> None:

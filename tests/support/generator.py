@@ -38,9 +38,14 @@ def copied(model: str, to: Path, below: str = "models") -> Path:
     (to / "src" / "instance").mkdir(parents=True)
     for shared in (ROOT / "src" / "instance").glob("*.toml"):
         shutil.copy(shared, to / "src" / "instance")
-    folder = to / below / model
-    folder.mkdir(parents=True)
-    return Path(shutil.copy(ROOT / below / model / "variables.toml", folder))
+    for declaration in (
+        *ROOT.glob("models/*/variables.toml"),
+        ROOT / below / model / "variables.toml",
+    ):
+        copy = to / declaration.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(declaration, copy)
+    return to / below / model / "variables.toml"
 
 
 def change(path: Path, old: str, new: str) -> None:

@@ -175,7 +175,7 @@ static void test_no_intermediate_update_of_booleans(void) {
     assert_message("21");
 }
 
-static void test_discrete_variables_have_no_derivatives(void) {
+static void test_only_reals_have_derivatives(void) {
     const fmi3ValueReference counting = WHEEL_is_counting;
     const fmi3ValueReference rate = WHEEL_rate;
     const fmi3ValueReference caught = WHEEL_is_caught;

@@ -43,6 +43,8 @@ static struct wheel_values *held(void) {
     return (void *)instance->memory.held;
 }
 
+static bool other_is_integrated_outside;
+
 /* What a second instance makes of the serialized state of the first one. */
 static enum status transfer(struct instance **other) {
     struct instance_snapshot *snapshot = NULL;
@@ -52,6 +54,7 @@ static enum status transfer(struct instance **other) {
     TEST_ASSERT_NOT_NULL(bytes);
     ASSERT_OK(instance_serialize(instance, snapshot, bytes, size));
     *other = initializing();
+    (*other)->is_integrated_outside = other_is_integrated_outside;
     struct instance_snapshot *read = NULL;
     enum status status = instance_deserialize(*other, bytes, size, &read);
     if (status == STATUS_OK) {
@@ -89,6 +92,9 @@ static void assert_event_points_are_possible(void) {
     instance->state.event_point = EVENT_PASSED;
     assert_forged_is_refused("event_point = 2 is impossible"); // before initialization ends
     instance->state.phase = PHASE_STEPPING;
+    other_is_integrated_outside = true;
+    assert_forged_is_refused("event_point = 2 is impossible"); // it makes no steps
+    other_is_integrated_outside = false;
     instance->state.event_point = (enum event_point)3;
     assert_forged_is_refused("event_point = 3 is impossible");
     instance->state.event_point = EVENT_DUE;

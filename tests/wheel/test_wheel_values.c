@@ -121,7 +121,7 @@ static void test_when_booleans_can_be_set(void) {
     ASSERT_OK(set_boolean(WHEEL_is_counting, 1));
 }
 
-static void test_discrete_variables_have_no_derivatives(void) {
+static void test_only_reals_have_derivatives(void) {
     const unsigned speed = WHEEL_speed;
     const unsigned rate = WHEEL_rate;
     const int order = 1;
@@ -140,8 +140,6 @@ static void test_discrete_variables_have_no_derivatives(void) {
          "is_reversed (value reference 2) is refused: it is of type"},
         {WHEEL_is_caught, WHEEL_speed, "it is of type boolean, an output, a local or a derivative"},
         {WHEEL_turns, WHEEL_speed, "it is of type int32, an output, a local or a derivative"},
-        {WHEEL_lost_speed, WHEEL_speed,
-         "lost_speed (value reference 42) is refused: it is discrete"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         TEST_ASSERT_EQUAL_INT(
@@ -155,13 +153,28 @@ static void test_discrete_variables_have_no_derivatives(void) {
                                                               1, &one, &result));
         assert_text(cases[i].text);
     }
-    const unsigned outputs[] = {WHEEL_is_turning, WHEEL_turns, WHEEL_lost_speed};
-    for (size_t i = 0; i < 3; i++) {
+    const unsigned outputs[] = {WHEEL_is_turning, WHEEL_turns};
+    for (size_t i = 0; i < 2; i++) {
         TEST_ASSERT_EQUAL_INT(
             STATUS_INVALID_ARGUMENT,
             instance_get_output_derivatives(instance, &outputs[i], 1, &order, &result));
         assert_text("is refused: it is ");
     }
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, result);
+
+    const unsigned both[] = {WHEEL_lost_speed, WHEEL_rate}; // the first one is held between events
+    double results[] = {7.0, 7.0};
+    ASSERT_OK(instance_get_directional_derivative(instance, KNOWN_MOTION, both, 2, &speed, 1, &one,
+                                                  results));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, results[0]);
+    TEST_ASSERT_EQUAL_DOUBLE(1.0, results[1]);
+    ASSERT_OK(instance_get_output_derivatives(instance, both, 1, &order, results));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, results[0]);
+    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
+                          instance_get_directional_derivative(instance, KNOWN_ARGUMENTS, &rate, 1,
+                                                              both, 1, &one, results));
+    assert_text("lost_speed (value reference 42) is refused: an input, a state");
+
     const unsigned counting = WHEEL_is_counting;
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
                           instance_set_input_derivatives(instance, &counting, 1, &order, &one));

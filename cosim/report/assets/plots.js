@@ -81,14 +81,20 @@ const Plots = (() => {
       mode: 'lines',
       line: { color: palette.ink, width: 1, dash: 'dash' },
     }));
-    // a logarithmic axis has no 0
-    const drawn = (values) => (plot.floor ? values.map((value) => Math.max(value, plot.floor)) : values);
+    // a logarithmic axis has no 0: a gap; a point between two gaps is seen by its marker
+    const drawn = (values) => (plot.log ? values.map((value) => (value > 0 ? value : null)) : values);
+    const alone = (values) => values.map((value, i) => {
+      const beside = values[i - 1] ?? values[i + 1] ?? null;
+      return value !== null && beside === null ? 5 : 0;
+    });
     const curves = plot.curves.map((curve, i) => {
       const { colour, dashes } = styleOf(curve, i, palette);
+      const y = drawn(curve.values);
+      const points = x.length > FEW && plot.log ? alone(y) : [];
       return {
         x,
-        y: drawn(curve.values),
-        mode,
+        y,
+        mode: points.some(Boolean) ? 'lines+markers' : mode,
         line: {
           color: colour,
           width: curve.limit ? 1 : 1.6,
@@ -96,7 +102,7 @@ const Plots = (() => {
           shape: curve.steps ? 'vh' : 'linear',
           dash: dashes.map((length) => `${length}px`).join() || 'solid',
         },
-        marker: { size: 5 },
+        marker: { size: points.some(Boolean) ? points : 5 },
       };
     });
     return [...references, ...levels, ...curves];

@@ -1,0 +1,99 @@
+/* Indicators that are below 0 where a restart finds them: the modes have just been found valid, so
+ * that they have not fallen yet. One state, x' = rate. */
+#include "integrator.h"
+
+#include <math.h>
+#include <unity.h>
+
+static const double below = -1e-6;
+static const size_t row_of_indicator[1] = {0};
+static double rate;
+static struct integrator *integrator;
+
+void setUp(void) {
+    integrator = NULL;
+}
+
+void tearDown(void) {
+    integrator_destroy(integrator);
+}
+
+static enum status rhs(double t, const double x[], double dx[], void *context) {
+    (void)t;
+    (void)x;
+    (void)context;
+    dx[0] = rate;
+    return STATUS_OK;
+}
+
+static enum status jacobian(double t, const double x[], double J[], void *context) {
+    (void)t;
+    (void)x;
+    (void)context;
+    J[0] = 0.0;
+    return STATUS_OK;
+}
+
+static enum status series(double t, double unit, int first, int last, double row[][SERIES_LENGTH],
+                          void *context) {
+    (void)t;
+    (void)context;
+    for (int k = first; k <= last; k++) {
+        if (k > 0) {
+            row[0][k] = k == 1 ? unit * rate : 0.0;
+        }
+    }
+    return STATUS_OK;
+}
+
+static enum status indicators(double t, const double x[], double z[], void *context) {
+    (void)t;
+    (void)context;
+    z[0] = x[0];
+    return STATUS_OK;
+}
+
+/* From x = below to the time 1 s, or to an event; the time there. */
+static double run(enum integrator_method method, enum indicator_kind kind) {
+    const double absolute[1] = {1e-14};
+    const struct ode ode = {
+        .state_count = 1,
+        .rhs = rhs,
+        .jacobian = jacobian,
+        .series = series,
+        .series_row_count = 1,
+        .row_of_indicator = row_of_indicator,
+        .indicator_count = 1,
+        .indicators = indicators,
+    };
+    const struct integrator_settings settings = {
+        .method = method, .relative_tolerance = 1e-12, .absolute_tolerances = absolute};
+    const struct indicator indicator = {.kind = kind, .factor = 1.0};
+    const struct integrator_start from = {.span = INFINITY, .indicators = &indicator};
+    const struct message_sink quiet = {0};
+    double x[1] = {below};
+    double reached;
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, &from));
+    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, 1.0, 100000, &reached, x));
+    TEST_ASSERT_EQUAL_INT(reached < 1.0, integrator_event(integrator) != NULL);
+    integrator_destroy(integrator);
+    integrator = NULL;
+    return reached;
+}
+
+static void test_only_a_fall_from_where_it_was_counts(void) {
+    static const enum indicator_kind kinds[] = {INDICATOR_OF_STATE, INDICATOR_OF_MODEL};
+    for (int method = 1; method < INTEGRATOR_METHODS; method++) {
+        for (int k = 0; k < 2; k++) {
+            rate = 0.0;
+            TEST_ASSERT_TRUE(run((enum integrator_method)method, kinds[k]) == 1.0);
+            rate = 0.1;
+            TEST_ASSERT_TRUE(run((enum integrator_method)method, kinds[k]) == 1.0);
+            rate = -0.1;
+            const double fallen = run((enum integrator_method)method, kinds[k]);
+            TEST_ASSERT_TRUE(fallen > 1e-6 && fallen < 1.001e-5);
+        }
+    }
+}
