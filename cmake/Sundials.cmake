@@ -1,5 +1,5 @@
 # Target sundials: what the integrator needs of SUNDIALS, compiled with the flags of the project. No
-# object of it exports a symbol, and it allocates from the reserve of an instance.
+# object of it exports a symbol, and it allocates from the workspace of an instance.
 
 set(SUNDIALS_VERSION 6.4.1)
 file(STRINGS ${SUNDIALS_SOURCE_DIR}/CMakeLists.txt version REGEX "^set\\(PACKAGE_VERSION_(MAJOR|MINOR|PATCH) ")
@@ -33,7 +33,7 @@ add_library(sundials STATIC ${files})
 target_include_directories(sundials
   SYSTEM PUBLIC ${sundials_include} ${SUNDIALS_SOURCE_DIR}/include
   PRIVATE ${SUNDIALS_SOURCE_DIR}/src/sundials)
-target_link_libraries(sundials PUBLIC reserve elementary_functions)
+target_link_libraries(sundials PUBLIC workspace elementary_functions)
 target_compile_options(sundials PRIVATE
   ${foreign_options} $<$<CONFIG:Release>:-ffile-prefix-map=${SUNDIALS_SOURCE_DIR}=sundials>
   "SHELL:-include \"${PROJECT_SOURCE_DIR}/src/integrator/sundials_allocation.h\"")

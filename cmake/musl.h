@@ -1,5 +1,5 @@
-/* In front of every file of musl (ElementaryFunctions.cmake): what its own headers of the same names
- * as the system's would define, and no fused operations on the processors that have them. */
+/* In front of every file of musl (ElementaryFunctions.cmake): what its own headers of the same
+ * names as the system's would define, and no fused operations on the processors that have them. */
 #ifndef MUSL_H
 #define MUSL_H
 

@@ -14,9 +14,9 @@
 
 #include <math.h>
 
-/* Of a quantity with the derivative dx by the time; k > 0:  x_k = (unit / k) dx_(k-1) */
-static inline double jet_integral(const double dx[], double unit, int k) {
-    return unit / k * dx[k - 1];
+/* Of a quantity with the derivative dx by the time; k > 0:  x_k = (time_scale / k) dx_(k-1) */
+static inline double jet_integral(const double dx[], double time_scale, int k) {
+    return time_scale / k * dx[k - 1];
 }
 
 /* Of an input. */

@@ -8,7 +8,7 @@
  *
  * because N' = J w' + 2 m2 L v w and P' = L w' + v w. With s1' = w c1 and c1' = -w s1 all right
  * sides are products of two series, (x z)_n = sum of x_i z_(n-i), and a derivative gives
- * x_k = (unit / k) (x')_(k-1). N and P at order k contain the unknown w_k:
+ * x_k = (time_scale / k) (x')_(k-1). N and P at order k contain the unknown w_k:
  *
  *   P_k = L_0 w_k + sum of L_(i+1) w_(k-1-i)
  *   N_k = F w_k + m2 (L_0 P_k + sum of L_(i+1) P_(k-1-i))
@@ -77,7 +77,7 @@ void rp_series_extend(const struct rp_parameters *parameters, const struct serie
     const double a_m2 = p.a * p.m2;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         const int n = k - 1;
-        const double h = origin->unit / k;
+        const double h = origin->time_scale / k;
         row[Q1][k] = h * row[W][n];
         row[Q2][k] = h * row[V][n];
         row[L][k] = row[Q2][k];

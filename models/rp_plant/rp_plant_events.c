@@ -14,8 +14,8 @@
 
 enum { SLIP_FORWARD, SLIP_BACKWARD, LOWER, UPPER, PUSH }; /* the indicators of a joint */
 
-/* What has fired, by the modes that held until now. */
-struct fired {
+/* What has triggered, by the modes that held until now. */
+struct triggered {
     bool halted[2]; /* a sliding joint has come to rest */
     int leaves[2];  /* the direction in which a stuck joint breaks away, else 0 */
     int hit[2];     /* +1: the lower stop is reached or left, -1: the upper one, else 0 */
@@ -32,15 +32,15 @@ static double near_limit(double limit) {
 
 /* Puts joints that have reached a stop, or are past a rigid one, on it; side: of the rigid ones.
  * True if a joint is on one of these. */
-static bool arrive(struct rp_plant_values *values, const struct fired *fired, int side[2]) {
+static bool arrive(struct rp_plant_values *values, const struct triggered *triggered, int side[2]) {
     const struct rp_plant_parameters *p = &values->parameters;
     bool is_any = false;
     for (int i = 0; i < 2; i++) {
-        const double hit = fired->hit[i] > 0 ? p->lower[i] : p->upper[i];
-        const bool is_near = fired->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
+        const double hit = triggered->hit[i] > 0 ? p->lower[i] : p->upper[i];
+        const bool is_near = triggered->hit[i] != 0 && fabs(values->q[i] - hit) <= near_limit(hit);
         side[i] = rp_plant_closed_stop(p, i, values->q[i]);
         if (side[i] == 0 && is_near && p->stops[i] == RP_PLANT_STOPS_RIGID) {
-            side[i] = fired->hit[i];
+            side[i] = triggered->hit[i];
         }
         if (is_near && rp_plant_has_contacts(p, i)) {
             values->q[i] = hit;
@@ -153,9 +153,9 @@ static bool take_payload(struct rp_plant_values *values) {
 
 /* ---- struct model_events -------------------------------------------------------------------- */
 
-static void read_fired(const struct rp_plant_values *values, const bool *at_zero,
-                       struct fired *fired) {
-    *fired = (struct fired){.halted = {false}};
+static void read_triggered(const struct rp_plant_values *values, const bool *at_zero,
+                           struct triggered *triggered) {
+    *triggered = (struct triggered){.halted = {false}};
     if (at_zero == NULL || values->modes.payload == RP_PLANT_UNDECIDED) {
         return;
     }
@@ -165,14 +165,14 @@ static void read_fired(const struct rp_plant_values *values, const bool *at_zero
             of_joint[k] = at_zero[plant_indicator_index(i, k)];
         }
         const int mode = values->modes.joint[i];
-        fired->halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
+        triggered->halted[i] = rp_plant_slides(mode) && of_joint[SLIP_FORWARD];
         if (mode == RP_PLANT_STUCK && of_joint[SLIP_FORWARD] != of_joint[SLIP_BACKWARD]) {
-            fired->leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
+            triggered->leaves[i] = of_joint[SLIP_FORWARD] ? 1 : -1;
         }
         if (mode != RP_PLANT_STUCK && of_joint[LOWER] != of_joint[UPPER]) {
-            fired->hit[i] = of_joint[LOWER] ? 1 : -1;
+            triggered->hit[i] = of_joint[LOWER] ? 1 : -1;
         }
-        fired->turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
+        triggered->turned[i] = of_joint[PUSH] && values->modes.contact[i] != RP_PLANT_APART;
     }
 }
 
@@ -212,16 +212,16 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
-    struct fired fired;
-    read_fired(values, event->fired, &fired);
+    struct triggered triggered;
+    read_triggered(values, event->triggered, &triggered);
 
     bool jumps = false;
     for (int i = 0; i < 2; i++) {
-        if (fired.halted[i]) {
+        if (triggered.halted[i]) {
             values->dq[i] = 0.0;
             jumps = true;
         }
-        if (fired.turned[i]) {
+        if (triggered.turned[i]) {
             rp_plant_turn_contact(&values->parameters, i, &values->dq[i],
                                   &values->modes.contact[i]);
         }
@@ -230,16 +230,16 @@ static enum status update(void *values_pointer, const struct event *event) {
         jumps = true;
     }
     int side[2];
-    if (arrive(values, &fired, side) && collide(values, event, side)) {
+    if (arrive(values, &triggered, side) && collide(values, event, side)) {
         jumps = true;
     }
 
-    // what has fired counts where the forces of the stuck joints have not changed since
+    // what has triggered counts where the forces of the stuck joints have not changed since
     const struct rp_plant_parameters *p = &values->parameters;
     struct rp_plant_decision decision;
     if (rp_plant_find_rest(p, values->q, values->dq, &values->modes, &decision.rest)) {
         rp_plant_decide(p, values->q, values->dq, &values->inputs, &values->modes, &decision);
-        rp_plant_break_away(values, event, &decision, jumps ? none : fired.leaves);
+        rp_plant_break_away(values, event, &decision, jumps ? none : triggered.leaves);
     }
     rp_plant_begin_contacts(p, values->q, values->dq, &values->inputs, &values->modes);
     return STATUS_OK;

@@ -60,8 +60,8 @@ void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2
 
 /* ---- Breaking away -------------------------------------------------------------------------- */
 
-/* The side on which a joint that stays is at its limit: that which has fired, or where the reaction
- * is the breakaway friction. */
+/* The side on which a joint that stays is at its limit: that which has triggered, or where the
+ * reaction is the breakaway friction. */
 static int side_at_limit(const struct rp_plant_decision *decision, int joint, int leaves) {
     const struct rp_plant_rest *rest = &decision->rest;
     if (!rest->at_rest[joint] || decision->outcome.pattern[joint] != 0) {

@@ -42,8 +42,8 @@ void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], con
 /* At the limit with no acceleration, stuck and sliding fit both: the next derivative decides. It
  * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
  * go to that side, and without friction, since that does not change at breakaway. A joint whose
- * indicator has fired (leaves: 1 forward, -1 backward, otherwise 0) leaves unless the rate points
- * back; otherwise it would fire again. */
+ * indicator has triggered (leaves: 1 forward, -1 backward, otherwise 0) leaves unless the rate
+ * points back; otherwise it would fire again. */
 void rp_plant_break_away(struct rp_plant_values *values, const struct event *event,
                          const struct rp_plant_decision *decision, const int leaves[2]);
 

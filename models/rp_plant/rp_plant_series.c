@@ -295,7 +295,7 @@ struct next {
 };
 
 static inline struct next next_order(const struct motion *m, int n, double row[][SERIES_LENGTH]) {
-    const double h = m->origin->unit / (n + 1);
+    const double h = m->origin->time_scale / (n + 1);
     struct next next = {
         .L = h * row[V][n],
         .effort = {effort_of(m, 0, n, row), effort_of(m, 1, n, row)},
@@ -327,7 +327,7 @@ static inline struct next next_order(const struct motion *m, int n, double row[]
 
 static inline void write_order(const struct motion *m, int k, const struct next *next,
                                double row[][SERIES_LENGTH]) {
-    row[Q1][k] = jet_integral(row[W], m->origin->unit, k);
+    row[Q1][k] = jet_integral(row[W], m->origin->time_scale, k);
     row[Q2][k] = next->L;
     row[L][k] = next->L;
     row[W][k] = next->w;
@@ -342,7 +342,7 @@ static inline void write_order(const struct motion *m, int k, const struct next 
 /* As plant_stuck_indicators with both sides in use; those of other joints are not of the model. */
 static void write_indicators(const struct motion *m, int k, const struct next *next,
                              double row[][SERIES_LENGTH]) {
-    const double rate = (k + 1) / m->origin->unit;
+    const double rate = (k + 1) / m->origin->time_scale;
     const double a_m2 = m->a * m->m2;
     const double coriolis = 2.0 * m->m2 * jet_product(row[P], row[V], k);
     const double fall = m->g * row[S][k];

@@ -20,9 +20,9 @@ static inline struct clock_time clock_two_sum(double x, double y) {
     return (struct clock_time){.s = s, .rest = (x - x_part) + (y - y_part)};
 }
 
-/* time + span */
-static inline struct clock_time clock_add(struct clock_time time, double span) {
-    const struct clock_time sum = clock_two_sum(time.s, span);
+/* time + duration */
+static inline struct clock_time clock_add(struct clock_time time, double duration) {
+    const struct clock_time sum = clock_two_sum(time.s, duration);
     return clock_two_sum(sum.s, sum.rest + time.rest);
 }
 

@@ -124,7 +124,7 @@ enum status instance_get_derivatives(struct instance *instance, double dx[], siz
 }
 
 enum status instance_get_nominals(struct instance *instance, double nominals[], size_t count) {
-    const struct span states = instance->model->states;
+    const struct range states = instance->model->states;
     const enum status status = check_count(instance, count);
     for (size_t i = 0; status == STATUS_OK && i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];

@@ -76,11 +76,11 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
     for (size_t i = 0; i < count; i++) {
         const struct variable *variable = variable_of(instance->description, references[i]);
         const size_t input = instance_input_index(instance, variable);
-        struct polynomial *pending = &instance->memory.pending[input];
-        pending->d[orders[i]] = values[i];
+        struct polynomial *next = &instance->memory.next_inputs[input];
+        next->d[orders[i]] = values[i];
         // from now on outputs answer for the input of the next step, as after instance_set_real
-        instance->memory.current[input] = *pending;
-        doubles_of(instance->memory.values, instance->model->inputs)[input] = pending->d[0];
+        instance->memory.current_inputs[input] = *next;
+        doubles_of(instance->memory.values, instance->model->inputs)[input] = next->d[0];
         instance->outputs_are_valid = false;
     }
     return STATUS_OK;
@@ -112,7 +112,7 @@ static enum status derive_by_time(struct instance *instance) {
     memcpy(doubles_of(instance->first_derivatives, model->states),
            doubles_of(memory->values, model->derivatives), model->states.size);
     for (size_t i = 0; i < count_of(model->inputs); i++) {
-        doubles_of(instance->first_derivatives, model->inputs)[i] = memory->current[i].d[1];
+        doubles_of(instance->first_derivatives, model->inputs)[i] = memory->current_inputs[i].d[1];
     }
     status = propagate(instance, 1.0, NULL);
     if (status != STATUS_OK) {
@@ -123,7 +123,7 @@ static enum status derive_by_time(struct instance *instance) {
     memcpy(doubles_of(instance->second_derivatives, model->states),
            doubles_of(instance->first_derivatives, model->derivatives), model->states.size);
     for (size_t i = 0; i < count_of(model->inputs); i++) {
-        doubles_of(instance->second_derivatives, model->inputs)[i] = memory->current[i].d[2];
+        doubles_of(instance->second_derivatives, model->inputs)[i] = memory->current_inputs[i].d[2];
     }
     return propagate(instance, 1.0, instance->second_derivatives);
 }

@@ -6,8 +6,9 @@
 #include <math.h>
 #include <string.h>
 
-void instance_leave_event(struct instance *instance, const bool fired[], struct clock_time end) {
-    memcpy(instance->memory.due, fired, instance_event_size(instance->model));
+void instance_leave_event(struct instance *instance, const bool triggered[],
+                          struct clock_time end) {
+    memcpy(instance->memory.unhandled, triggered, instance_event_size(instance->model));
     instance->state.event_point = EVENT_DUE;
     instance->state.cut_end = end;
 }
@@ -25,7 +26,7 @@ static void forget_due_forces(struct instance *instance) {
     }
     for (size_t i = 0; i < events->indicator_count; i++) {
         if (instance->indicators[i].kind == INDICATOR_OF_MODEL) {
-            instance->memory.due[i] = false;
+            instance->memory.unhandled[i] = false;
         }
     }
 }
@@ -36,23 +37,23 @@ enum status instance_pass_due_event(struct instance *instance, struct event_coun
         return STATUS_OK;
     }
     const bool is_unchanged = instance_is_unchanged(instance);
-    enum status status = instance_count_event(instance, instance->memory.due, in_step);
+    enum status status = instance_count_event(instance, instance->memory.unhandled, in_step);
     if (!is_unchanged) {
         forget_due_forces(instance);
     }
     if (status == STATUS_OK) {
-        status = instance_update_modes(instance, instance->memory.due);
+        status = instance_update_modes(instance, instance->memory.unhandled);
     }
     if (status == STATUS_OK) {
         state->event_point = is_unchanged ? EVENT_PASSED : NO_EVENT;
-        memset(instance->memory.due, 0, instance_event_size(instance->model));
+        memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
     }
     return status;
 }
 
 bool instance_is_unchanged(const struct instance *instance) {
     return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
-           !polynomials_move(instance->memory.running, count_of(instance->model->inputs)) &&
+           !polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)) &&
            instance_holds_all(instance);
 }
 

@@ -8,7 +8,7 @@
 
 /* A step that would have lasted until `end` ends at the present time, where these indicators fall
  * to 0: nothing has followed from it so far. */
-NONNULL void instance_leave_event(struct instance *instance, const bool fired[],
+NONNULL void instance_leave_event(struct instance *instance, const bool triggered[],
                                   struct clock_time end);
 
 /* The same where the event has been passed already. */

@@ -44,8 +44,8 @@ static inline void instance_write_field(struct instance *instance, const struct 
     void *field = instance_field(instance, variable);
     if (variable->causality == CAUSALITY_INPUT && variable->type == VARIABLE_FLOAT64) {
         const size_t i = instance_input_index(instance, variable);
-        instance->memory.pending[i].d[0] = value;
-        instance->memory.current[i] = instance->memory.pending[i];
+        instance->memory.next_inputs[i].d[0] = value;
+        instance->memory.current_inputs[i] = instance->memory.next_inputs[i];
         *(double *)field = value;
         return;
     }

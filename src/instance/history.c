@@ -8,20 +8,21 @@
 #include <string.h>
 
 /* The next step's inputs are held at the values that the integrator runs with. Polynomials need no
- * comparison: the span of the integrator ends with the step that they are for. */
+ * comparison: the horizon of the integrator ends with the step that they are for. */
 static bool inputs_are_held(const struct instance_memory *memory, size_t count) {
     for (size_t i = 0; i < count; i++) {
-        const struct polynomial *next = &memory->pending[i];
-        if (next->d[0] != memory->running[i].d[0] || polynomial_moves(next)) {
+        const struct polynomial *next = &memory->next_inputs[i];
+        if (next->d[0] != memory->active_inputs[i].d[0] || polynomial_moves(next)) {
             return false;
         }
     }
     return true;
 }
 
-static bool is_held(const struct instance *instance, struct span span) {
+static bool is_held(const struct instance *instance, struct range range) {
     const struct instance_memory *memory = &instance->memory;
-    return memcmp(memory->held + span.offset, memory->values + span.offset, span.size) == 0;
+    return memcmp(memory->restart_values + range.offset, memory->values + range.offset,
+                  range.size) == 0;
 }
 
 /* The parameters, and the inputs that are no numbers, are those that the integrator runs with. */
@@ -44,9 +45,9 @@ bool instance_holds_all(const struct instance *instance) {
  * with CVODE's history over a jump has 450 times the error of a restart and is slower where jumps
  * are 4e-4 of the input, has 40 times the error at 4e-6 and 4 times at 4e-8. It gains only below
  * 1e-9, and rollback would have to replay every jump. */
-static bool goes_on(const struct instance *instance, double target) {
+static bool continues(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
-    return state->has_history && target <= state->span && instance_holds_all(instance);
+    return state->has_history && target <= state->horizon && instance_holds_all(instance);
 }
 
 int64_t instance_longest_history(const struct instance *instance) {
@@ -61,7 +62,7 @@ static bool is_at_end(const struct instance *instance, double target) {
 }
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
-    if (!goes_on(instance, target)) {
+    if (!continues(instance, target)) {
         return instance->state.event_point == EVENT_PASSED && instance_is_unchanged(instance)
                    ? CONTINUE_AFTER_EVENT
                    : CONTINUE_AFTER_CHANGE;
@@ -80,25 +81,26 @@ void instance_update_next_step(struct instance *instance) {
 
 static struct integrator_start start_of(struct instance *instance) {
     const struct instance_state *state = &instance->state;
-    return (struct integrator_start){.span = state->span,
+    return (struct integrator_start){.horizon = state->horizon,
                                      .first_step = state->restart_step,
-                                     .goes_on = state->restart_goes_on,
+                                     .continues = state->restart_continues,
                                      .indicators = instance->model->events != NULL
                                                        ? instance_describe_indicators(instance)
                                                        : NULL};
 }
 
 /* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
-static void hold(struct instance *instance, struct span span) {
-    const double *from = doubles_of(instance->memory.values, span);
-    double *to = doubles_of(instance->memory.held, span);
-    for (size_t i = 0; i < count_of(span); i++) {
+static void hold(struct instance *instance, struct range range) {
+    const double *from = doubles_of(instance->memory.values, range);
+    double *to = doubles_of(instance->memory.restart_values, range);
+    for (size_t i = 0; i < count_of(range); i++) {
         to[i] = from[i];
     }
 }
 
-static void hold_bytes(struct instance *instance, struct span span) {
-    memcpy(instance->memory.held + span.offset, instance->memory.values + span.offset, span.size);
+static void hold_bytes(struct instance *instance, struct range range) {
+    memcpy(instance->memory.restart_values + range.offset, instance->memory.values + range.offset,
+           range.size);
 }
 
 void instance_end_history(struct instance *instance) {
@@ -108,8 +110,8 @@ void instance_end_history(struct instance *instance) {
 }
 
 /* Polynomials end with this step, held inputs at the stop time. */
-double instance_span(const struct instance_state *state, struct clock_time restart, double target,
-                     bool inputs_move) {
+double instance_horizon(const struct instance_state *state, struct clock_time restart,
+                        double target, bool inputs_move) {
     if (inputs_move) {
         return target;
     }
@@ -132,11 +134,11 @@ static inline void hold_all(struct instance *instance, struct clock_time end,
     }
     hold(instance, model->inputs);
     hold(instance, model->states);
-    memcpy(memory->running, inputs, count_of(model->inputs) * sizeof *inputs);
+    memcpy(memory->active_inputs, inputs, count_of(model->inputs) * sizeof *inputs);
     instance_prepare_inputs(instance);
 
     const double target = clock_difference(end, state->time);
-    state->span = instance_span(state, state->time, target, instance->inputs_move);
+    state->horizon = instance_horizon(state, state->time, target, instance->inputs_move);
     state->first_time = target;
     instance_end_history(instance); // until the first advance has succeeded
 }
@@ -158,28 +160,29 @@ static enum status restart(struct instance *instance, struct clock_time end,
     } else if (!is_event) {
         instance_update_next_step(instance);
     }
-    hold_all(instance, end, is_event ? memory->current : memory->pending, has_new_parameters);
+    hold_all(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
+             has_new_parameters);
 
     // note what a replay needs
     state->steps_before_restart = state->statistics.steps;
     state->restart_step = state->next_step;
-    state->restart_goes_on = continuation != CONTINUE_AFTER_CHANGE;
+    state->restart_continues = continuation != CONTINUE_AFTER_CHANGE;
     const struct integrator_start start = start_of(instance);
     return integrator_restart(instance->integrator,
-                              doubles_of(memory->held, instance->model->states), &start);
+                              doubles_of(memory->restart_values, instance->model->states), &start);
 }
 
 /* In the number of internal steps that the state gives. A forged state fails here. */
 enum status instance_replay_history(struct instance *instance) {
     const struct instance_state *state = &instance->state;
-    const struct span states = instance->model->states;
+    const struct range states = instance->model->states;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     double *x = doubles_of(instance->first_derivatives, states);
     double reached;
     instance_prepare_inputs(instance);
     const struct integrator_start start = start_of(instance);
-    enum status status =
-        integrator_restart(instance->integrator, doubles_of(instance->memory.held, states), &start);
+    enum status status = integrator_restart(
+        instance->integrator, doubles_of(instance->memory.restart_values, states), &start);
     if (status == STATUS_OK) {
         status = integrator_advance(instance->integrator, state->first_time, steps, &reached, x);
     }

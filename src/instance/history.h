@@ -33,8 +33,8 @@ NONNULL void instance_hold(struct instance *instance, struct clock_time end,
 
 /* How far from a restart the integrator may go, s: to target where inputs move, otherwise to the
  * stop time. */
-NONNULL double instance_span(const struct instance_state *state, struct clock_time restart,
-                             double target, bool inputs_move);
+NONNULL double instance_horizon(const struct instance_state *state, struct clock_time restart,
+                                double target, bool inputs_move);
 
 /* The history is over; times since the restart count from the present time on. */
 NONNULL void instance_end_history(struct instance *instance);

@@ -18,8 +18,8 @@ static size_t aligned(size_t size) {
     return (size + alignment - 1) / alignment * alignment;
 }
 
-static bool lies_in(struct span span, const struct variable *variable) {
-    return variable->offset >= span.offset && variable->offset - span.offset < span.size;
+static bool lies_in(struct range range, const struct variable *variable) {
+    return variable->offset >= range.offset && variable->offset - range.offset < range.size;
 }
 
 /* Only events write its value: a mode or a discrete state. */
@@ -79,7 +79,7 @@ static enum status check_bindings(const struct model_description *description,
 static void place_values(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
-        struct instance_place *place = &instance->places[variable->reference];
+        struct instance_real *place = &instance->reals[variable->reference];
         place->is_calculated = variable->initial == INITIAL_CALCULATED &&
                                variable->owner == VARIABLE_OF_MODEL &&
                                !is_kept_by_events(instance->model, variable);
@@ -88,7 +88,7 @@ static void place_values(struct instance *instance) {
         }
         place->value = instance_field(instance, variable);
         if (variable->causality == CAUSALITY_INPUT) {
-            place->value = instance->memory.pending[instance_input_index(instance, variable)].d;
+            place->value = instance->memory.next_inputs[instance_input_index(instance, variable)].d;
         }
     }
 }
@@ -100,9 +100,9 @@ static bool setup_events(struct instance *instance) {
     instance->absolute_tolerances =
         calloc(2 * state_count + count_of(model->inputs) + 2 * count + 1, sizeof(double));
     instance->indicators = calloc(count + 1, sizeof *instance->indicators);
-    instance->fired = calloc(count + 1, sizeof *instance->fired);
+    instance->triggered = calloc(count + 1, sizeof *instance->triggered);
     if (instance->absolute_tolerances == NULL || instance->indicators == NULL ||
-        instance->fired == NULL) {
+        instance->triggered == NULL) {
         return false;
     }
     instance->tolerances = instance->absolute_tolerances + state_count;
@@ -126,9 +126,9 @@ static enum status setup(struct instance *instance) {
     instance->first_derivatives = calloc(2, values_size);
     instance->u =
         calloc((POLYNOMIAL_NODES + 1 + SERIES_INPUT_LENGTH) * input_count + 1, sizeof(double));
-    instance->places = calloc(instance->description->reference_count, sizeof *instance->places);
+    instance->reals = calloc(instance->description->reference_count, sizeof *instance->reals);
     if (memory->block == NULL || instance->first_derivatives == NULL || instance->u == NULL ||
-        instance->places == NULL) {
+        instance->reals == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
@@ -136,11 +136,11 @@ static enum status setup(struct instance *instance) {
     instance->input_series =
         (double(*)[SERIES_INPUT_LENGTH])(instance->nodes + POLYNOMIAL_NODES * input_count);
     memory->values = memory->block;
-    memory->held = memory->values + values_size;
-    memory->pending = (struct polynomial *)(void *)(memory->held + values_size);
-    memory->current = memory->pending + input_count;
-    memory->running = memory->current + input_count;
-    memory->due = (bool *)(void *)(memory->running + input_count);
+    memory->restart_values = memory->values + values_size;
+    memory->next_inputs = (struct polynomial *)(void *)(memory->restart_values + values_size);
+    memory->current_inputs = memory->next_inputs + input_count;
+    memory->active_inputs = memory->current_inputs + input_count;
+    memory->unhandled = (bool *)(void *)(memory->active_inputs + input_count);
     place_values(instance);
     if (model->events != NULL && !setup_events(instance)) {
         return STATUS_OUT_OF_MEMORY;
@@ -192,10 +192,10 @@ void instance_destroy(struct instance *instance) {
         instance_forget(instance, &snapshot);
     }
     integrator_destroy(instance->integrator);
-    free(instance->fired);
+    free(instance->triggered);
     free(instance->indicators);
     free(instance->absolute_tolerances);
-    free(instance->places);
+    free(instance->reals);
     free(instance->u);
     free(instance->first_derivatives);
     free(instance->memory.block);

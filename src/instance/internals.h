@@ -36,15 +36,15 @@ struct instance_state {
      * restart and the first and the last advance since then (integrator_advance). */
     bool has_history;
     struct clock_time restart_time;
-    double span;        /* s since the restart that the integrator may not pass */
+    double horizon;     /* s since the restart that the integrator may not pass */
     double first_time;  /* s since the restart */
     double latest_time; /* s since the restart */
     double passed_time; /* s since the restart: where the last internal step ended */
     struct integrator_statistics statistics;
     int64_t steps_before_restart; /* internal steps */
-    double restart_step;  /* s: first internal step of the last restart; 0: the method found one */
-    double next_step;     /* s: the same, for a restart now */
-    bool restart_goes_on; /* the last restart was on the solution before it */
+    double restart_step; /* s: first internal step of the last restart; 0: the method found one */
+    double next_step;    /* s: the same, for a restart now */
+    bool restart_continues; /* the last restart was on the solution before it */
 
     enum event_point event_point;
     struct clock_time cut_end; /* where the step would have ended without that event */
@@ -53,19 +53,19 @@ struct instance_state {
 /* Parts of one block of memory, of which a snapshot is a copy. */
 struct instance_memory {
     char *block;
-    size_t size;                /* bytes */
-    char *values;               /* the model's value structure, as set and read from outside; its
-                                   inputs are those at the current time */
-    char *held;                 /* the value structure at the last restart: what the integrator runs
-                                   with */
-    struct polynomial *pending; /* inputs of the next step: last value set, and derivatives */
-    struct polynomial *current; /* inputs at the current time */
-    struct polynomial *running; /* inputs since the last restart */
-    bool *due;                  /* as fired of struct instance: the event that is due */
+    size_t size;          /* bytes */
+    char *values;         /* the model's value structure, as set and read from outside; its
+                             inputs are those at the current time */
+    char *restart_values; /* the value structure at the last restart: what the integrator runs
+                   with */
+    struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
+    struct polynomial *current_inputs; /* inputs at the current time */
+    struct polynomial *active_inputs;  /* inputs since the last restart */
+    bool *unhandled; /* as triggered of struct instance: the event that is not handled yet */
 };
 
 /* Where the value of a Real lies, and when the value of any variable is up to date. */
-struct instance_place {
+struct instance_real {
     const double *value; /* NULL: of no Real */
     bool is_calculated;  /* by the outputs of the model */
 };
@@ -77,7 +77,7 @@ struct instance {
     struct instance_state state;
     struct instance_memory memory;
 
-    struct instance_place *places; /* by value reference */
+    struct instance_real *reals; /* by value reference */
 
     bool is_integrated_outside;
     bool states_are_settable;  /* in event mode, too */
@@ -95,8 +95,8 @@ struct instance {
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* two per indicator */
-    bool *fired;                  /* one per indicator: it falls to 0; then whether a time event
-                                     has come */
+    bool *triggered;              /* one per indicator: it falls to 0; then whether a time event
+                                 has come */
     bool inputs_move;             /* since the last restart; otherwise u holds their values */
     double *u;                    /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
@@ -107,8 +107,8 @@ struct instance {
     struct instance_snapshot *oldest;
 };
 
-static inline size_t count_of(struct span span) {
-    return span.size / sizeof(double);
+static inline size_t count_of(struct range range) {
+    return range.size / sizeof(double);
 }
 
 /* It integrates its states itself. */
@@ -116,14 +116,14 @@ static inline bool instance_has_integrator(const struct instance *instance) {
     return instance->integrator != NULL && !instance->is_integrated_outside;
 }
 
-/* The doubles at a span of a value structure. */
-static inline double *doubles_of(char *values, struct span span) {
-    return (double *)(void *)(values + span.offset);
+/* The doubles at a range of a value structure. */
+static inline double *doubles_of(char *values, struct range range) {
+    return (double *)(void *)(values + range.offset);
 }
 
-/* The ints at a span of a value structure. */
-static inline int *ints_of(char *values, struct span span) {
-    return (int *)(void *)(values + span.offset);
+/* The ints at a range of a value structure. */
+static inline int *ints_of(char *values, struct range range) {
+    return (int *)(void *)(values + range.offset);
 }
 
 /* Places in the value structure for what events keep; empty for models without events. */
@@ -131,7 +131,7 @@ static inline struct model_events events_of(const struct model *model) {
     return model->events != NULL ? *model->events : (struct model_events){0};
 }
 
-/* Bytes of what says which event it is: fired of struct instance. */
+/* Bytes of what says which event it is: triggered of struct instance. */
 static inline size_t instance_event_size(const struct model *model) {
     return model->events != NULL ? (model->events->indicator_count + 1) * sizeof(bool) : 0;
 }

@@ -23,13 +23,13 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
     if (!instance_is_searched(instance)) {
         return NULL;
     }
-    instance->model->events->describe(instance->memory.held, instance->indicators);
+    instance->model->events->describe(instance->memory.restart_values, instance->indicators);
     return instance->indicators;
 }
 
 /* What the integrator may miss a state by: away from 0 the relative part is the larger one. */
 static void write_tolerances(struct instance *instance) {
-    const struct span states = instance->model->states;
+    const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
     for (size_t i = 0; i < count_of(states); i++) {
         instance->tolerances[i] = instance->absolute_tolerances[i] +
@@ -37,9 +37,9 @@ static void write_tolerances(struct instance *instance) {
     }
 }
 
-/* fired, of struct instance, says that a time event has come. */
-static bool is_timed(const struct instance *instance, const bool *fired) {
-    return fired != NULL && fired[instance->model->events->indicator_count];
+/* triggered, of struct instance, says that a time event has come. */
+static bool is_timed(const struct instance *instance, const bool *triggered) {
+    return triggered != NULL && triggered[instance->model->events->indicator_count];
 }
 
 /* Time must get on from one time event to the next. */
@@ -53,18 +53,18 @@ static enum status check_next_time(const struct instance *instance, double passe
     return STATUS_INTERNAL;
 }
 
-static enum status update(struct instance *instance, const bool *fired) {
+static enum status update(struct instance *instance, const bool *triggered) {
     const struct model_events *events = instance->model->events;
     write_tolerances(instance);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        instance->du[i] = instance->memory.current[i].d[1];
+        instance->du[i] = instance->memory.current_inputs[i].d[1];
     }
     char reason[200];
     reason[0] = '\0';
     const struct event event = {
         .t = instance->state.time.s,
-        .fired = fired,
-        .is_timed = is_timed(instance, fired),
+        .triggered = triggered,
+        .is_timed = is_timed(instance, triggered),
         .du = instance->du,
         .tolerance = instance->tolerances,
         .reason = reason,
@@ -82,12 +82,12 @@ static enum status update(struct instance *instance, const bool *fired) {
     return status;
 }
 
-enum status instance_update_modes(struct instance *instance, const bool *fired) {
+enum status instance_update_modes(struct instance *instance, const bool *triggered) {
     if (instance->model->events == NULL) {
         return STATUS_OK;
     }
     instance->outputs_are_valid = false;
-    return update(instance, fired);
+    return update(instance, triggered);
 }
 
 /* In the unit of an indicator: so far from 0 integrators end at its root. */
@@ -127,7 +127,7 @@ static const double slope_time = 1e-7;
 
 /* Indicator i has come to 0 and does not rise; z_ahead: after slope_time. Where a mode has just
  * begun at 0, rounding may let it fall, but not past the band. */
-static bool has_fired(const struct instance *instance, size_t i, double z, double z_ahead) {
+static bool has_triggered(const struct instance *instance, size_t i, double z, double z_ahead) {
     const struct indicator *indicator = &instance->indicators[i];
     if (indicator->kind == INDICATOR_OF_MODEL) {
         return z < 0.0;
@@ -143,8 +143,8 @@ static enum status evaluate(struct instance *instance, const double x[], double 
     return model->events->indicators(instance->memory.values, instance->state.time.s, x, u, z);
 }
 
-/* Writes which indicators have fired while the inputs stay. */
-static enum status find_fired(struct instance *instance, bool fired[], bool *is_any) {
+/* Writes which indicators have triggered while the inputs stay. */
+static enum status find_triggered(struct instance *instance, bool triggered[], bool *is_any) {
     const struct model *model = instance->model;
     char *values = instance->memory.values;
     const double *x = doubles_of(values, model->states);
@@ -164,8 +164,8 @@ static enum status find_fired(struct instance *instance, bool fired[], bool *is_
         status = evaluate(instance, ahead, z_ahead);
     }
     for (size_t i = 0; status == STATUS_OK && i < model->events->indicator_count; i++) {
-        fired[i] = has_fired(instance, i, z[i], z_ahead[i]);
-        *is_any |= fired[i];
+        triggered[i] = has_triggered(instance, i, z[i], z_ahead[i]);
+        *is_any |= triggered[i];
     }
     return status;
 }
@@ -179,19 +179,19 @@ static bool can_fire(const struct instance *instance) {
 void instance_note_due(struct instance *instance) {
     instance_forget_due(instance);
     bool is_any = false;
-    if (can_fire(instance) && find_fired(instance, instance->memory.due, &is_any) == STATUS_OK &&
-        is_any) {
+    if (can_fire(instance) &&
+        find_triggered(instance, instance->memory.unhandled, &is_any) == STATUS_OK && is_any) {
         instance->state.event_point = EVENT_DUE;
     }
 }
 
 void instance_forget_due(struct instance *instance) {
-    memset(instance->memory.due, 0, instance_event_size(instance->model));
+    memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
     instance->state.event_point = NO_EVENT;
 }
 
-/* Leaves in fired the forces that are still below 0 with what is set now. */
-static enum status forget_past_forces(struct instance *instance, bool fired[]) {
+/* Leaves in triggered the forces that are still below 0 with what is set now. */
+static enum status forget_past_forces(struct instance *instance, bool triggered[]) {
     if (!can_fire(instance)) {
         return STATUS_OK;
     }
@@ -200,45 +200,46 @@ static enum status forget_past_forces(struct instance *instance, bool fired[]) {
         return instance_not_finite(instance, "an event indicator");
     }
     for (size_t i = 0; i < instance->model->events->indicator_count; i++) {
-        fired[i] = fired[i] &&
-                   (instance->indicators[i].kind != INDICATOR_OF_MODEL || instance->z[i] < 0.0);
+        triggered[i] = triggered[i] &&
+                       (instance->indicators[i].kind != INDICATOR_OF_MODEL || instance->z[i] < 0.0);
     }
     return STATUS_OK;
 }
 
 enum status instance_update_at_point(struct instance *instance, bool *states_changed) {
     const struct model_events *events = instance->model->events;
-    const struct span states = instance->model->states;
+    const struct range states = instance->model->states;
     *states_changed = false;
     if (events == NULL) {
         return STATUS_OK;
     }
-    bool *fired = instance->fired;
-    memcpy(fired, instance->memory.due, instance_event_size(instance->model));
+    bool *triggered = instance->triggered;
+    memcpy(triggered, instance->memory.unhandled, instance_event_size(instance->model));
     const double now = instance->state.time.s;
-    fired[events->indicator_count] = instance_next_time(instance) - now <= clock_spacing(now);
-    const bool is_any = instance->state.event_point == EVENT_DUE || fired[events->indicator_count];
+    triggered[events->indicator_count] = instance_next_time(instance) - now <= clock_spacing(now);
+    const bool is_any =
+        instance->state.event_point == EVENT_DUE || triggered[events->indicator_count];
     instance_forget_due(instance);
     enum status status = STATUS_OK;
     if (is_any) {
         struct event_counts none = {0};
-        status = instance_count_event(instance, fired, &none);
+        status = instance_count_event(instance, triggered, &none);
     }
     if (status == STATUS_OK) {
-        status = forget_past_forces(instance, fired);
+        status = forget_past_forces(instance, triggered);
     }
     char *before = instance->second_derivatives + states.offset;
     memcpy(before, instance->memory.values + states.offset, states.size);
     if (status == STATUS_OK) {
-        status = instance_update_modes(instance, is_any ? fired : NULL);
+        status = instance_update_modes(instance, is_any ? triggered : NULL);
     }
     *states_changed = memcmp(before, instance->memory.values + states.offset, states.size) != 0;
     return status;
 }
 
-static void refuse_state_event(const struct instance *instance, const bool fired[]) {
+static void refuse_state_event(const struct instance *instance, const bool triggered[]) {
     size_t first = 0;
-    while (!fired[first]) {
+    while (!triggered[first]) {
         first++;
     }
     message_write(&instance->sink, STATUS_TOO_MANY_EVENTS,
@@ -255,16 +256,16 @@ static void refuse_time_event(const struct instance *instance) {
                   instance->state.own.time, instance->state.own.max_internal_steps);
 }
 
-enum status instance_count_event(struct instance *instance, const bool fired[],
+enum status instance_count_event(struct instance *instance, const bool triggered[],
                                  struct event_counts *in_step) {
     struct instance_values *own = &instance->state.own;
-    const bool is_time_event = is_timed(instance, fired);
+    const bool is_time_event = is_timed(instance, triggered);
     if (is_time_event && in_step->of_time >= own->max_internal_steps) {
         refuse_time_event(instance);
         return STATUS_TOO_MANY_EVENTS;
     }
     if (!is_time_event && in_step->of_states >= own->max_events) {
-        refuse_state_event(instance, fired);
+        refuse_state_event(instance, triggered);
         return STATUS_TOO_MANY_EVENTS;
     }
     *(is_time_event ? &in_step->of_time : &in_step->of_states) += 1;

@@ -9,7 +9,7 @@
 static inline bool instance_is_searched(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
     return events != NULL && events->are_possible != NULL &&
-           events->are_possible(instance->memory.held);
+           events->are_possible(instance->memory.restart_values);
 }
 
 /* Time of the next time event, s; INFINITY: there is none. */
@@ -19,9 +19,9 @@ NONNULL double instance_next_time(const struct instance *instance);
 NONNULL bool instance_is_at_rest(const struct instance *instance);
 
 /* Brings modes, states and discrete states to what follows the inputs and parameters set now and,
- * where `fired` is not NULL, the event at the current time. */
+ * where `triggered` is not NULL, the event at the current time. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
-    instance_update_modes(struct instance *instance, const bool *fired);
+    instance_update_modes(struct instance *instance, const bool *triggered);
 
 /* For an integrator outside: adds to the calculated indicators what keeps them from being 0 where a
  * mode begins. */
@@ -48,7 +48,8 @@ struct event_counts {
 };
 
 /* Counts an event at the current time. Fails, and says so, at the first one above its limit. */
-MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance, const bool fired[],
+MUST_CHECK NONNULL enum status instance_count_event(struct instance *instance,
+                                                    const bool triggered[],
                                                     struct event_counts *in_step);
 
 #endif

@@ -112,7 +112,7 @@ static bool has_possible_history(const struct instance *instance,
         {"latest_time", state->latest_time,
          !exists || (state->latest_time >= state->first_time && isfinite(state->latest_time))},
         {"passed_time", state->passed_time, !exists || state->passed_time >= state->first_time},
-        {"span", state->span, !exists || state->span >= state->latest_time},
+        {"horizon", state->horizon, !exists || state->horizon >= state->latest_time},
     };
     return are_possible(instance, values, COUNT(values));
 }
@@ -138,7 +138,7 @@ static bool are_within_limits(const struct instance *instance, const char *value
         const struct variable *variable = &instance->description->variables[i];
         const void *field = values + variable->offset;
         if (variable->owner != VARIABLE_OF_MODEL ||
-            instance->places[variable->reference].is_calculated) {
+            instance->reals[variable->reference].is_calculated) {
             continue;
         }
         const double number =
@@ -154,7 +154,7 @@ static bool are_within_limits(const struct instance *instance, const char *value
 
 /* Discrete states that are no variables. */
 static bool are_finite_kept(const struct instance *instance, const char *values) {
-    const struct span kept = events_of(instance->model).discrete_states;
+    const struct range kept = events_of(instance->model).discrete_states;
     for (size_t i = 0; i < count_of(kept); i++) {
         const double state = ((const double *)(const void *)(values + kept.offset))[i];
         const struct named_value value = {"a discrete state", state, isfinite(state)};
@@ -171,9 +171,9 @@ static bool refuse_modes(const struct instance *instance, const char *name) {
     return false;
 }
 
-static bool are_zeros(const char *values, struct span span) {
-    for (size_t i = 0; i < span.size; i++) {
-        if (values[span.offset + i] != 0) {
+static bool are_zeros(const char *values, struct range range) {
+    for (size_t i = 0; i < range.size; i++) {
+        if (values[range.offset + i] != 0) {
             return false;
         }
     }
@@ -183,20 +183,20 @@ static bool are_zeros(const char *values, struct span span) {
 /* Modes of values, which may have been set since the last event, and those that the integrator runs
  * with. While it goes on no event has been. */
 static bool has_possible_modes(const struct instance *instance, const struct instance_state *state,
-                               const char *values, const char *held) {
+                               const char *values, const char *restart_values) {
     const struct model_events *events = instance->model->events;
     if (events == NULL) {
         return true;
     }
-    const struct span modes = events->modes;
+    const struct range modes = events->modes;
     const bool is_decided = state->phase >= PHASE_STEPPING;
     if (is_decided ? !events->modes_are_possible(values, false)
                    : !are_zeros(values, modes) || !are_zeros(values, events->discrete_states)) {
         return refuse_modes(instance, "the modes");
     }
     if (state->has_history &&
-        (memcmp(values + modes.offset, held + modes.offset, modes.size) != 0 ||
-         !events->modes_are_possible(held, true))) {
+        (memcmp(values + modes.offset, restart_values + modes.offset, modes.size) != 0 ||
+         !events->modes_are_possible(restart_values, true))) {
         return refuse_modes(instance, "the modes since the restart");
     }
     return true;
@@ -221,12 +221,12 @@ static bool is_possible_structure(const struct instance *instance, const char *v
     return are_within_limits(instance, values) && are_finite_kept(instance, values);
 }
 
-/* An event that is due is one of an indicator or of the time. */
+/* An unhandled event is one of an indicator or of the time. */
 static bool is_possible_event_point(const struct instance *instance,
-                                    const struct instance_state *state, const bool due[]) {
+                                    const struct instance_state *state, const bool unhandled[]) {
     int count = 0;
-    for (size_t i = 0; i < instance_event_size(instance->model) / sizeof *due; i++) {
-        count += due[i];
+    for (size_t i = 0; i < instance_event_size(instance->model) / sizeof *unhandled; i++) {
+        count += unhandled[i];
     }
     const bool is_due = state->event_point == EVENT_DUE;
     const bool is_stepping = state->phase == PHASE_STEPPING && instance->model->events != NULL;
@@ -235,7 +235,7 @@ static bool is_possible_event_point(const struct instance *instance,
     const struct named_value values[] = {
         {"event_point", state->event_point,
          state->event_point == NO_EVENT || (is_stepping && (is_due || is_passed))},
-        {"the number of causes of the event that is due", count, is_due == (count > 0)},
+        {"the number of causes of the unhandled event", count, is_due == (count > 0)},
         {"the end of the step cut short", end.s, isfinite(end.s)},
         {"the rest of the end of the step cut short", end.rest,
          is_rest_of(end) && (state->event_point == NO_EVENT ||
@@ -320,14 +320,14 @@ static bool has_true_start(const struct instance *instance, const struct instanc
             do_agree(instance, of_no_experiment, COUNT(of_no_experiment)));
 }
 
-/* The integrator's history ends at the present time, and its span follows from what is held. */
+/* The integrator's history ends at the present time, and its horizon follows from the inputs. */
 static bool has_true_history(const struct instance *instance, const struct instance_state *state,
-                             const struct polynomial running[]) {
+                             const struct polynomial active_inputs[]) {
     const struct twin twins[] = {
         {"latest_time", state->latest_time, clock_difference(state->time, state->restart_time)},
-        {"span", state->span,
-         instance_span(state, state->restart_time, state->first_time,
-                       polynomials_move(running, count_of(instance->model->inputs)))},
+        {"horizon", state->horizon,
+         instance_horizon(state, state->restart_time, state->first_time,
+                          polynomials_move(active_inputs, count_of(instance->model->inputs)))},
         {"event_point", state->event_point, NO_EVENT},
     };
     return !state->has_history || do_agree(instance, twins, COUNT(twins));
@@ -336,7 +336,7 @@ static bool has_true_history(const struct instance *instance, const struct insta
 /* Inputs at the current time are among the values, too; fixed parameters also among those that the
  * integrator runs with. */
 static bool has_true_values(const struct instance *instance, const struct instance_state *state,
-                            const char *values, const char *held,
+                            const char *values, const char *restart_values,
                             const struct polynomial current[]) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
@@ -350,7 +350,7 @@ static bool has_true_values(const struct instance *instance, const struct instan
             twin = &current[instance_input_index(instance, variable)].d[0];
         } else if (variable->causality == CAUSALITY_PARAMETER && state->has_history &&
                    variable->variability == VARIABILITY_FIXED) {
-            twin = held + variable->offset;
+            twin = restart_values + variable->offset;
         }
         if (memcmp(field, twin, is_real ? sizeof(double) : sizeof(int)) != 0) {
             message_write(&instance->sink, STATUS_INVALID_ARGUMENT,
@@ -367,25 +367,26 @@ enum status instance_check_plausible(const struct instance *instance,
     // places in block as in the instance's own
     const struct instance_memory *memory = &instance->memory;
     const char *values = block + (memory->values - memory->block);
-    const char *held = block + (memory->held - memory->block);
-    const char *pending = block + ((const char *)memory->pending - memory->block);
-    const char *current = block + ((const char *)memory->current - memory->block);
-    const char *running = block + ((const char *)memory->running - memory->block);
+    const char *restart_values = block + (memory->restart_values - memory->block);
+    const char *next_inputs = block + ((const char *)memory->next_inputs - memory->block);
+    const char *current = block + ((const char *)memory->current_inputs - memory->block);
+    const char *active_inputs = block + ((const char *)memory->active_inputs - memory->block);
 
     // derivatives of inputs at the current time are not checked: they may have overflowed
     const bool is_plausible =
         has_possible_settings(instance, state) && has_possible_statistics(instance, state) &&
         has_possible_history(instance, state) &&
-        are_finite_inputs(instance, "an input", (const void *)pending) &&
-        are_finite_inputs(instance, "an input since the restart", (const void *)running) &&
+        are_finite_inputs(instance, "an input", (const void *)next_inputs) &&
+        are_finite_inputs(instance, "an input since the restart", (const void *)active_inputs) &&
         is_possible_structure(instance, values) &&
-        (!state->has_history || is_possible_structure(instance, held)) &&
-        has_possible_modes(instance, state, values, held) &&
+        (!state->has_history || is_possible_structure(instance, restart_values)) &&
+        has_possible_modes(instance, state, values, restart_values) &&
         has_possible_next_time(instance, state, values) &&
         is_possible_event_point(
-            instance, state, (const void *)(block + ((const char *)memory->due - memory->block))) &&
+            instance, state,
+            (const void *)(block + ((const char *)memory->unhandled - memory->block))) &&
         has_true_variables(instance, state) && has_true_start(instance, state) &&
-        has_true_history(instance, state, (const void *)running) &&
-        has_true_values(instance, state, values, held, (const void *)current);
+        has_true_history(instance, state, (const void *)active_inputs) &&
+        has_true_values(instance, state, values, restart_values, (const void *)current);
     return is_plausible ? STATUS_OK : STATUS_INVALID_ARGUMENT;
 }

@@ -6,14 +6,14 @@ _Static_assert((int)SERIES_INPUT_LENGTH == (int)POLYNOMIAL_DEGREE + 1,
 static void evaluate_inputs(const struct instance *instance, double t) {
     const size_t input_count = count_of(instance->model->inputs);
     for (size_t i = 0; i < input_count; i++) {
-        instance->u[i] = polynomial_value(&instance->memory.running[i], t);
+        instance->u[i] = polynomial_value(&instance->memory.active_inputs[i], t);
     }
 }
 
 void instance_prepare_inputs(struct instance *instance) {
     instance->inputs_move = false;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const struct polynomial *input = &instance->memory.running[i];
+        const struct polynomial *input = &instance->memory.active_inputs[i];
         double *series = instance->input_series[i];
         instance->inputs_move |= polynomial_moves(input);
         instance->u[i] = input->d[0];
@@ -29,7 +29,7 @@ enum status instance_rhs(double t, const double x[], double dx[], void *instance
     if (instance->inputs_move) {
         evaluate_inputs(instance, t);
     }
-    return instance->model->right_hand_side(instance->memory.held,
+    return instance->model->right_hand_side(instance->memory.restart_values,
                                             instance->state.restart_time.s + t, x, instance->u, dx);
 }
 
@@ -38,8 +38,8 @@ enum status instance_jacobian(double t, const double x[], double J[], void *inst
     if (instance->inputs_move) {
         evaluate_inputs(instance, t);
     }
-    return instance->model->jacobian(instance->memory.held, instance->state.restart_time.s + t, x,
-                                     instance->u, J);
+    return instance->model->jacobian(instance->memory.restart_values,
+                                     instance->state.restart_time.s + t, x, instance->u, J);
 }
 
 enum status instance_indicators(double t, const double x[], double z[], void *instance_pointer) {
@@ -48,37 +48,37 @@ enum status instance_indicators(double t, const double x[], double z[], void *in
         evaluate_inputs(instance, t);
     }
     return instance->model->events->indicators(
-        instance->memory.held, instance->state.restart_time.s + t, x, instance->u, z);
+        instance->memory.restart_values, instance->state.restart_time.s + t, x, instance->u, z);
 }
 
 void instance_reach(const double x[], double reach[], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
-    instance->model->events->reach(instance->memory.held, x, reach);
+    instance->model->events->reach(instance->memory.restart_values, x, reach);
 }
 
-/* Coefficients of the inputs at t, in units of time of unit. */
-static void expand_inputs(const struct instance *instance, double t, double unit) {
+/* Coefficients of the inputs at t, for the time scale time_scale. */
+static void expand_inputs(const struct instance *instance, double t, double time_scale) {
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         double *coefficients = instance->input_series[i];
-        const struct polynomial input = polynomial_shifted(&instance->memory.running[i], t);
-        double power = 1.0; // unit^k / k!
+        const struct polynomial input = polynomial_shifted(&instance->memory.active_inputs[i], t);
+        double power = 1.0; // time_scale^k / k!
         for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
             coefficients[k] = input.d[k] * power;
-            power *= unit / (k + 1);
+            power *= time_scale / (k + 1);
         }
     }
 }
 
-enum status instance_series(double t, double unit, int first, int last,
+enum status instance_series(double t, double time_scale, int first, int last,
                             double rows[][SERIES_LENGTH], void *instance_pointer) {
     const struct instance *instance = instance_pointer;
     if (first == 0 && instance->inputs_move) {
-        expand_inputs(instance, t, unit);
+        expand_inputs(instance, t, time_scale);
     }
     const struct series_origin origin = {
-        .values = instance->memory.held,
+        .values = instance->memory.restart_values,
         .t = instance->state.restart_time.s + t,
-        .unit = unit,
+        .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])instance->input_series,
     };
     return instance->model->series->extend(&origin, first, last, rows);

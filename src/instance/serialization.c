@@ -71,14 +71,14 @@ static void transfer_kept(struct codec *codec, const struct model *model, char *
 
 /* The event at which the last step ended. */
 static void transfer_event_point(struct codec *codec, const struct model *model,
-                                 struct instance_state *state, bool due[]) {
+                                 struct instance_state *state, bool unhandled[]) {
     int event_point = (int)state->event_point;
     codec_int(codec, "event_point", &event_point);
     state->event_point = (enum event_point)event_point;
     codec_real(codec, &state->cut_end.s);
     codec_real(codec, &state->cut_end.rest);
     for (size_t i = 0; i <= model->events->indicator_count; i++) {
-        codec_bool(codec, "a cause of the event that is due", &due[i]);
+        codec_bool(codec, "a cause of the unhandled event", &unhandled[i]);
     }
 }
 
@@ -114,7 +114,7 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_bool(codec, "has_history", &state->has_history);
     codec_real(codec, &state->restart_time.s);
     codec_real(codec, &state->restart_time.rest);
-    codec_real(codec, &state->span);
+    codec_real(codec, &state->horizon);
     codec_real(codec, &state->first_time);
     codec_real(codec, &state->latest_time);
     codec_real(codec, &state->passed_time);
@@ -122,16 +122,16 @@ static void transfer_state(struct codec *codec, const struct instance *instance,
     codec_int64(codec, &state->steps_before_restart);
     codec_real(codec, &state->restart_step);
     codec_real(codec, &state->next_step);
-    codec_bool(codec, "restart_goes_on", &state->restart_goes_on);
+    codec_bool(codec, "restart_continues", &state->restart_continues);
     transfer_structure(codec, instance, block + (memory->values - memory->block));
-    transfer_structure(codec, instance, block + (memory->held - memory->block));
-    // pending, current and running lie side by side
+    transfer_structure(codec, instance, block + (memory->restart_values - memory->block));
+    // the three arrays of inputs lie side by side
     transfer_polynomials(
-        codec, (struct polynomial *)(void *)(block + ((char *)memory->pending - memory->block)),
+        codec, (struct polynomial *)(void *)(block + ((char *)memory->next_inputs - memory->block)),
         3 * input_count);
     if (instance->model->events != NULL) {
         transfer_event_point(codec, instance->model, state,
-                             (bool *)(void *)(block + ((char *)memory->due - memory->block)));
+                             (bool *)(void *)(block + ((char *)memory->unhandled - memory->block)));
     }
 }
 

@@ -44,7 +44,7 @@ enum status instance_check_parameters(struct instance *instance) {
 
 /* Absolute tolerance of each state, in its unit. */
 static void write_absolute_tolerances(const struct instance *instance, double absolute[]) {
-    const struct span states = instance->model->states;
+    const struct range states = instance->model->states;
     const double tolerance = instance->state.own.effective_relative_tolerance;
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
@@ -121,7 +121,7 @@ bool instance_is_configured_otherwise(const struct instance *instance) {
 }
 
 enum status instance_configure_integrator(struct instance *instance) {
-    const struct span states = instance->model->states;
+    const struct range states = instance->model->states;
     double *absolute = doubles_of(instance->first_derivatives, states);
     write_absolute_tolerances(instance, absolute);
     struct integrator_settings settings = settings_of(instance);

@@ -41,7 +41,7 @@ static inline int64_t instance_steps_left(const struct step *step) {
 NONNULL void instance_begin_inputs(struct instance *instance);
 
 /* Those at the time of the instance, elapsed s after the beginning of the step. */
-NONNULL void instance_place_inputs(struct instance *instance, double elapsed);
+NONNULL void instance_evaluate_inputs(struct instance *instance, double elapsed);
 
 /* Sets the inputs of the step to polynomials through the values that the importer gives. */
 MUST_CHECK NONNULL enum status instance_ask_inputs(const struct step *step, double t, double h);

@@ -9,8 +9,9 @@
 static enum status rest(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    const struct polynomial *inputs =
-        continuation == CONTINUE_AFTER_EVENT ? instance->memory.current : instance->memory.pending;
+    const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
+                                          ? instance->memory.current_inputs
+                                          : instance->memory.next_inputs;
     // inputs that are held leave the modes as they are; only behind an event it counts what was
     // held
     const bool is_searched = polynomials_move(inputs, count_of(instance->model->inputs));
@@ -32,22 +33,22 @@ static enum status rest(struct step *step, enum continuation continuation) {
 static enum status meet_event(struct step *step, struct clock_time time) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    const bool *fired = instance->fired;
+    const bool *triggered = instance->triggered;
     const struct clock_time end = step->end;
     instance_set_clock(instance, time);
-    instance_place_inputs(instance, clock_difference(state->time, step->begin));
+    instance_evaluate_inputs(instance, clock_difference(state->time, step->begin));
     instance->step_met_event = true;
     if (step->options->at_event != EVENTS_PASSED && state->time.s > step->begin.s) {
         step->is_early = clock_difference(end, state->time) > 0.0;
         step->end = state->time;
         if (step->options->at_event == EVENTS_LEFT) {
-            instance_leave_event(instance, fired, end);
+            instance_leave_event(instance, triggered, end);
             return STATUS_OK;
         }
     }
-    enum status status = instance_count_event(instance, fired, &step->events);
+    enum status status = instance_count_event(instance, triggered, &step->events);
     if (status == STATUS_OK) {
-        status = instance_update_modes(instance, fired);
+        status = instance_update_modes(instance, triggered);
     }
     if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
         instance_note_event(instance, end);
@@ -93,17 +94,17 @@ static enum status move_part(struct step *step, enum continuation continuation) 
 static bool find_event(const struct step *step, bool has_moved, struct clock_time *time) {
     const struct instance *instance = step->instance;
     const size_t count = instance->model->events->indicator_count;
-    const bool *fired =
+    const bool *triggered =
         has_moved && instance->integrator != NULL ? integrator_event(instance->integrator) : NULL;
-    if (fired == NULL && !step->meets_time_event) {
+    if (triggered == NULL && !step->meets_time_event) {
         return false;
     }
-    memset(instance->fired, 0, instance_event_size(instance->model));
-    if (fired != NULL) {
-        memcpy(instance->fired, fired, count * sizeof *fired);
+    memset(instance->triggered, 0, instance_event_size(instance->model));
+    if (triggered != NULL) {
+        memcpy(instance->triggered, triggered, count * sizeof *triggered);
         *time = clock_add(instance->state.restart_time, instance->state.latest_time);
     } else {
-        instance->fired[count] = true;
+        instance->triggered[count] = true;
         *time = step->until;
     }
     return true;

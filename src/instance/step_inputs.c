@@ -8,17 +8,17 @@ void instance_begin_inputs(struct instance *instance) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        memory->current[i] = memory->pending[i];
-        u[i] = memory->pending[i].d[0];
+        memory->current_inputs[i] = memory->next_inputs[i];
+        u[i] = memory->next_inputs[i].d[0];
     }
 }
 
-void instance_place_inputs(struct instance *instance, double elapsed) {
+void instance_evaluate_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        memory->current[i] = polynomial_shifted(&memory->pending[i], elapsed);
-        u[i] = memory->current[i].d[0];
+        memory->current_inputs[i] = polynomial_shifted(&memory->next_inputs[i], elapsed);
+        u[i] = memory->current_inputs[i].d[0];
     }
 }
 
@@ -27,8 +27,8 @@ void instance_hold_last_nodes(const struct step *step) {
     const struct instance_memory *memory = &instance->memory;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
-        memory->pending[i].d[0] =
-            step->is_early ? memory->current[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
+        memory->next_inputs[i].d[0] =
+            step->is_early ? memory->current_inputs[i].d[0] : nodes[POLYNOMIAL_NODES - 1];
     }
 }
 
@@ -44,7 +44,7 @@ enum status instance_check_inputs(const struct step *step) {
     const struct instance *instance = step->instance;
     const double h = clock_difference(step->end, step->begin);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        const struct polynomial *input = &instance->memory.pending[i];
+        const struct polynomial *input = &instance->memory.next_inputs[i];
         if (polynomial_moves(input)) {
             const struct polynomial at_end = polynomial_shifted(input, h);
             if (!is_finite(&at_end)) {
@@ -64,8 +64,8 @@ static enum status set_polynomials(struct instance *instance, double h) {
         if (!is_finite(&input)) {
             return instance_not_finite(instance, "a derivative of an input");
         }
-        memory->pending[i] = input;
-        memory->current[i] = input;
+        memory->next_inputs[i] = input;
+        memory->current_inputs[i] = input;
         u[i] = input.d[0];
     }
     instance->outputs_are_valid = false;
@@ -82,7 +82,8 @@ enum status instance_ask_inputs(const struct step *step, double t, double h) {
             return status;
         }
         for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] = instance->memory.pending[i].d[0];
+            instance->nodes[i * POLYNOMIAL_NODES + (size_t)k] =
+                instance->memory.next_inputs[i].d[0];
         }
     }
     return set_polynomials(instance, clock_difference(step->end, step->begin));

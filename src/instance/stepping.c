@@ -54,14 +54,14 @@ static void end_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
-        struct polynomial *pending = &memory->pending[i];
-        if (polynomial_moves(pending)) {
-            memory->current[i] = polynomial_shifted(pending, elapsed);
-            *pending = (struct polynomial){{pending->d[0]}};
+        struct polynomial *next = &memory->next_inputs[i];
+        if (polynomial_moves(next)) {
+            memory->current_inputs[i] = polynomial_shifted(next, elapsed);
+            *next = (struct polynomial){{next->d[0]}};
         } else {
-            memory->current[i] = *pending;
+            memory->current_inputs[i] = *next;
         }
-        u[i] = memory->current[i].d[0];
+        u[i] = memory->current_inputs[i].d[0];
     }
 }
 
@@ -99,7 +99,7 @@ static bool observe(void *step_pointer, double t, const double x[]) {
     memcpy(doubles_of(instance->memory.values, instance->model->states), x,
            instance->model->states.size);
     instance_set_clock(instance, clock_add(instance->state.restart_time, t));
-    instance_place_inputs(instance, clock_difference(instance->state.time, step->begin));
+    instance_evaluate_inputs(instance, clock_difference(instance->state.time, step->begin));
     return report(step);
 }
 

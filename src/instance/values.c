@@ -135,25 +135,25 @@ enum status instance_set_bool(struct instance *instance, const unsigned referenc
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
                               double values[]) {
     const struct model_description *description = instance->description;
-    const struct instance_place *places = instance->places;
+    const struct instance_real *reals = instance->reals;
     for (size_t i = 0; i < count; i++) {
         const unsigned reference = references[i];
-        if (reference >= description->reference_count || places[reference].value == NULL) {
+        if (reference >= description->reference_count || reals[reference].value == NULL) {
             (void)instance_refuse_reference(instance, reference, VARIABLE_FLOAT64);
             return STATUS_INVALID_ARGUMENT;
         }
-        if (places[reference].is_calculated && !instance->outputs_are_valid) {
+        if (reals[reference].is_calculated && !instance->outputs_are_valid) {
             const enum status status = instance_update_outputs(instance);
             if (status != STATUS_OK) {
                 return status;
             }
         }
-        if (!isfinite(*places[reference].value)) {
+        if (!isfinite(*reals[reference].value)) {
             return instance_not_finite(instance, variable_of(description, reference)->name);
         }
     }
     for (size_t i = 0; i < count; i++) {
-        values[i] = *places[references[i]].value;
+        values[i] = *reals[references[i]].value;
     }
     return STATUS_OK;
 }
@@ -166,7 +166,7 @@ static enum status prepare_ints(struct instance *instance, enum array array,
         if (instance_find(instance, reference, type_for(instance, array, reference)) == NULL) {
             return STATUS_INVALID_ARGUMENT;
         }
-        if (instance->places[reference].is_calculated) {
+        if (instance->reals[reference].is_calculated) {
             const enum status status = instance_update_outputs(instance);
             if (status != STATUS_OK) {
                 return status;

@@ -1,7 +1,7 @@
 #include "integrator.h"
 
 #include "method.h"
-#include "reserve.h"
+#include "workspace.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@
 
 struct integrator {
     struct problem problem;
-    struct reserve reserve;      /* for the memory of the method */
+    struct workspace workspace;  /* for the memory of the method */
     const struct method *method; /* NULL: there is none */
     void *memory;                /* of the method */
     double internal;             /* s since the restart: end of the last internal step */
@@ -47,7 +47,7 @@ bool integrator_is_possible(enum integrator_method method, const struct ode *ode
 }
 
 /* Room for any method. */
-static size_t reserve_size(const struct ode *ode) {
+static size_t workspace_size(const struct ode *ode) {
     size_t largest = 0;
     for (int i = INTEGRATOR_NO_METHOD + 1; i < INTEGRATOR_METHODS; i++) {
         const size_t size = methods[i]->memory_size(ode);
@@ -71,7 +71,7 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
     created->absolute_tolerances = created->values;
     created->reached_x = created->values + n;
     created->x = created->values + 2 * n;
-    if (!reserve_create(&created->reserve, reserve_size(ode)) ||
+    if (!workspace_create(&created->workspace, workspace_size(ode)) ||
         !location_create(&created->problem.ode, created->absolute_tolerances,
                          &created->problem.location)) {
         integrator_destroy(created);
@@ -84,7 +84,7 @@ enum status integrator_create(const struct ode *ode, const struct message_sink *
 static void destroy_method(struct integrator *integrator) {
     if (integrator->method != NULL) {
         integrator->method->destroy(integrator->memory);
-        reserve_cut(&integrator->reserve, 0);
+        workspace_cut(&integrator->workspace, 0);
     }
     integrator->method = NULL;
     integrator->memory = NULL;
@@ -95,7 +95,7 @@ void integrator_destroy(struct integrator *integrator) {
         return;
     }
     destroy_method(integrator);
-    reserve_destroy(&integrator->reserve);
+    workspace_destroy(&integrator->workspace);
     location_destroy(&integrator->problem.location);
     free(integrator);
 }
@@ -105,11 +105,11 @@ static enum status configure(struct integrator *integrator, enum integrator_meth
     const struct method *method = methods[wanted];
     if (integrator->method != method) {
         destroy_method(integrator);
-        reserve_enter(&integrator->reserve);
+        workspace_enter(&integrator->workspace);
         const enum status status = method->create(&integrator->problem, &integrator->memory);
-        reserve_leave(&integrator->reserve);
+        workspace_leave(&integrator->workspace);
         if (status != STATUS_OK) {
-            reserve_cut(&integrator->reserve, 0);
+            workspace_cut(&integrator->workspace, 0);
             return status;
         }
         integrator->method = method;
@@ -142,9 +142,9 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
     struct problem *problem = &integrator->problem;
     integrator->statistics.restarts++;
     integrator->internal = -INFINITY;
-    problem->span = start->span;
+    problem->horizon = start->horizon;
     problem->first_step = start->first_step;
-    problem->goes_on = start->goes_on;
+    problem->continues = start->continues;
     problem->reached = 0.0;
     problem->failed_at = -INFINITY;
     memcpy(integrator->reached_x, x, problem->ode.state_count * sizeof(double));
@@ -264,7 +264,7 @@ enum status integrator_rest(struct integrator *integrator, const double x[],
 
 const bool *integrator_event(const struct integrator *integrator) {
     const struct location *location = &integrator->problem.location;
-    return location->time == integrator->problem.reached ? location->fired : NULL;
+    return location->time == integrator->problem.reached ? location->triggered : NULL;
 }
 
 void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,

@@ -80,18 +80,18 @@ MUST_CHECK NONNULL enum status integrator_create(const struct ode *ode,
 void integrator_destroy(struct integrator *integrator);
 
 /* Sets method, tolerances and limits and clears the statistics. Allocates all that the method
- * needs, where it is not the one before, from the reserve of the handle, which cannot fail; nothing
- * is allocated later. A restart must follow. On failure it must be called again. */
+ * needs, where it is not the one before, from the workspace of the handle, which cannot fail;
+ * nothing is allocated later. A restart must follow. On failure it must be called again. */
 MUST_CHECK NONNULL enum status integrator_configure(struct integrator *integrator,
                                                     const struct integrator_settings *settings);
 
 /* Times in s after the restart. */
 struct integrator_start {
-    double span; /* > 0: the right-hand side is not evaluated beyond, nor may integrator_advance go
-                    there; INFINITY: no limit */
+    double horizon; /* > 0: the right-hand side is not evaluated beyond, nor may integrator_advance
+                    go there; INFINITY: no limit */
     double first_step; /* what integrator_next_step gave for a solution like this one; 0: none is
                           known */
-    bool goes_on; /* the solution is the one that was integrated up to here: further advances are
+    bool continues; /* the solution is the one that was integrated up to here: further advances are
                      likely */
     const struct indicator *indicators; /* those of the ode until the next restart; they must stay.
                                            NULL: no events are looked for */

@@ -24,11 +24,11 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
     location->z = calloc(count, sizeof *location->z);
     location->is_armed = calloc(count, sizeof *location->is_armed);
     location->noise = calloc(count, sizeof *location->noise);
-    location->fired = calloc(count, sizeof *location->fired);
+    location->triggered = calloc(count, sizeof *location->triggered);
     if (location->rows == NULL || location->step.indicator_row == NULL || location->used == NULL ||
         location->first == NULL || location->samples == NULL || location->x == NULL ||
         location->z == NULL || location->is_armed == NULL || location->noise == NULL ||
-        location->fired == NULL) {
+        location->triggered == NULL) {
         location_destroy(location);
         return false;
     }
@@ -37,7 +37,7 @@ bool location_create(const struct ode *ode, const double tolerances[], struct lo
 }
 
 void location_destroy(struct location *location) {
-    free(location->fired);
+    free(location->triggered);
     free(location->noise);
     free(location->is_armed);
     free(location->z);
@@ -387,10 +387,10 @@ enum status location_search(struct location *location) {
     if (!(s <= 1.0)) {
         return STATUS_OK;
     }
-    memset(location->fired, 0, location->ode->indicator_count * sizeof *location->fired);
+    memset(location->triggered, 0, location->ode->indicator_count * sizeof *location->triggered);
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
-        location->fired[i] = location->first[i] <= s + same_time;
+        location->triggered[i] = location->first[i] <= s + same_time;
     }
     location->time = s == 1.0 ? step->end : step->begin + s * (step->end - step->begin);
     return STATUS_OK;
@@ -414,7 +414,7 @@ bool location_correction(struct location *location, double t, const double x[], 
     // over this part of the step the derivative of an indicator hardly changes
     const double ahead = 0x1p-20 * (location->step.end - location->step.begin);
     size_t i = 0;
-    while (!location->fired[i]) {
+    while (!location->triggered[i]) {
         i++;
     }
     double z;

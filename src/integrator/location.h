@@ -34,7 +34,7 @@ struct location {
     bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
     double *noise;                       /* by indicator of a state: one that is 0 at the restart
                                             may have either sign as long as it is within this */
-    bool *fired;                         /* by indicator: it is at 0 at `time` */
+    bool *triggered;                     /* by indicator: it is at 0 at `time` */
     double time;                         /* of the event, s since the restart; INFINITY: none */
     struct step_polynomial step;         /* the last one; methods write it */
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
@@ -60,7 +60,7 @@ static inline bool location_is_active(const struct location *location) {
     return location->indicators != NULL;
 }
 
-/* Searches location->step. If there is an event in it, writes its time and what has fired. */
+/* Searches location->step. If there is an event in it, writes its time and what has triggered. */
 MUST_CHECK NONNULL enum status location_search(struct location *location);
 
 /* The same for the time from 0 to t, over which the states stay at x. */
@@ -68,7 +68,7 @@ MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location
                                                        double t);
 
 /* Newton's correction (s) of the event's time, from the state x and its derivative dx at the time
- * t: -z / z' of the first indicator that has fired. False where it has none. */
+ * t: -z / z' of the first indicator that has triggered. False where it has none. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],
                                             const double dx[], double *correction);
 

@@ -207,7 +207,7 @@ static double step_of_curvature(const struct problem *problem, double fraction, 
 
 /* After an event the first internal step does not depend on where the next requested time is. */
 static bool does_not_depend_on_points(const struct problem *problem) {
-    return problem->goes_on && location_is_active(&problem->location);
+    return problem->continues && location_is_active(&problem->location);
 }
 
 /* s: over this time x'' is taken. */
@@ -218,7 +218,7 @@ static double step_after_event(struct cvode *cvode) {
     struct problem *problem = cvode->base.problem;
     const size_t n = problem->ode.state_count;
     const double *x = small_vector_data(cvode->base.x);
-    const double ahead = fmin(curvature_time, problem->span);
+    const double ahead = fmin(curvature_time, problem->horizon);
     double *dx = problem->location.x;
     double *ddx = small_vector_data(cvode->base.work);
     if (problem_rhs(problem, 0.0, x, dx) != STATUS_OK) {
@@ -303,7 +303,7 @@ static enum status search(struct cvode *cvode, double begin, double end) {
 /* A time to which CVODE's first step is looked for, s: it decides nothing but its longest length.
  */
 static double longest_first_step(const struct problem *problem) {
-    return fmin(problem->span, 1.0);
+    return fmin(problem->horizon, 1.0);
 }
 
 /* Takes the internal steps to t, which CVode in normal mode would take, one by one, searches each
@@ -356,13 +356,14 @@ static int integrate(struct cvode *cvode, double t, int64_t max_steps, double *s
     const bool is_searched = location_is_active(&problem->location);
     int flag = CVodeSetMaxNumSteps(cvode->solver, sundials_steps(max_steps));
     if (flag == CV_SUCCESS && problem->reached == 0.0) {
-        flag = does_not_depend_on_points(problem)
-                   ? CVodeSetInitStep(cvode->solver, fmin(step_after_event(cvode), problem->span))
-                   : CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
+        flag =
+            does_not_depend_on_points(problem)
+                ? CVodeSetInitStep(cvode->solver, fmin(step_after_event(cvode), problem->horizon))
+                : CVodeSetInitStep(cvode->solver, fmin(problem->first_step, t));
     }
     if (flag == CV_SUCCESS) {
         // at every call: CVODE forgets a stop time that it has reached and keeps one over restarts
-        flag = CVodeSetStopTime(cvode->solver, problem->span);
+        flag = CVodeSetStopTime(cvode->solver, problem->horizon);
     }
     cvode->columns.count = 0;
     if (flag == CV_SUCCESS && (problem->observer != NULL || is_searched)) {

@@ -1,7 +1,7 @@
 /* Explicit Runge-Kutta steps of ARKODE. Each advance starts ERKStep again: only the length of the
  * next step connects one advance with the next. */
-#include "reserve.h"
 #include "sundials.h"
+#include "workspace.h"
 
 #include <arkode/arkode_erkstep.h>
 #include <float.h>
@@ -159,7 +159,7 @@ static void report_text(int error_code, const char *module, const char *function
 
 static void destroy(void *memory) {
     struct erk *erk = memory;
-    reserve_free(erk->step_x);
+    workspace_free(erk->step_x);
     if (erk->solver != NULL) {
         ERKStepFree(&erk->solver);
     }
@@ -187,7 +187,7 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
-    erk->step_x = reserve_calloc(3 * n, sizeof *erk->step_x);
+    erk->step_x = workspace_calloc(3 * n, sizeof *erk->step_x);
     const bool is_created = erk->step_x != NULL && create_solver(erk);
     const enum status status = is_created ? sundials_warm_up(erk) : STATUS_OUT_OF_MEMORY;
     if (status != STATUS_OK) {

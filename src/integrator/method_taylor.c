@@ -1,15 +1,15 @@
 /* Steps by the Taylor series of the solution (Jorba and Zou, A software package for the numerical
  * integration of ODEs by means of high-order Taylor methods, Experimental Mathematics 14, 2005).
  *
- * The unit of time of a series is the way to the requested time. Orders are added until the terms
- * one unit ahead are within the tolerance; the step lands there, and the state is the sum of the
- * coefficients. Where the largest order is not enough, a step is as long as this order allows. At
- * its end the polynomial must fit the equations.
+ * The time scale of a series is the way to the requested time. Orders are added until the terms
+ * one time scale ahead are within the tolerance; the step lands there, and the state is the sum of
+ * the coefficients. Where the largest order is not enough, a step is as long as this order allows.
+ * At its end the polynomial must fit the equations.
  *
  * Where a restart goes on along the solution, its first step has the largest order and all the
  * length that this allows. The requested times in it are values of one polynomial. */
 #include "method.h"
-#include "reserve.h"
+#include "workspace.h"
 
 #include <float.h>
 #include <math.h>
@@ -25,19 +25,19 @@ static const double safety = 0.9;
 
 /* Units of the longest step that goes past requested times: terms that are needed for one much
  * longer may have underflowed. */
-static const double most_units = 1000.0;
+static const double most_scales = 1000.0;
 
-/* The next unit over the one before: where a term overflows, and in the step after that. */
+/* The next time scale over the one before: where a term overflows, and in the step after that. */
 static const double shrinking = 0x1p-20;
 static const double growing = 16.0;
 
 struct taylor {
     struct problem *problem;
     int largest_order;
-    double begin;        /* of the series, s since the restart */
-    double unit;         /* of its coefficients, s */
-    bool is_searched;    /* for events, since the restart */
-    double longest_unit; /* s: of the next step of the running advance */
+    double begin;         /* of the series, s since the restart */
+    double time_scale;    /* of its coefficients, s */
+    bool is_searched;     /* for events, since the restart */
+    double longest_scale; /* s: of the next step of the running advance */
     int order;
     int noted_order;    /* the largest whose size is noted */
     int expected_order; /* of the next step that lands; what it gives does not depend on it */
@@ -49,7 +49,7 @@ struct taylor {
     double (*row)[SERIES_LENGTH];
     double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step */
     double *end_x;                    /* the state there */
-    double *end_dx; /* the derivative of the polynomial there, by s, which counts units */
+    double *end_dx; /* the derivative of the polynomial there, by s, which counts time scales */
 };
 
 /* ---- Life ----------------------------------------------------------------------------------- */
@@ -62,23 +62,23 @@ static size_t memory_size(const struct ode *ode) {
 
 static void destroy(void *memory) {
     struct taylor *taylor = memory;
-    reserve_free(taylor->end_row);
-    reserve_free(taylor->row);
-    reserve_free(taylor->weight);
-    reserve_free(taylor);
+    workspace_free(taylor->end_row);
+    workspace_free(taylor->row);
+    workspace_free(taylor->weight);
+    workspace_free(taylor);
 }
 
 static enum status create(struct problem *problem, void **memory) {
     *memory = NULL;
-    struct taylor *taylor = reserve_calloc(1, sizeof *taylor);
+    struct taylor *taylor = workspace_calloc(1, sizeof *taylor);
     if (taylor == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
     taylor->problem = problem;
     const size_t n = problem->ode.state_count;
-    taylor->weight = reserve_calloc(3 * n, sizeof *taylor->weight);
-    taylor->row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->row);
-    taylor->end_row = reserve_calloc(problem->ode.series_row_count, sizeof *taylor->end_row);
+    taylor->weight = workspace_calloc(3 * n, sizeof *taylor->weight);
+    taylor->row = workspace_calloc(problem->ode.series_row_count, sizeof *taylor->row);
+    taylor->end_row = workspace_calloc(problem->ode.series_row_count, sizeof *taylor->end_row);
     if (taylor->weight == NULL || taylor->row == NULL || taylor->end_row == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
@@ -116,8 +116,8 @@ static enum status restart(void *memory, const double x[]) {
 /* ---- Series --------------------------------------------------------------------------------- */
 
 /* Begins the series at the state x, with the orders from 0 to last. */
-static enum status begin_series(struct taylor *taylor, double t, double unit, const double x[],
-                                int last) {
+static enum status begin_series(struct taylor *taylor, double t, double time_scale,
+                                const double x[], int last) {
     const struct integrator_settings *settings = &taylor->problem->settings;
     for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
         taylor->row[i][0] = x[i];
@@ -125,20 +125,21 @@ static enum status begin_series(struct taylor *taylor, double t, double unit, co
             1.0 / (settings->relative_tolerance * fabs(x[i]) + settings->absolute_tolerances[i]);
     }
     taylor->begin = t;
-    taylor->unit = unit;
+    taylor->time_scale = time_scale;
     taylor->order = last;
     taylor->noted_order = 0;
-    return problem_series(taylor->problem, t, unit, 0, last, taylor->row);
+    return problem_series(taylor->problem, t, time_scale, 0, last, taylor->row);
 }
 
 /* Goes on with the series, to the order last. */
 static enum status add_orders(struct taylor *taylor, int last) {
     const int first = taylor->order + 1;
     taylor->order = last;
-    return problem_series(taylor->problem, taylor->begin, taylor->unit, first, last, taylor->row);
+    return problem_series(taylor->problem, taylor->begin, taylor->time_scale, first, last,
+                          taylor->row);
 }
 
-/* Sum of the terms of an order, one unit ahead, in tolerances of the states. */
+/* Sum of the terms of an order, one time scale ahead, in tolerances of the states. */
 static double size_of_terms(const struct taylor *taylor, int order) {
     double size = 0.0;
     for (size_t i = 0; i < taylor->problem->ode.state_count; i++) {
@@ -155,7 +156,7 @@ static void note_sizes(struct taylor *taylor, int last) {
     taylor->noted_order = last;
 }
 
-/* The terms of two orders, one unit ahead, are within the tolerance and become smaller. */
+/* The terms of two orders, one time scale ahead, are within the tolerance and become smaller. */
 static bool has_converged(const struct taylor *taylor, int order) {
     return taylor->size[order - 1] <= 1.0 && taylor->size[order] <= taylor->size[order - 1];
 }
@@ -167,8 +168,8 @@ static int exponent_of(double x) {
     return (int)(bits >> 52) - 1023;
 }
 
-/* The length of a step, in units, at whose end the terms of the last two orders are within the
- * tolerance, and the bound at most; NaN where a term is not finite. */
+/* The length of a step, in time scales, at whose end the terms of the last two orders are within
+ * the tolerance, and the bound at most; NaN where a term is not finite. */
 static double step_of_last_terms(const struct taylor *taylor, double bound) {
     const int last = taylor->order;
     const double *size = taylor->size;
@@ -184,8 +185,8 @@ static double step_of_last_terms(const struct taylor *taylor, double bound) {
 
 /* Looks for the order at which the series has converged and adds orders to find it: odd ones,
  * because with steps of even order the errors of a swing cancel, and cease to cancel at a smaller
- * tolerance where some steps have one order more. Writes the length of the step, in units: 1, or
- * what the largest order allows, 1 at most; NaN as above. */
+ * tolerance where some steps have one order more. Writes the length of the step, in time scales: 1,
+ * or what the largest order allows, 1 at most; NaN as above. */
 static enum status find_order(struct taylor *taylor, double *step) {
     for (int order = LEAST_ORDER;; order += 2) {
         if (order > taylor->order) {
@@ -204,7 +205,8 @@ static enum status find_order(struct taylor *taylor, double *step) {
     }
 }
 
-/* The state at begin + s unit and, unless NULL, its derivative by s. n: the number of states. */
+/* The state at begin + s * time_scale and, unless NULL, its derivative by s. n: the number of
+ * states. */
 ALWAYS_INLINE void evaluate_of(const struct taylor *taylor, double s, size_t n, double x[],
                                double dx[]) {
     for (size_t i = 0; i < n; i++) {
@@ -252,10 +254,11 @@ static void evaluate(const struct taylor *taylor, double s, double x[], double d
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
-/* Writes the state at begin + s unit to end_x, and by how much the polynomial misses the equations
- * there: the difference of its derivative from theirs, in tolerances per step. That is about the
- * order of the first term left out times its size. Small terms prove nothing, because orders of a
- * series may vanish: a motion from rest can have the orders 3, 4, 11, 12, 19 ... and none between.
+/* Writes the state at begin + s * time_scale to end_x, and by how much the polynomial misses the
+ * equations there: the difference of its derivative from theirs, in tolerances per step. That is
+ * about the order of the first term left out times its size. Small terms prove nothing, because
+ * orders of a series may vanish: a motion from rest can have the orders 3, 4, 11, 12, 19 ... and
+ * none between.
  */
 static enum status measure_defect(struct taylor *taylor, double s, double *defect) {
     const size_t n = taylor->problem->ode.state_count;
@@ -263,8 +266,9 @@ static enum status measure_defect(struct taylor *taylor, double s, double *defec
     for (size_t i = 0; i < n; i++) {
         taylor->end_row[i][0] = taylor->end_x[i];
     }
-    const enum status status = problem_series(taylor->problem, taylor->begin + s * taylor->unit,
-                                              taylor->unit, 0, 1, taylor->end_row);
+    const enum status status =
+        problem_series(taylor->problem, taylor->begin + s * taylor->time_scale, taylor->time_scale,
+                       0, 1, taylor->end_row);
     if (status != STATUS_OK) {
         return status;
     }
@@ -292,7 +296,7 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
             if (status != STATUS_OK) {
                 return status;
             }
-        } else if (taylor->begin + 0.5 * *step * taylor->unit > taylor->begin) {
+        } else if (taylor->begin + 0.5 * *step * taylor->time_scale > taylor->begin) {
             *step *= 0.5;
             work->failed_steps++;
         } else {
@@ -306,41 +310,41 @@ static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
 /* Longest step from the time t on, s. */
 static double longest_step(const struct problem *problem, double t) {
     const double max_step = problem->settings.max_step;
-    const double left = problem->span - t;
+    const double left = problem->horizon - t;
     return max_step > 0.0 && max_step < left ? max_step : left;
 }
 
-static double longest_step_in_units(const struct problem *problem, double t, double unit) {
-    const double longest = longest_step(problem, t) / unit;
-    const double most = location_is_active(&problem->location) ? growing : most_units;
+static double longest_step_in_scales(const struct problem *problem, double t, double time_scale) {
+    const double longest = longest_step(problem, t) / time_scale;
+    const double most = location_is_active(&problem->location) ? growing : most_scales;
     return longest < most ? longest : most;
 }
 
 /* Begins the series of a step at the state x, the orders of which depend on is_long; writes the
- * length of the step in units. */
-static enum status expand_with_unit(struct taylor *taylor, double unit, double t, bool is_long,
-                                    const double x[], double *step) {
+ * length of the step in time scales. */
+static enum status expand_with_scale(struct taylor *taylor, double time_scale, double t,
+                                     bool is_long, const double x[], double *step) {
     const int first_orders = is_long ? taylor->largest_order : taylor->expected_order;
-    const enum status status = begin_series(taylor, t, unit, x, first_orders);
+    const enum status status = begin_series(taylor, t, time_scale, x, first_orders);
     if (status != STATUS_OK || !is_long) {
         return status != STATUS_OK ? status : find_order(taylor, step);
     }
     note_sizes(taylor, taylor->order);
-    *step = step_of_last_terms(taylor, longest_step_in_units(taylor->problem, t, unit));
+    *step = step_of_last_terms(taylor, longest_step_in_scales(taylor->problem, t, time_scale));
     return STATUS_OK;
 }
 
 /* Expands the solution about the state x at the time t. is_long: for a step as long as possible;
- * otherwise for one of `length` (s) at most, which is the unit unless terms overflow. Writes the
- * length of the step in units. */
+ * otherwise for one of `length` (s) at most, which is the time scale unless terms overflow. Writes
+ * the length of the step in time scales. */
 static enum status expand(struct taylor *taylor, double t, double length, bool is_long,
                           const double x[], double *step, struct method_work *work) {
-    const double first = taylor->longest_unit < length ? taylor->longest_unit : length;
-    for (double unit = first; unit >= DBL_MIN; unit *= shrinking) {
-        const enum status status = expand_with_unit(taylor, unit, t, is_long, x, step);
+    const double first = taylor->longest_scale < length ? taylor->longest_scale : length;
+    for (double time_scale = first; time_scale >= DBL_MIN; time_scale *= shrinking) {
+        const enum status status = expand_with_scale(taylor, time_scale, t, is_long, x, step);
         if (status != STATUS_OK || !isnan(*step)) {
             // the next step need not begin from the whole length again
-            taylor->longest_unit = unit < length ? growing * unit : INFINITY;
+            taylor->longest_scale = time_scale < length ? growing * time_scale : INFINITY;
             return status;
         }
         work->failed_steps++;
@@ -351,7 +355,7 @@ static enum status expand(struct taylor *taylor, double t, double length, bool i
 /* The shortest step that a way shortens, over the time since the restart. */
 static const double resolution = 0x1p-40;
 
-/* A step (in units) in which no state moves farther from x, where it begins, than it may. */
+/* A step (in time scales) in which no state moves farther from x, where it begins, than it may. */
 static double step_within_reach(struct taylor *taylor, const double x[], double step) {
     const struct ode *ode = &taylor->problem->ode;
     if (!taylor->is_searched || ode->reach == NULL) {
@@ -373,7 +377,7 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
     if (within == step) {
         return step;
     }
-    const double shortest = resolution * taylor->begin / taylor->unit;
+    const double shortest = resolution * taylor->begin / taylor->time_scale;
     return fmax(within, fmin(step, shortest));
 }
 
@@ -408,13 +412,13 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
         return status;
     }
     taylor->expected_order = is_long ? taylor->expected_order : taylor->order;
-    const bool lands = step == 1.0 && taylor->unit == t - now;
-    *end = lands ? t : now + step * taylor->unit;
+    const bool lands = step == 1.0 && taylor->time_scale == t - now;
+    *end = lands ? t : now + step * taylor->time_scale;
     if (!(*end > now)) {
         return STATUS_NO_CONVERGENCE;
     }
     if (*end > t) {
-        evaluate(taylor, (t - now) / taylor->unit, x, NULL);
+        evaluate(taylor, (t - now) / taylor->time_scale, x, NULL);
     } else {
         memcpy(x, taylor->end_x, taylor->problem->ode.state_count * sizeof(double));
     }
@@ -426,7 +430,7 @@ static enum status take_step(struct taylor *taylor, double now, double t, bool i
     return STATUS_OK;
 }
 
-/* Writes the coefficients of a row over time in units of this length. */
+/* Writes the coefficients of a row over time with this time scale. */
 static void copy_row(const struct taylor *taylor, const double from[], double length, double to[]) {
     double power = 1.0;
     for (int k = 0; k <= taylor->order; k++) {
@@ -440,7 +444,7 @@ static enum status search(struct taylor *taylor, double end) {
     struct location *location = &taylor->problem->location;
     struct step_polynomial *step = &location->step;
     const size_t *row_of_indicator = taylor->problem->ode.row_of_indicator;
-    const double length = (end - taylor->begin) / taylor->unit;
+    const double length = (end - taylor->begin) / taylor->time_scale;
     step->begin = taylor->begin;
     step->end = end;
     step->is_from_end = false;
@@ -466,7 +470,7 @@ static double begin_advance(struct taylor *taylor, const double begin_x[], doubl
     memcpy(x, has_passed ? taylor->end_x : begin_x, problem->ode.state_count * sizeof(double));
     const double begin = has_passed ? taylor->passed : problem->reached;
     taylor->passed = -INFINITY;
-    taylor->longest_unit = INFINITY;
+    taylor->longest_scale = INFINITY;
     return begin;
 }
 
@@ -475,7 +479,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
     struct taylor *taylor = memory;
     const struct problem *problem = taylor->problem;
     const bool is_searched = taylor->is_searched;
-    bool is_long = problem->reached == 0.0 ? problem->goes_on : is_searched;
+    bool is_long = problem->reached == 0.0 ? problem->continues : is_searched;
     *stopped_at = begin_advance(taylor, begin_x, x);
     work->internal = *stopped_at;
     while (*stopped_at < t) {
@@ -496,7 +500,7 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         if (is_searched && problem->location.time <= t) {
             taylor->passed = end;
             *stopped_at = problem->location.time;
-            evaluate(taylor, (*stopped_at - taylor->begin) / taylor->unit, x, NULL);
+            evaluate(taylor, (*stopped_at - taylor->begin) / taylor->time_scale, x, NULL);
             work->is_cut_short = true;
             break;
         }
@@ -519,7 +523,7 @@ static bool interpolate(void *memory, double t, double x[]) {
     if (t > taylor->passed) {
         return false;
     }
-    evaluate(taylor, (t - taylor->begin) / taylor->unit, x, NULL);
+    evaluate(taylor, (t - taylor->begin) / taylor->time_scale, x, NULL);
     return true;
 }
 

@@ -17,8 +17,8 @@ typedef enum status ode_rhs(double t, const double x[], double dx[], void *conte
 typedef enum status ode_jacobian(double t, const double x[], double J[], void *context);
 
 /* Writes the Taylor coefficients of orders first to last of the solution that is at rows[i][0] at
- * the time t, as struct series does; unit: s. */
-typedef enum status ode_series(double t, double unit, int first, int last,
+ * the time t, as struct series does; time_scale: s. */
+typedef enum status ode_series(double t, double time_scale, int first, int last,
                                double rows[][SERIES_LENGTH], void *context);
 
 /* Writes all indicators at the time t and the state x to z. As ode_rhs else. */

@@ -11,9 +11,9 @@ struct problem {
     struct ode ode;
     struct message_sink sink;
     struct integrator_settings settings;
-    double span;              /* the right-hand side is not evaluated beyond */
+    double horizon;           /* the right-hand side is not evaluated beyond */
     double first_step;        /* length of the first internal step, s; 0: the method finds one */
-    bool goes_on;             /* as in struct integrator_start */
+    bool continues;           /* as in struct integrator_start */
     double reached;           /* where the last advance ended; 0 after a restart */
     double failed_at;         /* last time at which the right-hand side failed; -INFINITY: none */
     int64_t evaluation_count; /* calls of the right-hand side; series begun */
@@ -63,11 +63,11 @@ static inline enum status problem_jacobian(struct problem *problem, double t, co
 
 /* Writes coefficients as in ode.h; the orders from 0 on count as an evaluation. Fails as
  * problem_rhs; whether they are finite is for the caller to see. */
-static inline enum status problem_series(struct problem *problem, double t, double unit, int first,
-                                         int last, double rows[][SERIES_LENGTH]) {
+static inline enum status problem_series(struct problem *problem, double t, double time_scale,
+                                         int first, int last, double rows[][SERIES_LENGTH]) {
     const struct ode *ode = &problem->ode;
     problem->evaluation_count += first == 0 ? 1 : 0;
-    if (ode->series(t, unit, first, last, rows, ode->context) == STATUS_OK) {
+    if (ode->series(t, time_scale, first, last, rows, ode->context) == STATUS_OK) {
         return STATUS_OK;
     }
     problem->failed_at = t;

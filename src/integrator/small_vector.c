@@ -1,7 +1,7 @@
 #include "small_vector.h"
 
 #include "platform.h"
-#include "reserve.h"
+#include "workspace.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -24,7 +24,7 @@ static sunindextype length_of(N_Vector x) {
 
 static N_Vector create_like(const struct _generic_N_Vector *base, sunindextype length) {
     struct small_vector *created =
-        reserve_calloc(1, sizeof *created + (size_t)length * sizeof(double));
+        workspace_calloc(1, sizeof *created + (size_t)length * sizeof(double));
     if (created == NULL) {
         return NULL;
     }
@@ -39,7 +39,7 @@ static N_Vector clone(N_Vector x) {
 }
 
 static void destroy(N_Vector x) {
-    reserve_free(x);
+    workspace_free(x);
 }
 
 static void space(N_Vector x, sunindextype *reals, sunindextype *integers) {

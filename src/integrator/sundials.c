@@ -1,6 +1,6 @@
 #include "sundials.h"
 
-#include "reserve.h"
+#include "workspace.h"
 
 #include <math.h>
 #include <string.h>
@@ -38,7 +38,7 @@ void sundials_text(int error_code, const char *module, const char *function, cha
 void *sundials_create(size_t size, struct problem *problem, const struct method *method,
                       enum status (*status_of_flag)(const struct problem *, int)) {
     const sunindextype n = (sunindextype)problem->ode.state_count;
-    struct sundials *created = reserve_calloc(1, size);
+    struct sundials *created = workspace_calloc(1, size);
     if (created == NULL) {
         return NULL;
     }
@@ -66,7 +66,7 @@ void sundials_destroy(void *memory) {
     if (sundials->context != NULL) {
         SUNContext_Free(&sundials->context);
     }
-    reserve_free(sundials);
+    workspace_free(sundials);
 }
 
 int sundials_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
@@ -118,7 +118,7 @@ enum status sundials_warm_up(void *memory) {
         .sink = wanted.sink,
         .settings = {.relative_tolerance = 1e-3,
                      .absolute_tolerances = small_vector_data(sundials->work)},
-        .span = INFINITY,
+        .horizon = INFINITY,
         .failed_at = -INFINITY,
     };
     enum status status = method->configure(memory);

@@ -1,10 +1,10 @@
 /* In front of every file of SUNDIALS, by an option of the compiler (cmake/Sundials.cmake): what it
- * allocates comes from the reserve of the instance. Macros without arguments, because SUNDIALS has
- * members named free. The headers of the system come first: they declare the true functions. */
+ * allocates comes from the workspace of the instance. Macros without arguments, because SUNDIALS
+ * has members named free. The headers of the system come first: they declare the true functions. */
 #ifndef SUNDIALS_ALLOCATION_H
 #define SUNDIALS_ALLOCATION_H
 
-#include "reserve.h"
+#include "workspace.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -12,9 +12,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define malloc  reserve_malloc
-#define calloc  reserve_calloc
-#define realloc reserve_realloc
-#define free    reserve_free
+#define malloc  workspace_malloc
+#define calloc  workspace_calloc
+#define realloc workspace_realloc
+#define free    workspace_free
 
 #endif

@@ -12,7 +12,7 @@
 #include <stddef.h>
 
 /* Parts of the value structure. */
-struct span {
+struct range {
     size_t offset; /* bytes from the start of the structure */
     size_t size;   /* bytes */
 };
@@ -35,8 +35,8 @@ struct indicator {
 
 struct event {
     double t;                /* s */
-    const bool *fired;       /* one per indicator: it falls to 0 here. NULL: there is no event;
-                                inputs or parameters have changed, or the initialization ends */
+    const bool *triggered;   /* one per indicator: it falls to 0 here. NULL: there is no event;
+                            inputs or parameters have changed, or the initialization ends */
     bool is_timed;           /* the time that next_time gave has come */
     const double *du;        /* derivative of each input by the time after the event */
     const double *tolerance; /* of each state, in its unit: relative part and absolute one */
@@ -54,10 +54,10 @@ static inline double event_shortest_period(double t) {
 struct model_events {
     size_t indicator_count;
     const char *const *indicator_names;
-    struct span modes;           /* int[]: the right-hand side reads them, only update writes them.
+    struct range modes;           /* int[]: the right-hand side reads them, only update writes them.
                                     Zeros until the initialization ends */
-    struct span discrete_states; /* double[]: sums over events, samples; as modes */
-    struct span discrete_inputs; /* int[]: Boolean inputs */
+    struct range discrete_states; /* double[]: sums over events, samples; as modes */
+    struct range discrete_inputs; /* int[]: Boolean inputs */
 
     /* Time of the next time event, s; INFINITY: there is none. It follows from parameters, modes
      * and discrete states, and moves on with update. NULL: the model has no time events. */

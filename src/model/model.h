@@ -11,11 +11,11 @@
 #include <stddef.h>
 
 struct model {
-    size_t values_size;      /* bytes of the value structure */
-    struct span parameters;  /* all fields that parameters are bound to */
-    struct span inputs;      /* double[], all inputs */
-    struct span states;      /* double[], all continuous states */
-    struct span derivatives; /* double[], time derivative of each state in the order of states; may
+    size_t values_size;       /* bytes of the value structure */
+    struct range parameters;  /* all fields that parameters are bound to */
+    struct range inputs;      /* double[], all inputs */
+    struct range states;      /* double[], all continuous states */
+    struct range derivatives; /* double[], time derivative of each state in the order of states; may
                                 overlap states */
 
     /* Writes x' = f(t, x, u, p) to dx. A pure function: parameters are read from values, states and

@@ -12,12 +12,12 @@ enum { SERIES_LENGTH = 32 };
 /* Of an input: inputs are polynomials of degree 3 at most. */
 enum { SERIES_INPUT_LENGTH = 4 };
 
-/* Coefficient k of a quantity y is unit^k / k! times its k-th derivative by the time, so that
- * y(t + s unit) is the sum of y_k s^k; all coefficients have the unit of y. */
+/* Coefficient k of a quantity y is time_scale^k / k! times its k-th derivative by the time, so that
+ * y(t + s time_scale) is the sum of y_k s^k; all coefficients have the unit of y. */
 struct series_origin {
     const void *values;                          /* value structure, of which parameters are read */
     double t;                                    /* s */
-    double unit;                                 /* s: unit of time of the coefficients, > 0 */
+    double time_scale;                           /* s: time scale of the coefficients, > 0 */
     const double (*inputs)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
 };
 

@@ -224,7 +224,7 @@ def test_what_may_be_included(project: Path, name: str, header: str) -> None:
     ("name", "header"),
     [
         ("src/model/status.c", "ode.h"),
-        ("src/integrator/reserve.c", "sched.h"),
+        ("src/integrator/workspace.c", "sched.h"),
         ("src/integrator/method_cvode.c", "instance.h"),
         ("src/instance/values.c", "method.h"),
         ("src/instance/values.c", "component.h"),

@@ -48,7 +48,7 @@ static void check(int *now, int *since_restart, int mode, const char *text) {
 static void test_a_ball_in_the_air_does_not_rest(void) {
     start(&ball_description);
     struct ball_values *now = (void *)toy->memory.values;
-    struct ball_values *held = (void *)toy->memory.held;
+    struct ball_values *held = (void *)toy->memory.restart_values;
     check(&now->is_resting, &held->is_resting, 2, "the modes are impossible");
     check(&now->is_resting, &held->is_resting, -1, "the modes are impossible");
     check(&now->is_resting, &held->is_resting, 1, "the modes since the restart are impossible");
@@ -67,7 +67,7 @@ static void test_no_stroke_before_the_start(void) {
 static void test_a_block_slides_where_its_velocity_points(void) {
     start(&block_description);
     struct block_values *now = (void *)toy->memory.values;
-    struct block_values *held = (void *)toy->memory.held;
+    struct block_values *held = (void *)toy->memory.restart_values;
     check(&now->direction, &held->direction, 2, "the modes are impossible");
     check(&now->direction, &held->direction, -2, "the modes are impossible");
     check(&now->direction, &held->direction, -1, "the modes since the restart are impossible");

@@ -28,8 +28,8 @@ static enum status jacobian(const void *values, double t, const double x[], cons
 
 static void extend_motion(const struct series_origin *origin, int k, double a,
                           double rows[][SERIES_LENGTH]) {
-    rows[0][k] = origin->unit / k * rows[1][k - 1];
-    rows[1][k] = origin->unit / k * a;
+    rows[0][k] = origin->time_scale / k * rows[1][k - 1];
+    rows[1][k] = origin->time_scale / k * a;
 }
 
 static double input_order(const struct series_origin *origin, int k) {
@@ -106,7 +106,7 @@ static enum status ball_update(void *values, const struct event *event) {
         ball->is_resting = 0;
         return STATUS_OK;
     }
-    const bool hits = event->fired != NULL ? event->fired[BALL_HEIGHT] : ball->h <= 0.0;
+    const bool hits = event->triggered != NULL ? event->triggered[BALL_HEIGHT] : ball->h <= 0.0;
     const double pull = ball->g - ball->lift;
     if (hits && !ball->is_resting) {
         ball->h = 0.0;
@@ -231,7 +231,7 @@ static enum status block_indicators(const void *values, double t, const double x
 
 static enum status block_update(void *values, const struct event *event) {
     struct block_values *block = values;
-    if (event->fired != NULL && event->fired[BLOCK_SPEED]) {
+    if (event->triggered != NULL && event->triggered[BLOCK_SPEED]) {
         block->v = 0.0;
     }
     if (block->v != 0.0) {
@@ -240,8 +240,8 @@ static enum status block_update(void *values, const struct event *event) {
     }
     const bool rises = event->du[0] > 0.0;
     const bool falls = event->du[0] < 0.0;
-    const bool forward = event->fired != NULL && event->fired[BLOCK_FORWARD] && !falls;
-    const bool backward = event->fired != NULL && event->fired[BLOCK_BACKWARD] && !rises;
+    const bool forward = event->triggered != NULL && event->triggered[BLOCK_FORWARD] && !falls;
+    const bool backward = event->triggered != NULL && event->triggered[BLOCK_BACKWARD] && !rises;
     block->direction = forward || block->f > block->breakaway     ? 1
                        : backward || block->f < -block->breakaway ? -1
                                                                   : 0;
@@ -345,7 +345,7 @@ static enum status hammer_update(void *values, const struct event *event) {
         hammer->is_started = 1;
         hammer->start = event->t;
     }
-    if (event->fired != NULL && event->fired[0]) {
+    if (event->triggered != NULL && event->triggered[0]) {
         hammer->x = 0.0;
         hammer->v = fabs(hammer->v);
         hammer->hits++;

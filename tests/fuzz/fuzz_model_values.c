@@ -64,7 +64,7 @@ static int any_integer(struct fuzz_input *input, const struct variable *variable
 /* In Model Exchange importers set states as variables: in continuous-time mode, and in FMI 3.0 in
  * event mode too. */
 static bool is_free_state(const struct subject *subject, const struct variable *variable) {
-    const struct span states = model_description.model->states;
+    const struct range states = model_description.model->states;
     return (fmu_version == 3 || subject->phase == PHASE_CONTINUOUS_TIME) &&
            subject->instance->kind == fmi2ModelExchange && variable->owner == VARIABLE_OF_MODEL &&
            variable->offset >= states.offset && variable->offset - states.offset < states.size;

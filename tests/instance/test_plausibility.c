@@ -167,7 +167,7 @@ static void test_an_experiment_can_be_run(void) {
     assert_refused("stop time");
 }
 
-/* A replay goes from the restart to first_time and on to latest_time, within the span and the
+/* A replay goes from the restart to first_time and on to latest_time, within the horizon and the
  * steps.
  */
 static void test_a_history_does_not_contradict_itself(void) {
@@ -180,9 +180,9 @@ static void test_a_history_does_not_contradict_itself(void) {
     const double passed[2] = {state.first_time, INFINITY};
     const double not_passed[2] = {0.999 * state.first_time, -INFINITY};
     check_real(&state.passed_time, "passed_time", passed, not_passed);
-    const double span[2] = {state.span, state.span};
+    const double horizon[2] = {state.horizon, state.horizon};
     const double not_span[2] = {0.999 * state.latest_time, -INFINITY};
-    check_real(&state.span, "span", span, not_span);
+    check_real(&state.horizon, "horizon", horizon, not_span);
 
     // internal steps since the restart: at least one, and no more than restart and step allow
     const int64_t most = integrator_longest_history(INTEGRATOR_CVODE_ADAMS, false) +
@@ -197,7 +197,7 @@ static void test_a_history_does_not_contradict_itself(void) {
 
     // all of that does not matter without a history
     state.has_history = false;
-    state.first_time = state.latest_time = state.passed_time = state.span = -1.0;
+    state.first_time = state.latest_time = state.passed_time = state.horizon = -1.0;
     follow();
     TEST_ASSERT_TRUE(is_plausible());
 }
@@ -227,7 +227,7 @@ static char *place(const void *own) {
 
 static void test_values_could_have_been_set(void) {
     struct oscillator_values *values = (void *)place(instance->memory.values);
-    struct oscillator_values *held = (void *)place(instance->memory.held);
+    struct oscillator_values *held = (void *)place(instance->memory.restart_values);
     const double omegas[2] = {-10.0, 100.0};
     const double no_omegas[2] = {-10.5, 100.5};
     check_real(&values->omega, "omega", omegas, no_omegas);
@@ -248,10 +248,10 @@ static void test_values_could_have_been_set(void) {
 static void test_inputs_are_finite(void) {
     const double finite[2] = {-1e300, 1e300};
     const double infinite[2] = {-INFINITY, INFINITY};
-    struct polynomial *pending = (void *)place(instance->memory.pending);
-    struct polynomial *current = (void *)place(instance->memory.current);
-    struct polynomial *running = (void *)place(instance->memory.running);
-    state.has_history = false; // its span follows from the inputs
+    struct polynomial *pending = (void *)place(instance->memory.next_inputs);
+    struct polynomial *current = (void *)place(instance->memory.current_inputs);
+    struct polynomial *running = (void *)place(instance->memory.active_inputs);
+    state.has_history = false; // its horizon follows from the inputs
     for (int k = 0; k <= POLYNOMIAL_DEGREE; k++) {
         check_real(&pending->d[k], "an input =", finite, infinite);
         check_real(&running->d[k], "an input since the restart", finite, infinite);
@@ -294,13 +294,13 @@ static void test_what_stands_twice_agrees(void) {
     check_int_twin(&own->solver_last_order, "solver_last_order");
     check_twin(&own->last_event_time, "last_event_time"); // there has been no event
     check_twin(&state.latest_time, "latest_time");
-    check_twin(&state.span, "span");
+    check_twin(&state.horizon, "horizon");
 
     const struct oscillator_values *values = (void *)place(instance->memory.values);
-    struct polynomial *current = (void *)place(instance->memory.current);
+    struct polynomial *current = (void *)place(instance->memory.current_inputs);
     TEST_ASSERT_EQUAL_MEMORY(&values->u, &current->d[0], sizeof current->d[0]);
     check_twin(&current->d[0], "two values of u");
-    struct oscillator_values *held = (void *)place(instance->memory.held);
+    struct oscillator_values *held = (void *)place(instance->memory.restart_values);
     check_twin(&held->gain, "gain");
 }
 
@@ -309,7 +309,7 @@ static void test_the_clock_and_the_history_agree(void) {
     assert_refused("latest_time = 1");
     state.time.s = state.own.time = 1.0;
     state.experiment.stop_time = 5.0;
-    assert_refused("span = 10");
+    assert_refused("horizon = 10");
     state.experiment.stop_time = 10.0;
     state.experiment_defined = false;
     assert_refused("experiment_defined");

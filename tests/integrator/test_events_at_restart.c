@@ -34,13 +34,13 @@ static enum status jacobian(double t, const double x[], double J[], void *contex
     return STATUS_OK;
 }
 
-static enum status series(double t, double unit, int first, int last, double row[][SERIES_LENGTH],
-                          void *context) {
+static enum status series(double t, double time_scale, int first, int last,
+                          double row[][SERIES_LENGTH], void *context) {
     (void)t;
     (void)context;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
-            row[0][k] = k == 1 ? unit * rate : 0.0;
+            row[0][k] = k == 1 ? time_scale * rate : 0.0;
         }
     }
     return STATUS_OK;
@@ -69,7 +69,7 @@ static double run(enum integrator_method method, enum indicator_kind kind) {
     const struct integrator_settings settings = {
         .method = method, .relative_tolerance = 1e-12, .absolute_tolerances = absolute};
     const struct indicator indicator = {.kind = kind, .factor = 1.0};
-    const struct integrator_start from = {.span = INFINITY, .indicators = &indicator};
+    const struct integrator_start from = {.horizon = INFINITY, .indicators = &indicator};
     const struct message_sink quiet = {0};
     double x[1] = {below};
     double reached;

@@ -41,7 +41,7 @@ static void test_derivatives_that_are_too_large_are_named(void) {
     const struct integrator_settings settings = {.method = INTEGRATOR_CVODE_ADAMS,
                                                  .relative_tolerance = 1e-8,
                                                  .absolute_tolerances = absolute};
-    const struct integrator_start from = {.span = INFINITY};
+    const struct integrator_start from = {.horizon = INFINITY};
     double x[2];
     double reached;
     ASSERT_OK(integrator_create(&ode, &last_text_sink, &integrator));

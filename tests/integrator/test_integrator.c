@@ -33,14 +33,14 @@ static enum status circle_jacobian(double t, const double x[], double J[], void 
     return STATUS_OK;
 }
 
-static enum status circle_series(double t, double unit, int first, int last,
+static enum status circle_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
     struct circle *of = context;
     of->latest = fmax(of->latest, t);
     of->evaluations += first == 0 ? 1 : 0;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
-        row[0][k] = unit / k * row[1][k - 1];
-        row[1][k] = t >= of->failing_from ? NAN : -unit / k * row[0][k - 1];
+        row[0][k] = time_scale / k * row[1][k - 1];
+        row[1][k] = t >= of->failing_from ? NAN : -time_scale / k * row[0][k - 1];
     }
     return STATUS_OK;
 }
@@ -52,10 +52,10 @@ static enum status always_failing(double t, const double x[], double dx[], void 
     return STATUS_OUT_OF_RANGE;
 }
 
-static enum status series_always_failing(double t, double unit, int first, int last,
+static enum status series_always_failing(double t, double time_scale, int first, int last,
                                          double row[][SERIES_LENGTH], void *context) {
     (void)t;
-    (void)unit;
+    (void)time_scale;
     (void)context;
     for (int k = first; k <= last; k++) {
         row[0][k] = 0.0;
@@ -103,9 +103,10 @@ static void configure(double tolerance) {
     configure_with(tolerance, 0.0);
 }
 
-static void restart(double span) {
+static void restart(double horizon) {
     TEST_ASSERT_EQUAL_INT(
-        STATUS_OK, integrator_restart(integrator, start, &(struct integrator_start){.span = span}));
+        STATUS_OK,
+        integrator_restart(integrator, start, &(struct integrator_start){.horizon = horizon}));
 }
 
 static void advance(double t, double x[2]) {
@@ -177,7 +178,7 @@ EACH_CVODE_METHOD static void test_asking_for_more_points_costs_no_steps(void) {
 EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
     enum { POINTS = 300 };
     // otherwise the first step depends on the first point
-    const struct integrator_start first = {.span = INFINITY, .first_step = 1e-6};
+    const struct integrator_start first = {.horizon = INFINITY, .first_step = 1e-6};
     double many[POINTS][2];
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, &first));
     for (int i = 0; i < POINTS; i++) {
@@ -201,7 +202,7 @@ EACH_METHOD static void test_a_restart_begins_at_time_zero_from_its_state(void) 
     TEST_ASSERT_EQUAL_MEMORY(first, again, sizeof first);
 }
 
-EACH_METHOD static void test_nothing_is_evaluated_beyond_the_span(void) {
+EACH_METHOD static void test_nothing_is_evaluated_beyond_the_horizon(void) {
     double x[2];
     restart(1.0);
     for (int i = 1; i <= 100; i++) {
@@ -210,7 +211,7 @@ EACH_METHOD static void test_nothing_is_evaluated_beyond_the_span(void) {
     TEST_ASSERT_TRUE(circle.latest <= 1.0 + 1e-12);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(1.0), x[0]);
 
-    // a later restart without a span is not bound by the former one
+    // a later restart without a horizon is not bound by the former one
     restart(INFINITY);
     advance(2.0, x);
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), x[0]);
@@ -426,7 +427,7 @@ EACH_METHOD static void test_another_method_may_take_over(void) {
         TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
         TEST_ASSERT_EQUAL_INT(STATUS_OK,
                               integrator_restart(integrator, not_finite,
-                                                 &(struct integrator_start){.span = INFINITY}));
+                                                 &(struct integrator_start){.horizon = INFINITY}));
     }
     configure(1e-10);
     restart(INFINITY);

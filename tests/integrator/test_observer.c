@@ -26,12 +26,12 @@ static enum status circle_jacobian(double t, const double x[], double J[], void 
     return STATUS_OK;
 }
 
-static enum status circle_series(double t, double unit, int first, int last,
+static enum status circle_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
     (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
-        row[0][k] = unit / k * row[1][k - 1];
-        row[1][k] = t >= failing_from ? NAN : -unit / k * row[0][k - 1];
+        row[0][k] = time_scale / k * row[1][k - 1];
+        row[1][k] = t >= failing_from ? NAN : -time_scale / k * row[0][k - 1];
     }
     return STATUS_OK;
 }
@@ -69,7 +69,7 @@ static void begin(const struct integrator_start *start_of, double max_step) {
 
 /* All methods need many internal steps for an advance of some seconds. */
 void setUp(void) {
-    begin(&(struct integrator_start){.span = INFINITY}, 0.25);
+    begin(&(struct integrator_start){.horizon = INFINITY}, 0.25);
 }
 
 void tearDown(void) {
@@ -230,7 +230,7 @@ EACH_METHOD static void test_the_limit_of_steps_holds(void) {
  */
 
 EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) {
-    const struct integrator_start on = {.span = INFINITY, .goes_on = true};
+    const struct integrator_start on = {.horizon = INFINITY, .continues = true};
     double x[2] = {-7.0, -7.0};
     double expected[2];
     double reached;

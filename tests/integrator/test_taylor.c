@@ -17,15 +17,15 @@ static enum status linear_rhs(double t, const double x[], double dx[], void *con
     return STATUS_OK;
 }
 
-static enum status linear_series(double t, double unit, int first, int last,
+static enum status linear_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
-    // (t + s unit)^3
-    const double push[4] = {t * t * t, 3.0 * t * t * unit, 3.0 * t * unit * unit,
-                            unit * unit * unit};
+    // (t + s time_scale)^3
+    const double push[4] = {t * t * t, 3.0 * t * t * time_scale, 3.0 * t * time_scale * time_scale,
+                            time_scale * time_scale * time_scale};
     (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
-        row[0][k] = unit / k * row[1][k - 1];
-        row[1][k] = unit / k * (rate * row[0][k - 1] + (k <= 4 ? push[k - 1] : 0.0));
+        row[0][k] = time_scale / k * row[1][k - 1];
+        row[1][k] = time_scale / k * (rate * row[0][k - 1] + (k <= 4 ? push[k - 1] : 0.0));
     }
     return STATUS_OK;
 }
@@ -39,7 +39,7 @@ static enum status square_rhs(double t, const double x[], double dx[], void *con
     return STATUS_OK;
 }
 
-static enum status square_series(double t, double unit, int first, int last,
+static enum status square_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
     (void)t;
     (void)context;
@@ -48,7 +48,7 @@ static enum status square_series(double t, double unit, int first, int last,
         for (int i = 0; i < k; i++) {
             sum += row[0][i] * row[0][k - 1 - i];
         }
-        row[0][k] = unit / k * sum;
+        row[0][k] = time_scale / k * sum;
         row[1][k] = 0.0;
     }
     return STATUS_OK;
@@ -76,8 +76,8 @@ static void create(ode_rhs *rhs, ode_series *series, double max_step) {
     create_at(rhs, series, max_step, usual_tolerance);
 }
 
-static void restart(double x1, double x2, double span, bool goes_on) {
-    const struct integrator_start start = {.span = span, .goes_on = goes_on};
+static void restart(double x1, double x2, double horizon, bool continues) {
+    const struct integrator_start start = {.horizon = horizon, .continues = continues};
     const double x[2] = {x1, x2};
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, &start));
 }
@@ -247,7 +247,7 @@ static void test_a_pole_is_not_passed(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-4, 1000.0, x[0]);
 }
 
-/* Terms of high order overflow where the unit is much longer than the motion is quick. */
+/* Terms of high order overflow where the time_scale is much longer than the motion is quick. */
 static void test_a_unit_in_which_terms_overflow_is_shortened(void) {
     double x[2];
     double reached;

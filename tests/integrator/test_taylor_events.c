@@ -37,14 +37,14 @@ static enum status indicators(double t, const double x[], double z[], void *cont
     return STATUS_OK;
 }
 
-static enum status series(double t, double unit, int first, int last, double row[][SERIES_LENGTH],
-                          void *context) {
+static enum status series(double t, double time_scale, int first, int last,
+                          double row[][SERIES_LENGTH], void *context) {
     (void)t;
     (void)context;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
-            row[X][k] = unit / k * row[V][k - 1];
-            row[V][k] = -unit / k * row[X][k - 1];
+            row[X][k] = time_scale / k * row[V][k - 1];
+            row[V][k] = -time_scale / k * row[X][k - 1];
         }
         row[LEFT][k] = k == 0 ? 0.5 : 0.0;
         for (int i = 0; i <= k; i++) {
@@ -66,7 +66,7 @@ static void start(const struct ode *ode) {
     const struct integrator_settings settings = {
         .method = INTEGRATOR_TAYLOR, .relative_tolerance = 1e-12, .absolute_tolerances = absolute};
     static const struct indicator of_model = {.kind = INDICATOR_OF_MODEL};
-    const struct integrator_start from = {.span = INFINITY, .indicators = &of_model};
+    const struct integrator_start from = {.horizon = INFINITY, .indicators = &of_model};
     const struct message_sink quiet = {0};
     const double x[2] = {0.0, 1.0};
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(ode, &quiet, &integrator));

@@ -14,11 +14,11 @@ static enum status rhs(double t, const double x[], double dx[], void *context) {
     return STATUS_OK;
 }
 
-/* Coefficient k of p (t + s unit)^(p-1). */
-static double factor(double t, double unit, int k) {
+/* Coefficient k of p (t + s time_scale)^(p-1). */
+static double factor(double t, double time_scale, int k) {
     double value = power;
     for (int i = 0; i < k; i++) {
-        value *= unit * (power - 1 - i) / (i + 1);
+        value *= time_scale * (power - 1 - i) / (i + 1);
     }
     return k < power ? value * pow(t, power - 1 - k) : 0.0;
 }
@@ -33,15 +33,15 @@ static double product(const double x[], const double y[], int k) {
 
 enum row { X, SQUARE, FACTOR, ROWS };
 
-static enum status series(double t, double unit, int first, int last, double row[][SERIES_LENGTH],
-                          void *context) {
+static enum status series(double t, double time_scale, int first, int last,
+                          double row[][SERIES_LENGTH], void *context) {
     (void)context;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
-            row[X][k] = unit / k * product(row[FACTOR], row[SQUARE], k - 1);
+            row[X][k] = time_scale / k * product(row[FACTOR], row[SQUARE], k - 1);
         }
         row[SQUARE][k] = product(row[X], row[X], k);
-        row[FACTOR][k] = factor(t, unit, k);
+        row[FACTOR][k] = factor(t, time_scale, k);
     }
     return STATUS_OK;
 }
@@ -65,17 +65,17 @@ static enum status rhs_of_three(double t, const double x[], double dx[], void *c
     return rhs(t, x, dx, context);
 }
 
-static enum status series_of_three(double t, double unit, int first, int last,
+static enum status series_of_three(double t, double time_scale, int first, int last,
                                    double row[][SERIES_LENGTH], void *context) {
     static double own[ROWS][SERIES_LENGTH];
     for (int k = first; k <= last; k++) {
         if (k == 0) {
             own[X][0] = row[0][0];
         } else {
-            row[1][k] = unit / k * row[1][k - 1];
-            row[2][k] = k == 1 ? unit : 0.0;
+            row[1][k] = time_scale / k * row[1][k - 1];
+            row[2][k] = k == 1 ? time_scale : 0.0;
         }
-        (void)series(t, unit, k, k, own, context);
+        (void)series(t, time_scale, k, k, own, context);
         row[0][k] = own[X][k];
     }
     return STATUS_OK;
@@ -88,7 +88,7 @@ static void test_orders_that_nearly_vanish(void) {
     const struct ode ode = {
         .state_count = 3, .rhs = rhs_of_three, .series = series_of_three, .series_row_count = 3};
     const struct message_sink quiet = {0};
-    const struct integrator_start start = {.span = INFINITY};
+    const struct integrator_start start = {.horizon = INFINITY};
     power = 5;
     integrator_destroy(integrator);
     TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
@@ -106,7 +106,7 @@ static void test_orders_that_nearly_vanish(void) {
 }
 
 /* Steps towards the pole at 1; a start error grows with x^2. */
-static void assert_solution(double tolerance, bool goes_on) {
+static void assert_solution(double tolerance, bool continues) {
     const double absolute = 1e-2 * tolerance;
     const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
                                                  .relative_tolerance = tolerance,
@@ -116,7 +116,7 @@ static void assert_solution(double tolerance, bool goes_on) {
         const double begin = 1.0;
         const double t = 0.1 * i;
         const double exact = 1.0 / (1.0 - pow(t, power));
-        const struct integrator_start start = {.span = INFINITY, .goes_on = goes_on};
+        const struct integrator_start start = {.horizon = INFINITY, .continues = continues};
         double reached, x;
         TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, &begin, &start));
         TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, &x));

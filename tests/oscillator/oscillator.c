@@ -35,8 +35,8 @@ static enum status extend(const struct series_origin *origin, int first, int las
     const struct oscillator_values *values = origin->values;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
-            row[X][k] = jet_integral(row[V], origin->unit, k);
-            row[V][k] = jet_integral(row[A], origin->unit, k);
+            row[X][k] = jet_integral(row[V], origin->time_scale, k);
+            row[V][k] = jet_integral(row[A], origin->time_scale, k);
         }
         row[A][k] =
             -values->omega * values->omega * row[X][k] + values->gain * jet_input(origin, 0, k);

@@ -193,7 +193,7 @@ static void test_integral_and_input(void) {
     TEST_ASSERT_TRUE(jet_integral(dx, 0.5, 2) == 1.25);
 
     const double inputs[2][SERIES_INPUT_LENGTH] = {{1.0, 2.0, 3.0, 4.0}, {5.0, 6.0, 7.0, 8.0}};
-    const struct series_origin origin = {.unit = 1.0, .inputs = inputs};
+    const struct series_origin origin = {.time_scale = 1.0, .inputs = inputs};
     TEST_ASSERT_TRUE(jet_input(&origin, 0, 3) == 4.0 && jet_input(&origin, 1, 0) == 5.0);
     TEST_ASSERT_TRUE(jet_input(&origin, 0, 4) == 0.0 && jet_input(&origin, 1, 31) == 0.0);
 }

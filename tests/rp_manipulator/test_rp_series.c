@@ -23,7 +23,7 @@ typedef double jet[SERIES_LENGTH];
 
 static struct rp_test_random random_source;
 static struct rp_values at;
-static double unit;
+static double time_scale;
 static double inputs[2][SERIES_INPUT_LENGTH];
 static jet row[MAX_ROWS];
 
@@ -31,7 +31,7 @@ void setUp(void) {
     random_source.state = 23;
     memset(&at, 0, sizeof at);
     memset(inputs, 0, sizeof inputs);
-    unit = 1.0;
+    time_scale = 1.0;
     rp_test_default_parameters(&at.parameters);
 }
 static void next_sample(void) {
@@ -41,11 +41,11 @@ static void next_sample(void) {
     memcpy(at.q, state.q, sizeof state.q);
     memcpy(at.dq, state.dq, sizeof state.dq);
     memcpy(at.tau, state.tau, sizeof state.tau);
-    unit = pow(2.0, rp_test_uniform(&random_source, -10.0, 0.0));
+    time_scale = pow(2.0, rp_test_uniform(&random_source, -10.0, 0.0));
     for (int i = 0; i < 2; i++) {
         inputs[i][0] = at.tau[i];
         for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
-            inputs[i][k] = rp_test_uniform(&random_source, -20.0, 20.0) * pow(unit, k);
+            inputs[i][k] = rp_test_uniform(&random_source, -20.0, 20.0) * pow(time_scale, k);
         }
     }
 }
@@ -53,7 +53,7 @@ static void next_sample(void) {
 static void extend(int first, int last) {
     const struct series_origin origin = {
         .values = &at,
-        .unit = unit,
+        .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
     TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_series.row_count);
@@ -99,10 +99,10 @@ static void begin(double minus, struct motion *m) {
 
 /* What order k of q and q' follows from, and its functions; sinh and cosh are majorants. */
 static void next_order(double minus, int k, struct motion *m) {
-    m->q1[k] = jet_integral(m->dq1, unit, k);
-    m->q2[k] = jet_integral(m->dq2, unit, k);
-    m->dq1[k] = jet_integral(m->ddq1, unit, k);
-    m->dq2[k] = jet_integral(m->ddq2, unit, k);
+    m->q1[k] = jet_integral(m->dq1, time_scale, k);
+    m->q2[k] = jet_integral(m->dq2, time_scale, k);
+    m->dq1[k] = jet_integral(m->ddq1, time_scale, k);
+    m->dq2[k] = jet_integral(m->ddq2, time_scale, k);
     m->L[k] = m->q2[k];
     m->L_L[k] = jet_square(m->L, k);
     m->J[k] = -minus * at.parameters.m2 * m->L_L[k];
@@ -162,8 +162,8 @@ static void test_coefficients_are_those_of_the_textbook_form(void) {
 static void assert_derivative(const double ddq[2], int order, double count) {
     static struct motion bound;
     expand_by_jets(majorant, order, &bound);
-    // coefficient k = order of q' is unit^k / k! times this derivative of q''
-    const double scale = pow(unit, order) / tgamma(order + 1.0);
+    // coefficient k = order of q' is time_scale^k / k! times this derivative of q''
+    const double scale = pow(time_scale, order) / tgamma(order + 1.0);
     ASSERT_CLOSE(ddq[0] * scale, row[W][order], count * EPS * bound.dq1[order]);
     ASSERT_CLOSE(ddq[1] * scale, row[V][order], count * EPS * bound.dq2[order]);
 }
@@ -180,8 +180,8 @@ static void test_derivatives_are_those_of_the_forward_dynamics(void) {
         struct rp_values first = {.q = {at.dq[0], at.dq[1]}, .dq = {ddq[0], ddq[1]}};
         struct rp_values second = {.q = {ddq[0], ddq[1]}};
         for (int i = 0; i < 2; i++) {
-            first.tau[i] = inputs[i][1] / unit;
-            second.tau[i] = 2.0 * inputs[i][2] / (unit * unit);
+            first.tau[i] = inputs[i][1] / time_scale;
+            second.tau[i] = 2.0 * inputs[i][2] / (time_scale * time_scale);
         }
         rp_propagate(&at, &first, NULL);
         assert_derivative(first.ddq, 2, 32.0);
@@ -224,8 +224,8 @@ static void assert_rows(const jet q1, const jet q2, const double scale[], double
         ASSERT_CLOSE(q1[k], row[Q1][k], count * EPS * scale[k]);
         ASSERT_CLOSE(q2[k], row[Q2][k], count * EPS * scale[k]);
         if (k + 1 < SERIES_LENGTH) {
-            ASSERT_CLOSE(q1[k + 1] * (k + 1) / unit, row[W][k], count * EPS * scale[k]);
-            ASSERT_CLOSE(q2[k + 1] * (k + 1) / unit, row[V][k], count * EPS * scale[k]);
+            ASSERT_CLOSE(q1[k + 1] * (k + 1) / time_scale, row[W][k], count * EPS * scale[k]);
+            ASSERT_CLOSE(q2[k + 1] * (k + 1) / time_scale, row[V][k], count * EPS * scale[k]);
         }
     }
 }
@@ -236,10 +236,10 @@ static void test_free_fall_along_the_upright_link(void) {
     at.q[0] = 0.5 * RP_TEST_PI; // whose cosine is 6e-17
     at.q[1] = 0.25;
     at.dq[1] = 1.5;
-    unit = 0.125; // s: until then J is far from 0
+    time_scale = 0.125; // s: until then J is far from 0
     expand();
     const jet q1 = {at.q[0]};
-    const jet q2 = {0.25, 1.5 * unit, -g * unit * unit / 2.0};
+    const jet q2 = {0.25, 1.5 * time_scale, -g * time_scale * time_scale / 2.0};
     jet scale;
     for (int k = 0; k < SERIES_LENGTH; k++) {
         scale[k] = g;
@@ -253,16 +253,16 @@ static void test_slide_under_a_cubic_force(void) {
     at.q[0] = 1.0;
     at.q[1] = 0.25;
     at.dq[1] = -2.0;
-    unit = 0.5;
+    time_scale = 0.5;
     for (int k = 0; k < SERIES_INPUT_LENGTH; k++) {
         inputs[1][k] = k + 1.0;
     }
     expand();
     const jet q1 = {1.0};
-    jet q2 = {0.25, -2.0 * unit};
+    jet q2 = {0.25, -2.0 * time_scale};
     jet scale = {1.0, 2.0};
     for (int k = 0; k < SERIES_INPUT_LENGTH; k++) {
-        q2[k + 2] = unit * unit * inputs[1][k] / at.parameters.m2 / ((k + 1) * (k + 2));
+        q2[k + 2] = time_scale * time_scale * inputs[1][k] / at.parameters.m2 / ((k + 1) * (k + 2));
         scale[k + 1] = 8.0;
     }
     scale[SERIES_INPUT_LENGTH + 1] = 8.0;
@@ -289,9 +289,9 @@ static void parabola(jet q1, jet q2) {
     const double c1 = cos(at.q[0]);
     const double along = at.dq[1] - p->a * at.dq[0];
     const double across = at.q[1] * at.dq[0];
-    const jet x = {at.q[1] * c1 - p->a * s1, unit * (along * c1 - across * s1)};
-    const jet y = {at.q[1] * s1 + p->a * c1, unit * (along * s1 + across * c1),
-                   -0.5 * p->g * unit * unit};
+    const jet x = {at.q[1] * c1 - p->a * s1, time_scale * (along * c1 - across * s1)};
+    const jet y = {at.q[1] * s1 + p->a * c1, time_scale * (along * s1 + across * c1),
+                   -0.5 * p->g * time_scale * time_scale};
     const jet a = {p->a};
     jet L_L, r2, direction, slant;
     for (int k = 0; k < SERIES_LENGTH; k++) {
@@ -325,12 +325,12 @@ static void test_flight_on_a_parabola(void) {
         at.q[1] = rp_test_uniform(&random_source, 1.0, 2.0);
         at.dq[0] = rp_test_uniform(&random_source, -1.0, 1.0);
         at.dq[1] = rp_test_uniform(&random_source, -1.0, 1.0);
-        unit = time_to_pole();
+        time_scale = time_to_pole();
         expand();
         jet q1, q2, scale;
         parabola(q1, q2);
         for (int k = 0; k < SERIES_LENGTH; k++) {
-            scale[k] = 4.0 / unit;
+            scale[k] = 4.0 / time_scale;
         }
         assert_rows(q1, q2, scale, 64.0);
     }
@@ -395,7 +395,7 @@ static void test_energy_grows_by_the_work_of_the_efforts(void) {
         }
         energies_of(majorant, &bounding, &bound);
         for (int k = 1; k <= ORDER; k++) {
-            ASSERT_CLOSE(jet_integral(found.power, unit, k), found.total[k],
+            ASSERT_CLOSE(jet_integral(found.power, time_scale, k), found.total[k],
                          8.0 * k * EPS * bound.total[k]);
         }
     }

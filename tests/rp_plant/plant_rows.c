@@ -122,7 +122,8 @@ static void evaluate_series(const void *row_pointer, void *results_pointer) {
     struct series_results *results = results_pointer;
     const struct rp_plant_values v = values_of(&row->model);
     const struct series *series = rp_plant_model.series;
-    const struct series_origin origin = {.values = &v, .unit = row->unit, .inputs = row->inputs};
+    const struct series_origin origin = {
+        .values = &v, .time_scale = row->unit, .inputs = row->inputs};
     for (int i = 0; i < 2; i++) {
         rows[i][0] = v.q[i];
         rows[2 + i][0] = v.dq[i];

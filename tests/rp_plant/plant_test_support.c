@@ -82,20 +82,20 @@ void plant_test_outputs(struct rp_plant_values *v) {
     TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.outputs(v, 3.0));
 }
 
-void plant_test_update_with(struct rp_plant_values *v, const bool *fired, const double *du) {
+void plant_test_update_with(struct rp_plant_values *v, const bool *triggered, const double *du) {
     static const double constant[PLANT_INPUTS] = {0.0};
     static const double tolerance[PLANT_STATES] = {1e-10, 1e-10, 1e-10, 1e-10};
     const struct event event = {
-        .t = 3.0, .fired = fired, .du = du != NULL ? du : constant, .tolerance = tolerance};
+        .t = 3.0, .triggered = triggered, .du = du != NULL ? du : constant, .tolerance = tolerance};
     TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.events->update(v, &event));
 }
 
 void plant_test_update(struct rp_plant_values *v, int indicator) {
-    bool fired[RP_PLANT_INDICATORS] = {false};
+    bool triggered[RP_PLANT_INDICATORS] = {false};
     if (indicator >= 0) {
-        fired[indicator] = true;
+        triggered[indicator] = true;
     }
-    plant_test_update_with(v, indicator >= 0 ? fired : NULL, NULL);
+    plant_test_update_with(v, indicator >= 0 ? triggered : NULL, NULL);
 }
 
 void plant_test_same(double expected, double actual, int line) {

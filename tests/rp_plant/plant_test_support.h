@@ -27,11 +27,12 @@ void plant_test_random_inertia(struct rp_test_random *random, struct rp_plant_in
 
 void plant_test_outputs(struct rp_plant_values *v);
 
-/* update with constant inputs and absolute tolerances of 1e-10; indicator -1: none has fired. */
+/* update with constant inputs and absolute tolerances of 1e-10; indicator -1: none has triggered.
+ */
 void plant_test_update(struct rp_plant_values *v, int indicator);
 
-/* The same with rates of the inputs (NULL: 0) and any set of fired indicators (NULL: none). */
-void plant_test_update_with(struct rp_plant_values *v, const bool *fired, const double *du);
+/* The same with rates of the inputs (NULL: 0) and any set of triggered indicators (NULL: none). */
+void plant_test_update_with(struct rp_plant_values *v, const bool *triggered, const double *du);
 
 /* Bit for bit, but +0 equals -0; NaN fails. */
 #define ASSERT_SAME(expected, actual) plant_test_same(expected, actual, __LINE__)

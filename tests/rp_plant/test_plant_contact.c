@@ -68,7 +68,7 @@ static void test_far_from_the_limit_the_position_stays(void) {
     TEST_ASSERT_TRUE(v.q[1] == -0.875);
 }
 
-static void test_contacts_follow_from_the_state_where_nothing_has_fired(void) {
+static void test_contacts_follow_from_the_state_where_nothing_has_triggered(void) {
     const struct {
         double q, dq;
         int contact;

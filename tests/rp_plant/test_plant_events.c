@@ -48,9 +48,9 @@ static void indicators_now(double z[RP_PLANT_INDICATORS]) {
 }
 
 static void fire(int indicator, const double *du) {
-    bool fired[RP_PLANT_INDICATORS] = {false};
-    fired[indicator] = true;
-    plant_test_update_with(&v, fired, du);
+    bool triggered[RP_PLANT_INDICATORS] = {false};
+    triggered[indicator] = true;
+    plant_test_update_with(&v, triggered, du);
 }
 
 /* ---- Any state ------------------------------------------------------------------------------ */
@@ -190,7 +190,7 @@ static void test_at_breakaway_the_rate_decides(void) {
         fire(indicator, NULL);
         assert_modes(RP_PLANT_STUCK, side);
 
-        // an input that jumps to the limit: nothing has fired
+        // an input that jumps to the limit: nothing has triggered
         v = held;
         v.inputs.tau[1] = side * tau2;
         plant_test_update(&v, -1);
@@ -250,10 +250,10 @@ static void test_what_fires_counts_only_where_forces_have_not_jumped(void) {
     v.parameters.arm.a = 0.5;
     v.modes.joint[1] = RP_PLANT_FORWARD;
     v.inputs.tau[0] = 3.0 - 1e-3;
-    bool fired[RP_PLANT_INDICATORS] = {false};
-    fired[FORWARD1] = fired[FORWARD2] = true; // the slide halts, joint 1 is then held
+    bool triggered[RP_PLANT_INDICATORS] = {false};
+    triggered[FORWARD1] = triggered[FORWARD2] = true; // the slide halts, joint 1 is then held
     const double du[PLANT_INPUTS] = {1.0};
-    plant_test_update_with(&v, fired, du);
+    plant_test_update_with(&v, triggered, du);
     assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
 }
 

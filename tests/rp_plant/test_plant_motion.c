@@ -8,7 +8,7 @@
 #include <string.h>
 
 #define STEP     (1.0 / 2048.0)
-#define RESOLVED 1e-13 /* an indicator has fired that is below -RESOLVED */
+#define RESOLVED 1e-13 /* an indicator has triggered that is below -RESOLVED */
 
 enum {
     WORK = PLANT_STATES,
@@ -76,7 +76,7 @@ static void runge_kutta(const double start[ALL], double h, double end[ALL]) {
     }
 }
 
-static bool fires(double t, const double y[ALL], bool fired[RP_PLANT_INDICATORS]) {
+static bool fires(double t, const double y[ALL], bool triggered[RP_PLANT_INDICATORS]) {
     double z[RP_PLANT_INDICATORS];
     double u[PLANT_INPUTS];
     const struct rp_plant_inputs inputs = inputs_at(t);
@@ -84,26 +84,26 @@ static bool fires(double t, const double y[ALL], bool fired[RP_PLANT_INDICATORS]
     memcpy(u, &inputs, sizeof u);
     TEST_ASSERT_EQUAL_INT(STATUS_OK, events->indicators(&v, t, y, u, z));
     for (int k = 0; k < RP_PLANT_INDICATORS; k++) {
-        fired[k] = z[k] < -RESOLVED;
-        any = any || fired[k];
+        triggered[k] = z[k] < -RESOLVED;
+        any = any || triggered[k];
     }
     return any;
 }
 
-static void update(const bool *fired) {
+static void update(const bool *triggered) {
     double du[PLANT_INPUTS];
     memcpy(du, &rate, sizeof du);
     v.inputs = inputs_at(now);
-    plant_test_update_with(&v, fired, du);
+    plant_test_update_with(&v, triggered, du);
 }
 
 /* One step, or up to the first event in it, which is handled. True if one was. */
 static bool advance(double h) {
     const double start[ALL] = {v.q[0], v.q[1], v.dq[0], v.dq[1], work};
     double end[ALL];
-    bool fired[RP_PLANT_INDICATORS];
+    bool triggered[RP_PLANT_INDICATORS];
     runge_kutta(start, h, end);
-    const bool event = fires(now + h, end, fired);
+    const bool event = fires(now + h, end, triggered);
     if (event) {
         double before = 0.0;
         while (h - before > 1e-16) {
@@ -112,10 +112,10 @@ static bool advance(double h) {
             if (middle == before || middle == h) {
                 break;
             }
-            *(fires(now + middle, end, fired) ? &h : &before) = middle;
+            *(fires(now + middle, end, triggered) ? &h : &before) = middle;
         }
         runge_kutta(start, h, end);
-        (void)fires(now + h, end, fired);
+        (void)fires(now + h, end, triggered);
         event_count++;
     }
     now += h;
@@ -124,7 +124,7 @@ static bool advance(double h) {
     work = end[WORK];
     v.inputs = inputs_at(now);
     if (event) {
-        update(fired);
+        update(triggered);
     }
     return event;
 }

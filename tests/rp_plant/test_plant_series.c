@@ -16,7 +16,7 @@ typedef double row[SERIES_LENGTH];
 
 static struct rp_test_random random_source;
 static struct rp_plant_values plant;
-static double unit;
+static double time_scale;
 static double inputs[PLANT_INPUTS][SERIES_INPUT_LENGTH];
 static row rows[MAX_ROWS];
 
@@ -35,13 +35,14 @@ static void clear(row all[MAX_ROWS]) {
 /* The inputs of the sample, which move in one of two draws. */
 static void next_inputs(void) {
     const bool move = rp_test_random_bits(&random_source) % 2 == 0;
-    unit = pow(2.0, rp_test_uniform(&random_source, -12.0, -6.0));
+    time_scale = pow(2.0, rp_test_uniform(&random_source, -12.0, -6.0));
     double u[PLANT_INPUTS];
     memcpy(u, &plant.inputs, sizeof u);
     for (int i = 0; i < PLANT_INPUTS; i++) {
         inputs[i][0] = u[i];
         for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
-            inputs[i][k] = move ? rp_test_uniform(&random_source, -20.0, 20.0) * pow(unit, k) : 0.0;
+            inputs[i][k] =
+                move ? rp_test_uniform(&random_source, -20.0, 20.0) * pow(time_scale, k) : 0.0;
         }
     }
 }
@@ -55,7 +56,7 @@ static void extend(const struct series *series, const void *values, int first, i
                    row all[MAX_ROWS]) {
     const struct series_origin origin = {
         .values = values,
-        .unit = unit,
+        .time_scale = time_scale,
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
     TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, series->row_count);
@@ -125,7 +126,7 @@ static void test_each_feature_counts(void) {
             STATUS_OK, rp_plant_model.right_hand_side(&plant, 3.0, x, (const double *)&plant.inputs,
                                                       expected));
         for (int k = 0; k < PLANT_STATES; k++) {
-            ASSERT_CLOSE(expected[k], rows[k][1] / unit, 1e-12 * (1.0 + fabs(expected[k])));
+            ASSERT_CLOSE(expected[k], rows[k][1] / time_scale, 1e-12 * (1.0 + fabs(expected[k])));
         }
     }
 }
@@ -178,16 +179,16 @@ static bool has_converged(const struct indicator kinds[]) {
     return true;
 }
 
-/* The series with a unit as long as it converges fast. */
+/* The series with a time_scale as long as it converges fast. */
 static void expand_far(void) {
     double begin[PLANT_INPUTS][SERIES_INPUT_LENGTH];
     struct indicator kinds[RP_PLANT_INDICATORS];
     memcpy(begin, inputs, sizeof begin);
     rp_plant_model.events->describe(&plant, kinds);
-    const double first_unit = unit;
+    const double first_unit = time_scale;
     for (int exponent = 10; exponent > -20; exponent--) {
         const double part = ldexp(1.0, exponent);
-        unit = part * first_unit;
+        time_scale = part * first_unit;
         for (int i = 0; i < PLANT_INPUTS; i++) {
             for (int k = 1; k < SERIES_INPUT_LENGTH; k++) {
                 inputs[i][k] = begin[i][k] * pow(part, k);
@@ -225,7 +226,7 @@ static void assert_model_at(double s) {
     rp_plant_model.events->describe(&plant, kinds);
     for (int i = 0; i < PLANT_STATES; i++) {
         const struct sum sum = sum_of(rows[i], s);
-        ASSERT_CLOSE(dx[i] * unit, sum.derivative, 1e-11 * (unit + sum.size));
+        ASSERT_CLOSE(dx[i] * time_scale, sum.derivative, 1e-11 * (time_scale + sum.size));
     }
     for (int i = 0; i < RP_PLANT_INDICATORS; i++) {
         if (kinds[i].kind == INDICATOR_OF_MODEL) {
@@ -257,7 +258,7 @@ static void test_modes_that_are_not_decided_yet(void) {
         next_plant();
         plant.modes = (struct rp_plant_modes){.payload = RP_PLANT_UNDECIDED};
         plant.dq[n % 2] = 0.0;
-        unit = 1e-3;
+        time_scale = 1e-3;
         clear(rows);
         extend(&rp_plant_series, &plant, 0, DEGREE, rows);
         assert_model_at(0.0);
@@ -313,7 +314,7 @@ static void test_friction_of_a_fast_joint_is_constant(void) {
     plant.parameters.coulomb_friction[1] = 1.0;
     plant.parameters.stribeck_velocity[1] = 0.25;
     plant.q[0] = 1.0;
-    unit = 0.001;
+    time_scale = 0.001;
     memset(inputs, 0, sizeof inputs);
     for (int n = 0; n < 2; n++) {
         plant.dq[1] = n == 0 ? 2.0 : 1.5; // 8 vs, 6 vs

@@ -110,9 +110,9 @@ static void test_a_slide_on_its_stop_is_carried_until_it_is_lifted(void) {
 
     v.inputs.tau[1] = weight;
     const double du[PLANT_INPUTS] = {0.0, 1.0};
-    bool fired[RP_PLANT_INDICATORS] = {false};
-    fired[FORWARD2] = true;
-    plant_test_update_with(&v, fired, du);
+    bool triggered[RP_PLANT_INDICATORS] = {false};
+    triggered[FORWARD2] = true;
+    plant_test_update_with(&v, triggered, du);
     assert_modes(RP_PLANT_STUCK, RP_PLANT_FREE);
     plant_test_outputs(&v);
     ASSERT_SAME(0.0, v.stop_force[1]);

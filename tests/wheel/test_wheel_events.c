@@ -11,8 +11,8 @@ void setUp(void) {
     values = (struct wheel_values){.stop = 2.0, .speed = 3.0, .angle = 1.5};
 }
 
-static void update(const bool fired[2]) {
-    const struct event event = {.fired = fired};
+static void update(const bool triggered[2]) {
+    const struct event event = {.triggered = triggered};
     TEST_ASSERT_EQUAL_INT(STATUS_OK, wheel_model.events->update(&values, &event));
 }
 

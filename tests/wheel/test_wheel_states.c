@@ -10,8 +10,8 @@
 
 /* The wheel arrives at its stop at 3 rad/s. */
 static void catch_wheel(void) {
-    const bool fired[] = {true, false};
-    const struct event event = {.fired = fired};
+    const bool triggered[] = {true, false};
+    const struct event event = {.triggered = triggered};
     set_real(WHEEL_stop, 1.0);
     set_real(WHEEL_angle, 1.0);
     set_real(WHEEL_speed, 3.0);
@@ -40,7 +40,7 @@ static void test_snapshots_keep_modes_and_discrete_states(void) {
 }
 
 static struct wheel_values *held(void) {
-    return (void *)instance->memory.held;
+    return (void *)instance->memory.restart_values;
 }
 
 static bool other_is_integrated_outside;
@@ -75,7 +75,8 @@ static void test_serialized_states_keep_modes_and_discrete_states(void) {
     assert_caught(other, 1);
     TEST_ASSERT_EQUAL_INT(0, get_boolean(other, WHEEL_is_counting));
     TEST_ASSERT_EQUAL_INT(1, get_boolean(other, WHEEL_is_reversed));
-    TEST_ASSERT_EQUAL_INT(5, ((struct wheel_values *)(void *)other->memory.held)->catches);
+    TEST_ASSERT_EQUAL_INT(5,
+                          ((struct wheel_values *)(void *)other->memory.restart_values)->catches);
     instance_destroy(other);
 }
 
@@ -98,11 +99,11 @@ static void assert_event_points_are_possible(void) {
     instance->state.event_point = (enum event_point)3;
     assert_forged_is_refused("event_point = 3 is impossible");
     instance->state.event_point = EVENT_DUE;
-    assert_forged_is_refused("causes of the event that is due = 0 is impossible");
+    assert_forged_is_refused("causes of the unhandled event = 0 is impossible");
     instance->state = kept;
-    instance->memory.due[1] = true;
-    assert_forged_is_refused("causes of the event that is due = 1 is impossible");
-    instance->memory.due[1] = false;
+    instance->memory.unhandled[1] = true;
+    assert_forged_is_refused("causes of the unhandled event = 1 is impossible");
+    instance->memory.unhandled[1] = false;
     instance->state.cut_end.s = NAN;
     assert_forged_is_refused("the end of the step cut short = nan is impossible");
     instance->state = kept;

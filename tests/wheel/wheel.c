@@ -73,13 +73,13 @@ static enum status indicators(const void *values_pointer, double t, const double
 /* The stop catches a wheel that reaches it, and lets go of one that turns back. */
 static enum status update(void *values_pointer, const struct event *event) {
     struct wheel_values *values = values_pointer;
-    const bool *fired = event->fired;
+    const bool *triggered = event->triggered;
     if (values->is_caught) {
-        const bool ends = fired != NULL && fired[PUSH];
+        const bool ends = triggered != NULL && triggered[PUSH];
         values->is_caught = are_possible(values) && values->speed >= 0.0 && !ends;
         return STATUS_OK;
     }
-    const bool arrives = values->angle >= values->stop || (fired != NULL && fired[TO_STOP]);
+    const bool arrives = values->angle >= values->stop || (triggered != NULL && triggered[TO_STOP]);
     if (are_possible(values) && arrives && values->speed > 0.0) {
         values->is_caught = 1;
         values->catches++;

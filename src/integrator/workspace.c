@@ -1,4 +1,4 @@
-#include "reserve.h"
+#include "workspace.h"
 
 #include <errno.h>
 #include <stdatomic.h>
@@ -6,15 +6,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Threads that have entered a reserve: SUNDIALS passes nothing to malloc that would identify the
+/* Threads that have entered a workspace: SUNDIALS passes nothing to malloc that would identify the
  * instance. Thread-local storage would be the usual place, but in a shared object that is loaded
  * later it either allocates at a thread's first access, and ends the process where that fails, or
  * takes from room that the loader does not always get back: after a hundred cycles of loading and
  * unloading three FMUs they could not be loaded any more. No lock: a thread of high priority would
  * wait for one of low priority. */
 struct slot {
-    const void *_Atomic thread; /* NULL: free */
-    struct reserve *reserve;    /* that the thread entered last; of no concern to others */
+    const void *_Atomic thread;  /* NULL: free */
+    struct workspace *workspace; /* that the thread entered last; of no concern to others */
 };
 
 /* More threads at once than this, each in the few microseconds of making or freeing a solver, have
@@ -56,64 +56,64 @@ static struct slot *claim_slot(void) {
     return &slots[i];
 }
 
-bool reserve_create(struct reserve *reserve, size_t size) {
-    *reserve = (struct reserve){.block = malloc(size)};
-    reserve->size = reserve->block != NULL ? size : 0;
-    return reserve->block != NULL;
+bool workspace_create(struct workspace *workspace, size_t size) {
+    *workspace = (struct workspace){.block = malloc(size)};
+    workspace->size = workspace->block != NULL ? size : 0;
+    return workspace->block != NULL;
 }
 
-void reserve_destroy(struct reserve *reserve) {
-    free(reserve->block);
-    *reserve = (struct reserve){0};
+void workspace_destroy(struct workspace *workspace) {
+    free(workspace->block);
+    *workspace = (struct workspace){0};
 }
 
-void reserve_enter(struct reserve *reserve) {
+void workspace_enter(struct workspace *workspace) {
     struct slot *slot = own_slot();
     if (slot == NULL) {
         slot = claim_slot();
     }
-    reserve->slot = (size_t)(slot - slots);
-    reserve->outer = slot->reserve;
-    slot->reserve = reserve;
+    workspace->slot = (size_t)(slot - slots);
+    workspace->outer = slot->workspace;
+    slot->workspace = workspace;
 }
 
-void reserve_leave(struct reserve *reserve) {
-    struct slot *slot = &slots[reserve->slot];
-    slot->reserve = reserve->outer;
-    if (slot->reserve == NULL) {
+void workspace_leave(struct workspace *workspace) {
+    struct slot *slot = &slots[workspace->slot];
+    slot->workspace = workspace->outer;
+    if (slot->workspace == NULL) {
         atomic_store_explicit(&slot->thread, NULL, memory_order_release);
     }
 }
 
-void reserve_cut(struct reserve *reserve, size_t used) {
-    reserve->used = used;
+void workspace_cut(struct workspace *workspace, size_t used) {
+    workspace->used = used;
 }
 
 /* ---- Allocator ------------------------------------------------------------------------------ */
 
-void *reserve_malloc(size_t size) {
+void *workspace_malloc(size_t size) {
     const size_t alignment = _Alignof(max_align_t);
     const struct slot *slot = own_slot();
     if (slot == NULL) {
         return NULL;
     }
-    struct reserve *reserve = slot->reserve;
-    const size_t left = reserve->size - reserve->used;
+    struct workspace *workspace = slot->workspace;
+    const size_t left = workspace->size - workspace->used;
     if (size >= left) { // even a block of no bytes must lie inside
         return NULL;
     }
-    void *taken = reserve->block + reserve->used;
+    void *taken = workspace->block + workspace->used;
     const size_t with_padding = (size + alignment - 1) / alignment * alignment;
-    reserve->used += with_padding < left ? with_padding : left;
+    workspace->used += with_padding < left ? with_padding : left;
     return memset(taken, 0, size);
 }
 
-void *reserve_calloc(size_t items, size_t size) {
-    return size == 0 || items <= SIZE_MAX / size ? reserve_malloc(items * size) : NULL;
+void *workspace_calloc(size_t items, size_t size) {
+    return size == 0 || items <= SIZE_MAX / size ? workspace_malloc(items * size) : NULL;
 }
 
-void *reserve_realloc(void *memory, size_t size) {
-    char *taken = reserve_malloc(size);
+void *workspace_realloc(void *memory, size_t size) {
+    char *taken = workspace_malloc(size);
     if (taken != NULL && memory != NULL) {
         // the old block was not longer than what lies between
         const size_t between = (size_t)(taken - (char *)memory);
@@ -122,6 +122,6 @@ void *reserve_realloc(void *memory, size_t size) {
     return taken;
 }
 
-void reserve_free(void *memory) {
+void workspace_free(void *memory) {
     (void)memory;
 }
