@@ -9,10 +9,11 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
-from cosim import command_line, project, streams
+from cosim import command_line, project
 from cosim.commands import Ended
 from cosim.errors import UserError, reason
 from cosim.interruption import handle_endings
+from cosim.output import streams
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 

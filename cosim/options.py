@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cosim import project
 from cosim.errors import WrongValueError
-from cosim.model import VERSIONS
+from cosim.project import VERSIONS
 from cosim.units import SECONDS, typed_quantity
 
 

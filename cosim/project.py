@@ -18,7 +18,6 @@ build/report/                           what the commands write: index.html, fol
 from pathlib import Path
 
 from cosim.errors import UserError, did_you_mean
-from cosim.model import VERSIONS
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -28,6 +27,7 @@ STUDY = "study"  # the module of a system's folder that cosim.system.study descr
 ANIMATION = "animation"  # the module of a model's or system's folder for cosim.report.motion
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
+VERSIONS = tuple(BUILD_FOLDERS)
 
 
 def scenario_files() -> dict[str, Path]:

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from cosim import project, trajectory_csv
-from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.fmu_file import read_model
+from cosim.fmi.fmu_file import read_model
 from cosim.output_files import whole
-from cosim.scenario import Scenario
+from cosim.scenarios import scenario as scenarios
+from cosim.scenarios.scenario import Scenario
 
 # Writes the reference of a scenario to a folder.
 Writer = Callable[[Scenario, Path], None]

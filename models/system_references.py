@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim import trajectory_csv
 from cosim.errors import UserError
-from cosim.model import Value
+from cosim.fmi.model import Value
 
 NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
 KEPT = 20  # every so many communication points go into the files

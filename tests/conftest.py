@@ -12,7 +12,7 @@ from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
-    from cosim.fmu_file import Fmu
+    from cosim.fmi.fmu_file import Fmu
     from tests.support.browser import Browser
     from tests.support.hosts import Network
 
@@ -28,7 +28,7 @@ def fmu() -> Path:
 
 @pytest.fixture(scope="module")
 def opened(fmu: Path) -> Iterator["Fmu"]:
-    from cosim.fmu_file import Fmu
+    from cosim.fmi.fmu_file import Fmu
 
     with Fmu(fmu) as opened:
         yield opened

@@ -11,15 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import project, scenario
+from cosim import project
 from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Component, Held
 from cosim.campaign.loop import Part
 from cosim.coupling.connected_instance import start_value
 from cosim.errors import UserError, WrongValueError, did_you_mean
-from cosim.fmu_file import describe, read_model
-from cosim.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
-from cosim.scenario import MAX_STEPS, Scenario
+from cosim.fmi.fmu_file import describe, read_model
+from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
+from cosim.scenarios import scenario
+from cosim.scenarios.scenario import MAX_STEPS, Scenario
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 

@@ -11,7 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from cosim.fmi_instance import Instance
+from cosim.fmi.fmi_instance import Instance
 
 FUNCTIONS = {
     "2.0": (

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.campaign.loop import Part
 from cosim.campaign.measures import Measure
-from cosim.model import Value
+from cosim.fmi.model import Value
 
 
 @dataclass(frozen=True)

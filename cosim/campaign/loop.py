@@ -25,7 +25,7 @@ from cosim.campaign.fmi_calls import (
     do_step,
     move_values,
 )
-from cosim.fmi_instance import Instance
+from cosim.fmi.fmi_instance import Instance
 
 COLUMNS = 7  # component and addresses of its functions
 

@@ -19,7 +19,7 @@ from cosim.campaign.measures import (
     plain,
 )
 from cosim.errors import UserError, WrongValueError, did_you_mean, one_line
-from cosim.model import INPUTS, TOLERANCE, Value, Variable
+from cosim.fmi.model import INPUTS, TOLERANCE, Value, Variable
 from cosim.texts import unit
 
 RUN, FAILURE = "run", "failure"  # columns of every table

@@ -15,8 +15,8 @@ from cosim.campaign.fmi_calls import DISCARD, TERMINATED, functions
 from cosim.campaign.job import Job, Target
 from cosim.campaign.measures import Recorded
 from cosim.errors import UserError, one_line
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 
 LONGEST_REASON = 500  # characters
 

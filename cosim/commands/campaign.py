@@ -9,13 +9,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosim import console, project
+from cosim import project
 from cosim.commands import Ended
 from cosim.errors import UserError, one_line
 from cosim.interruption import arrived
 from cosim.options import count, number
+from cosim.output import console
+from cosim.output.progress import Progress
 from cosim.output_files import from_here, written
-from cosim.progress import Progress
 
 if TYPE_CHECKING:
     from distributed import Security

@@ -2,9 +2,10 @@
 
 import argparse
 
-from cosim import console, project
+from cosim import project
 from cosim.commands import Ended
 from cosim.options import add_report, add_system
+from cosim.output import console
 from cosim.output_files import check_writable
 from cosim.system import study
 

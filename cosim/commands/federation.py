@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import console, project
+from cosim import project
 from cosim.commands import Ended
 from cosim.coupling.master import Master
 from cosim.errors import UserError, did_you_mean
@@ -17,8 +17,9 @@ from cosim.federation.federation import Record
 from cosim.federation.network import KEY, key
 from cosim.federation.parts import parts, real_connections
 from cosim.options import add_silence, add_system
-from cosim.progress import Progress
-from cosim.result_tables import FederationTable
+from cosim.output import console
+from cosim.output.progress import Progress
+from cosim.output.result_tables import FederationTable
 from cosim.system import comparison, ecos, ssp, study
 from cosim.system.ssp import Ssp
 from cosim.texts import counted

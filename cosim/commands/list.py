@@ -3,8 +3,10 @@
 import argparse
 import textwrap
 
-from cosim import console, project, scenario
+from cosim import project
 from cosim.commands import Ended
+from cosim.output import console
+from cosim.scenarios import scenario
 from cosim.texts import shortened
 
 DESCRIPTION = "Prints the name and the title of every scenario."

@@ -3,11 +3,12 @@
 import argparse
 from pathlib import Path
 
-from cosim import project, scenario_template
+from cosim import project
 from cosim.commands import Ended
 from cosim.errors import UserError, reason
-from cosim.fmu_file import read_model
+from cosim.fmi.fmu_file import read_model
 from cosim.output_files import whole
+from cosim.scenarios import template
 
 DESCRIPTION = (
     "Writes NAME.toml, a scenario with comments that runs as it is: ./run.sh NAME.toml. Exit code: "
@@ -33,7 +34,7 @@ def run(options: argparse.Namespace) -> Ended:
     path = _path(options.name)
     folder = project.model(options.model) if options.model else _usual_model()
     model = read_model(project.built(folder, ".fmu"))
-    text = scenario_template.text(path.stem, folder.name, model)
+    text = template.text(path.stem, folder.name, model)
     try:
         path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
     except FileExistsError:

@@ -10,27 +10,29 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cosim import console, convergence, project, results
-from cosim import scenario as scenarios
+from cosim import project
 from cosim.command_line import COMMANDS, PROGRAM
 from cosim.commands import Ended
 from cosim.commands import list as scenario_list
-from cosim.comparison import Failure, Run, Runs
-from cosim.convergence import Convergence
 from cosim.errors import UserError, WrongValueError, did_you_mean, together
-from cosim.fmu_file import Fmu
-from cosim.model import VERSIONS
+from cosim.fmi.fmu_file import Fmu
 from cosim.options import add_fmi, add_open, add_report, relative_tolerance
+from cosim.output import console, results
+from cosim.output.progress import Progress
+from cosim.output.result_tables import RunTable, SweepTable, measured
+from cosim.output.result_tables import convergence as convergence_table
 from cosim.output_files import check_writable, from_here, written
-from cosim.progress import Progress
+from cosim.project import VERSIONS
 from cosim.report import pages
 from cosim.report.browser import show
 from cosim.report.writer import ReportWriter
-from cosim.result_tables import RunTable, SweepTable, measured
-from cosim.result_tables import convergence as convergence_table
-from cosim.scenario import Scenario
+from cosim.runs import convergence
+from cosim.runs.comparison import Failure, Run, Runs
+from cosim.runs.convergence import Convergence
+from cosim.runs.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
+from cosim.scenarios import scenario as scenarios
+from cosim.scenarios.scenario import Scenario
 from cosim.texts import counted, short
-from cosim.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
 
 DESCRIPTION = (
     "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "

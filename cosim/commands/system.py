@@ -6,19 +6,20 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim import console, project
+from cosim import project
 from cosim.command_line import PROGRAM
 from cosim.commands import Ended
 from cosim.errors import UserError, did_you_mean, together
 from cosim.options import add_open, add_report, add_system
+from cosim.output import console
+from cosim.output.result_tables import VariantTable
 from cosim.output_files import check_writable, from_here, written
-from cosim.report import overview
+from cosim.report import overview, system_page
 from cosim.report.browser import show
 from cosim.report.overview import Entry
-from cosim.result_tables import VariantTable
-from cosim.system import comparison, report, ssp, study
+from cosim.report.system_page import Section
+from cosim.system import comparison, ssp, study
 from cosim.system.comparison import Outcome, Reference
-from cosim.system.report import Section
 from cosim.system.ssp import Ssp
 from cosim.system.study import Study
 from cosim.texts import counted
@@ -81,7 +82,7 @@ def run(options: argparse.Namespace) -> Ended:
                 with written(options.report):
                     for name, folder in project.systems().items():
                         known = comparison.reference_names(folder)
-                        report.remove(options.report, name, known)
+                        system_page.remove(options.report, name, known)
             raise
         chosen = _choose(systems, options.names)
         if options.list:
@@ -89,7 +90,7 @@ def run(options: argparse.Namespace) -> Ended:
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
-                report.remove(options.report, system.folder.name, names)
+                system_page.remove(options.report, system.folder.name, names)
         plans = [_planned(system, names) for system, names in chosen]
         return _run(plans, options)
 
@@ -181,13 +182,13 @@ def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> Ended:
                 table.failed(name)
                 rows.append({"system": plan.system.folder.name, "name": name, "error": str(error)})
                 with written(options.report):
-                    entries.append(report.write_failed(options.report, section, name, error))
+                    entries.append(system_page.write_failed(options.report, section, name, error))
                 continue
             table.row(outcome)
             rows.append(_row(plan, outcome))
             console.messages(name, outcome.run.messages)
             with written(options.report):
-                entries.append(report.write_variant(options.report, section, outcome))
+                entries.append(system_page.write_variant(options.report, section, outcome))
             if options.pictures:
                 with written(options.pictures):
                     _draw(options.pictures, section, outcome)

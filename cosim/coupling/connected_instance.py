@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import UserError, WrongValueError
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
-from cosim.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
 
 
 @dataclass(frozen=True)

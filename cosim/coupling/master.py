@@ -27,9 +27,9 @@ from fmpy.fmi1 import FMICallException
 from cosim.coupling.connected_instance import ConnectedInstance, Wiring
 from cosim.coupling.switches import Switches, split
 from cosim.errors import UserError
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
-from cosim.model import Value
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import Value
 from cosim.system.structure import Connection
 
 ORDERS = ("jacobi", "gauss_seidel")

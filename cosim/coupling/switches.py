@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping
 
 from cosim.errors import UserError
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from cosim.system.structure import Connection
 
 

@@ -11,8 +11,8 @@ from cosim.federation import watching
 from cosim.federation.network import Federate
 from cosim.federation.parts import Part
 from cosim.federation.watching import Silence
-from cosim.fmi_instance import Instance, Reals
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance, Reals
+from cosim.fmi.fmu_file import Fmu
 
 
 def run(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import UserError, did_you_mean
-from cosim.model import Value
+from cosim.fmi.model import Value
 from cosim.system.ssp import Ssp
 from cosim.system.structure import Connection
 

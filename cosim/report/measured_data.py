@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from cosim.measured import Comparison
-from cosim.model import Model
+from cosim.fmi.model import Model
 from cosim.report.pages import Table
 from cosim.report.run_data import Curve, Plot, without_rounding
+from cosim.runs.measured import Comparison
 from cosim.texts import unit
 
 

@@ -13,10 +13,10 @@ from typing import Any, cast
 import numpy as np
 
 from cosim import project
-from cosim.comparison import Run
-from cosim.model import Value
-from cosim.scenario import Scenario
-from cosim.simulation import Result
+from cosim.fmi.model import Value
+from cosim.runs.comparison import Run
+from cosim.runs.simulation import Result
+from cosim.scenarios.scenario import Scenario
 from cosim.system.comparison import Outcome
 from cosim.system.ssp import Ssp
 

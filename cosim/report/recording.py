@@ -22,12 +22,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim import project
-from cosim import scenario as scenarios
-from cosim.comparison import Runs
 from cosim.errors import UserError, did_you_mean, one_line
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.output_files import whole, written
 from cosim.report import motion
+from cosim.runs.comparison import Runs
+from cosim.scenarios import scenario as scenarios
 from cosim.system import comparison, ssp, study
 
 if TYPE_CHECKING:

@@ -7,9 +7,7 @@ from types import MappingProxyType
 import numpy as np
 
 from cosim import trajectory_csv
-from cosim.comparison import Failure, Run, estimated_from
-from cosim.measured import comparisons
-from cosim.model import Model, Variable
+from cosim.fmi.model import Model, Variable
 from cosim.report import motion, pages
 from cosim.report.measured_data import measured_tables, with_measured
 from cosim.report.overview import FAILED, PASSED, RAN, Entry
@@ -18,8 +16,10 @@ from cosim.report.run_data import Curve, Plot, RunData, thinned, without_roundin
 from cosim.report.signal_texts import describe
 from cosim.report.sparkline import path as sparkline
 from cosim.report.sparkline import scale_of
-from cosim.scenario import Scenario
-from cosim.simulation import Result
+from cosim.runs.comparison import Failure, Run, estimated_from
+from cosim.runs.measured import comparisons
+from cosim.runs.simulation import Result
+from cosim.scenarios.scenario import Scenario
 from cosim.texts import bits, milliseconds, number, ordinal, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none

@@ -1,6 +1,6 @@
 """Inputs of a scenario as text."""
 
-from cosim.signals import Constant, Logged, Signal, Sines, Switches
+from cosim.scenarios.signals import Constant, Logged, Signal, Sines, Switches
 from cosim.texts import number
 
 MOST_POINTS = 8  # of a table, to be listed

@@ -5,15 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import project, reference
-from cosim.convergence import Convergence
+from cosim import project
 from cosim.report import pages
 from cosim.report.overview import FAILED, PASSED, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Axis, Curve, Plot, RunData
 from cosim.report.sparkline import path as sparkline
+from cosim.runs import reference
+from cosim.runs.convergence import Convergence
+from cosim.runs.tolerance_sweep import Sweep
 from cosim.texts import milliseconds, short, verdict
-from cosim.tolerance_sweep import Sweep
 
 ACCURACY = "accuracy"  # name of the page over the tolerance
 UPDATE = "intermediate update"

@@ -6,12 +6,12 @@ from itertools import chain, count
 from pathlib import Path
 
 from cosim import project
-from cosim.comparison import Failure, Run
-from cosim.convergence import Convergence
 from cosim.output_files import from_here
 from cosim.report import assets, overview, scenario_page, studies_page
 from cosim.report.overview import FILES, SCENARIOS, STUDIES
-from cosim.tolerance_sweep import Sweep
+from cosim.runs.comparison import Failure, Run
+from cosim.runs.convergence import Convergence
+from cosim.runs.tolerance_sweep import Sweep
 
 
 class ReportWriter:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import project, reference, trajectory_csv
+from cosim import project, trajectory_csv
 from cosim.errors import UserError
-from cosim.reference import Summed
+from cosim.runs import reference
+from cosim.runs.reference import Summed
 from cosim.system import ecos
 from cosim.system.ssp import Ssp
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from cosim.archives import unpack
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import Model, Variable
 from cosim.input_files import UnreadableError
 from cosim.interruption import temporary_folder
-from cosim.model import Model, Variable
 from cosim.system import ssp_checks
 from cosim.system.ssp_reader import SspReader
 from cosim.system.structure import System

@@ -6,9 +6,9 @@ from typing import NoReturn
 
 from cosim.archives import LARGEST_SYSTEM
 from cosim.errors import UserError, WrongValueError, did_you_mean
-from cosim.fmu_file import describe
+from cosim.fmi.fmu_file import describe
+from cosim.fmi.model import TOLERANCE, Model, Variable
 from cosim.input_files import UnreadableError, is_file
-from cosim.model import TOLERANCE, Model, Variable
 from cosim.system.structure import Component, Connector, Parameter, System
 
 # type of a variable -> types of a parameter's value that engines can give it

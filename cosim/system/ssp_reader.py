@@ -16,10 +16,10 @@ from lxml import etree
 
 from cosim.archives import read_xml, wrong_name
 from cosim.errors import UserError
+from cosim.fmi.model import Value
 from cosim.input_files import UnreadableError, is_file
-from cosim.model import Value
 from cosim.project import STRUCTURE
-from cosim.scenario import MAX_STEPS
+from cosim.scenarios.scenario import MAX_STEPS
 from cosim.system.structure import Component, Connection, Connector, Parameter, System
 
 NAMESPACES = {

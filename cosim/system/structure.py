@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from cosim.model import Value
+from cosim.fmi.model import Value
 
 
 @dataclass(frozen=True)

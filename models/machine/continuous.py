@@ -21,8 +21,8 @@ from matplotlib.figure import Figure
 from cosim import project, trajectory_csv
 from cosim.coupling.master import Master
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
-from cosim.model import Value
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import Value
 from cosim.report.style import ERRORS, RUN, STYLE, save
 from cosim.system import ssp
 from cosim.system.ssp import Ssp

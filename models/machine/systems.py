@@ -10,8 +10,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from lxml import etree
 
-from cosim.fmu_file import Fmu
-from cosim.model import Model, Value
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import Model, Value
 from cosim.system import ecos, ssp
 from cosim.system.ssp import Ssp
 from cosim.system.structure import Connection

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 from cosim import project
 from cosim.coupling.master import Master
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.report.style import ERRORS, RUN, STYLE, save
 from cosim.system import ssp
 from cosim.system.ssp import Ssp

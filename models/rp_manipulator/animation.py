@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.model import Value
+from cosim.fmi.model import Value
 from cosim.report.motion import Animation, Recorded
 
 JOINTS = ("q1", "q2")

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.model import Value
+from cosim.fmi.model import Value
 from cosim.report.motion import Animation, Recorded
 from models.rp_manipulator.animation import EFFORTS, acting, ghost, joints
 from models.rp_manipulator.animation import geometry as arm_geometry

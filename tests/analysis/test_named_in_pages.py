@@ -202,7 +202,7 @@ def test_what_pages_name_exists(page: str) -> None:
             "clock_two_sum of stepping.c",
         ),
         ("see `arm_forward_dynamics` of `rp_plant.h`", "arm_forward_dynamics of rp_plant.h"),
-        ("- `cosim/model.py`: `Model.seek` finds", "Model.seek of cosim/model.py"),
+        ("- `cosim/fmi/model.py`: `Model.seek` finds", "Model.seek of cosim/fmi/model.py"),
         ("`src/instance/steppings.c` does", "src/instance/steppings.c"),
         ("by tests/fuzz/replays.c", "tests/fuzz/replays.c"),
         ("`steppings.c` does", "steppings.c"),

@@ -184,7 +184,7 @@ def test_imports_are_found(tmp_path: Path) -> None:
         "def f():\n    from two import x\n"
     )
     assert imported(tmp_path / "a.py") == {"os", "one.part", "b", "two", "two.x"}
-    assert {"numpy", "fmpy"} <= set(foreign_imports(("cosim/simulation.py",)))
+    assert {"numpy", "fmpy"} <= set(foreign_imports(("cosim/runs/simulation.py",)))
 
 
 @pytest.mark.parametrize("name", COMMANDS)

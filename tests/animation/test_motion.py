@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from cosim import project, trajectory_csv
-from cosim.comparison import Run, Runs
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.report import motion
+from cosim.runs.comparison import Run, Runs
 from cosim.system import comparison, ecos, ssp
 from cosim.system.comparison import Outcome
 from tests.animation.player_page import show

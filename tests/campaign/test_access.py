@@ -14,9 +14,9 @@ import pytest
 from distributed import Client
 
 from cosim.campaign import cluster
-from tests.campaign import processes
+from tests.campaign.cluster import processes
+from tests.campaign.cluster.processes import ENVIRONMENT
 from tests.campaign.files import write
-from tests.campaign.processes import ENVIRONMENT
 
 CHANGES = [("runs = 40", "runs = 240"), ("block = 8", "block = 6")]
 
@@ -38,7 +38,7 @@ def test_strangers_are_refused(client: Client, user: int | None) -> None:
     places = [address.removeprefix("tls://") for address in addresses(client)]
     own = client.security
     given = {"user": user, "places": places, "cert": own.tls_client_cert, "key": own.tls_client_key}
-    child = processes.python("tests.campaign.stranger", input=True)
+    child = processes.python("tests.campaign.cluster.stranger", input=True)
     out, err = child.communicate(json.dumps(given))
     assert child.returncode == 0, err
     said = json.loads(out)

@@ -8,9 +8,9 @@ import pytest
 from cosim.campaign import bases, planning
 from cosim.campaign.points import Points
 from cosim.campaign.runs import Runner, open_fmus
-from tests.campaign.c_loop import CLoop
 from tests.campaign.files import campaign
-from tests.campaign.works import WORKS
+from tests.campaign.rate.c_loop import CLoop
+from tests.campaign.rate.works import WORKS
 
 RUNS = 6
 

@@ -15,8 +15,8 @@ import pytest
 from cosim import __main__ as cli
 from cosim.campaign import figures, page
 from cosim.commands.campaign import _command
+from tests.campaign.cluster.processes import ENVIRONMENT, finish, start, table
 from tests.campaign.files import commands, write
-from tests.campaign.processes import ENVIRONMENT, finish, start, table
 from tests.support.paths import ROOT
 
 PAGE = [

@@ -9,7 +9,7 @@ import pytest
 from cosim import __main__ as cli
 from cosim.campaign import cluster, credentials
 from cosim.errors import UserError
-from tests.campaign import certificates, processes
+from tests.campaign.cluster import certificates, processes
 from tests.campaign.files import write
 from tests.support.hosts import LOOPBACK
 

@@ -1,6 +1,6 @@
 """Campaigns that are stopped or killed go on, and give the table of an undisturbed one.
 
-long_kills.py kills workers and fills the disk.
+cluster/long_kills.py kills workers and fills the disk.
 """
 
 import errno
@@ -20,9 +20,8 @@ from cosim.campaign.points import Points
 from cosim.campaign.results import Results
 from cosim.campaign.worker import Plugin
 from cosim.errors import UserError
-from tests.campaign import processes
-from tests.campaign.files import write
-from tests.campaign.processes import (
+from tests.campaign.cluster import processes
+from tests.campaign.cluster.processes import (
     blocks,
     completed,
     finish,
@@ -33,6 +32,7 @@ from tests.campaign.processes import (
     wait_for,
     workers,
 )
+from tests.campaign.files import write
 from tests.support.hosts import LOOPBACK
 
 Made = tuple[engine.Engine, Results]

@@ -14,8 +14,8 @@ from cosim.campaign.fmi_calls import DO_STEP
 from cosim.campaign.loop import COLUMNS
 from cosim.campaign.measures import LYAPUNOV
 from cosim.campaign.runs import Rows
+from tests.campaign.cluster.processes import completed
 from tests.campaign.files import ARM, HEAD, campaign, commands, write
-from tests.campaign.processes import completed
 from tests.campaign.runners import rows, runner
 from tests.support.cosim_project import BUILD, FMUS, fmi3_fmu, repacked
 from tests.support.paths import ROOT

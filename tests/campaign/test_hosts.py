@@ -1,8 +1,8 @@
 """Scheduler and workers on different hosts, links between which are lost, too.
 
 The hosts are network namespaces, connected by a pair of virtual devices. Where the kernel permits
-none, only the process groups on loopback are left. long_kills.py waits for the time-outs that are
-short here.
+none, only the process groups on loopback are left. cluster/long_kills.py waits for the time-outs
+that are short here.
 """
 
 import os
@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.campaign.files import write
-from tests.campaign.processes import (
+from tests.campaign.cluster.processes import (
     ENVIRONMENT,
     blocks,
     cluster,
@@ -23,6 +22,7 @@ from tests.campaign.processes import (
     table,
     wait_for,
 )
+from tests.campaign.files import write
 from tests.support.hosts import LOOPBACK, Host, Network
 
 CHANGES = [("runs = 40", "runs = 160"), ("block = 8", "block = 4")]

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from cosim import campaign
-from tests.campaign.processes import ENVIRONMENT
+from tests.campaign.cluster.processes import ENVIRONMENT
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "cosim" / "campaign"

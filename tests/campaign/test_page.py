@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from tests.campaign.cluster.processes import completed
 from tests.campaign.files import write
-from tests.campaign.processes import completed
 from tests.support.browser import Browser
 
 RUNS = 16  # groups

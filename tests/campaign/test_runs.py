@@ -8,8 +8,8 @@ import pytest
 
 from cosim.campaign.measures import LYAPUNOV
 from cosim.coupling.master import Master
-from cosim.fmu_file import Fmu
-from cosim.simulation import simulate
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs.simulation import simulate
 from cosim.system import ssp
 from tests.campaign.files import ARM, HEAD, campaign
 from tests.campaign.runners import rows, runner

@@ -9,7 +9,7 @@ import pytest
 from lxml import etree
 
 from cosim import project
-from cosim.model import VERSIONS
+from cosim.project import VERSIONS
 from cosim.system import ssp
 from cosim.system.ssp_reader import NAMESPACES
 from tests.support.paths import ROOT

@@ -9,13 +9,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cosim import comparison, reference, simulation, tolerance_sweep
-from cosim.comparison import Runs
-from cosim.fmu_file import Fmu
-from cosim.reference import Reference
+from cosim.fmi.fmu_file import Fmu
 from cosim.report import scenario_page
 from cosim.report.writer import ReportWriter
-from cosim.tolerance_sweep import Sweep
+from cosim.runs import comparison, reference, simulation, tolerance_sweep
+from cosim.runs.comparison import Runs
+from cosim.runs.reference import Reference
+from cosim.runs.tolerance_sweep import Sweep
 from tests.report.sizes import OF_SCENARIOS
 from tests.support.all_fmus import FOLDERS
 from tests.support.cosim_project import (

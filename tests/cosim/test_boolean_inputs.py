@@ -5,10 +5,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from cosim import scenario, simulation
 from cosim.coupling.master import Master
 from cosim.errors import UserError
-from cosim.fmu_file import INSTANCES, Fmu
+from cosim.fmi.fmu_file import INSTANCES, Fmu
+from cosim.runs import simulation
+from cosim.scenarios import scenario
 from cosim.system.structure import Connection
 from tests.support.cosim_project import BUILD, fmi3_fmu
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, timed, toy

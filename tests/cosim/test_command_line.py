@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from cosim import __main__ as cli
-from cosim import simulation, trajectory_csv
+from cosim import trajectory_csv
 from cosim.commands import run as run_command
+from cosim.runs import simulation
 from tests.support.cosim_project import (
     LONG,
     NAMES,

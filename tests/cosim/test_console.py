@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import command_line, console, result_tables, streams
+from cosim import command_line
 from cosim.command_line import COMMANDS
-from cosim.comparison import Run, Runs
-from cosim.fmu_file import Fmu
-from cosim.result_tables import RunTable, SweepTable
+from cosim.fmi.fmu_file import Fmu
+from cosim.output import console, result_tables, streams
+from cosim.output.result_tables import RunTable, SweepTable
+from cosim.runs.comparison import Run, Runs
+from cosim.runs.tolerance_sweep import TOLERANCES, Sweep
 from cosim.texts import brief, seconds, shortened
-from cosim.tolerance_sweep import TOLERANCES, Sweep
 from tests.support.cosim_project import FMUS, LONG, SHORT, assert_one_line, call, load
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP

@@ -17,8 +17,13 @@ import pytest
 import sympy as sp
 
 from cosim import __main__ as cli
-from cosim import convergence, result_tables
-from cosim.convergence import (
+from cosim.errors import UserError
+from cosim.fmi.fmu_file import Fmu
+from cosim.output import result_tables
+from cosim.project import convergence_files
+from cosim.report.writer import ReportWriter
+from cosim.runs import convergence
+from cosim.runs.convergence import (
     FACTORS,
     INTERMEDIATE_UPDATE,
     NAMES,
@@ -27,11 +32,7 @@ from cosim.convergence import (
     Convergence,
     Problem,
 )
-from cosim.errors import UserError
-from cosim.fmu_file import Fmu
-from cosim.project import convergence_files
-from cosim.report.writer import ReportWriter
-from cosim.signals import Sines
+from cosim.scenarios.signals import Sines
 from tests.support.cosim_project import declared, load
 from tests.support.paths import ROOT
 

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from cosim import convergence, project, simulation
+from cosim import project
 from cosim.errors import UserError, WrongValueError
-from cosim.fmu_file import Fmu, read_model
-from cosim.model import Variable
+from cosim.fmi.fmu_file import Fmu, read_model
+from cosim.fmi.model import Variable
+from cosim.runs import convergence, simulation
 from tests.support.cosim_project import (
     FMUS,
     SHORT,

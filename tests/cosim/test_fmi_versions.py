@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import comparison, simulation
-from cosim.fmu_file import Fmu
-from cosim.simulation import Result
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import comparison, simulation
+from cosim.runs.simulation import Result
 from tests.support.cosim_project import (
     BUILD,
     LONG,

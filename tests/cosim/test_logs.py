@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import logs, scenario
 from cosim.errors import UserError
-from cosim.scenario import Scenario
+from cosim.scenarios import logs, scenario
+from cosim.scenarios.scenario import Scenario
 from tests.cosim.test_boolean_inputs import SWITCHED
 from tests.support.cosim_project import FMUS, call
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy

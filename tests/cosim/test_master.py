@@ -8,7 +8,7 @@ import pytest
 from cosim.coupling import step_control
 from cosim.coupling.master import Master, Snapshot
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.system.structure import Connection
 from tests.support.cosim_project import BUILD, fmi3_fmu
 

@@ -17,11 +17,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import fmu_file, reference, simulation
-from cosim import scenario as scenarios
 from cosim.errors import UserError
-from cosim.fmi2_instance import Fmi2Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi import fmu_file
+from cosim.fmi.fmi2_instance import Fmi2Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference, simulation
+from cosim.scenarios import scenario as scenarios
 from tests.support.all_fmus import SYSTEMS
 from tests.support.cosim_project import (
     BUILD,

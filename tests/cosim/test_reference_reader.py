@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import reference
 from cosim.errors import UserError
+from cosim.runs import reference
 from tests.support.cosim_project import LONG, NAMES, declared, edit, load, reference_file
 
 MAKE_REFERENCES = "build/venv/bin/python models/rp_manipulator/references/make_references.py"

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import project, scenario
+from cosim import project
 from cosim.errors import UserError
+from cosim.scenarios import scenario
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, timed, toy
 
 

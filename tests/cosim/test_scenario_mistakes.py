@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim import scenario
 from cosim.errors import UserError
+from cosim.scenarios import scenario
 from tests.support.toy_model import HEAD, TIME, TOY, timed
 
 # mistakes: the text of the file, what the message says

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from cosim import progress as progress_module
-from cosim import scenario as scenarios
-from cosim import simulation, trajectory_csv
+from cosim import trajectory_csv
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.output import progress as progress_module
+from cosim.runs import simulation
+from cosim.scenarios import scenario as scenarios
 from tests.support.cosim_project import LONG, SHORT, edit, load, repacked
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from cosim import scenario as scenarios
-from cosim.comparison import Runs
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
-from cosim.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
-from cosim.scenario import Scenario
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
+from cosim.runs.comparison import Runs
+from cosim.scenarios import scenario as scenarios
+from cosim.scenarios.scenario import Scenario
 from tests.support.cosim_project import FMUS, SHORT, assert_one_line, call, declared, fmi3_fmu
 from tests.support.ssp_files import SSP, edited, replace
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from cosim import scenario
 from cosim.errors import UserError, WrongValueError
-from cosim.model import Variable
-from cosim.signals import Sines, Table
+from cosim.fmi.model import Variable
+from cosim.scenarios import scenario
+from cosim.scenarios.signals import Sines, Table
 from cosim.units import SECONDS, typed_quantity
 from tests.support.cosim_project import FMUS, NAMES, declared, load
 from tests.support.toy_model import DESCRIPTION, TOY, toy

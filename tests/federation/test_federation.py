@@ -20,7 +20,7 @@ from cosim.coupling.master import Master
 from cosim.errors import UserError
 from cosim.federation import addresses, federation
 from cosim.federation.parts import parts, real_connections
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from tests.federation.processes import Start

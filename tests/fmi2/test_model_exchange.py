@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from cosim import reference
-from cosim.reference import Reference
-from cosim.scenario import Scenario
-from cosim.simulation import Result
+from cosim.runs import reference
+from cosim.runs.reference import Reference
+from cosim.runs.simulation import Result
+from cosim.scenarios.scenario import Scenario
 from tests.support.cosim_project import declared, load, names_of
 from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
 

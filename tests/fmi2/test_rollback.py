@@ -15,7 +15,7 @@ import pytest
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from cosim import convergence
+from cosim.runs import convergence
 from tests.fmi2.rollback_sequences import (
     KINDS,
     START,

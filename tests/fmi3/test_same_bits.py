@@ -11,7 +11,7 @@ import pytest
 from fmpy import fmi2, fmi3
 
 from cosim.project import model_folder
-from cosim.scenario import Scenario
+from cosim.scenarios.scenario import Scenario
 from tests.support.cosim_project import FILES, FMUS, NAMES, load
 
 MODES = {  # eventModeUsed, earlyReturnAllowed

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from cosim.convergence import slope
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs.convergence import slope
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import continuous

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import wall_limit

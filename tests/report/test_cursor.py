@@ -8,8 +8,8 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 
 from cosim import trajectory_csv
-from cosim.reference import SMALLEST_SCALE
 from cosim.report.run_data import ROUNDING
+from cosim.runs.reference import SMALLEST_SCALE
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from cosim import scenario
 from cosim.report import browser as shown
 from cosim.report.overview import Entry, forget, read, record
 from cosim.report.signal_texts import describe
-from cosim.signals import Table
+from cosim.scenarios import scenario
+from cosim.scenarios.signals import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
 from tests.support.cosim_project import FMUS, assert_one_line, call, declared

@@ -7,8 +7,8 @@ from urllib.parse import quote
 import pytest
 
 from cosim import project
+from cosim.report.system_page import MOST_ROWS
 from cosim.system import comparison, ssp
-from cosim.system.report import MOST_ROWS
 from tests.report import sizes
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser

@@ -15,7 +15,7 @@ import pytest
 from cosim import __main__ as cli
 from cosim import archives
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from cosim.system import ssp
 from tests.support.cosim_project import assert_one_line, repacked
 from tests.support.paths import ROOT

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from cosim import input_files, reference
-from cosim import scenario as scenarios
+from cosim import input_files
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference
+from cosim.scenarios import scenario as scenarios
 from cosim.system import ssp
 from models.closed_loop.coupling.loop import opened as opened_loop
 from tests.support.cosim_project import declared

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from cosim import reference
-from cosim.comparison import Runs
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference
+from cosim.runs.comparison import Runs
 from tests.support.cosim_project import declared, load, names_of
 from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT

@@ -17,9 +17,9 @@ import pytest
 from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
 
-from cosim import reference
-from cosim.comparison import Runs
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference
+from cosim.runs.comparison import Runs
 from tests.rp_controller.controller_symbolic import (
     ARM,
     CASES,

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from cosim import reference
-from cosim.comparison import Runs
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference
+from cosim.runs.comparison import Runs
 from tests.support.cosim_project import declared, fmi3_fmu, load
 from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 

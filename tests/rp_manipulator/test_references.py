@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from cosim.scenario import Scenario
+from cosim.scenarios.scenario import Scenario
 from tests.support.cosim_project import declared, load, names_of
 from tests.support.paths import ROOT
 

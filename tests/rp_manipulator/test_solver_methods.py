@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import reference, simulation
-from cosim.comparison import Runs
-from cosim.fmu_file import Fmu
-from cosim.reference import Reference
-from cosim.scenario import Scenario
-from cosim.tolerance_sweep import TOLERANCES, sweep
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference, simulation
+from cosim.runs.comparison import Runs
+from cosim.runs.reference import Reference
+from cosim.runs.tolerance_sweep import TOLERANCES, sweep
+from cosim.scenarios.scenario import Scenario
 from tests.support.cosim_project import load as load_scenario
 from tests.support.cosim_project import names_of
 from tests.support.paths import ROOT

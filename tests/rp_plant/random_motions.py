@@ -20,8 +20,8 @@ from fmpy.fmi1 import FMICallException
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from cosim.errors import UserError
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from models.rp_plant.references.equations import INPUTS, STATES
 from models.rp_plant.references.motion import Event, Motion
 from models.rp_plant.references.solver import Solver

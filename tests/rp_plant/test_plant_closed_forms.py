@@ -9,7 +9,7 @@ import math
 import mpmath
 import pytest
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_runs import (
     FIRM,
     METHODS,

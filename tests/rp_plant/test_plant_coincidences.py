@@ -5,7 +5,7 @@ import random
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_runs import (
     FIRM,
     METHODS,

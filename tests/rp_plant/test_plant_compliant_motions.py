@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from models.rp_plant.references.solver import Solver
 from tests.rp_plant.plant_runs import COMPLIANT, METHODS
 from tests.rp_plant.random_motions import Outcome, compliant_case, judge_all

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_model_exchange import STATES, PlantModel, model, unknowns
 from tests.rp_plant.plant_runs import COMPLIANT, RIGID, modes, started
 

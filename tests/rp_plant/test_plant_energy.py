@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import simulation
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import simulation
 from models.rp_plant.references.equations import INPUTS
 from tests.rp_plant.plant_runs import AT_REST, COMPLIANT, METHODS, RIGID, read, started
 from tests.rp_plant.random_motions import Case, compliant_case, random_case

@@ -11,10 +11,10 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from cosim.errors import UserError
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
-from cosim.scenario import Scenario
-from cosim.simulation import initialize
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs.simulation import initialize
+from cosim.scenarios.scenario import Scenario
 from tests.rp_plant.plant_runs import COMPLIANT, METHODS, NONE, RIGID, started
 from tests.support.cosim_project import load, names_of
 from tests.support.paths import ROOT

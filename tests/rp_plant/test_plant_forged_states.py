@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_runs import COMPLIANT, RIGID, last_event, modes, started
 from tests.rp_plant.test_plant_rollback import Run, packed, unpack
 from tests.support.instances import ERROR, status_of

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_model_exchange import STATES, PlantModel, model
 from tests.rp_plant.plant_runs import COMPLIANT, RIGID
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from cosim import project
-from cosim.fmu_file import Fmu
-from cosim.reference import bound
-from cosim.scenario import load
-from cosim.simulation import initialize
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs.reference import bound
+from cosim.runs.simulation import initialize
+from cosim.scenarios.scenario import load
 from tests.rp_plant.plant_model_exchange import STATES, model
 from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, RIGID, read, started
 

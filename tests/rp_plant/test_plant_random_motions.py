@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from models.rp_plant.references.solver import Solver
 from tests.rp_plant.plant_runs import METHODS
 from tests.rp_plant.random_motions import MOST_EVENTS, Outcome, judge_all

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.scenario import Scenario
+from cosim.scenarios.scenario import Scenario
 from models.rp_plant.references import make_references
 from tests.support.cosim_project import load, names_of
 

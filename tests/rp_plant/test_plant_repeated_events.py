@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_runs import (
     COMPLIANT,
     FIRM,

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.plant_runs import (
     AT_REST,
     BOUNCY_STOPS,

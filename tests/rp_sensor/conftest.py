@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.support.cosim_project import fmi3_fmu
 
 

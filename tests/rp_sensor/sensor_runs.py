@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from fractions import Fraction
 from types import ModuleType
 
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from tests.support.cosim_project import declared
 from tests.support.paths import ROOT
 

@@ -11,7 +11,7 @@ from fmpy.simulation import instantiate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import COUNTS, MODEL, SCRIPT, independent, start_values, started
 from tests.support.cosim_project import declared, fmi3_fmu, load, names_of
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of

@@ -8,8 +8,8 @@ from fractions import Fraction
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import (
     INPUTS,
     Cubic,

@@ -11,10 +11,10 @@ import pytest
 
 from cosim import __main__ as cli
 from cosim import project
-from cosim import scenario as scenarios
-from cosim.fmu_file import read_model
-from cosim.model import Model
-from cosim.scenario import Scenario
+from cosim.fmi.fmu_file import read_model
+from cosim.fmi.model import Model
+from cosim.scenarios import scenario as scenarios
+from cosim.scenarios.scenario import Scenario
 from tests.support.all_fmus import FOLDERS
 from tests.support.paths import ROOT
 

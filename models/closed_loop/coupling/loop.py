@@ -15,8 +15,8 @@ import numpy as np
 from cosim import trajectory_csv
 from cosim.coupling.master import Master
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
-from cosim.model import Value
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import Value
 from cosim.system import ssp
 from cosim.system.structure import Connection
 from models.closed_loop.experiment import STOP

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.convergence import slope
+from cosim.runs.convergence import slope
 from models.closed_loop.coupling.loop import (
     METHODS,
     REFERENCES,

@@ -12,8 +12,8 @@ import numpy as np
 
 from cosim import project
 from cosim.errors import UserError
-from cosim.fmu_file import read_model
-from cosim.model import Value, Variable
+from cosim.fmi.fmu_file import read_model
+from cosim.fmi.model import Value, Variable
 from models.closed_loop.references import equations
 from models.closed_loop.references.loop import COEFFICIENTS, INTEGRALS, SIGNALS, Loop
 from models.rp_manipulator.references.make_references import INPUTS, STATES

@@ -13,8 +13,8 @@ import numpy as np
 
 from cosim import project
 from cosim.errors import UserError
-from cosim.fmu_file import read_model
-from cosim.model import Model, Value
+from cosim.fmi.fmu_file import read_model
+from cosim.fmi.model import Model, Value
 from models.closed_loop.references.closed_loop import reference_motion
 from models.machine.references.components import (
     Actuator,

@@ -16,7 +16,7 @@ import numpy as np
 FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parents[2]))
 
-from cosim.model import Value
+from cosim.fmi.model import Value
 from models import system_references
 from models.machine.experiment import STEPS_PER_SECOND, STOP
 from models.machine.references.components import Sample

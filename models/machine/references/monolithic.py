@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from cosim.errors import UserError
-from cosim.model import Value
+from cosim.fmi.model import Value
 from models.closed_loop.references import equations as motion
 from models.closed_loop.references.closed_loop import prepare
 from models.closed_loop.references.loop import COEFFICIENTS

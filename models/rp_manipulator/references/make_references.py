@@ -19,7 +19,7 @@ ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
 from cosim.errors import UserError
-from cosim.scenario import Scenario
+from cosim.scenarios.scenario import Scenario
 from models import reference_files
 
 MODEL = "RPManipulator"

@@ -15,13 +15,14 @@ import numpy as np
 import sympy as sp
 from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 
-from cosim import convergence, project
-from cosim import scenario as scenarios
+from cosim import project
 from cosim.errors import UserError
-from cosim.fmu_file import read_model
+from cosim.fmi.fmu_file import read_model
 from cosim.output_files import whole
-from cosim.scenario import Scenario
-from cosim.signals import Sines
+from cosim.runs import convergence
+from cosim.scenarios import scenario as scenarios
+from cosim.scenarios.scenario import Scenario
+from cosim.scenarios.signals import Sines
 
 equations = functools.cache(derive)
 

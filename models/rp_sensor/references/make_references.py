@@ -17,7 +17,7 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim.scenario import Scenario
+from cosim.scenarios.scenario import Scenario
 from models import reference_files
 
 MODEL = "RPSensor"

@@ -27,9 +27,9 @@ from cosim.campaign import bases, campaign_file, cluster, engine, planning
 from cosim.campaign.points import Points
 from cosim.campaign.results import Results
 from cosim.campaign.runs import open_fmus
-from tests.campaign.c_loop import CLoop
-from tests.campaign.plain_processes import plain_processes
-from tests.campaign.works import WORKS
+from tests.campaign.rate.c_loop import CLoop
+from tests.campaign.rate.plain_processes import plain_processes
+from tests.campaign.rate.works import WORKS
 
 
 @dataclass(frozen=True)

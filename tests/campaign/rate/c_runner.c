@@ -1,5 +1,5 @@
 /* The stepping loop of cosim/campaign/loop.py in C, over the same arrays: what a compiled runner
- * would gain. rate_loop.py loads it as a shared library.
+ * would gain. loop.py loads it as a shared library.
  */
 #include <stdint.h>
 

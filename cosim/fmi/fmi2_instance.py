@@ -3,25 +3,22 @@
 from collections.abc import Sequence
 from ctypes import Array, c_double, sizeof
 from functools import partial
-from typing import TYPE_CHECKING
 
 import fmpy
 import numpy as np
 from fmpy import fmi2
 
-from cosim.fmi_instance import (
+from cosim.fmi.fmi_instance import (
     InputPolynomials,
     Instance,
     OutputDerivatives,
     Reals,
     SavedState,
+    UnpackedFmu,
     doubles,
     no_call,
     view,
 )
-
-if TYPE_CHECKING:
-    from cosim.fmu_file import Fmu
 
 
 class Fmi2Instance(Instance):
@@ -39,7 +36,7 @@ class Fmi2Instance(Instance):
         "String": "setString",
     }
 
-    def __init__(self, fmu: "Fmu", name: str, smooth_inputs: Sequence[str] = ()) -> None:
+    def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
         super().__init__(fmu, name, smooth_inputs)
         # The texts are taken as sent: fmpy's proxy, which fills in printf arguments, has one logger
         # for the whole process. The structure stays referenced for as long as the FMU uses it.
@@ -54,7 +51,7 @@ class Fmi2Instance(Instance):
     def _log(
         self, _environment: int, _instance: bytes, status: int, _category: bytes, message: bytes
     ) -> None:
-        self._note(status, message)
+        self._keep_unless_ok(status, message)
 
     def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> None:
         with self.explained("in initialization"):

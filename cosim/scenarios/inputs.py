@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from cosim import logs
 from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.fmi.model import INPUTS, Model, Variable
 from cosim.input_files import show
-from cosim.logs import Log
-from cosim.model import INPUTS, Model, Variable
-from cosim.scenario_reader import Reader
-from cosim.signals import EARLY, Constant, Logged, Signal, Sines, Switches, Table
+from cosim.scenarios import logs
+from cosim.scenarios.logs import Log
+from cosim.scenarios.reader import Reader
+from cosim.scenarios.signals import EARLY, Constant, Logged, Signal, Sines, Switches, Table
 from cosim.units import HERTZ, RADIANS, SECONDS
 
 MEASURED = "measured"  # section of a scenario

@@ -12,12 +12,13 @@ from lxml import etree
 
 from cosim.archives import check_library, read_xml, unpack
 from cosim.errors import UserError, one_line, reason
-from cosim.fmi2_instance import Fmi2Instance
-from cosim.fmi3_instance import Fmi3Instance
-from cosim.fmi_instance import Instance
+from cosim.fmi.fmi2_instance import Fmi2Instance
+from cosim.fmi.fmi3_instance import Fmi3Instance
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.model import Model, described
 from cosim.input_files import UnreadableError, show
 from cosim.interruption import temporary_folder
-from cosim.model import VERSIONS, Model, described
+from cosim.project import VERSIONS
 
 DESCRIPTION = "modelDescription.xml"
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform

@@ -14,11 +14,11 @@ import numpy as np
 
 from cosim import project
 from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
 from cosim.input_files import read_toml, show
-from cosim.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
-from cosim.scenario_inputs import MEASURED, InputReader
-from cosim.scenario_reader import Reader
-from cosim.signals import Logged, Signal
+from cosim.scenarios.inputs import MEASURED, InputReader
+from cosim.scenarios.reader import Reader
+from cosim.scenarios.signals import Logged, Signal
 from cosim.units import SECONDS
 
 MODEL = "model"  # key of a file that is in no model's folder

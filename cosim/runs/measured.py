@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.scenario import Scenario
-from cosim.simulation import Result
+from cosim.runs.simulation import Result
+from cosim.scenarios.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False)

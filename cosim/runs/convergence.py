@@ -17,15 +17,16 @@ from pathlib import Path
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from cosim import project, simulation
-from cosim import scenario as scenarios
+from cosim import project
 from cosim.errors import UserError
-from cosim.fmi3_instance import Fmi3Instance
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
-from cosim.model import Model
-from cosim.scenario import Scenario
-from cosim.signals import Sines
+from cosim.fmi.fmi3_instance import Fmi3Instance
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.fmi.model import Model
+from cosim.runs import simulation
+from cosim.scenarios import scenario as scenarios
+from cosim.scenarios.scenario import Scenario
+from cosim.scenarios.signals import Sines
 
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
 ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: inputs are held

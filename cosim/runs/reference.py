@@ -8,10 +8,10 @@ import numpy as np
 
 from cosim import project, trajectory_csv
 from cosim.errors import UserError
+from cosim.fmi.model import Model
 from cosim.input_files import is_file, read_toml
-from cosim.model import Model
-from cosim.scenario import Scenario
-from cosim.simulation import Result
+from cosim.runs.simulation import Result
+from cosim.scenarios.scenario import Scenario
 
 SMALLEST_SCALE = 1e-3  # in the variable's unit; below it an error counts as absolute
 

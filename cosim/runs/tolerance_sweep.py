@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from cosim import reference
-from cosim.comparison import Runs
-from cosim.scenario import Scenario
+from cosim.runs import reference
+from cosim.runs.comparison import Runs
+from cosim.scenarios.scenario import Scenario
 
 TOLERANCES = tuple(float(f"1e-{exponent}") for exponent in range(4, 12))  # loosest first
 TIGHTEST = TOLERANCES[-1]

@@ -1,4 +1,4 @@
-"""One who knows the addresses of Dask's processes: `python -m tests.campaign.stranger`.
+"""One who knows the addresses of Dask's processes: `python -m tests.campaign.cluster.stranger`.
 
 Reads places (host:port), a user id and credentials from standard input, becomes that user, and
 says which attempts each of the processes has answered.

@@ -17,7 +17,6 @@ from cosim.units import ANGLE, Displays, Units, display_unit, finite_number, qua
 Value = float | int | bool | str
 TURN = 2 * math.pi
 
-VERSIONS = ("2.0", "3.0")  # of FMI
 INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 and an Int32 of FMI 3.0 hold
 
 # what a scenario may set, by the name of its section
@@ -116,7 +115,7 @@ class Model:
     """What an FMU declares."""
 
     name: str
-    fmi_version: str  # one of `VERSIONS`
+    fmi_version: str  # one of `project.VERSIONS`
     variables: Mapping[str, Variable]  # by name, in the order of the model description
     states: tuple[str, ...]  # names of the continuous states, in that order
     interpolates_inputs: bool  # takes inputs that are polynomials over a step
@@ -186,7 +185,7 @@ class Model:
 
 
 def described(description: ModelDescription) -> Model:
-    """Model that a description of one of `VERSIONS`, for co-simulation, declares.
+    """Model that a description of FMI 2.0 or 3.0, for co-simulation, declares.
 
     Raises
     ------

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from cosim.comparison import Failure, Run
-from cosim.convergence import Convergence
-from cosim.measured import comparisons
-from cosim.scenario import Scenario
-from cosim.tolerance_sweep import Sweep
+from cosim.runs.comparison import Failure, Run
+from cosim.runs.convergence import Convergence
+from cosim.runs.measured import comparisons
+from cosim.runs.tolerance_sweep import Sweep
+from cosim.scenarios.scenario import Scenario
 
 
 class Done(Protocol):

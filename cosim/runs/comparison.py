@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim import project, reference, simulation
+from cosim import project
 from cosim.errors import UserError
-from cosim.fmu_file import Fmu
-from cosim.reference import Reference
-from cosim.scenario import Scenario
-from cosim.simulation import Result, StoppedError
+from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference, simulation
+from cosim.runs.reference import Reference
+from cosim.runs.simulation import Result, StoppedError
+from cosim.scenarios.scenario import Scenario
 from cosim.texts import short
 
 ESTIMATE_TOLERANCE = 1e-11  # of the run that errors are estimated from, or a tighter one

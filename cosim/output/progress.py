@@ -4,7 +4,7 @@ import sys
 
 from tqdm import tqdm
 
-from cosim import streams
+from cosim.output import streams
 
 DELAY = 1.0  # s, shorter activities show nothing
 

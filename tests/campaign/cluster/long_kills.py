@@ -1,6 +1,6 @@
 """Kills workers, the scheduler and the campaign, loses links, fills the disk: the same table.
 
-    build/venv/bin/python -m tests.campaign.long_kills
+    build/venv/bin/python -m tests.campaign.cluster.long_kills
 
 Takes some minutes. ctest -C Long -R long_campaign_kills runs it.
 """
@@ -17,8 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.campaign.files import write
-from tests.campaign.processes import (
+from tests.campaign.cluster.processes import (
     blocks,
     cluster,
     completed,
@@ -30,6 +29,7 @@ from tests.campaign.processes import (
     wait_for,
     workers,
 )
+from tests.campaign.files import write
 from tests.support.hosts import LOOPBACK, Network, NotPermittedError, network
 
 RUNS, KILLS = 2400, 20

@@ -12,7 +12,7 @@ from fmpy import fmi3
 from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError
-from cosim.fmi_instance import (
+from cosim.fmi.fmi_instance import (
     InputPolynomials,
     Instance,
     OutputDerivatives,
@@ -68,7 +68,7 @@ class Fmi3Instance(Instance):
         self._results = tuple(map(byref, results))
 
     def _log(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
-        self._note(status, message)
+        self._keep_unless_ok(status, message)
 
     def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> None:
         self._experiment = tolerance, start, stop

@@ -1,6 +1,6 @@
 """Measures the loop that numba compiles against the same loop in C, over the same instances.
 
-    build/venv/bin/python -m tests.campaign.rate_loop [--runs 40]
+    build/venv/bin/python -m tests.campaign.rate.loop [--runs 40]
 
 Both make each run in turns, by the processor time of the thread; their records must have the same
 bits. "All of a run" is the loop with numba, what goes before it, and the measures. Ratios are
@@ -22,8 +22,8 @@ import numpy as np
 from cosim.campaign import campaign_file
 from cosim.campaign.loop import Wires
 from cosim.campaign.runs import Runner
+from tests.campaign.rate.works import WORKS
 from tests.campaign.runners import runner
-from tests.campaign.works import WORKS
 from tests.support.paths import ROOT
 
 
@@ -48,7 +48,7 @@ def compiled(folder: Path) -> CDLL:
     """The loop in C."""
     headers = Path(fmpy.__file__).parent / "c-code"
     library = folder / "c_runner.so"
-    source = ROOT / "tests" / "campaign" / "c_runner.c"
+    source = ROOT / "tests" / "campaign" / "rate" / "c_runner.c"
     flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     subprocess.run(
         ["gcc", *flags, "-isystem", str(headers), str(source), "-o", str(library)], check=True

@@ -11,20 +11,30 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
 from ctypes import Array, byref, c_double, c_uint, c_void_p
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError, one_line
-from cosim.model import Value
-
-if TYPE_CHECKING:
-    from cosim.fmu_file import Fmu
+from cosim.fmi.model import Model, Value
 
 OK, ERROR, FATAL = 0, 3, 4
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
+
+
+class UnpackedFmu(Protocol):
+    """What instances need to know of their FMU: `cosim.fmi.fmu_file.Fmu`."""
+
+    path: Path  # for messages
+    folder: Path
+    library: Path  # the shared object
+    identifier: str  # its name
+    guid: str  # in FMI 3.0, the instantiationToken
+    log_categories: Sequence[str]
+    model: Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +101,7 @@ class Instance(ABC):
 
     Parameters
     ----------
-    fmu : Fmu
+    fmu : UnpackedFmu
         Stays open as long as the instance.
     name : str
         Of the instance, for messages.
@@ -105,7 +115,7 @@ class Instance(ABC):
     INSTANTIATE: ClassVar[str]  # name of the function
     SETTERS: ClassVar[Mapping[str, str]]  # methods of LIBRARY, by type of the variable
 
-    def __init__(self, fmu: "Fmu", name: str, smooth_inputs: Sequence[str] = ()) -> None:
+    def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
         self.fmu = fmu
         self.name = name
         self.smooth_inputs = list(smooth_inputs)
@@ -155,8 +165,8 @@ class Instance(ABC):
 
     # ---- Messages --------------------------------------------------------------------------------
 
-    def _note(self, status: int, message: bytes | None) -> None:
-        """Keep a message of the FMU."""
+    def _keep_unless_ok(self, status: int, message: bytes | None) -> None:
+        """Keep a message of the FMU as one line in `messages`, but none of status OK."""
         if status != OK:
             self.messages.append(one_line((message or b"").decode("utf-8", errors="replace")))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim import project, trajectory_csv
 from cosim.errors import UserError
-from cosim.model import KINDS, Value, Variable
+from cosim.fmi.model import KINDS, Value, Variable
 from cosim.output_files import whole
 from cosim.report import assets, motion, overview, pages
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry

@@ -5,7 +5,7 @@ import math
 import textwrap
 from collections.abc import Iterator
 
-from cosim.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
+from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
 
 WIDTH = 100
 

@@ -8,7 +8,7 @@ import fmpy
 import numpy as np
 
 from cosim.campaign.job import Job
-from cosim.fmu_file import Fmu
+from cosim.fmi.fmu_file import Fmu
 from tests.support.paths import ROOT
 
 KINDS = {"Real": "reals", "Integer": "integers", "Enumeration": "integers", "Boolean": "booleans"}
@@ -34,7 +34,7 @@ class CLoop:
         self._outputs = sum(len(c.reals.outputs) for c in job.components)
         (folder / "work.h").write_text(_header(job, fmus, points), encoding="utf-8")
         headers = Path(fmpy.__file__).parent / "c-code"
-        source = ROOT / "tests" / "campaign" / "c_loop.c"
+        source = ROOT / "tests" / "campaign" / "rate" / "c_loop.c"
         flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", f"-I{folder}"]
         libraries = ["-lm", "-ldl", "-lpthread"]
         command = ["gcc", *flags, "-isystem", headers, source, "-o", self._program, *libraries]

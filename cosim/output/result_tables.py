@@ -2,15 +2,15 @@
 
 from collections.abc import Iterable, Sequence
 
-from cosim import console
-from cosim.comparison import Run
-from cosim.console import Table
-from cosim.convergence import Convergence
-from cosim.measured import comparisons
+from cosim.output import console
+from cosim.output.console import Table
+from cosim.runs.comparison import Run
+from cosim.runs.convergence import Convergence
+from cosim.runs.measured import comparisons
+from cosim.runs.tolerance_sweep import TIGHTEST, Sweep
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.study import Measure
 from cosim.texts import brief, milliseconds, seconds, short, unit, verdict
-from cosim.tolerance_sweep import TIGHTEST, Sweep
 
 NONE = "-"
 

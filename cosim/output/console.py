@@ -5,7 +5,7 @@ import sys
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence, Sized
 
-from cosim import streams
+from cosim.output import streams
 from cosim.texts import counted, shortened
 
 WIDTH = 80  # columns that a terminal has, if it has no fewer

@@ -9,9 +9,9 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError
-from cosim.fmi_instance import Instance
-from cosim.fmu_file import Fmu
-from cosim.scenario import Scenario
+from cosim.fmi.fmi_instance import Instance
+from cosim.fmi.fmu_file import Fmu
+from cosim.scenarios.scenario import Scenario
 
 PROGRESS_EVERY = 0.1  # s
 

@@ -1,0 +1,1 @@
+"""FMUs: read, unpacked, instantiated and called, in all versions of FMI."""

@@ -1,0 +1,1 @@
+"""Runs of scenarios, compared with references and measurements, over tolerances and steps."""

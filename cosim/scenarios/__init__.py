@@ -1,0 +1,1 @@
+"""Scenarios: read and checked against the models they are of."""
