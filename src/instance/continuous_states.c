@@ -1,8 +1,11 @@
 #include "continuous_states.h"
 
+#include "active_values.h"
 #include "event_point.h"
 #include "fields.h"
 #include "model_modes.h"
+#include "outputs.h"
+#include "outside_events.h"
 #include "settings.h"
 
 #include <math.h>

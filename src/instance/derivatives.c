@@ -1,6 +1,7 @@
 #include "derivatives.h"
 
 #include "fields.h"
+#include "outputs.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 #include "event_point.h"
 
-#include "history.h"
+#include "active_values.h"
 #include "model_modes.h"
 
 #include <math.h>
@@ -49,12 +49,6 @@ enum status instance_pass_due_event(struct instance *instance, struct event_coun
         memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
     }
     return status;
-}
-
-bool instance_is_unchanged(const struct instance *instance) {
-    return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
-           !polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)) &&
-           instance_holds_all(instance);
 }
 
 struct clock_time instance_resumed_end(const struct instance *instance, struct clock_time end) {

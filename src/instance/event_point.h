@@ -19,9 +19,6 @@ NONNULL void instance_note_event(struct instance *instance, struct clock_time en
 MUST_CHECK NONNULL enum status instance_pass_due_event(struct instance *instance,
                                                        struct event_counts *in_step);
 
-/* All that is set is what the integrator ran with until now: the modes are those that follow. */
-NONNULL bool instance_is_unchanged(const struct instance *instance);
-
 /* The end of a step after an event: that of the step which the event cut short, if the importer
  * means the same time. Its own differences of times have rounding errors. */
 NONNULL struct clock_time instance_resumed_end(const struct instance *instance,

@@ -1,7 +1,5 @@
 #include "fields.h"
 
-#include "model_modes.h"
-
 #include <limits.h>
 
 const struct variable *instance_refuse_reference(const struct instance *instance,
@@ -19,12 +17,6 @@ const struct variable *instance_refuse_reference(const struct instance *instance
     return NULL;
 }
 
-void instance_set_clock(struct instance *instance, struct clock_time time) {
-    instance->state.time = time;
-    instance->state.own.time = time.s;
-    instance->outputs_are_valid = false;
-}
-
 static int saturated(int64_t count) {
     return count > INT_MAX ? INT_MAX : (int)count;
 }
@@ -37,22 +29,6 @@ void instance_write_statistics(const struct integrator_statistics *statistics,
     own->solver_failed_steps = saturated(statistics->failed_steps);
     own->solver_last_step = statistics->last_step;
     own->solver_last_order = statistics->last_order;
-}
-
-enum status instance_update_outputs(struct instance *instance) {
-    if (instance->outputs_are_valid) {
-        return STATUS_OK;
-    }
-    const enum status status =
-        instance->model->outputs(instance->memory.values, instance->state.time.s);
-    instance->outputs_are_valid = status == STATUS_OK;
-    if (status != STATUS_OK) {
-        message_write(&instance->sink, status, "no outputs at t = %.17g: %s",
-                      instance->state.time.s, status_text(status));
-    } else if (instance->is_integrated_outside && instance->model->events != NULL) {
-        instance_add_bands(instance);
-    }
-    return status;
 }
 
 enum status instance_not_finite(const struct instance *instance, const char *what) {

@@ -1,4 +1,4 @@
-/* Where the values of an instance lie, and when the calculated ones are up to date. */
+/* Where the values of an instance lie. */
 #ifndef INSTANCE_FIELDS_H
 #define INSTANCE_FIELDS_H
 
@@ -57,14 +57,15 @@ static inline void instance_write_field(struct instance *instance, const struct 
     }
 }
 
-NONNULL void instance_set_clock(struct instance *instance, struct clock_time time);
+static inline void instance_set_clock(struct instance *instance, struct clock_time time) {
+    instance->state.time = time;
+    instance->state.own.time = time.s;
+    instance->outputs_are_valid = false;
+}
 
 /* Writes the variables that show totals of the integrator. */
 NONNULL void instance_write_statistics(const struct integrator_statistics *statistics,
                                        struct instance_values *own);
-
-/* Brings the calculated values up to date; a message says why that fails. */
-MUST_CHECK NONNULL enum status instance_update_outputs(struct instance *instance);
 
 /* Returns STATUS_NOT_FINITE, with a message that `what` cannot be computed. */
 NONNULL enum status instance_not_finite(const struct instance *instance, const char *what);

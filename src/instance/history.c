@@ -1,41 +1,11 @@
 #include "history.h"
 
-#include "event_point.h"
+#include "active_values.h"
 #include "model_modes.h"
 #include "right_hand_side.h"
 
 #include <math.h>
 #include <string.h>
-
-/* The next step's inputs are held at the values that the integrator runs with. Polynomials need no
- * comparison: the horizon of the integrator ends with the step that they are for. */
-static bool inputs_are_held(const struct instance_memory *memory, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        const struct polynomial *next = &memory->next_inputs[i];
-        if (next->d[0] != memory->active_inputs[i].d[0] || polynomial_moves(next)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static bool is_held(const struct instance *instance, struct range range) {
-    const struct instance_memory *memory = &instance->memory;
-    return memcmp(memory->restart_values + range.offset, memory->values + range.offset,
-                  range.size) == 0;
-}
-
-/* The parameters, and the inputs that are no numbers, are those that the integrator runs with. */
-static bool parameters_are_held(const struct instance *instance) {
-    const struct model_events *events = instance->model->events;
-    return is_held(instance, instance->model->parameters) &&
-           (events == NULL || is_held(instance, events->discrete_inputs));
-}
-
-bool instance_holds_all(const struct instance *instance) {
-    return inputs_are_held(&instance->memory, count_of(instance->model->inputs)) &&
-           parameters_are_held(instance);
-}
 
 /* Whether the motion to target is the one of the integrator's history. It depends only on the
  * values set now and those that the integrator runs with, not on how often or in what order they
@@ -47,7 +17,7 @@ bool instance_holds_all(const struct instance *instance) {
  * 1e-9, and rollback would have to replay every jump. */
 static bool continues(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
-    return state->has_history && target <= state->horizon && instance_holds_all(instance);
+    return state->has_history && target <= state->horizon && instance_values_are_active(instance);
 }
 
 int64_t instance_longest_history(const struct instance *instance) {
@@ -145,7 +115,7 @@ static inline void hold_all(struct instance *instance, struct clock_time end,
 
 void instance_hold(struct instance *instance, struct clock_time end,
                    const struct polynomial inputs[]) {
-    hold_all(instance, end, inputs, !parameters_are_held(instance));
+    hold_all(instance, end, inputs, !instance_parameters_are_active(instance));
 }
 
 static enum status restart(struct instance *instance, struct clock_time end,
@@ -153,7 +123,7 @@ static enum status restart(struct instance *instance, struct clock_time end,
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
     const bool is_event = continuation == CONTINUE_AFTER_EVENT;
-    const bool has_new_parameters = !parameters_are_held(instance);
+    const bool has_new_parameters = !instance_parameters_are_active(instance);
     // the last step gives the length of the first one, unless the parameters have changed
     if (has_new_parameters) {
         state->next_step = 0.0;

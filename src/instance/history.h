@@ -20,9 +20,6 @@ enum continuation {
 MUST_CHECK NONNULL enum continuation instance_continuation(const struct instance *instance,
                                                            double target);
 
-/* Inputs and parameters are those that the integrator runs with; inputs do not move. */
-NONNULL bool instance_holds_all(const struct instance *instance);
-
 /* integrator_longest_history of the method, in the present modes. */
 NONNULL int64_t instance_longest_history(const struct instance *instance);
 

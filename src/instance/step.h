@@ -1,4 +1,5 @@
-/* A step that is being done, for the files that do it: stepping.c, step_inputs.c and step_events.c.
+/* A step that is being done, for the files step_*.c and
+ * stepping.c that do it.
  */
 #ifndef INSTANCE_STEP_H
 #define INSTANCE_STEP_H
@@ -23,9 +24,13 @@ struct step {
     int64_t steps_before;           /* internal ones, since initialization */
 };
 
-/* ---- Integration (stepping.c) --------------------------------------------------------------- */
+/* ---- Integration (step_part.c) -------------------------------------------------------------- */
 
-/* To step->until, or to a state event before it. */
+/* Reports the time of the instance to options->accept; true: the step is to end there, or before
+ * the end so far. */
+NONNULL bool instance_report(struct step *step);
+
+/* To step->until, or to a state event before it. step->until may come forward on the way. */
 MUST_CHECK NONNULL enum status instance_move(struct step *step, enum continuation continuation);
 
 /* Internal steps that the step may still take. */

@@ -2,7 +2,6 @@
 
 #include "event_point.h"
 #include "fields.h"
-#include "right_hand_side.h"
 #include "settings.h"
 #include "snapshot_contents.h"
 #include "step.h"
@@ -74,66 +73,6 @@ static void keep(struct step *step) {
     }
 }
 
-/* Reports the time of the instance; true: the step is to end there, or before the end so far. */
-static bool report(struct step *step) {
-    const double now = step->instance->state.time.s;
-    double end = step->end.s;
-    step->answer = step->options->accept(step->options->context, now, &end);
-    if (step->answer != STATUS_OK || end < step->end.s) {
-        step->is_over = step->answer != STATUS_OK || !(end - now > clock_slack(now, end - now));
-        step->end = step->is_over ? step->instance->state.time : (struct clock_time){.s = end};
-        step->is_early = true;
-        if (clock_difference(step->until, step->end) > 0.0) {
-            step->until = step->end;
-            step->meets_time_event = false;
-        }
-        return true;
-    }
-    return false;
-}
-
-/* An integrator_observer. */
-static bool observe(void *step_pointer, double t, const double x[]) {
-    struct step *step = step_pointer;
-    struct instance *instance = step->instance;
-    memcpy(doubles_of(instance->memory.values, instance->model->states), x,
-           instance->model->states.size);
-    instance_set_clock(instance, clock_add(instance->state.restart_time, t));
-    instance_evaluate_inputs(instance, clock_difference(instance->state.time, step->begin));
-    return report(step);
-}
-
-static bool is_at_event(const struct instance *instance) {
-    return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
-}
-
-/* To step->until, which may come forward on the way. */
-ALWAYS_INLINE enum status advance(struct step *step) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    double *x = doubles_of(instance->memory.values, instance->model->states);
-    if (step->options->accept != NULL) {
-        integrator_set_observer(instance->integrator, observe, step);
-    }
-    enum status status;
-    for (;;) {
-        const int64_t left = instance_steps_left(step);
-        status = integrator_advance(instance->integrator,
-                                    clock_difference(step->until, state->restart_time),
-                                    left > 1 ? left : 1, &state->latest_time, x);
-        if (status != STATUS_OK || step->is_over || is_at_event(instance) ||
-            !(state->latest_time < clock_difference(step->until, state->restart_time))) {
-            break;
-        }
-        // to the new end; the step that the observer cut short counts
-        integrator_get_statistics(instance->integrator, &state->statistics);
-    }
-    if (step->options->accept != NULL) {
-        integrator_set_observer(instance->integrator, NULL, NULL);
-    }
-    return status;
-}
-
 /* The instance is at the time where the step has ended. */
 static void arrive(const struct step *step, struct clock_time time) {
     instance_set_clock(step->instance, time);
@@ -153,35 +92,6 @@ static bool interpolate(const struct step *step, double target) {
     return true;
 }
 
-/* To step->until, or to an event before it. */
-ALWAYS_INLINE enum status move(struct step *step, enum continuation continuation) {
-    struct instance *instance = step->instance;
-    struct instance_state *state = &instance->state;
-    enum status status = instance_prepare_history(instance, step->end, continuation);
-    if (status != STATUS_OK) {
-        return status;
-    }
-    status = advance(step);
-    if (status != STATUS_OK) {
-        instance_set_clock(instance, clock_add(state->restart_time, state->latest_time));
-    }
-
-    // a step that ended early cannot be replayed: its end was not known when it began
-    const bool is_whole = !step->is_early && !step->meets_time_event && !is_at_event(instance);
-    state->has_history = status == STATUS_OK && is_whole && instance_longest_history(instance) > 0;
-    state->passed_time = integrator_passed_time(instance->integrator);
-    if (!state->has_history) {
-        state->next_step = status == STATUS_OK ? integrator_next_step(instance->integrator) : 0.0;
-    }
-    integrator_get_statistics(instance->integrator, &state->statistics);
-    instance_write_statistics(&state->statistics, &state->own);
-    return status;
-}
-
-enum status instance_move(struct step *step, enum continuation continuation) {
-    return move(step, continuation);
-}
-
 static enum status integrate(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -193,7 +103,7 @@ static enum status integrate(struct step *step) {
     }
     keep(step);
     const enum status status = instance->model->events == NULL
-                                   ? move(step, continuation)
+                                   ? instance_move(step, continuation)
                                    : instance_move_over_events(step, continuation);
     arrive(step, status == STATUS_OK ? step->end : state->time);
     return status;
@@ -240,7 +150,7 @@ static enum status do_step(struct step *step, double communication_point, double
     }
     const bool ends_at_event = instance->state.event_point != NO_EVENT;
     if (step->options->accept != NULL && (!step->is_early || ends_at_event)) {
-        (void)report(step);
+        (void)instance_report(step);
     }
     return step->answer;
 }

@@ -1,6 +1,7 @@
 #include "values.h"
 
 #include "fields.h"
+#include "outputs.h"
 #include "settings.h"
 
 #include <math.h>

@@ -1,18 +1,32 @@
 """Which folder may include or import which: arrows between folders go one way.
 
 A C file may include headers of its own folder, public headers of the folders below it, and the C
-standard library. What else a folder may use is in the tables here, and in no other place.
+standard library. What else a folder may use is in the tables here, and in no other place. No files
+call each other in a circle.
 """
 
 import ast
+import os
 import re
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from tests.analysis.call_graph import (
+    Graph,
+    Symbols,
+    c_graph,
+    circles,
+    objects,
+    package_graph,
+    read_symbols,
+)
 from tests.support.paths import ROOT
+
+BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
 
 # ---- The architecture ----------------------------------------------------------------------------
 
@@ -118,24 +132,16 @@ def wrong_includes(root: Path) -> Iterator[str]:
                 yield f"{path.relative_to(root)} includes {name}"
 
 
-def include_circles(root: Path) -> Iterator[str]:
-    """Circles of headers that include each other."""
+def graph_of_c_files(root: Path, symbols: dict[str, Symbols]) -> Graph:
+    """Calls by these symbols of the C files, calls in inline functions of headers, includes."""
     files = c_files(root)
-    done: set[Path] = set()
-
-    def visit(header: Path, way: list[Path]) -> Iterator[str]:
-        if header in way:
-            yield " -> ".join(path.name for path in [*way[way.index(header) :], header])
-        elif header not in done:
-            for name in includes(header):
-                included = find_header(name, header, files)
-                if included is not None:
-                    yield from visit(included, [*way, header])
-            done.add(header)
-
+    names = {path: path.relative_to(root).as_posix() for path in files}
+    headers = {names[path]: path.read_text() for path in files if path.suffix == ".h"}
+    included = {}
     for path in files:
-        if path.suffix == ".h":
-            yield from visit(path, [])
+        found = [find_header(name, path, files) for name in includes(path)]
+        included[names[path]] = {names[header] for header in found if header is not None}
+    return c_graph(symbols, headers, included)
 
 
 # ---- Python: imports -----------------------------------------------------------------------------
@@ -172,12 +178,20 @@ def test_includes_follow_the_architecture() -> None:
     assert list(wrong_includes(ROOT)) == []
 
 
-def test_no_header_includes_itself_by_way_of_others() -> None:
-    assert list(include_circles(ROOT)) == []
+def test_no_circle_of_c_files() -> None:
+    compiled = objects(BUILD)
+    sources = [path for path in c_files(ROOT) if path.suffix == ".c" and path in compiled]
+    assert len(sources) > 80, "build the project first"
+    symbols = {path.relative_to(ROOT).as_posix(): read_symbols(compiled[path]) for path in sources}
+    assert circles(graph_of_c_files(ROOT, symbols)) == []
 
 
 def test_imports_follow_the_architecture() -> None:
     assert list(wrong_imports(ROOT)) == []
+
+
+def test_no_circle_of_folders_and_modules_of_cosim() -> None:
+    assert circles(package_graph(ROOT / "cosim")) == []
 
 
 @pytest.fixture
@@ -252,11 +266,74 @@ def test_a_folder_without_a_rule_is_noticed(project: Path) -> None:
         list(wrong_includes(project))
 
 
-def test_a_circle_is_noticed(project: Path) -> None:
+def test_a_circle_of_headers_is_noticed(project: Path) -> None:
     write(project, "src/model/model.h", '#include "second.h"\n')
     write(project, "src/model/second.h", '#include "third.h"\n')
     write(project, "src/model/third.h", '#include "second.h"\n')
-    assert list(include_circles(project)) == ["second.h -> third.h -> second.h"]
+    assert circles(graph_of_c_files(project, {})) == [
+        "src/model/second.h -> src/model/third.h (include); "
+        "src/model/third.h -> src/model/second.h (include)"
+    ]
+
+
+def test_a_circle_of_calls_is_noticed() -> None:
+    symbols = {
+        "a.c": Symbols({"a_do", "a_get"}, {"b_do", "malloc"}),
+        "b.c": Symbols({"b_do"}, {"c_do"}),
+        "c.c": Symbols({"c_do"}, {"a_do", "a_get"}),
+        "above.c": Symbols({"above"}, {"a_do"}),
+        "below.c": Symbols({"below"}, set()),
+    }
+    assert circles(c_graph(symbols, {}, {})) == [
+        "a.c -> b.c (b_do); b.c -> c.c (c_do); c.c -> a.c (a_do, a_get)"
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "static inline int f(void) {\n    return up_do(1);\n}\n",
+        "#define F(x) \\\n    up_do(x)\n",
+    ],
+)
+def test_a_header_that_calls_up_is_noticed(text: str) -> None:
+    symbols = {"up.c": Symbols({"up_do"}, set())}
+    assert circles(c_graph(symbols, {"low.h": text}, {"up.c": {"low.h"}})) == [
+        "low.h -> up.c (up_do); up.c -> low.h (include)"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("up.h", "static inline int f(void) { return up_do(1); }\n"),  # its own file
+        ("low.h", "int up_do(int x);\nstruct s { int (*up_do)(int x); };\n// { up_do() }\n"),
+    ],
+)
+def test_a_header_may_declare_and_call_its_own_file(name: str, text: str) -> None:
+    symbols = {"up.c": Symbols({"up_do"}, set())}
+    assert circles(c_graph(symbols, {name: text}, {"up.c": {name}})) == []
+
+
+def test_symbols_are_those_that_other_files_see(tmp_path: Path) -> None:
+    source = tmp_path / "a.c"
+    source.write_text(
+        "extern int used; int own(void); int shared; static int hidden(void) { return used; }\n"
+        "int own(void) { return hidden(); }\n"
+    )
+    subprocess.run(["cc", "-c", source, "-o", tmp_path / "a.o"], check=True)
+    assert read_symbols(tmp_path / "a.o") == Symbols({"own", "shared"}, {"used"})
+
+
+def test_a_circle_of_imports_is_noticed(project: Path) -> None:
+    write(project, "cosim/unit.py", "def late():\n    from cosim import pages\n")
+    write(project, "cosim/pages/__init__.py", "")
+    write(project, "cosim/pages/first.py", "import cosim.pages.second\nimport cosim.other\n")
+    write(project, "cosim/pages/second.py", "from cosim.unit import Fmu\n")
+    write(project, "cosim/other.py", "if TYPE_CHECKING:\n    import cosim.pages.first\n")
+    assert circles(package_graph(project / "cosim")) == [
+        "pages -> unit (pages/second.py: cosim.unit.Fmu); unit -> pages (unit.py: cosim.pages)"
+    ]
 
 
 @pytest.mark.parametrize(
