@@ -30,13 +30,7 @@ double rp_plant_sliding_friction(const struct rp_plant_parameters *p, int joint,
 }
 
 int rp_plant_closed_stop(const struct rp_plant_parameters *p, int joint, double q) {
-    if (p->stops[joint] != RP_PLANT_STOPS_RIGID) {
-        return 0;
-    }
-    if (q <= p->lower[joint]) {
-        return 1;
-    }
-    return q >= p->upper[joint] ? -1 : 0;
+    return plant_closed_stop(&p, joint, q);
 }
 
 /* det D = J (m2 + b2) + m2 a^2 b2 */

@@ -20,7 +20,7 @@ EQUATION struct plant_hold plant_hold(const struct rp_plant_parameters *const p[
         return (struct plant_hold){plant_friction(p, mode, i, dq), compliant};
     }
     const real breakaway = plant_breakaway(p, i);
-    const int closed = rp_plant_closed_stop(p[0], i, value_of(q));
+    const int closed = plant_closed_stop(p, i, q);
     const struct rp_plant_hold held =
         rp_plant_hold(value_of(reaction), value_of(breakaway), closed);
     if (held.stop == 0.0) {

@@ -133,7 +133,18 @@ EQUATION real plant_friction(const struct rp_plant_parameters *const p[SOURCES],
     return scaled(mode, plant_sliding_friction(p, i, scaled(mode, dq)));
 }
 
-/* ---- Compliant stops ------------------------------------------------------------------------ */
+/* ---- Stops ---------------------------------------------------------------------------------- */
+
+/* As rp_plant_closed_stop, of the position's value. */
+EQUATION int plant_closed_stop(const struct rp_plant_parameters *const p[SOURCES], int i, real q) {
+    if (p[0]->stops[i] != RP_PLANT_STOPS_RIGID) {
+        return 0;
+    }
+    if (value_of(q) <= p[0]->lower[i]) {
+        return 1;
+    }
+    return value_of(q) >= p[0]->upper[i] ? -1 : 0;
+}
 
 /* d of the stop that the joint is in contact with. */
 EQUATION real plant_penetration(const struct rp_plant_parameters *const p[SOURCES], int contact,
@@ -281,7 +292,7 @@ static inline size_t plant_indicator_index(int joint, int k) {
 /* Those of a stuck joint on its lower and upper side; a closed stop leaves the one that opens. */
 EQUATION void plant_stuck_indicators(const struct rp_plant_parameters *const p[SOURCES], int i,
                                      real q, real reaction, real z[2]) {
-    const int closed = rp_plant_closed_stop(p[0], i, value_of(q));
+    const int closed = plant_closed_stop(p, i, q);
     const real breakaway = plant_breakaway(p, i);
     z[0] = closed < 0 ? constant(1.0) : minus(breakaway, reaction);
     z[1] = closed > 0 ? constant(1.0) : plus(breakaway, reaction);
