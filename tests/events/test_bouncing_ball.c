@@ -1,18 +1,10 @@
 /* A ball that bounces: impacts at v1 / g + 2 v1 (e + ... + e^(k-1)) / g, rest at
  * v1 / g (1 + e) / (1 - e) from a height with v1 = sqrt(2 g h). */
 #include "continuous_states.h"
+#include "each_method.h"
 #include "toy_run.h"
 
-#include <string.h>
-
 static const double g = 9.81;
-
-void setUp(void) {}
-
-void tearDown(void) {
-    instance_destroy(toy);
-    toy = NULL;
-}
 
 /* Time of impact k, from 1 on. */
 static double impact_time(double height, double e, int k) {
@@ -24,64 +16,58 @@ static double impact_time(double height, double e, int k) {
     return time;
 }
 
-static void test_times_of_impacts(void) {
+EACH_METHOD static void test_times_of_impacts(void) {
     static const double steps[] = {1e-3, 1e-2, 0.1};
-    for (int method = 1; method <= 4; method++) {
-        for (int s = 0; s < 3; s++) {
-            int seen = 0;
-            prepare(&ball_description, method, 1e-10);
-            initialize();
-            for (int i = 0; i < (int)round(1.5 / steps[s]); i++) {
-                run(i * steps[s], steps[s], 1);
-                const int count = get_int(TOY_EVENTS);
-                if (count > seen) {
-                    const double expected = impact_time(1.0, 0.8, count);
-                    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, get(TOY_LAST_EVENT));
-                    seen = count;
-                }
+    for (int s = 0; s < 3; s++) {
+        int seen = 0;
+        prepare(&ball_description, method, 1e-10);
+        initialize();
+        for (int i = 0; i < (int)round(1.5 / steps[s]); i++) {
+            run(i * steps[s], steps[s], 1);
+            const int count = get_int(TOY_EVENTS);
+            if (count > seen) {
+                const double expected = impact_time(1.0, 0.8, count);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected, get(TOY_LAST_EVENT));
+                seen = count;
             }
-            TEST_ASSERT_EQUAL_INT(2, seen);
         }
+        TEST_ASSERT_EQUAL_INT(2, seen);
     }
 }
 
-static void test_it_comes_to_rest_on_the_floor(void) {
+EACH_METHOD static void test_it_comes_to_rest_on_the_floor(void) {
     static const double steps[] = {1e-3, 1.0, 10.0};
-    for (int method = 1; method <= 4; method++) {
-        for (int s = 0; s < 3; s++) {
-            prepare(&ball_description, method, 1e-10);
-            set(TOY_POSITION, 0.5);
-            initialize();
-            run(0.0, steps[s], (int)round(10.0 / steps[s]));
-            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_POSITION));
-            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
-            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_ACCELERATION));
-            const double e = 0.8;
-            const double rest = sqrt(2.0 * 0.5 / g) * (1.0 + e) / (1.0 - e);
-            const double fraction = method == 1 || method == 2 ? 2e-3 : method == 3 ? 1e-2 : 1e-1;
-            const double left_out = 2.0 * sqrt(2.0 * 1e-12 * fraction / g) / (1.0 - e);
-            // with BDF the last bounces are as low as the error of the position
-            const double most = method == 2 ? 1.5 : 1.0;
-            const double early = rest - get(TOY_LAST_EVENT);
-            TEST_ASSERT_TRUE(0.0 < early && early <= most * left_out);
-        }
+    for (int s = 0; s < 3; s++) {
+        prepare(&ball_description, method, 1e-10);
+        set(TOY_POSITION, 0.5);
+        initialize();
+        run(0.0, steps[s], (int)round(10.0 / steps[s]));
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_POSITION));
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_ACCELERATION));
+        const double e = 0.8;
+        const double rest = sqrt(2.0 * 0.5 / g) * (1.0 + e) / (1.0 - e);
+        const double fraction = method == 1 || method == 2 ? 2e-3 : method == 3 ? 1e-2 : 1e-1;
+        const double left_out = 2.0 * sqrt(2.0 * 1e-12 * fraction / g) / (1.0 - e);
+        // with BDF the last bounces are as low as the error of the position
+        const double most = method == 2 ? 1.5 : 1.0;
+        const double early = rest - get(TOY_LAST_EVENT);
+        TEST_ASSERT_TRUE(0.0 < early && early <= most * left_out);
     }
 }
 
 /* Bounces as low as the error of the position, in many internal steps each: they lose height,
  * however the steps lie to the floor. */
-static void test_low_bounces_come_to_rest(void) {
+EACH_METHOD static void test_low_bounces_come_to_rest(void) {
     static const double longest_steps[] = {0.0, 1e-8, 1e-9, 1.7e-10};
-    for (int method = 1; method <= 4; method++) {
-        for (int s = 0; s < 4; s++) {
-            prepare(&ball_description, method, 1e-10);
-            set(TOY_POSITION, 1e-13);
-            set(TOY_MAX_STEP, longest_steps[s]);
-            initialize();
-            run(0.0, 1e-6, 10);
-            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_ACCELERATION));
-            TEST_ASSERT_INT_WITHIN(10, 10, get_int(TOY_EVENTS));
-        }
+    for (int s = 0; s < 4; s++) {
+        prepare(&ball_description, method, 1e-10);
+        set(TOY_POSITION, 1e-13);
+        set(TOY_MAX_STEP, longest_steps[s]);
+        initialize();
+        run(0.0, 1e-6, 10);
+        TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_ACCELERATION));
+        TEST_ASSERT_INT_WITHIN(10, 10, get_int(TOY_EVENTS));
     }
 }
 
@@ -106,75 +92,65 @@ static void test_later_points_do_not_change_the_times(void) {
 }
 
 /* Thrown down and lifted, it passes the floor by this depth between two communication points. */
-static void test_a_short_dip_is_found(void) {
+EACH_METHOD static void test_a_short_dip_is_found(void) {
     static const double steps[] = {1e-3, 1e-2, 1.0, 4.0};
-    for (int method = 1; method <= 4; method++) {
-        for (int s = 0; s < 4; s++) {
-            const double depth = 1e-7;
-            const double pull = 1.0; // upwards
-            const double v = -sqrt(2.0 * pull * (1.0 + depth));
-            prepare(&ball_description, method, 1e-8);
-            set(TOY_INPUT, g + pull);
-            set(TOY_SPEED, v);
-            initialize();
-            run(0.0, steps[s], (int)round(4.0 / steps[s]));
-            TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
-            // 2e-7 s for each 1e-10 m
-            const double first = -v - sqrt(2.0 * pull * depth);
-            TEST_ASSERT_DOUBLE_WITHIN(2e-7, first, get(TOY_LAST_EVENT));
-        }
-    }
-}
-
-static void test_restitution_1_keeps_the_energy(void) {
-    for (int method = 1; method <= 4; method++) {
-        prepare(&ball_description, method, 1e-10);
-        set(TOY_PARAMETER2, 1.0);
-        initialize();
-        run(0.0, 10.0, 100);
-        TEST_ASSERT_INT_WITHIN(1, 1107, get_int(TOY_EVENTS));
-        const double energy = g * get(TOY_POSITION) + 0.5 * get(TOY_SPEED) * get(TOY_SPEED);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, g, energy);
-    }
-}
-
-static void test_a_limit_of_events_ends_the_step(void) {
-    for (int method = 1; method <= 4; method++) {
+    for (int s = 0; s < 4; s++) {
+        const double depth = 1e-7;
+        const double pull = 1.0; // upwards
+        const double v = -sqrt(2.0 * pull * (1.0 + depth));
         prepare(&ball_description, method, 1e-8);
-        set_int(TOY_MAX_EVENTS, 3);
+        set(TOY_INPUT, g + pull);
+        set(TOY_SPEED, v);
         initialize();
-        TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(toy, 0.0, 5.0));
-        TEST_ASSERT_EQUAL_INT(3, get_int(TOY_EVENTS));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, impact_time(1.0, 0.8, 4), instance_time(toy));
-        TEST_ASSERT_NOT_NULL(strstr(last_text, "ended"));
-        TEST_ASSERT_NOT_NULL(strstr(last_text, "the height fell to 0"));
+        run(0.0, steps[s], (int)round(4.0 / steps[s]));
+        TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
+        // 2e-7 s for each 1e-10 m
+        const double first = -v - sqrt(2.0 * pull * depth);
+        TEST_ASSERT_DOUBLE_WITHIN(2e-7, first, get(TOY_LAST_EVENT));
     }
+}
+
+EACH_METHOD static void test_restitution_1_keeps_the_energy(void) {
+    prepare(&ball_description, method, 1e-10);
+    set(TOY_PARAMETER2, 1.0);
+    initialize();
+    run(0.0, 10.0, 100);
+    TEST_ASSERT_INT_WITHIN(1, 1107, get_int(TOY_EVENTS));
+    const double energy = g * get(TOY_POSITION) + 0.5 * get(TOY_SPEED) * get(TOY_SPEED);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, g, energy);
+}
+
+EACH_METHOD static void test_a_limit_of_events_ends_the_step(void) {
+    prepare(&ball_description, method, 1e-8);
+    set_int(TOY_MAX_EVENTS, 3);
+    initialize();
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(instance, 0.0, 5.0));
+    TEST_ASSERT_EQUAL_INT(3, get_int(TOY_EVENTS));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, impact_time(1.0, 0.8, 4), instance_time(instance));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "ended"));
+    TEST_ASSERT_NOT_NULL(strstr(last_text, "the height fell to 0"));
 }
 
 /* The internal steps of all flights count together. */
-static void test_a_limit_of_internal_steps_ends_the_step(void) {
-    for (int method = 1; method <= 4; method++) {
-        prepare(&ball_description, method, 1e-8);
-        set_int(TOY_MAX_STEPS, 30);
-        initialize();
-        TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(toy, 0.0, 5.0));
-        TEST_ASSERT_INT_WITHIN(2, 30, get_int(TOY_STEPS));
-        TEST_ASSERT_GREATER_THAN_INT(0, get_int(TOY_EVENTS));
-    }
+EACH_METHOD static void test_a_limit_of_internal_steps_ends_the_step(void) {
+    prepare(&ball_description, method, 1e-8);
+    set_int(TOY_MAX_STEPS, 30);
+    initialize();
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 0.0, 5.0));
+    TEST_ASSERT_INT_WITHIN(2, 30, get_int(TOY_STEPS));
+    TEST_ASSERT_GREATER_THAN_INT(0, get_int(TOY_EVENTS));
 }
 
-static void test_the_lift_takes_it_from_the_floor(void) {
-    for (int method = 1; method <= 4; method++) {
-        prepare(&ball_description, method, 1e-10);
-        set(TOY_POSITION, 0.0);
-        initialize();
-        run(0.0, 1.0, 2);
-        TEST_ASSERT_EQUAL_INT(0, get_int(TOY_STEPS));
-        set(TOY_INPUT, g + 1.0);
-        run(2.0, 1.0, 1);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.5, get(TOY_POSITION));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
-    }
+EACH_METHOD static void test_the_lift_takes_it_from_the_floor(void) {
+    prepare(&ball_description, method, 1e-10);
+    set(TOY_POSITION, 0.0);
+    initialize();
+    run(0.0, 1.0, 2);
+    TEST_ASSERT_EQUAL_INT(0, get_int(TOY_STEPS));
+    set(TOY_INPUT, g + 1.0);
+    run(2.0, 1.0, 1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.5, get(TOY_POSITION));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
 }
 
 /* An integrator outside ends a little before the impact or a little after it. */
@@ -184,19 +160,19 @@ static void test_integrated_from_outside_it_bounces_once(void) {
         struct discrete_update update = {
             .states_changed = false, .is_incomplete = false, .next_time = 0.0};
         prepare(&ball_description, 1, 1e-8);
-        instance_integrate_outside(toy);
+        instance_integrate_outside(instance);
         initialize();
         const double falling[2] = {heights[i], -2.0};
         double x[2];
-        ASSERT_OK(instance_enter_continuous_time(toy));
-        ASSERT_OK(instance_set_time(toy, 0.4));
-        ASSERT_OK(instance_set_states(toy, falling, 2));
-        instance_enter_event_mode(toy);
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        ASSERT_OK(instance_set_time(instance, 0.4));
+        ASSERT_OK(instance_set_states(instance, falling, 2));
+        instance_enter_event_mode(instance);
         for (int k = 0; k < 3; k++) {
-            ASSERT_OK(instance_update_discrete_states(toy, &update));
+            ASSERT_OK(instance_update_discrete_states(instance, &update));
             TEST_ASSERT_EQUAL_INT(k == 0, update.states_changed);
         }
-        ASSERT_OK(instance_get_states(toy, x, 2));
+        ASSERT_OK(instance_get_states(instance, x, 2));
         TEST_ASSERT_EQUAL_DOUBLE(0.0, x[0]);
         TEST_ASSERT_EQUAL_DOUBLE(1.6, x[1]);
         TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
@@ -210,12 +186,12 @@ static void test_integrated_from_outside_nothing_happens_elsewhere(void) {
         struct discrete_update update = {
             .states_changed = true, .is_incomplete = false, .next_time = 0.0};
         prepare(&ball_description, 1, 1e-8);
-        instance_integrate_outside(toy);
+        instance_integrate_outside(instance);
         initialize();
-        ASSERT_OK(instance_enter_continuous_time(toy));
-        ASSERT_OK(instance_set_states(toy, states[i], 2));
-        instance_enter_event_mode(toy);
-        ASSERT_OK(instance_update_discrete_states(toy, &update));
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        ASSERT_OK(instance_set_states(instance, states[i], 2));
+        instance_enter_event_mode(instance);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
         TEST_ASSERT_FALSE(update.states_changed);
         TEST_ASSERT_EQUAL_INT(0, get_int(TOY_EVENTS));
     }
@@ -231,12 +207,11 @@ static void test_a_step_that_fails_at_once_leaves_the_time(void) {
     struct model_events events = *ball_description.model->events;
     struct model model = *ball_description.model;
     struct model_description failing = ball_description;
-    const struct instance_experiment experiment = {.start_time = 5.0};
     events.update = update_or_fail;
     model.events = &events;
     failing.model = &model;
     create(&failing);
-    ASSERT_OK(instance_setup_experiment(toy, &experiment));
+    setup(instance, 5.0, INFINITY);
     set(TOY_POSITION, 10.0);
     has_no_modes = false;
     initialize();
@@ -244,28 +219,11 @@ static void test_a_step_that_fails_at_once_leaves_the_time(void) {
         const double time = 5.0 + i * 0.125;
         has_no_modes = true;
         set(TOY_INPUT, 1.0 + i);
-        TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_do_step(toy, time, 0.125));
-        TEST_ASSERT_EQUAL_DOUBLE(time, instance_time(toy));
+        TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_do_step(instance, time, 0.125));
+        TEST_ASSERT_EQUAL_DOUBLE(time, instance_time(instance));
         TEST_ASSERT_EQUAL_DOUBLE(time, get(TOY_TIME));
         has_no_modes = false;
         run(time, 0.125, 1);
     }
     tearDown();
-}
-
-int main(void) {
-    UNITY_BEGIN();
-    RUN_TEST(test_a_step_that_fails_at_once_leaves_the_time);
-    RUN_TEST(test_times_of_impacts);
-    RUN_TEST(test_it_comes_to_rest_on_the_floor);
-    RUN_TEST(test_low_bounces_come_to_rest);
-    RUN_TEST(test_later_points_do_not_change_the_times);
-    RUN_TEST(test_a_short_dip_is_found);
-    RUN_TEST(test_restitution_1_keeps_the_energy);
-    RUN_TEST(test_a_limit_of_events_ends_the_step);
-    RUN_TEST(test_a_limit_of_internal_steps_ends_the_step);
-    RUN_TEST(test_the_lift_takes_it_from_the_floor);
-    RUN_TEST(test_integrated_from_outside_it_bounces_once);
-    RUN_TEST(test_integrated_from_outside_nothing_happens_elsewhere);
-    return UNITY_END();
 }

@@ -2,33 +2,21 @@
  * strokes is that of a constant force. */
 #include "continuous_states.h"
 #include "derivatives.h"
-#include "internals.h"
+#include "each_method.h"
 #include "serialization.h"
 #include "toy_run.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 static const double period = 0.3, first = 0.07, kick = 0.25, force = 0.5;
 
-void setUp(void) {}
-
-void tearDown(void) {
-    instance_destroy(toy);
-    toy = NULL;
-}
-
 static const struct hammer_values *hammer(void) {
-    return (const void *)toy->memory.values;
+    return (const void *)instance->memory.values;
 }
 
-static void start_as(const struct model_description *description, int method, double start_time,
-                     double between, double offset) {
-    const struct instance_experiment experiment = {.start_time = start_time};
-    create(description);
-    ASSERT_OK(instance_setup_experiment(toy, &experiment));
-    set_int(TOY_METHOD, method);
-    set(TOY_TOLERANCE, 1e-10);
+static void start_as(const struct model_description *description, int with_method,
+                     double start_time, double between, double offset) {
+    prepare_at(start_time, description, with_method, 1e-10);
     set(TOY_PARAMETER1, between);
     set(TOY_PARAMETER2, offset);
     set(TOY_PARAMETER3, kick);
@@ -36,8 +24,8 @@ static void start_as(const struct model_description *description, int method, do
     initialize();
 }
 
-static void start_hammer(int method, double start_time, double between, double offset) {
-    start_as(&hammer_description, method, start_time, between, offset);
+static void start_hammer(int with_method, double start_time, double between, double offset) {
+    start_as(&hammer_description, with_method, start_time, between, offset);
 }
 
 /* The motion from x = 1 m at rest, t s after the start. */
@@ -50,23 +38,21 @@ static void expected_motion(double t, double x[2]) {
     }
 }
 
-static void test_the_motion_between_strokes(void) {
+EACH_METHOD static void test_the_motion_between_strokes(void) {
     static const double steps[] = {0.001, 0.007, 0.25, 5.0};
-    for (int method = 1; method <= 4; method++) {
-        for (int i = 0; i < 4; i++) {
-            const double h = steps[i];
-            const int count = (int)(5.0 / h);
-            double x[2];
-            start_hammer(method, 2.0, period, first);
-            run(2.0, h, count);
-            expected_motion(count * h, x);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-9, x[0], get(TOY_POSITION));
-            TEST_ASSERT_DOUBLE_WITHIN(1e-9, x[1], get(TOY_SPEED));
-            const int strokes = 1 + (int)((count * h - first) / period);
-            TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
-            TEST_ASSERT_EQUAL_INT(strokes, get_int(TOY_EVENTS));
-            TEST_ASSERT_EQUAL_DOUBLE(2.0 + first + (strokes - 1) * period, get(TOY_LAST_EVENT));
-        }
+    for (int i = 0; i < 4; i++) {
+        const double h = steps[i];
+        const int count = (int)(5.0 / h);
+        double x[2];
+        start_hammer(method, 2.0, period, first);
+        run(2.0, h, count);
+        expected_motion(count * h, x);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, x[0], get(TOY_POSITION));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, x[1], get(TOY_SPEED));
+        const int strokes = 1 + (int)((count * h - first) / period);
+        TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
+        TEST_ASSERT_EQUAL_INT(strokes, get_int(TOY_EVENTS));
+        TEST_ASSERT_EQUAL_DOUBLE(2.0 + first + (strokes - 1) * period, get(TOY_LAST_EVENT));
     }
 }
 
@@ -81,8 +67,8 @@ static void test_inputs_are_those_of_the_time(void) {
             const int order = 1;
             const double slope = 2.0;
             set(TOY_INPUT, slope * k * h);
-            ASSERT_OK(instance_set_input_derivatives(toy, &input, 1, &order, &slope));
-            ASSERT_OK(instance_do_step(toy, k * h, h));
+            ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
+            ASSERT_OK(instance_do_step(instance, k * h, h));
             if (hammer()->strokes > 0) {
                 const double stroke = first + (hammer()->strokes - 1) * period;
                 TEST_ASSERT_DOUBLE_WITHIN(1e-15, slope * stroke, hammer()->last);
@@ -101,7 +87,7 @@ static void test_a_stroke_at_the_end_of_a_step(void) {
         double t = 10.0;
         start_hammer(1, t, h, h);
         for (int n = 1; n <= 1000; n++) {
-            ASSERT_OK(instance_do_step(toy, t, h));
+            ASSERT_OK(instance_do_step(instance, t, h));
             t += h;
             TEST_ASSERT_EQUAL_INT(n, hammer()->strokes);
         }
@@ -130,7 +116,7 @@ static void test_strokes_close_to_each_other(void) {
     TEST_ASSERT_GREATER_THAN_INT(1000, hammer()->strokes);
     TEST_ASSERT_TRUE(get(TOY_TIME) == 1.25);
     const int strokes = hammer()->strokes;
-    ASSERT_OK(instance_do_step(toy, 1.25, 3e-7));
+    ASSERT_OK(instance_do_step(instance, 1.25, 3e-7));
     TEST_ASSERT_GREATER_THAN_INT(strokes, hammer()->strokes);
     TEST_ASSERT_TRUE(get(TOY_LAST_EVENT) >= 1.25);
 }
@@ -138,12 +124,12 @@ static void test_strokes_close_to_each_other(void) {
 /* With the force held, the bits do not depend on the communication points. */
 static void test_later_points_do_not_change_the_motion(void) {
     static const double steps[] = {0x1p-9, 0x1p-7, 0x1p-1};
-    for (int method = 1; method <= 4; method += method == 2 ? 2 : 1) {
+    for (int other = 1; other <= 4; other += other == 2 ? 2 : 1) {
         double x[2];
         for (int i = 0; i < 3; i++) {
-            start_hammer(method, 0.0, period, first);
+            start_hammer(other, 0.0, period, first);
             run(0.0, 0x1p-10, 1); // the first point is the same
-            ASSERT_OK(instance_do_step(toy, 0x1p-10, steps[i] - 0x1p-10));
+            ASSERT_OK(instance_do_step(instance, 0x1p-10, steps[i] - 0x1p-10));
             run(steps[i], steps[i], (int)(5.0 / steps[i]) - 1);
             if (i == 0) {
                 x[0] = get(TOY_POSITION);
@@ -156,43 +142,39 @@ static void test_later_points_do_not_change_the_motion(void) {
 }
 
 /* v = -1 m/s from x = 1 m: the wall is hit after the stroke or before it. */
-static void test_state_events_beside_time_events(void) {
+EACH_METHOD static void test_state_events_beside_time_events(void) {
     static const double offsets[] = {0.5, 2.0};
     static const double hit_at[] = {0.5 + 0.5 / 0.75, 1.0};
-    for (int method = 1; method <= 4; method++) {
-        for (int i = 0; i < 2; i++) {
-            prepare(&hammer_description, method, 1e-10);
-            set(TOY_PARAMETER1, 100.0);
-            set(TOY_PARAMETER2, offsets[i]);
-            set(TOY_PARAMETER3, kick);
-            set_int(TOY_MAX_EVENTS, 1); // of state events
-            set(TOY_SPEED, -1.0);
-            initialize();
-            run(0.0, 3.0, 1);
-            TEST_ASSERT_EQUAL_INT(1, hammer()->hits);
-            TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
-            const double speed = i == 0 ? 0.75 : 1.0;
-            const double struck = i == 0 ? 0.0 : kick * (3.0 - offsets[i]);
-            TEST_ASSERT_DOUBLE_WITHIN(1e-9, speed * (3.0 - hit_at[i]) + struck, get(TOY_POSITION));
-        }
-    }
-}
-
-/* Rounding decides which of two comes first; neither is lost. */
-static void test_a_stroke_at_the_wall(void) {
-    for (int method = 1; method <= 4; method++) {
+    for (int i = 0; i < 2; i++) {
         prepare(&hammer_description, method, 1e-10);
         set(TOY_PARAMETER1, 100.0);
+        set(TOY_PARAMETER2, offsets[i]);
         set(TOY_PARAMETER3, kick);
+        set_int(TOY_MAX_EVENTS, 1); // of state events
         set(TOY_SPEED, -1.0);
         initialize();
         run(0.0, 3.0, 1);
         TEST_ASSERT_EQUAL_INT(1, hammer()->hits);
         TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
-        const bool is_struck_first = get(TOY_SPEED) < 1.0;
-        const double speed = is_struck_first ? 1.0 - kick : 1.0 + kick;
-        TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * speed, get(TOY_POSITION));
+        const double speed = i == 0 ? 0.75 : 1.0;
+        const double struck = i == 0 ? 0.0 : kick * (3.0 - offsets[i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, speed * (3.0 - hit_at[i]) + struck, get(TOY_POSITION));
     }
+}
+
+/* Rounding decides which of two comes first; neither is lost. */
+EACH_METHOD static void test_a_stroke_at_the_wall(void) {
+    prepare(&hammer_description, method, 1e-10);
+    set(TOY_PARAMETER1, 100.0);
+    set(TOY_PARAMETER3, kick);
+    set(TOY_SPEED, -1.0);
+    initialize();
+    run(0.0, 3.0, 1);
+    TEST_ASSERT_EQUAL_INT(1, hammer()->hits);
+    TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
+    const bool is_struck_first = get(TOY_SPEED) < 1.0;
+    const double speed = is_struck_first ? 1.0 - kick : 1.0 + kick;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * speed, get(TOY_POSITION));
 }
 
 /* The limit is for events that could follow each other without end. */
@@ -210,22 +192,22 @@ static void test_the_internal_steps_allowed_limit_time_events(void) {
     set(TOY_PARAMETER1, 0x1p-38);
     set(TOY_PARAMETER2, 0.25);
     initialize();
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(toy, 0.0, 0.25));
+    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_EVENTS, instance_do_step(instance, 0.0, 0.25));
     TEST_ASSERT_EQUAL_STRING("the step ended at t = 0.25: a time event is due there, one more than "
                              "max_internal_steps = 100",
                              last_text);
     TEST_ASSERT_EQUAL_INT(100, hammer()->strokes);
     TEST_ASSERT_EQUAL_INT(100, get_int(TOY_EVENTS));
-    ASSERT_OK(instance_do_step(toy, 0.25, 1e-12));
+    ASSERT_OK(instance_do_step(instance, 0.25, 1e-12));
     TEST_ASSERT_EQUAL_INT(100, hammer()->strokes);
-    ASSERT_OK(instance_do_step(toy, 0.25 + 1e-12, 110 * 0x1p-38));
+    ASSERT_OK(instance_do_step(instance, 0.25 + 1e-12, 110 * 0x1p-38));
     TEST_ASSERT_EQUAL_INT(111, hammer()->strokes);
 }
 
 static void test_time_events_without_progress_are_refused(void) {
     start_hammer(1, 0.0, 0.0, 0.1);
     last_text[0] = '\0';
-    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_do_step(toy, 0.0, 1.0));
+    TEST_ASSERT_EQUAL_INT(STATUS_INTERNAL, instance_do_step(instance, 0.0, 1.0));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, "ended at 0.1"), last_text);
 }
 
@@ -237,34 +219,32 @@ static void go_on(double t, double x[2]) {
 }
 
 /* Back to before a stroke, between two strokes, and by bytes in another instance. */
-static void test_rollback_across_strokes(void) {
-    for (int method = 1; method <= 4; method++) {
-        double straight[2];
-        double again[2];
-        for (int k = 0; k < 8; k++) {
-            struct instance_snapshot *snapshot = NULL;
-            struct instance_snapshot *read = NULL;
-            start_hammer(method, 0.0, period, first);
-            run(0.0, 0.05, k);
-            const double t = k * 0.05;
-            ASSERT_OK(instance_save(toy, 0, &snapshot));
-            go_on(t, straight);
-            const int strokes = hammer()->strokes;
-            ASSERT_OK(instance_restore(toy, snapshot));
-            go_on(t, again);
-            TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
-            TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
+EACH_METHOD static void test_rollback_across_strokes(void) {
+    double straight[2];
+    double again[2];
+    for (int k = 0; k < 8; k++) {
+        struct instance_snapshot *snapshot = NULL;
+        struct instance_snapshot *read = NULL;
+        start_hammer(method, 0.0, period, first);
+        run(0.0, 0.05, k);
+        const double t = k * 0.05;
+        ASSERT_OK(instance_save(instance, 0, &snapshot));
+        go_on(t, straight);
+        const int strokes = hammer()->strokes;
+        ASSERT_OK(instance_restore(instance, snapshot));
+        go_on(t, again);
+        TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
+        TEST_ASSERT_EQUAL_INT(strokes, hammer()->strokes);
 
-            const size_t size = instance_serialized_size(toy);
-            unsigned char *bytes = malloc(size);
-            ASSERT_OK(instance_serialize(toy, snapshot, bytes, size));
-            create(&hammer_description);
-            ASSERT_OK(instance_deserialize(toy, bytes, size, &read));
-            ASSERT_OK(instance_restore(toy, read));
-            free(bytes);
-            go_on(t, again);
-            TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
-        }
+        const size_t size = instance_serialized_size(instance);
+        unsigned char *bytes = malloc(size);
+        ASSERT_OK(instance_serialize(instance, snapshot, bytes, size));
+        create(&hammer_description);
+        ASSERT_OK(instance_deserialize(instance, bytes, size, &read));
+        ASSERT_OK(instance_restore(instance, read));
+        free(bytes);
+        go_on(t, again);
+        TEST_ASSERT_EQUAL_MEMORY(straight, again, sizeof straight);
     }
 }
 
@@ -273,17 +253,18 @@ static void test_a_stroke_is_left_to_event_mode(void) {
     const struct step_options left = {.at_event = EVENTS_LEFT};
     struct discrete_update update;
     start_hammer(1, 0.0, period, first);
-    ASSERT_OK(instance_do_step_with(toy, 0.0, 1.0, &left));
-    TEST_ASSERT_TRUE(instance_met_event(toy) && instance_time(toy) == first);
+    ASSERT_OK(instance_do_step_with(instance, 0.0, 1.0, &left));
+    TEST_ASSERT_TRUE(instance_met_event(instance) && instance_time(instance) == first);
     TEST_ASSERT_EQUAL_INT(0, hammer()->strokes);
-    ASSERT_OK(instance_update_discrete_states(toy, &update));
+    ASSERT_OK(instance_update_discrete_states(instance, &update));
     TEST_ASSERT_EQUAL_INT(1, hammer()->strokes);
     TEST_ASSERT_EQUAL_DOUBLE(first + period, update.next_time);
-    ASSERT_OK(instance_do_step_with(toy, first, 0.1, &left));
-    TEST_ASSERT_FALSE(instance_met_event(toy));
-    ASSERT_OK(instance_do_step_with(toy, first + 0.1, 0.2, &left)); // with rounding: at the end
-    TEST_ASSERT_TRUE(instance_met_event(toy));
-    ASSERT_OK(instance_do_step_with(toy, first + 0.1 + 0.2, 0.1, &left)); // passes it first
+    ASSERT_OK(instance_do_step_with(instance, first, 0.1, &left));
+    TEST_ASSERT_FALSE(instance_met_event(instance));
+    ASSERT_OK(
+        instance_do_step_with(instance, first + 0.1, 0.2, &left)); // with rounding: at the end
+    TEST_ASSERT_TRUE(instance_met_event(instance));
+    ASSERT_OK(instance_do_step_with(instance, first + 0.1 + 0.2, 0.1, &left)); // passes it first
     TEST_ASSERT_EQUAL_INT(2, hammer()->strokes);
 }
 
@@ -292,7 +273,7 @@ static bool is_held_until_struck(const void *values) {
 }
 
 /* A mass that is held until the first stroke moves the same whether or not a step ends there. */
-static void test_a_stroke_ends_rest(void) {
+EACH_METHOD static void test_a_stroke_ends_rest(void) {
     const struct step_options left = {.at_event = EVENTS_LEFT};
     static struct model_description description; // they outlive the test
     static struct model model;
@@ -303,29 +284,27 @@ static void test_a_stroke_ends_rest(void) {
     events.is_at_rest = is_held_until_struck;
     model.events = &events;
     description.model = &model;
-    for (int method = 1; method <= 4; method++) {
-        double straight[3];
-        for (int i = 0; i < 2; i++) {
-            start_as(&description, method, 0.0, 5.0, first);
-            if (i == 1) {
-                ASSERT_OK(instance_do_step_with(toy, 0.0, 1.0, &left));
-                TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(toy));
-                TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
-            }
-            ASSERT_OK(instance_do_step(toy, instance_time(toy), 1.0 - instance_time(toy)));
-            const double x[] = {get(TOY_POSITION), get(TOY_SPEED), get_int(TOY_STEPS)};
-            TEST_ASSERT_DOUBLE_WITHIN(1e-9, kick + force * (1.0 - first), x[1]);
-            if (i == 0) {
-                memcpy(straight, x, sizeof straight);
-            }
-            TEST_ASSERT_EQUAL_MEMORY(straight, x, sizeof straight);
+    double straight[3];
+    for (int i = 0; i < 2; i++) {
+        start_as(&description, method, 0.0, 5.0, first);
+        if (i == 1) {
+            ASSERT_OK(instance_do_step_with(instance, 0.0, 1.0, &left));
+            TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(instance));
+            TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
         }
+        ASSERT_OK(
+            instance_do_step(instance, instance_time(instance), 1.0 - instance_time(instance)));
+        const double x[] = {get(TOY_POSITION), get(TOY_SPEED), get_int(TOY_STEPS)};
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, kick + force * (1.0 - first), x[1]);
+        if (i == 0) {
+            memcpy(straight, x, sizeof straight);
+        }
+        TEST_ASSERT_EQUAL_MEMORY(straight, x, sizeof straight);
     }
 }
 
 /* An integrator outside goes to the time that it was given. */
 static enum status rising_force(void *context, double time) {
-    (void)context;
     set(TOY_INPUT, 2.0 * time);
     return STATUS_OK;
 }
@@ -337,9 +316,9 @@ static void test_an_input_stays_where_the_stroke_is(void) {
     for (int i = 0; i < 2; i++) {
         const struct step_options options = {.ask_inputs = rising_force, .at_event = handlings[i]};
         start_hammer(1, 0.0, period, first);
-        ASSERT_OK(instance_do_step_with(toy, 0.0, 0.2, &options));
-        TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(toy));
-        ASSERT_OK(instance_do_step(toy, first, 0.1));
+        ASSERT_OK(instance_do_step_with(instance, 0.0, 0.2, &options));
+        TEST_ASSERT_EQUAL_DOUBLE(first, instance_time(instance));
+        ASSERT_OK(instance_do_step(instance, first, 0.1));
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, first * first + kick + 2.0 * first * 0.1, get(TOY_SPEED));
     }
 }
@@ -347,26 +326,25 @@ static void test_an_input_stays_where_the_stroke_is(void) {
 static void test_integrated_from_outside(void) {
     struct discrete_update update;
     create(&hammer_description);
-    const struct instance_experiment experiment = {.start_time = 1.0};
-    ASSERT_OK(instance_setup_experiment(toy, &experiment));
+    setup(instance, 1.0, INFINITY);
     set(TOY_PARAMETER2, first);
-    instance_integrate_outside(toy);
+    instance_integrate_outside(instance);
     initialize();
-    ASSERT_OK(instance_update_discrete_states(toy, &update));
+    ASSERT_OK(instance_update_discrete_states(instance, &update));
     TEST_ASSERT_FALSE(update.states_changed);
     for (int n = 1; n <= 3; n++) {
         const double t = 1.0 + first + (n - 1) * 1.0;
         TEST_ASSERT_EQUAL_DOUBLE(t, update.next_time);
-        ASSERT_OK(instance_enter_continuous_time(toy));
-        ASSERT_OK(instance_set_time(toy, t - 0.01));
-        instance_enter_event_mode(toy);
-        ASSERT_OK(instance_update_discrete_states(toy, &update));
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        ASSERT_OK(instance_set_time(instance, t - 0.01));
+        instance_enter_event_mode(instance);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
         TEST_ASSERT_EQUAL_INT(n - 1, hammer()->strokes);
-        ASSERT_OK(instance_enter_continuous_time(toy));
-        ASSERT_OK(instance_set_time(toy, t));
-        instance_enter_event_mode(toy);
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        ASSERT_OK(instance_set_time(instance, t));
+        instance_enter_event_mode(instance);
         for (int k = 0; k < 2; k++) {
-            ASSERT_OK(instance_update_discrete_states(toy, &update));
+            ASSERT_OK(instance_update_discrete_states(instance, &update));
             TEST_ASSERT_EQUAL_INT(k == 0, update.states_changed);
             TEST_ASSERT_EQUAL_INT(n, hammer()->strokes);
         }
@@ -378,13 +356,13 @@ static void test_strokes_passed_from_outside_follow_one_by_one(void) {
     struct discrete_update update;
     prepare(&hammer_description, 1, 1e-8);
     set(TOY_PARAMETER2, first);
-    instance_integrate_outside(toy);
+    instance_integrate_outside(instance);
     initialize();
-    ASSERT_OK(instance_enter_continuous_time(toy));
-    ASSERT_OK(instance_set_time(toy, first + 2.5));
-    instance_enter_event_mode(toy);
+    ASSERT_OK(instance_enter_continuous_time(instance));
+    ASSERT_OK(instance_set_time(instance, first + 2.5));
+    instance_enter_event_mode(instance);
     for (int n = 1; n <= 4; n++) {
-        ASSERT_OK(instance_update_discrete_states(toy, &update));
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
         TEST_ASSERT_EQUAL_INT(n < 4, update.states_changed);
         TEST_ASSERT_EQUAL_DOUBLE(first + (n < 3 ? n : 3), update.next_time);
         TEST_ASSERT_EQUAL_INT(n < 3, update.is_incomplete);

@@ -8,7 +8,6 @@
 static enum status ball_rhs(const void *values, double t, const double x[], const double u[],
                             double dx[]) {
     const struct ball_values *ball = values;
-    (void)t;
     dx[0] = ball->is_resting ? 0.0 : x[1];
     dx[1] = ball->is_resting ? 0.0 : u[0] - ball->g;
     return STATUS_OK;
@@ -17,10 +16,6 @@ static enum status ball_rhs(const void *values, double t, const double x[], cons
 /* Both models are two integrals: x' = v, v' = a. */
 static enum status jacobian(const void *values, double t, const double x[], const double u[],
                             double J[]) {
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
     memset(J, 0, 4 * sizeof *J);
     J[2] = 1.0;
     return STATUS_OK;
@@ -50,15 +45,11 @@ static const struct series ball_series = {.row_count = 2, .extend = ball_extend}
 
 static enum status ball_outputs(void *values, double t) {
     struct ball_values *ball = values;
-    (void)t;
     ball->a = ball->is_resting ? 0.0 : ball->lift - ball->g;
     return STATUS_OK;
 }
 
 static enum status no_check(const void *values, char *text, size_t size) {
-    (void)values;
-    (void)text;
-    (void)size;
     return STATUS_OK;
 }
 
@@ -94,7 +85,6 @@ static void ball_describe(const void *values, struct indicator indicators[]) {
 static enum status ball_indicators(const void *values, double t, const double x[], const double u[],
                                    double z[]) {
     const struct ball_values *ball = values;
-    (void)t;
     z[BALL_HEIGHT] = ball->is_resting ? 1.0 : x[0];
     z[BALL_LOAD] = ball->is_resting ? ball->g - u[0] : 1.0;
     return STATUS_OK;
@@ -163,7 +153,6 @@ static double block_acceleration(const struct block_values *block, double f) {
 static enum status block_rhs(const void *values, double t, const double x[], const double u[],
                              double dx[]) {
     const struct block_values *block = values;
-    (void)t;
     dx[0] = block->direction == 0 ? 0.0 : x[1];
     dx[1] = block_acceleration(block, u[0]);
     return STATUS_OK;
@@ -184,13 +173,11 @@ static const struct series block_series = {.row_count = 2, .extend = block_exten
 
 static enum status block_outputs(void *values, double t) {
     struct block_values *block = values;
-    (void)t;
     block->a = block_acceleration(block, block->f);
     return STATUS_OK;
 }
 
 static bool block_always(const void *values) {
-    (void)values;
     return true;
 }
 
@@ -222,7 +209,6 @@ static void block_describe(const void *values, struct indicator indicators[]) {
 static enum status block_indicators(const void *values, double t, const double x[],
                                     const double u[], double z[]) {
     const struct block_values *block = values;
-    (void)t;
     z[BLOCK_SPEED] = block->direction == 0 ? 1.0 : block->direction * x[1];
     z[BLOCK_FORWARD] = block->direction == 0 ? block->breakaway - u[0] : 1.0;
     z[BLOCK_BACKWARD] = block->direction == 0 ? block->breakaway + u[0] : 1.0;
@@ -280,8 +266,6 @@ static const struct model block_model = {
 
 static enum status hammer_rhs(const void *values, double t, const double x[], const double u[],
                               double dx[]) {
-    (void)values;
-    (void)t;
     dx[0] = x[1];
     dx[1] = u[0];
     return STATUS_OK;
@@ -299,7 +283,6 @@ static const struct series hammer_series = {.row_count = 2, .extend = hammer_ext
 
 static enum status hammer_outputs(void *values, double t) {
     struct hammer_values *hammer = values;
-    (void)t;
     hammer->a = hammer->f;
     return STATUS_OK;
 }
@@ -311,13 +294,11 @@ static double hammer_next_time(const void *values) {
 }
 
 static bool hammer_is_never_at_rest(const void *values) {
-    (void)values;
     return false;
 }
 
 static bool hammer_modes_are_possible(const void *values, bool is_held) {
     const struct hammer_values *hammer = values;
-    (void)is_held;
     return hammer->is_started == 1 && hammer->strokes >= 0 && hammer->hits >= 0;
 }
 
@@ -332,9 +313,6 @@ static void hammer_describe(const void *values, struct indicator indicators[]) {
 
 static enum status hammer_indicators(const void *values, double t, const double x[],
                                      const double u[], double z[]) {
-    (void)values;
-    (void)t;
-    (void)u;
     z[0] = x[0];
     return STATUS_OK;
 }
@@ -400,51 +378,20 @@ static const struct model hammer_model = {
 #define OUTPUT                     CAUSALITY_OUTPUT, VARIABILITY_CONTINUOUS, INITIAL_CALCULATED
 #define COUNTER                    CAUSALITY_LOCAL, VARIABILITY_DISCRETE, INITIAL_CALCULATED
 #define ANY                        -INFINITY, INFINITY, 1.0
-#define OWN                                                                                         \
-    {TOY_METHOD,                                                                                    \
-     "solver_method",                                                                               \
-     OF_INSTANCE(VARIABLE_ENUMERATION, solver_method),                                              \
-     FIXED,                                                                                         \
-     1.0,                                                                                           \
-     1.0,                                                                                           \
-     4.0,                                                                                           \
-     1.0},                                                                                          \
-        {TOY_TOLERANCE,                                                                             \
-         "relative_tolerance",                                                                      \
-         OF_INSTANCE(VARIABLE_FLOAT64, relative_tolerance),                                         \
-         FIXED,                                                                                     \
-         0.0,                                                                                       \
-         0.0,                                                                                       \
-         INFINITY,                                                                                  \
-         1.0},                                                                                      \
-        {TOY_EVENTS, "event_count", OF_INSTANCE(VARIABLE_INT32, event_count), COUNTER, 0.0, ANY},   \
-        {TOY_LAST_EVENT,                                                                            \
-         "last_event_time",                                                                         \
-         OF_INSTANCE(VARIABLE_FLOAT64, last_event_time),                                            \
-         COUNTER,                                                                                   \
-         0.0,                                                                                       \
-         ANY},                                                                                      \
-        {TOY_MAX_EVENTS, "max_events", OF_INSTANCE(VARIABLE_INT32, max_events), FIXED, 1000.0, 1.0, \
-         INFINITY,       1.0},                                                                      \
-        {TOY_STEPS, "solver_steps", OF_INSTANCE(VARIABLE_INT32, solver_steps), COUNTER, 0.0, ANY},  \
-        {TOY_RESTARTS,                                                                              \
-         "solver_restarts",                                                                         \
-         OF_INSTANCE(VARIABLE_INT32, solver_restarts),                                              \
-         COUNTER,                                                                                   \
-         0.0,                                                                                       \
-         ANY},                                                                                      \
-        {TOY_MAX_STEPS,                                                                             \
-         "max_internal_steps",                                                                      \
-         OF_INSTANCE(VARIABLE_INT32, max_internal_steps),                                           \
-         FIXED,                                                                                     \
-         100000.0,                                                                                  \
-         1.0,                                                                                       \
-         INFINITY,                                                                                  \
-         1.0},                                                                                      \
-    {                                                                                               \
-        TOY_MAX_STEP, "max_step", OF_INSTANCE(VARIABLE_FLOAT64, max_step), FIXED, 0.0, 0.0,         \
-            INFINITY, 1.0                                                                           \
-    }
+#define OF_SOLVER(reference, type, field, ...)                                                     \
+    { TOY_##reference, #field, OF_INSTANCE(VARIABLE_##type, field), __VA_ARGS__ }
+// clang-format off
+#define OWN \
+    OF_SOLVER(METHOD, ENUMERATION, solver_method, FIXED, 1.0, 1.0, 4.0, 1.0), \
+    OF_SOLVER(TOLERANCE, FLOAT64, relative_tolerance, FIXED, 0.0, 0.0, INFINITY, 1.0), \
+    OF_SOLVER(EVENTS, INT32, event_count, COUNTER, 0.0, ANY), \
+    OF_SOLVER(LAST_EVENT, FLOAT64, last_event_time, COUNTER, 0.0, ANY), \
+    OF_SOLVER(MAX_EVENTS, INT32, max_events, FIXED, 1000.0, 1.0, INFINITY, 1.0), \
+    OF_SOLVER(STEPS, INT32, solver_steps, COUNTER, 0.0, ANY), \
+    OF_SOLVER(RESTARTS, INT32, solver_restarts, COUNTER, 0.0, ANY), \
+    OF_SOLVER(MAX_STEPS, INT32, max_internal_steps, FIXED, 100000.0, 1.0, INFINITY, 1.0), \
+    OF_SOLVER(MAX_STEP, FLOAT64, max_step, FIXED, 0.0, 0.0, INFINITY, 1.0)
+// clang-format on
 
 static const struct variable ball_variables[] = {
     {TOY_TIME, "time", OF_INSTANCE(VARIABLE_FLOAT64, time), TIME, 0.0, ANY},

@@ -2,61 +2,33 @@
 #ifndef TOY_RUN_H
 #define TOY_RUN_H
 
-#include "last_text.h"
+#include "one_instance.h"
 #include "snapshot.h"
-#include "stepping.h"
 #include "toy.h"
-#include "values.h"
 
-#include <math.h>
-#include <unity.h>
-
-static struct instance *toy;
-
-static double get(unsigned reference) {
-    double value = NAN;
-    ASSERT_OK(instance_get_real(toy, &reference, 1, &value));
-    return value;
-}
-
-static int get_int(unsigned reference) {
-    int value = -1;
-    ASSERT_OK(instance_get_integer(toy, &reference, 1, &value));
-    return value;
-}
-
-static void set(unsigned reference, double value) {
-    ASSERT_OK(instance_set_real(toy, &reference, 1, &value));
-}
-
-static void set_int(unsigned reference, int value) {
-    ASSERT_OK(instance_set_integer(toy, &reference, 1, &value));
-}
-
-static void create(const struct model_description *description) {
-    instance_destroy(toy);
-    toy = NULL;
-    ASSERT_OK(instance_create(description, &last_text_sink, &toy));
-}
-
-/* With a method, at a tolerance. */
-static void prepare(const struct model_description *description, int method, double tolerance) {
-    const struct instance_experiment experiment = {0};
+/* With a method, at a tolerance; the experiment starts at start (s). */
+static inline void prepare_at(double start, const struct model_description *description,
+                              int with_method, double tolerance) {
     create(description);
-    ASSERT_OK(instance_setup_experiment(toy, &experiment));
-    set_int(TOY_METHOD, method);
+    setup(instance, start, INFINITY);
+    set_int(TOY_METHOD, with_method);
     set(TOY_TOLERANCE, tolerance);
 }
 
-static void initialize(void) {
-    ASSERT_OK(instance_enter_initialization(toy));
-    ASSERT_OK(instance_exit_initialization(toy));
+static inline void prepare(const struct model_description *description, int with_method,
+                           double tolerance) {
+    prepare_at(0.0, description, with_method, tolerance);
+}
+
+static inline void initialize(void) {
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
 }
 
 /* Steps of h from the time t on, which must be the instance's. */
-static void run(double t, double h, int steps) {
+static inline void run(double t, double h, int steps) {
     for (int i = 0; i < steps; i++) {
-        ASSERT_OK(instance_do_step(toy, t + i * h, h));
+        ASSERT_OK(instance_do_step(instance, t + i * h, h));
     }
 }
 

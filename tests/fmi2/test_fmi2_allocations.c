@@ -27,8 +27,6 @@ static fmi2Status set_slopes(fmi2Component c, int i) {
 typedef fmi2Status change(fmi2Component c, int i);
 
 static fmi2Status change_nothing(fmi2Component c, int i) {
-    (void)c;
-    (void)i;
     return fmi2OK;
 }
 
@@ -56,7 +54,7 @@ static void assert_steps_allocate_nothing(fmi2Component c, double start, change 
         }
     }
     TEST_ASSERT_EQUAL_INT(before, allocation_count());
-    TEST_ASSERT_EQUAL_INT(fmi2OK, status);
+    ASSERT_OK(status);
 }
 
 EACH_METHOD static void test_the_allocations_of_the_fmu_are_counted(void) {
@@ -92,7 +90,7 @@ EACH_METHOD static void test_a_long_hold_allocates_nothing(void) {
         status = fmu.DoStep(c, i * length, length, fmi2True);
     }
     TEST_ASSERT_EQUAL_INT(before, allocation_count());
-    TEST_ASSERT_EQUAL_INT(fmi2OK, status);
+    ASSERT_OK(status);
     TEST_ASSERT_GREATER_THAN_INT(1, fmu_get_integer(c, RP_MANIPULATOR_solver_restarts));
     assert_steps_allocate_nothing(c, 2.0 * length, change_nothing);
 }
@@ -108,7 +106,7 @@ EACH_METHOD static void test_steps_after_a_rollback_allocate_nothing(void) {
         const long before = allocation_count();
         const fmi2Status status = fmu.SetFMUstate(source, state);
         TEST_ASSERT_EQUAL_INT(before, allocation_count());
-        TEST_ASSERT_EQUAL_INT(fmi2OK, status);
+        ASSERT_OK(status);
         assert_steps_allocate_nothing(source, 200.0 * h, change_nothing);
 
         const fmi2Component c = fmu_initialized_with(other, &messages, 0.0);
@@ -131,10 +129,10 @@ EACH_METHOD static void test_what_is_refused_allocates_nothing(void) {
     const fmi2Status in_error = fmu.DoStep(c, 0.0, h, fmi2True);
     const fmi2Status restored = fmu.SetFMUstate(c, state);
     TEST_ASSERT_EQUAL_INT(before, allocation_count());
-    TEST_ASSERT_EQUAL_INT(fmi2Discard, discarded);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, step_back);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, in_error);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, restored);
+    ASSERT_DISCARD(discarded);
+    ASSERT_ERROR(step_back);
+    ASSERT_ERROR(in_error);
+    ASSERT_OK(restored);
     assert_steps_allocate_nothing(c, 0.0, change_inputs);
 }
 
@@ -153,8 +151,8 @@ EACH_METHOD static void test_a_step_that_fails_allocates_nothing(void) {
         const fmi2Status failed = fmu.DoStep(c, 200.0 * h, 1000.0, fmi2True);
         const fmi2Status restored = fmu.SetFMUstate(c, state);
         TEST_ASSERT_EQUAL_INT(before, allocation_count());
-        TEST_ASSERT_EQUAL_INT(fmi2Discard, failed);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, restored);
+        ASSERT_DISCARD(failed);
+        ASSERT_OK(restored);
         assert_steps_allocate_nothing(c, 200.0 * h, change_inputs);
         fmu_free(c);
     }

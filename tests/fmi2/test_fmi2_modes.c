@@ -63,20 +63,20 @@ static void test_parameters_tuned_at_an_event_keep_the_states(void) {
     static const fmi2ValueReference states[FMU_STATES] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                           RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
     const fmi2Component c = fmu_me_initialized(&messages, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_step(c, 0.0, 0.25));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetContinuousStates(c, before, FMU_STATES));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
+    ASSERT_OK(fmu_me_step(c, 0.0, 0.25));
+    ASSERT_OK(fmu.GetContinuousStates(c, before, FMU_STATES));
+    ASSERT_OK(fmu.EnterEventMode(c));
     fmu_set(c, RP_MANIPULATOR_m2, 2.5);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterContinuousTimeMode(c));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetContinuousStates(c, after, FMU_STATES));
+    ASSERT_OK(fmu.EnterContinuousTimeMode(c));
+    ASSERT_OK(fmu.GetContinuousStates(c, after, FMU_STATES));
     TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof before);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetDerivatives(c, dx, FMU_STATES));
+    ASSERT_OK(fmu.GetDerivatives(c, dx, FMU_STATES));
 
     const fmi2Component fresh = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
     fmu_set(fresh, RP_MANIPULATOR_m2, 2.5);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(fresh, states, FMU_STATES, before));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_enter_continuous_time(fresh, 0.25));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetDerivatives(fresh, dx_fresh, FMU_STATES));
+    ASSERT_OK(fmu.SetReal(fresh, states, FMU_STATES, before));
+    ASSERT_OK(fmu_me_enter_continuous_time(fresh, 0.25));
+    ASSERT_OK(fmu.GetDerivatives(fresh, dx_fresh, FMU_STATES));
     TEST_ASSERT_EQUAL_MEMORY(dx_fresh, dx, sizeof dx);
 }
 
@@ -84,24 +84,24 @@ static void set_no_inertia(fmi2Component c) {
     static const fmi2ValueReference references[] = {RP_MANIPULATOR_lc1, RP_MANIPULATOR_I1z,
                                                     RP_MANIPULATOR_I2z};
     static const double zeros[] = {0.0, 0.0, 0.0};
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetReal(c, references, 3, zeros));
+    ASSERT_OK(fmu.SetReal(c, references, 3, zeros));
 }
 
 /* The sum of the inertias is checked where a mode ends in which it can be set. */
 static void test_parameters_without_inertia_are_refused(void) {
     fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
     set_no_inertia(c);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(c));
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.ExitInitializationMode(c));
+    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
+    ASSERT_OK(fmu.EnterInitializationMode(c));
+    ASSERT_ERROR(fmu.ExitInitializationMode(c));
     fmu_assert_logged(&messages, "lc1 = 0");
     fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an initialization without inertia");
 
     fmu_log_clear(&messages);
     c = fmu_me_initialized(&messages, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterEventMode(c));
+    ASSERT_OK(fmu.EnterEventMode(c));
     set_no_inertia(c);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterContinuousTimeMode(c));
+    ASSERT_ERROR(fmu.EnterContinuousTimeMode(c));
     fmu_assert_logged(&messages, "lc1 = 0");
     fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an event without inertia");
 }
@@ -113,20 +113,20 @@ static void test_rollback_is_exact(void) {
     static struct fmu_run expected;
     static struct fmu_run run;
     const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
+    ASSERT_OK(fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
 
     const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, c, 0));
+    ASSERT_OK(fmu_run_start(fmi2ModelExchange, c, 0));
     memset(&run, 0, sizeof run);
     fmi2FMUstate saved[FMU_RUN_STEPS];
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
         saved[i] = fmu_save(c);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, i, &run));
+        ASSERT_OK(fmu_run_step(fmi2ModelExchange, c, i, &run));
         if (i % 4 == 3) { // go back, and repeat without saving
             fmu_restore(c, saved[i - 2]);
             for (unsigned again = i - 2; again <= i; again++) {
                 memset(&run.after[again], 0, sizeof run.after[again]);
-                TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, again, &run));
+                ASSERT_OK(fmu_run_step(fmi2ModelExchange, c, again, &run));
             }
         }
     }
@@ -137,18 +137,18 @@ static void test_another_instance_goes_on_from_the_bytes(void) {
     static struct fmu_run expected;
     static struct fmu_run run;
     const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
+    ASSERT_OK(fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
 
     memset(&run, 0, sizeof run);
     fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, c, 0));
+    ASSERT_OK(fmu_run_start(fmi2ModelExchange, c, 0));
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
         struct fmu_bytes bytes = fmu_save_bytes(c);
         fmu_free(c);
         c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
         fmu_restore_bytes(c, &bytes);
         fmu_bytes_free(&bytes);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, c, i, &run));
+        ASSERT_OK(fmu_run_step(fmi2ModelExchange, c, i, &run));
     }
     TEST_ASSERT_EQUAL_MEMORY(&expected, &run, sizeof run);
 }
@@ -160,27 +160,27 @@ static void test_both_kinds_side_by_side(void) {
     static struct fmu_run together[2];
     const fmi2Component own = fmu_instantiate(&messages, false);
     const fmi2Component other = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(own, 2, &alone[0]));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(fmi2ModelExchange, other, 2, &alone[1]));
+    ASSERT_OK(fmu_run(own, 2, &alone[0]));
+    ASSERT_OK(fmu_run_as(fmi2ModelExchange, other, 2, &alone[1]));
     fmu_free(own);
     fmu_free(other);
 
     memset(together, 0, sizeof together);
     const fmi2Component c = fmu_instantiate(&messages, false);
     const fmi2Component m = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2CoSimulation, c, 2));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_start(fmi2ModelExchange, m, 2));
+    ASSERT_OK(fmu_run_start(fmi2CoSimulation, c, 2));
+    ASSERT_OK(fmu_run_start(fmi2ModelExchange, m, 2));
     for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2CoSimulation, c, i, &together[0]));
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_step(fmi2ModelExchange, m, i, &together[1]));
+        ASSERT_OK(fmu_run_step(fmi2CoSimulation, c, i, &together[0]));
+        ASSERT_OK(fmu_run_step(fmi2ModelExchange, m, i, &together[1]));
     }
     TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);
 }
 
 static void test_reset_keeps_the_kind(void) {
     const fmi2Component c = fmu_me_initialized(&messages, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_me_enter_continuous_time(c, 0.0));
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, 0.0, 0.1, fmi2True));
+    ASSERT_OK(fmu.Reset(c));
+    ASSERT_OK(fmu_me_enter_continuous_time(c, 0.0));
+    ASSERT_ERROR(fmu.DoStep(c, 0.0, 0.1, fmi2True));
     fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after a reset");
 }

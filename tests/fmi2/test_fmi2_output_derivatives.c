@@ -7,12 +7,12 @@
 #include <unity.h>
 
 static void step(fmi2Component c, double time, double length) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, time, length, fmi2True));
+    ASSERT_OK(fmu.DoStep(c, time, length, fmi2True));
 }
 
 static double output_derivative(fmi2Component c, fmi2ValueReference reference, fmi2Integer order) {
     double value = NAN;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealOutputDerivatives(c, &reference, 1, &order, &value));
+    ASSERT_OK(fmu.GetRealOutputDerivatives(c, &reference, 1, &order, &value));
     return value;
 }
 
@@ -95,7 +95,7 @@ static void test_output_derivatives_follow_what_is_set(void) {
         if (value_first) {
             fmu_set(c, f2, value);
         }
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetRealInputDerivatives(c, &f2, 1, &first, &slope));
+        ASSERT_OK(fmu.SetRealInputDerivatives(c, &f2, 1, &first, &slope));
         if (!value_first) {
             fmu_set(c, f2, value);
         }
@@ -161,11 +161,10 @@ static void test_missing_arrays(void) {
         const int missing = i / 2;
         const fmi2ValueReference reference = input ? RP_MANIPULATOR_f2 : RP_MANIPULATOR_q1;
         const fmi2Component c = fmu_initialized(&messages, 0.0);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, derive(input, c, NULL, 0, NULL, NULL));
+        ASSERT_OK(derive(input, c, NULL, 0, NULL, NULL));
         fmu_log_clear(&messages);
-        TEST_ASSERT_EQUAL_INT(fmi2Error,
-                              derive(input, c, missing == 0 ? NULL : &reference, 1,
-                                     missing == 1 ? NULL : &order, missing == 2 ? NULL : &value));
+        ASSERT_ERROR(derive(input, c, missing == 0 ? NULL : &reference, 1,
+                            missing == 1 ? NULL : &order, missing == 2 ? NULL : &value));
         fmu_assert_logged(&messages, "NULL");
         fmu_assert_in_error(c);
         fmu_free(c);

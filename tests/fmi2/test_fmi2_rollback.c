@@ -28,7 +28,7 @@ static void run_saving_everywhere(unsigned seed) {
     fmi2FMUstate reused = NULL;
     const fmi2Component c = fmu_instantiate(&messages, false);
     for (size_t at = 0; at < expected.count; at++) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &reused));
+        ASSERT_OK(fmu.GetFMUstate(c, &reused));
         (void)fmu_save(c); // FreeInstance frees it
         struct fmu_bytes bytes = fmu_serialize(c, reused);
         fmu_bytes_free(&bytes);
@@ -71,7 +71,7 @@ static void save(struct run *run) {
         run->saved_count++;
     }
     run->saved[slot].at = run->at;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(run->component, &run->saved[slot].state));
+    ASSERT_OK(fmu.GetFMUstate(run->component, &run->saved[slot].state));
 }
 
 static void restore(struct run *run, const struct saved *saved) {
@@ -94,7 +94,7 @@ static void move_to_other_instance(struct run *run) {
     run->saved_count = 0;
     run->component = fmu_instantiate(&messages, false);
     if (fmu_random_below(&run->random, 2) == 0) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run(run->component, 7, &other_run));
+        ASSERT_OK(fmu_run(run->component, 7, &other_run));
     }
     fmu_restore_bytes(run->component, &bytes);
     fmu_bytes_free(&bytes);
@@ -121,10 +121,10 @@ static void make_detour(struct run *run) {
         (void)fmu.Terminate(run->component);
         break;
     case 1:
-        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(run->component));
+        ASSERT_ERROR(fmu.CancelStep(run->component));
         break;
     case 2:
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(run->component));
+        ASSERT_OK(fmu.Reset(run->component));
         (void)fmu_run(run->component, 3, &other_run);
         break;
     default:
@@ -205,15 +205,15 @@ EACH_METHOD static void test_rollback_is_exact_where_the_first_slope_fails(void)
     struct fmu_values outcomes[2];
     for (int with_detour = 0; with_detour < 2; with_detour++) {
         const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.0, 0.125, fmi2True));
+        ASSERT_OK(fmu.DoStep(c, 0.0, 0.125, fmi2True));
         fmi2FMUstate state = fmu_save(c);
         if (with_detour) {
             fmu_set(c, RP_MANIPULATOR_f2, 30.0);
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.125, 3.0, fmi2True));
+            ASSERT_OK(fmu.DoStep(c, 0.125, 3.0, fmi2True));
             fmu_restore(c, state);
         }
         fmu_set(c, RP_MANIPULATOR_tau1, 1.7e308);
-        TEST_ASSERT_EQUAL_INT(fmi2Discard, fmu.DoStep(c, 0.125, 0.125, fmi2True));
+        ASSERT_DISCARD(fmu.DoStep(c, 0.125, 0.125, fmi2True));
         (void)fmu_get_all(c, &outcomes[with_detour]); // accelerations are not finite
         fmu_free(c);
     }
@@ -234,8 +234,8 @@ enum { HELD_STEPS = 6000 };
 static const double held_step = 5e-3; // s
 
 static void step_held(fmi2Component c, unsigned step, struct fmu_values *values) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, step * held_step, held_step, fmi2True));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, values));
+    ASSERT_OK(fmu.DoStep(c, step * held_step, held_step, fmi2True));
+    ASSERT_OK(fmu_get_all(c, values));
 }
 
 EACH_METHOD static void test_rollback_is_exact_where_nothing_is_set_for_long(void) {
@@ -257,7 +257,7 @@ EACH_METHOD static void test_rollback_is_exact_where_nothing_is_set_for_long(voi
         struct fmu_values values;
         snprintf(text, sizeof text, "held, step %u", step);
         if (state == NULL || fmu_random_below(&random, 40) == 0) {
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &state));
+            ASSERT_OK(fmu.GetFMUstate(c, &state));
             saved_at = step;
         }
         step_held(c, step, &values);
@@ -281,14 +281,14 @@ EACH_METHOD static void test_rollback_is_exact_over_steps_of_many_internal_steps
     const fmi2Component saving = fmu_lasting(method, &messages);
     for (int i = 0; i < 4; i++) {
         fmi2FMUstate state = fmu_save(saving);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * length, length, fmi2True));
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &first));
+        ASSERT_OK(fmu.DoStep(c, i * length, length, fmi2True));
+        ASSERT_OK(fmu_get_all(c, &first));
         for (int repeat = 0; repeat < 2; repeat++) {
             fmu_restore(saving, state);
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(saving, i * length, 1.0, fmi2True));
+            ASSERT_OK(fmu.DoStep(saving, i * length, 1.0, fmi2True));
             fmu_restore(saving, state);
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(saving, i * length, length, fmi2True));
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(saving, &again));
+            ASSERT_OK(fmu.DoStep(saving, i * length, length, fmi2True));
+            ASSERT_OK(fmu_get_all(saving, &again));
             fmu_assert_same_values(&first, &again, "a step of 20 s");
         }
     }

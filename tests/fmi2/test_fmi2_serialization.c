@@ -47,7 +47,7 @@ static void test_instances_in_the_same_state_give_the_same_bytes(void) {
         const fmi2Component a = fmu_instantiate(&messages, false);
         const fmi2Component b = fmu_instantiate(&messages, true);
         fmu_sequence_run(b, &sequence, &trace);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(b));
+        ASSERT_OK(fmu.Reset(b));
         fmu_sequence_run(a, &sequence, &trace);
         fmu_sequence_run(b, &sequence, &trace);
         struct fmu_bytes from_a = fmu_save_bytes(a);
@@ -66,7 +66,7 @@ EACH_METHOD static void test_a_large_buffer_is_filled_as_far_as_needed(void) {
     struct fmu_bytes exact = fmu_serialize(c, state);
     struct fmu_bytes large = fmu_bytes_copy(&exact, exact.size + 64);
     memset(large.data, 0x55, large.size);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SerializeFMUstate(c, state, large.data, large.size));
+    ASSERT_OK(fmu.SerializeFMUstate(c, state, large.data, large.size));
     TEST_ASSERT_EQUAL_MEMORY(exact.data, large.data, exact.size);
     for (size_t i = exact.size; i < large.size; i++) {
         TEST_ASSERT_EQUAL_HEX8(0x55, large.data[i]);
@@ -83,7 +83,7 @@ EACH_METHOD static void test_a_small_buffer_is_refused(void) {
         struct fmu_bytes small = fmu_bytes_copy(&exact, size);
         memset(small.data, 0x55, size);
         fmu_log_clear(&messages);
-        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.SerializeFMUstate(c, state, small.data, size));
+        ASSERT_ERROR(fmu.SerializeFMUstate(c, state, small.data, size));
         TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2Error]);
         for (size_t i = 0; i < size; i++) {
             TEST_ASSERT_EQUAL_HEX8(0x55, small.data[i]);
@@ -101,7 +101,7 @@ EACH_METHOD static void test_the_new_handle_is_only_written(void) {
     fmi2FMUstate made = &nothing;
     const fmi2Component c = fmu_used(method, &messages);
     struct fmu_bytes bytes = fmu_save_bytes(c);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
+    ASSERT_OK(fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
     TEST_ASSERT_TRUE(made != (void *)&nothing);
     fmu_restore(c, made);
     fmu_bytes_free(&bytes);
@@ -118,11 +118,11 @@ static void check_kind(fmi2Type from, fmi2Type to) {
         fmi2FMUstate made = NULL;
         const fmi2Status made_status = fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made);
         const fmi2Status status = made_status == fmi2OK ? fmu.SetFMUstate(c, made) : made_status;
-        TEST_ASSERT_EQUAL_INT(fmi2Error, status);
+        ASSERT_ERROR(status);
         TEST_ASSERT_EQUAL_UINT(1, messages.count[fmi2Error]);
         fmu_assert_in_error(c);
         fmu_restore(c, good);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(c));
+        ASSERT_OK(fmu.ExitInitializationMode(c));
         fmu_bytes_free(&bytes);
         fmu_free(source);
         fmu_free(c);

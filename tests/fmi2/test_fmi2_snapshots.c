@@ -12,7 +12,7 @@
 static const fmi2Type types[] = {fmi2CoSimulation, fmi2ModelExchange};
 
 static void step(fmi2Component c, double time) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, time, 0.125, fmi2True));
+    ASSERT_OK(fmu.DoStep(c, time, 0.125, fmi2True));
 }
 
 /* ---- Every state ---------------------------------------------------------------------------- */
@@ -21,7 +21,7 @@ static void get_all_where_allowed(fmi2Component c, const struct fmu_state *state
                                   struct fmu_values *values) {
     memset(values, 0, sizeof *values);
     if (state->letter != 'I') {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, values));
+        ASSERT_OK(fmu_get_all(c, values));
     }
 }
 
@@ -29,14 +29,14 @@ static void go_elsewhere(fmi2Type type, fmi2Component c, int where) {
     static struct fmu_run run;
     switch (where) {
     case 0:
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+        ASSERT_OK(fmu.Reset(c));
         break;
     case 1:
-        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(c));
+        ASSERT_ERROR(fmu.CancelStep(c));
         break;
     default:
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_run_as(type, c, 5, &run));
+        ASSERT_OK(fmu.Reset(c));
+        ASSERT_OK(fmu_run_as(type, c, 5, &run));
         break;
     }
 }
@@ -86,13 +86,13 @@ static void test_the_time_of_a_failed_step_is_restored(void) {
     double restored = -1.0;
     const struct fmu_state *failed = fmu_state_of(fmi2CoSimulation, 'F');
     const fmi2Component c = fmu_reach(fmi2CoSimulation, failed, &messages);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
+    ASSERT_OK(fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
     fmi2FMUstate saved = fmu_save(c);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    ASSERT_OK(fmu.Reset(c));
     fmu_restore(c, saved);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &restored));
+    ASSERT_OK(fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &restored));
     TEST_ASSERT_EQUAL_DOUBLE(reached, restored);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(c, reached, 0.1, fmi2True));
+    ASSERT_ERROR(fmu.DoStep(c, reached, 0.1, fmi2True));
 }
 
 /* A failed step is undone and repeated in two halves: section 4.2.2. */
@@ -120,7 +120,7 @@ EACH_METHOD static void test_get_into_a_handle_reuses_it(void) {
     const fmi2FMUstate first = state;
     step(c, 0.0);
     const double q1 = fmu_get(c, RP_MANIPULATOR_q1);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &state));
+    ASSERT_OK(fmu.GetFMUstate(c, &state));
     TEST_ASSERT_EQUAL_PTR(first, state);
     step(c, 0.125);
     fmu_restore(c, state);
@@ -134,11 +134,11 @@ EACH_METHOD static void test_a_restored_copy_stays_valid(void) {
     fmi2FMUstate saved = fmu_save(c);
     struct fmu_bytes before = fmu_serialize(c, saved);
     step(c, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &expected));
+    ASSERT_OK(fmu_get_all(c, &expected));
     for (int i = 0; i < 3; i++) {
         fmu_restore(c, saved);
         step(c, 0.0);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &values));
+        ASSERT_OK(fmu_get_all(c, &values));
         fmu_assert_same_values(&expected, &values, "restored again");
     }
     struct fmu_bytes after = fmu_serialize(c, saved);
@@ -152,13 +152,13 @@ EACH_METHOD static void test_handles_survive_a_reset_and_an_error(void) {
     const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
     step(c, 0.0);
     fmi2FMUstate saved = fmu_save(c);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(c));
+    ASSERT_OK(fmu.Reset(c));
+    ASSERT_ERROR(fmu.CancelStep(c));
     fmu_restore(c, saved);
     step(c, 0.125);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.CancelStep(c));
+    ASSERT_ERROR(fmu.CancelStep(c));
     fmu_forget(c, &saved); // allowed in the error state
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Reset(c));
+    ASSERT_OK(fmu.Reset(c));
 }
 
 static void test_free_sets_null_and_takes_null(void) {
@@ -168,7 +168,7 @@ static void test_free_sets_null_and_takes_null(void) {
     TEST_ASSERT_TRUE(a != b);
     fmu_forget(c, &a);
     fmu_forget(c, &a); // it is NULL now
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.FreeFMUstate(c, NULL));
+    ASSERT_OK(fmu.FreeFMUstate(c, NULL));
     fmu_restore(c, b); // the other one is still there
     fmu_forget(c, &b);
     TEST_ASSERT_EQUAL_UINT(0, fmu_log_total(&messages));
@@ -204,12 +204,12 @@ static void assert_handle_refused(enum fmu_function function, fmi2Component c, f
     const char *name = fmu_name_of(function);
     fmi2FMUstate good = fmu_save(c);
     fmi2FMUstate given = state;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &before));
+    ASSERT_OK(fmu_get_all(c, &before));
     fmu_log_clear(&messages);
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call_with(function, c, &given), name);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(1, messages.count[fmi2Error], name);
     TEST_ASSERT_EQUAL_PTR_MESSAGE(state, given, name);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(c, &after));
+    ASSERT_OK(fmu_get_all(c, &after));
     fmu_assert_same_values(&before, &after, name);
     fmu_assert_in_error(c);
     fmu_restore(c, good);
@@ -243,7 +243,7 @@ static void test_what_is_no_handle_is_refused(void) {
         fmu_forget(c, &saved);
         saved = freed;
         fmu_log_clear(&messages);
-        TEST_ASSERT_EQUAL_INT(fmi2Error, call_with(handle_functions[i], c, &saved));
+        ASSERT_ERROR(call_with(handle_functions[i], c, &saved));
         fmu_assert_in_error(c);
         fmu_restore(c, kept);
         step(c, 0.0);
@@ -311,10 +311,10 @@ EACH_METHOD static void test_thousands_that_are_never_freed_do_no_harm(void) {
     for (int i = 0; i < SNAPSHOTS; i++) {
         fmi2FMUstate latest = fmu_save(c);
         fmu_set(c, RP_MANIPULATOR_tau1, i % 3 - 1.0);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * h, h, fmi2True));
+        ASSERT_OK(fmu.DoStep(c, i * h, h, fmi2True));
         if (i % 16 == 0) {
             fmu_restore(c, latest);
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, i * h, h, fmi2True));
+            ASSERT_OK(fmu.DoStep(c, i * h, h, fmi2True));
         }
     }
     fmu_restore(c, oldest);

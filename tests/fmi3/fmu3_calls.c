@@ -6,97 +6,130 @@ const double fmu3_calls_step = 0.01;
 
 static const fmi3ValueReference q1 = RP_MANIPULATOR_q1;
 static const fmi3ValueReference tau1 = RP_MANIPULATOR_tau1;
+static const fmi3ValueReference ddq1 = RP_MANIPULATOR_ddq1;
+static const fmi3Int32 order = 1;
+static const double one = 1.0;
+static const double zeros[FMU3_STATES];
+
+// where results go
+static bool flags[5];
+static double reals[FMU3_STATES];
+static size_t count;
+
+/* ---- With these arguments ------------------------------------------------------------------- */
+
+#define CALL_PLAIN(name)                                                                           \
+    static fmi3Status call_##name(fmi3Instance c, double now) {                                    \
+        return fmu3.name(c);                                                                       \
+    }
+#define CALL(name, ...)                                                                            \
+    static fmi3Status call_##name(fmi3Instance c, double now) {                                    \
+        return fmu3.name(c, __VA_ARGS__);                                                          \
+    }
+CALL(SetDebugLogging, false, 0, NULL)
+CALL(EnterInitializationMode, true, 1e-6, 0.0, true, 100.0)
+CALL_PLAIN(ExitInitializationMode)
+CALL_PLAIN(EnterEventMode)
+CALL_PLAIN(Terminate)
+CALL_PLAIN(Reset)
+CALL(FreeFMUState, &(fmi3FMUState){NULL})
+CALL(GetDirectionalDerivative, &ddq1, 1, &tau1, 1, &one, 1, reals, 1)
+CALL(GetAdjointDerivative, &ddq1, 1, &tau1, 1, &one, 1, reals, 1)
+CALL(UpdateDiscreteStates, &flags[0], &flags[1], &flags[2], &flags[3], &flags[4], reals)
+CALL(GetFloat64, &q1, 1, reals, 1)
+CALL(SetFloat64, &tau1, 1, &one, 1)
+
+/* No value: of these types there is no variable, or none that is accessed in all states of the row.
+ */
+#define NO_VALUE(type)                                                                             \
+    CALL(Get##type, NULL, 0, NULL, 0)                                                              \
+    CALL(Set##type, NULL, 0, NULL, 0)
+NO_VALUE(Float32)
+NO_VALUE(Int8)
+NO_VALUE(UInt8)
+NO_VALUE(Int16)
+NO_VALUE(UInt16)
+NO_VALUE(Int32)
+NO_VALUE(UInt32)
+NO_VALUE(Int64)
+NO_VALUE(UInt64)
+NO_VALUE(Boolean)
+NO_VALUE(String)
+CALL(GetBinary, NULL, 0, NULL, NULL, 0)
+CALL(SetBinary, NULL, 0, NULL, NULL, 0)
+
+// Model Exchange
+CALL_PLAIN(EnterContinuousTimeMode)
+CALL(CompletedIntegratorStep, true, &flags[0], &flags[1])
+CALL(SetTime, now)
+CALL(SetContinuousStates, zeros, FMU3_STATES)
+CALL(GetContinuousStateDerivatives, reals, FMU3_STATES)
+CALL(GetEventIndicators, reals, 0)
+CALL(GetContinuousStates, reals, FMU3_STATES)
+CALL(GetNominalsOfContinuousStates, reals, FMU3_STATES)
+CALL(GetNumberOfEventIndicators, &count)
+CALL(GetNumberOfContinuousStates, &count)
+
+// Co-Simulation
+CALL_PLAIN(EnterStepMode)
+CALL(GetOutputDerivatives, &q1, 1, &order, reals, 1)
+
+// clocks, configuration, dependencies: refused whatever the arguments are
+CALL(GetClock, NULL, 0, NULL)
+CALL(SetClock, NULL, 0, NULL)
+CALL(GetIntervalDecimal, NULL, 0, NULL, NULL)
+CALL(GetIntervalFraction, NULL, 0, NULL, NULL, NULL)
+CALL(GetShiftDecimal, NULL, 0, NULL)
+CALL(GetShiftFraction, NULL, 0, NULL, NULL)
+CALL(SetIntervalDecimal, NULL, 0, NULL)
+CALL(SetIntervalFraction, NULL, 0, NULL, NULL)
+CALL(SetShiftDecimal, NULL, 0, NULL)
+CALL(SetShiftFraction, NULL, 0, NULL, NULL)
+CALL_PLAIN(EvaluateDiscreteStates)
+CALL_PLAIN(EnterConfigurationMode)
+CALL_PLAIN(ExitConfigurationMode)
+CALL(GetNumberOfVariableDependencies, q1, &count)
+CALL(GetVariableDependencies, q1, NULL, NULL, NULL, NULL, 0)
+CALL(ActivateModelPartition, 0, 0.0)
+
+/* ---- With more than arguments --------------------------------------------------------------- */
 
 static fmi3Status ok_if(bool condition) {
     return condition ? fmi3OK : fmi3Error;
 }
 
-static fmi3Status call_without_instance(enum fmu3_function function) {
-    fmi3Instance other = NULL;
-    switch (function) {
-    case FMU3_GetVersion:
-        return ok_if(strcmp(fmu3.GetVersion(), "3.0") == 0);
-    case FMU3_InstantiateModelExchange:
-        other = fmu3.InstantiateModelExchange("other", RP_MANIPULATOR_TOKEN_FMI3, "", false, false,
-                                              NULL, NULL);
-        break;
-    case FMU3_InstantiateCoSimulation:
-        other = fmu3.InstantiateCoSimulation("other", RP_MANIPULATOR_TOKEN_FMI3, "", false, false,
-                                             true, false, NULL, 0, NULL, NULL, NULL);
-        break;
-    default: // for Scheduled Execution there is none
-        return ok_if(fmu3.InstantiateScheduledExecution("other", RP_MANIPULATOR_TOKEN_FMI3, "",
-                                                        false, false, NULL, NULL, NULL, NULL,
-                                                        NULL) == NULL);
-    }
-    fmu3.FreeInstance(other);
-    return ok_if(other != NULL);
+static fmi3Status call_GetVersion(fmi3Instance c, double now) {
+    return ok_if(strcmp(fmu3.GetVersion(), "3.0") == 0);
 }
 
-/* Of a type that no variable has, no value. */
-static fmi3Status call_value_of_no_type(enum fmu3_function function, fmi3Instance c) {
-    switch (function) {
-    case FMU3_GetFloat32:
-        return fmu3.GetFloat32(c, NULL, 0, NULL, 0);
-    case FMU3_GetInt8:
-        return fmu3.GetInt8(c, NULL, 0, NULL, 0);
-    case FMU3_GetUInt8:
-        return fmu3.GetUInt8(c, NULL, 0, NULL, 0);
-    case FMU3_GetInt16:
-        return fmu3.GetInt16(c, NULL, 0, NULL, 0);
-    case FMU3_GetUInt16:
-        return fmu3.GetUInt16(c, NULL, 0, NULL, 0);
-    case FMU3_GetUInt32:
-        return fmu3.GetUInt32(c, NULL, 0, NULL, 0);
-    case FMU3_GetUInt64:
-        return fmu3.GetUInt64(c, NULL, 0, NULL, 0);
-    case FMU3_GetBoolean:
-        return fmu3.GetBoolean(c, NULL, 0, NULL, 0);
-    case FMU3_GetString:
-        return fmu3.GetString(c, NULL, 0, NULL, 0);
-    case FMU3_GetBinary:
-        return fmu3.GetBinary(c, NULL, 0, NULL, NULL, 0);
-    case FMU3_SetFloat32:
-        return fmu3.SetFloat32(c, NULL, 0, NULL, 0);
-    case FMU3_SetInt8:
-        return fmu3.SetInt8(c, NULL, 0, NULL, 0);
-    case FMU3_SetUInt8:
-        return fmu3.SetUInt8(c, NULL, 0, NULL, 0);
-    case FMU3_SetInt16:
-        return fmu3.SetInt16(c, NULL, 0, NULL, 0);
-    case FMU3_SetUInt16:
-        return fmu3.SetUInt16(c, NULL, 0, NULL, 0);
-    case FMU3_SetUInt32:
-        return fmu3.SetUInt32(c, NULL, 0, NULL, 0);
-    case FMU3_SetUInt64:
-        return fmu3.SetUInt64(c, NULL, 0, NULL, 0);
-    case FMU3_SetBoolean:
-        return fmu3.SetBoolean(c, NULL, 0, NULL, 0);
-    case FMU3_SetString:
-        return fmu3.SetString(c, NULL, 0, NULL, 0);
-    default:
-        return fmu3.SetBinary(c, NULL, 0, NULL, NULL, 0);
-    }
+static fmi3Status freed(fmi3Instance made) {
+    fmu3.FreeInstance(made);
+    return ok_if(made != NULL);
 }
 
-static fmi3Status call_value(enum fmu3_function function, fmi3Instance c) {
-    double real = 1.0;
-    switch (function) {
-    case FMU3_GetFloat64:
-        return fmu3.GetFloat64(c, &q1, 1, &real, 1);
-    case FMU3_SetFloat64:
-        return fmu3.SetFloat64(c, &tau1, 1, &real, 1);
-    case FMU3_GetInt32: // no variable can be accessed in all states of the row
-        return fmu3.GetInt32(c, NULL, 0, NULL, 0);
-    case FMU3_SetInt32:
-        return fmu3.SetInt32(c, NULL, 0, NULL, 0);
-    case FMU3_GetInt64:
-        return fmu3.GetInt64(c, NULL, 0, NULL, 0);
-    case FMU3_SetInt64:
-        return fmu3.SetInt64(c, NULL, 0, NULL, 0);
-    default:
-        return call_value_of_no_type(function, c);
-    }
+static fmi3Status call_InstantiateModelExchange(fmi3Instance c, double now) {
+    return freed(fmu3.InstantiateModelExchange("other", RP_MANIPULATOR_TOKEN_FMI3, "", false, false,
+                                               NULL, NULL));
+}
+
+static fmi3Status call_InstantiateCoSimulation(fmi3Instance c, double now) {
+    return freed(fmu3.InstantiateCoSimulation("other", RP_MANIPULATOR_TOKEN_FMI3, "", false, false,
+                                              true, false, NULL, 0, NULL, NULL, NULL));
+}
+
+/* There is none. */
+static fmi3Status call_InstantiateScheduledExecution(fmi3Instance c, double now) {
+    return ok_if(fmu3.InstantiateScheduledExecution("other", RP_MANIPULATOR_TOKEN_FMI3, "", false,
+                                                    false, NULL, NULL, NULL, NULL, NULL) == NULL);
+}
+
+static fmi3Status call_FreeInstance(fmi3Instance c, double now) {
+    fmu3_free(c);
+    return fmi3OK;
+}
+
+static fmi3Status call_DoStep(fmi3Instance c, double now) {
+    return fmu3_try_step(c, now, fmu3_calls_step).status;
 }
 
 /* With a state that the instance has given out, or with none where it gives out none. */
@@ -126,152 +159,19 @@ static fmi3Status call_with_state(enum fmu3_function function, fmi3Instance c) {
     return status;
 }
 
-/* Clocks, configuration, dependencies: refused whatever the arguments are. */
-static fmi3Status call_unsupported(enum fmu3_function function, fmi3Instance c) {
-    size_t count;
-    switch (function) {
-    case FMU3_GetClock:
-        return fmu3.GetClock(c, NULL, 0, NULL);
-    case FMU3_SetClock:
-        return fmu3.SetClock(c, NULL, 0, NULL);
-    case FMU3_GetIntervalDecimal:
-        return fmu3.GetIntervalDecimal(c, NULL, 0, NULL, NULL);
-    case FMU3_GetIntervalFraction:
-        return fmu3.GetIntervalFraction(c, NULL, 0, NULL, NULL, NULL);
-    case FMU3_GetShiftDecimal:
-        return fmu3.GetShiftDecimal(c, NULL, 0, NULL);
-    case FMU3_GetShiftFraction:
-        return fmu3.GetShiftFraction(c, NULL, 0, NULL, NULL);
-    case FMU3_SetIntervalDecimal:
-        return fmu3.SetIntervalDecimal(c, NULL, 0, NULL);
-    case FMU3_SetIntervalFraction:
-        return fmu3.SetIntervalFraction(c, NULL, 0, NULL, NULL);
-    case FMU3_SetShiftDecimal:
-        return fmu3.SetShiftDecimal(c, NULL, 0, NULL);
-    case FMU3_SetShiftFraction:
-        return fmu3.SetShiftFraction(c, NULL, 0, NULL, NULL);
-    case FMU3_EvaluateDiscreteStates:
-        return fmu3.EvaluateDiscreteStates(c);
-    case FMU3_EnterConfigurationMode:
-        return fmu3.EnterConfigurationMode(c);
-    case FMU3_ExitConfigurationMode:
-        return fmu3.ExitConfigurationMode(c);
-    case FMU3_GetNumberOfVariableDependencies:
-        return fmu3.GetNumberOfVariableDependencies(c, q1, &count);
-    case FMU3_GetVariableDependencies:
-        return fmu3.GetVariableDependencies(c, q1, NULL, NULL, NULL, NULL, 0);
-    default:
-        return fmu3.ActivateModelPartition(c, 0, 0.0);
+#define CALL_WITH_STATE(name)                                                                      \
+    static fmi3Status call_##name(fmi3Instance c, double now) {                                    \
+        return call_with_state(FMU3_##name, c);                                                    \
     }
-}
-
-static fmi3Status call_model_exchange(enum fmu3_function function, fmi3Instance c, double now) {
-    double values[FMU3_STATES] = {0};
-    bool flags[2];
-    size_t count;
-    switch (function) {
-    case FMU3_EnterContinuousTimeMode:
-        return fmu3.EnterContinuousTimeMode(c);
-    case FMU3_CompletedIntegratorStep:
-        return fmu3.CompletedIntegratorStep(c, true, &flags[0], &flags[1]);
-    case FMU3_SetTime:
-        return fmu3.SetTime(c, now);
-    case FMU3_SetContinuousStates:
-        return fmu3.SetContinuousStates(c, values, FMU3_STATES);
-    case FMU3_GetContinuousStateDerivatives:
-        return fmu3.GetContinuousStateDerivatives(c, values, FMU3_STATES);
-    case FMU3_GetEventIndicators:
-        return fmu3.GetEventIndicators(c, values, 0);
-    case FMU3_GetContinuousStates:
-        return fmu3.GetContinuousStates(c, values, FMU3_STATES);
-    case FMU3_GetNominalsOfContinuousStates:
-        return fmu3.GetNominalsOfContinuousStates(c, values, FMU3_STATES);
-    case FMU3_GetNumberOfEventIndicators:
-        return fmu3.GetNumberOfEventIndicators(c, &count);
-    default:
-        return fmu3.GetNumberOfContinuousStates(c, &count);
-    }
-}
-
-static fmi3Status call_mode_or_step(enum fmu3_function function, fmi3Instance c, double now) {
-    const fmi3Int32 order = 1;
-    const double seed = 1.0;
-    const fmi3ValueReference ddq1 = RP_MANIPULATOR_ddq1;
-    bool flags[5];
-    double real;
-    switch (function) {
-    case FMU3_SetDebugLogging:
-        return fmu3.SetDebugLogging(c, false, 0, NULL);
-    case FMU3_EnterInitializationMode:
-        return fmu3.EnterInitializationMode(c, true, 1e-6, 0.0, true, 100.0);
-    case FMU3_ExitInitializationMode:
-        return fmu3.ExitInitializationMode(c);
-    case FMU3_EnterEventMode:
-        return fmu3.EnterEventMode(c);
-    case FMU3_Terminate:
-        return fmu3.Terminate(c);
-    case FMU3_Reset:
-        return fmu3.Reset(c);
-    case FMU3_UpdateDiscreteStates:
-        return fmu3.UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2], &flags[3], &flags[4],
-                                         &real);
-    case FMU3_GetDirectionalDerivative:
-        return fmu3.GetDirectionalDerivative(c, &ddq1, 1, &tau1, 1, &seed, 1, &real, 1);
-    case FMU3_GetAdjointDerivative:
-        return fmu3.GetAdjointDerivative(c, &ddq1, 1, &tau1, 1, &seed, 1, &real, 1);
-    case FMU3_EnterStepMode:
-        return fmu3.EnterStepMode(c);
-    case FMU3_GetOutputDerivatives:
-        return fmu3.GetOutputDerivatives(c, &q1, 1, &order, &real, 1);
-    default:
-        return fmu3_try_step(c, now, fmu3_calls_step).status;
-    }
-}
+CALL_WITH_STATE(GetFMUState)
+CALL_WITH_STATE(SetFMUState)
+CALL_WITH_STATE(SerializedFMUStateSize)
+CALL_WITH_STATE(SerializeFMUState)
+CALL_WITH_STATE(DeserializeFMUState)
 
 fmi3Status fmu3_call(enum fmu3_function function, fmi3Instance c, double now) {
-    fmi3FMUState no_state = NULL;
-    switch (function) {
-    case FMU3_GetVersion:
-    case FMU3_InstantiateModelExchange:
-    case FMU3_InstantiateCoSimulation:
-    case FMU3_InstantiateScheduledExecution:
-        return call_without_instance(function);
-    case FMU3_FreeInstance:
-        fmu3_free(c);
-        return fmi3OK;
-    case FMU3_FreeFMUState:
-        return fmu3.FreeFMUState(c, &no_state);
-    case FMU3_GetFMUState:
-    case FMU3_SetFMUState:
-    case FMU3_SerializedFMUStateSize:
-    case FMU3_SerializeFMUState:
-    case FMU3_DeserializeFMUState:
-        return call_with_state(function, c);
-    default:
-        break;
-    }
-    if ((function >= FMU3_GetFloat32 && function <= FMU3_GetBinary) ||
-        (function >= FMU3_SetFloat32 && function <= FMU3_SetBinary)) {
-        return call_value(function, c);
-    }
-    if (function >= FMU3_EnterContinuousTimeMode && function <= FMU3_GetNumberOfContinuousStates) {
-        return call_model_exchange(function, c, now);
-    }
-    switch (function) {
-    case FMU3_SetDebugLogging:
-    case FMU3_EnterInitializationMode:
-    case FMU3_ExitInitializationMode:
-    case FMU3_EnterEventMode:
-    case FMU3_Terminate:
-    case FMU3_Reset:
-    case FMU3_UpdateDiscreteStates:
-    case FMU3_GetDirectionalDerivative:
-    case FMU3_GetAdjointDerivative:
-    case FMU3_EnterStepMode:
-    case FMU3_GetOutputDerivatives:
-    case FMU3_DoStep:
-        return call_mode_or_step(function, c, now);
-    default:
-        return call_unsupported(function, c);
-    }
+#define CALL_OF(name) call_##name,
+    static fmi3Status (*const calls[])(fmi3Instance c, double now) = {FMU3_FUNCTION_LIST(CALL_OF)};
+#undef CALL_OF
+    return calls[function](c, now);
 }

@@ -91,9 +91,9 @@ static void test_callbacks_may_be_null(void) {
         "m", RP_MANIPULATOR_TOKEN_FMI3, NULL, true, true, true, true, &tau1, 1, NULL, NULL, NULL);
     TEST_ASSERT_NOT_NULL(instance);
     fmu3_initialize(instance, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterStepMode(instance));
+    ASSERT_OK(fmu3.EnterStepMode(instance));
     fmu3_step(instance, 0.0, 0.1);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_set(instance, RP_MANIPULATOR_ddq1, 1.0));
+    ASSERT_ERROR(fmu3_try_set(instance, RP_MANIPULATOR_ddq1, 1.0));
     fmu3.FreeInstance(instance);
     TEST_ASSERT_NULL(fmu3.InstantiateModelExchange("", "", NULL, false, false, NULL, NULL));
     TEST_ASSERT_NULL(fmu3.InstantiateScheduledExecution("m", RP_MANIPULATOR_TOKEN_FMI3, "", false,
@@ -103,12 +103,12 @@ static void test_callbacks_may_be_null(void) {
 /* ---- Messages ------------------------------------------------------------------------------- */
 
 static void discard(fmi3Instance instance) {
-    TEST_ASSERT_EQUAL_INT(fmi3Discard, fmu3_try_set(instance, RP_MANIPULATOR_tau1, NAN));
+    ASSERT_DISCARD(fmu3_try_set(instance, RP_MANIPULATOR_tau1, NAN));
 }
 
 static void fail(fmi3Instance instance) {
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_set(instance, RP_MANIPULATOR_ddq1, 1.0));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.Reset(instance));
+    ASSERT_ERROR(fmu3_try_set(instance, RP_MANIPULATOR_ddq1, 1.0));
+    ASSERT_OK(fmu3.Reset(instance));
 }
 
 /* Section 2.3.1: with logging off errors are sent all the same, and nothing else. */
@@ -118,10 +118,10 @@ static void test_errors_cannot_be_silenced(void) {
     const fmi3Instance quiet = fmu3_co_simulation(&importer, NULL);
     for (int round = 0; round < 3; round++) {
         if (round == 1) {
-            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(quiet, false, 0, NULL));
+            ASSERT_OK(fmu3.SetDebugLogging(quiet, false, 0, NULL));
         } else if (round == 2) {
             static const fmi3String errors[] = {"logStatusError", "logStatusFatal"};
-            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(quiet, false, 2, errors));
+            ASSERT_OK(fmu3.SetDebugLogging(quiet, false, 2, errors));
         }
         fmu3_clear_messages(&importer);
         discard(quiet);
@@ -137,14 +137,14 @@ static void test_errors_cannot_be_silenced(void) {
     discard(loud);
     TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Discard]);
     TEST_ASSERT_GREATER_THAN_UINT(0, importer.count[fmi3OK]); // the call
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(loud, true, 1, events));
+    ASSERT_OK(fmu3.SetDebugLogging(loud, true, 1, events));
     fmu3_clear_messages(&importer);
     discard(loud);
     TEST_ASSERT_EQUAL_UINT(0, fmu3_message_count(&importer));
     fmu3_initialize(loud, 0.0);
     TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3OK]);
     TEST_ASSERT_EQUAL_STRING("logEvents", importer.category);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(loud, true, 0, NULL));
+    ASSERT_OK(fmu3.SetDebugLogging(loud, true, 0, NULL));
     discard(loud);
     TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Discard]);
 }
@@ -152,10 +152,10 @@ static void test_errors_cannot_be_silenced(void) {
 static void test_an_unknown_category_is_an_error(void) {
     static const fmi3String unknown[] = {"logEvents", "logNothing"};
     const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetDebugLogging(instance, true, 2, unknown));
+    ASSERT_ERROR(fmu3.SetDebugLogging(instance, true, 2, unknown));
     fmu3_assert_logged(&importer, "logNothing");
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.Reset(instance));
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetDebugLogging(instance, true, 2, NULL));
+    ASSERT_OK(fmu3.Reset(instance));
+    ASSERT_ERROR(fmu3.SetDebugLogging(instance, true, 2, NULL));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -202,7 +202,7 @@ static void test_counts_that_differ_are_errors(void) {
                 status = fmu3.GetString(c, references, 2, NULL, counts[i]);
                 break;
             }
-            TEST_ASSERT_EQUAL_INT(fmi3Error, status);
+            ASSERT_ERROR(status);
             TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
             fmu3_assert_logged(&importer, "2 are expected");
             TEST_ASSERT_TRUE(values[0] == -1.0);
@@ -218,29 +218,29 @@ static void test_types(void) {
     fmi3Int32 integer = -1;
     fmi3Int64 item = -1;
     fmi3Instance c = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt64(c, &method, 1, &item, 1));
+    ASSERT_OK(fmu3.GetInt64(c, &method, 1, &item, 1));
     TEST_ASSERT_EQUAL_INT(1, item);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt32(c, &steps, 1, &integer, 1));
+    ASSERT_OK(fmu3.GetInt32(c, &steps, 1, &integer, 1));
     TEST_ASSERT_EQUAL_INT(100000, integer);
     item = 3;
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetInt64(c, &method, 1, &item, 1));
+    ASSERT_OK(fmu3.SetInt64(c, &method, 1, &item, 1));
     item = 0;
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt64(c, &method, 1, &item, 1));
+    ASSERT_OK(fmu3.GetInt64(c, &method, 1, &item, 1));
     TEST_ASSERT_EQUAL_INT(3, item);
 
     static const fmi3Int64 no_items[] = {0, 5, -1, INT64_MAX, INT64_MIN, (INT64_C(1) << 32) + 1};
     for (size_t i = 0; i < FMU3_COUNT(no_items); i++) {
-        TEST_ASSERT_EQUAL_INT(fmi3Discard, fmu3.SetInt64(c, &method, 1, &no_items[i], 1));
+        ASSERT_DISCARD(fmu3.SetInt64(c, &method, 1, &no_items[i], 1));
     }
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetInt32(c, &method, 1, &integer, 1));
+    ASSERT_ERROR(fmu3.GetInt32(c, &method, 1, &integer, 1));
     fmu3_assert_logged(&importer, "enumeration");
     c = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetInt64(c, &steps, 1, &item, 1));
+    ASSERT_ERROR(fmu3.GetInt64(c, &steps, 1, &item, 1));
     fmu3_assert_logged(&importer, "int32");
     c = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetInt32(c, &method, 1, &integer, 1));
+    ASSERT_ERROR(fmu3.SetInt32(c, &method, 1, &integer, 1));
     c = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.SetInt64(c, &steps, 1, &item, 1));
+    ASSERT_ERROR(fmu3.SetInt64(c, &steps, 1, &item, 1));
 }
 
 /* Each of the types that no variable has. */
@@ -274,7 +274,7 @@ static void test_types_without_variables(void) {
             status = fmu3.SetInt8(c, &q1, 1, (const fmi3Int8 *)memory, 1);
             break;
         }
-        TEST_ASSERT_EQUAL_INT(fmi3Error, status);
+        ASSERT_ERROR(status);
         fmu3_assert_logged(&importer, "value reference 10");
         fmu3_free(c);
     }
@@ -294,8 +294,8 @@ static void test_values_before_initialization(void) {
 static void update_discrete_states(fmi3Instance c) {
     bool flags[] = {true, true, true, true, true};
     double next = -1.0;
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2],
-                                                            &flags[3], &flags[4], &next));
+    ASSERT_OK(
+        fmu3.UpdateDiscreteStates(c, &flags[0], &flags[1], &flags[2], &flags[3], &flags[4], &next));
     for (size_t i = 0; i < FMU3_COUNT(flags); i++) {
         TEST_ASSERT_FALSE(flags[i]);
     }
@@ -311,11 +311,11 @@ static void test_inputs_may_jump_in_event_mode(void) {
         fmu3_initialize(c, 0.0);
         if (with_events) {
             update_discrete_states(c);
-            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterStepMode(c));
+            ASSERT_OK(fmu3.EnterStepMode(c));
         }
         for (int i = 0; i < 20; i++) {
             if (i % 4 == 1 && with_events) {
-                TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterEventMode(c));
+                ASSERT_OK(fmu3.EnterEventMode(c));
             }
             if (i % 4 == 1) {
                 fmu3_set(c, RP_MANIPULATOR_tau1, i - 7.0);
@@ -323,7 +323,7 @@ static void test_inputs_may_jump_in_event_mode(void) {
             }
             if (i % 4 == 1 && with_events) {
                 update_discrete_states(c);
-                TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterStepMode(c));
+                ASSERT_OK(fmu3.EnterStepMode(c));
             }
             fmu3_step(c, 0.05 * i, 0.05);
         }
@@ -343,9 +343,8 @@ static void test_results_of_an_event_need_a_place(void) {
         }
         const fmi3Instance c = fmu3_co_simulation(&importer, &events);
         fmu3_initialize(c, 0.0);
-        TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.UpdateDiscreteStates(c, places[0], places[1],
-                                                                   places[2], places[3], places[4],
-                                                                   missing == 5 ? NULL : &next));
+        ASSERT_ERROR(fmu3.UpdateDiscreteStates(c, places[0], places[1], places[2], places[3],
+                                               places[4], missing == 5 ? NULL : &next));
         fmu3_assert_logged(&importer, "NULL");
         fmu3_free(c);
     }
@@ -359,10 +358,9 @@ static void test_results_of_a_step_need_a_place(void) {
         double reached;
         const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
         fmu3_initialize(c, 0.0);
-        TEST_ASSERT_EQUAL_INT(
-            fmi3Error, fmu3.DoStep(c, 0.0, 0.1, true, missing == 0 ? NULL : &flags[0],
-                                   missing == 1 ? NULL : &flags[1], missing == 2 ? NULL : &flags[2],
-                                   missing == 3 ? NULL : &reached));
+        ASSERT_ERROR(fmu3.DoStep(c, 0.0, 0.1, true, missing == 0 ? NULL : &flags[0],
+                                 missing == 1 ? NULL : &flags[1], missing == 2 ? NULL : &flags[2],
+                                 missing == 3 ? NULL : &reached));
         fmu3_assert_logged(&importer, "NULL");
         fmu3_free(c);
     }
@@ -371,9 +369,9 @@ static void test_results_of_a_step_need_a_place(void) {
 /* The stop time comes with the initialization. */
 static void test_no_step_passes_the_stop_time(void) {
     const fmi3Instance c = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterInitializationMode(c, false, 0.0, 1.0, true, 2.0));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.ExitInitializationMode(c));
+    ASSERT_OK(fmu3.EnterInitializationMode(c, false, 0.0, 1.0, true, 2.0));
+    ASSERT_OK(fmu3.ExitInitializationMode(c));
     fmu3_step(c, 1.0, 0.75);
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_step(c, 1.75, 0.5).status);
+    ASSERT_ERROR(fmu3_try_step(c, 1.75, 0.5).status);
     fmu3_assert_logged(&importer, "stop time is 2");
 }

@@ -45,9 +45,8 @@ static void get_jacobian(fmi3Instance instance, double J[UNKNOWNS][KNOWNS]) {
     for (int j = 0; j < KNOWNS; j++) {
         const double one = 1.0;
         double column[UNKNOWNS];
-        TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetDirectionalDerivative(instance, unknowns, UNKNOWNS,
-                                                                    &knowns[j], 1, &one, 1, column,
-                                                                    UNKNOWNS));
+        ASSERT_OK(fmu3.GetDirectionalDerivative(instance, unknowns, UNKNOWNS, &knowns[j], 1, &one,
+                                                1, column, UNKNOWNS));
         for (int i = 0; i < UNKNOWNS; i++) {
             J[i][j] = column[i];
         }
@@ -56,8 +55,7 @@ static void get_jacobian(fmi3Instance instance, double J[UNKNOWNS][KNOWNS]) {
 
 static void test_it_is_the_transposed_directional_derivative_at_1000_points(void) {
     const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
-    TEST_ASSERT_EQUAL_INT(fmi3OK,
-                          fmu3.EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0));
+    ASSERT_OK(fmu3.EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0));
     for (int point = 0; point < 1000; point++) {
         double J[UNKNOWNS][KNOWNS];
         double seed[UNKNOWNS];
@@ -67,9 +65,8 @@ static void test_it_is_the_transposed_directional_derivative_at_1000_points(void
         for (int i = 0; i < UNKNOWNS; i++) {
             seed[i] = random_between(-1.0, 1.0);
         }
-        TEST_ASSERT_EQUAL_INT(fmi3OK,
-                              fmu3.GetAdjointDerivative(instance, unknowns, UNKNOWNS, knowns,
-                                                        KNOWNS, seed, UNKNOWNS, adjoint, KNOWNS));
+        ASSERT_OK(fmu3.GetAdjointDerivative(instance, unknowns, UNKNOWNS, knowns, KNOWNS, seed,
+                                            UNKNOWNS, adjoint, KNOWNS));
         for (int j = 0; j < KNOWNS; j++) {
             long double expected = 0.0L;
             double scale = 0.0;
@@ -92,20 +89,17 @@ static void test_parameters_and_repeated_knowns(void) {
     double directional;
     const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
     fmu3_set(instance, RP_MANIPULATOR_q1, 0.7);
-    TEST_ASSERT_EQUAL_INT(fmi3OK,
-                          fmu3.EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0));
-    TEST_ASSERT_EQUAL_INT(
-        fmi3OK, fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, adjoint, 3));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetDirectionalDerivative(instance, &unknown, 1, of, 1, &one,
-                                                                1, &directional, 1));
+    ASSERT_OK(fmu3.EnterInitializationMode(instance, false, 0.0, 0.0, false, 0.0));
+    ASSERT_OK(fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, adjoint, 3));
+    ASSERT_OK(
+        fmu3.GetDirectionalDerivative(instance, &unknown, 1, of, 1, &one, 1, &directional, 1));
     TEST_ASSERT_TRUE(directional != 0.0);
     TEST_ASSERT_TRUE(adjoint[0] == seed * directional);
     TEST_ASSERT_TRUE(adjoint[2] == adjoint[0]);
     // also later
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.ExitInitializationMode(instance));
+    ASSERT_OK(fmu3.ExitInitializationMode(instance));
     double later[3];
-    TEST_ASSERT_EQUAL_INT(
-        fmi3OK, fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, later, 3));
+    ASSERT_OK(fmu3.GetAdjointDerivative(instance, &unknown, 1, of, 3, &seed, 1, later, 3));
     TEST_ASSERT_EQUAL_MEMORY(adjoint, later, sizeof later);
 }
 
@@ -128,8 +122,7 @@ static void test_what_is_refused(void) {
         double result[] = {-1.0, -1.0};
         const fmi3Instance instance = fmu3_co_simulation(&importer, NULL);
         fmu3_initialize(instance, 0.0);
-        TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetAdjointDerivative(instance, rows, 2, columns, 2,
-                                                                   seed, 2, result, 2));
+        ASSERT_ERROR(fmu3.GetAdjointDerivative(instance, rows, 2, columns, 2, seed, 2, result, 2));
         TEST_ASSERT_TRUE(result[0] == -1.0 && result[1] == -1.0);
         fmu3_free(instance);
     }
@@ -138,8 +131,7 @@ static void test_what_is_refused(void) {
     fmu3_initialize(instance, 0.0);
     const double seed = 1e200;
     double result = -1.0;
-    TEST_ASSERT_EQUAL_INT(
-        fmi3Discard,
+    ASSERT_DISCARD(
         fmu3.GetAdjointDerivative(instance, &unknowns[0], 1, &knowns[2], 1, &seed, 1, &result, 1));
     TEST_ASSERT_TRUE(result == -1.0);
 }

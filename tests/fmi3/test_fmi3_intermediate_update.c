@@ -61,10 +61,10 @@ static void slope(fmi3Instance instance, double t, const double x[FMU3_STATES],
                   double dx[FMU3_STATES]) {
     double u[2];
     smooth_inputs(t, u);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetTime(instance, t));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetContinuousStates(instance, x, FMU3_STATES));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFloat64(instance, inputs, 2, u, 2));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetContinuousStateDerivatives(instance, dx, FMU3_STATES));
+    ASSERT_OK(fmu3.SetTime(instance, t));
+    ASSERT_OK(fmu3.SetContinuousStates(instance, x, FMU3_STATES));
+    ASSERT_OK(fmu3.SetFloat64(instance, inputs, 2, u, 2));
+    ASSERT_OK(fmu3.GetContinuousStateDerivatives(instance, dx, FMU3_STATES));
 }
 
 /* The reference: the classical Runge-Kutta method from 0 to end, at steps that leave 1e-13. */
@@ -72,7 +72,7 @@ static void integrate_reference(double end, double x[FMU3_STATES]) {
     enum { STEPS = 8192 };
     const fmi3Instance instance = fmu3_model_exchange(&importer);
     fmu3_initialize(instance, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterContinuousTimeMode(instance));
+    ASSERT_OK(fmu3.EnterContinuousTimeMode(instance));
     const double h = end / STEPS;
     for (int i = 0; i < STEPS; i++) {
         static const double weights[] = {1.0, 2.0, 2.0, 1.0};
@@ -107,7 +107,7 @@ static double error_of(const double reference[FMU3_STATES], int with_method, dou
         if (held) {
             double u[2];
             smooth_inputs(i * h, u);
-            TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFloat64(instance, inputs, 2, u, 2));
+            ASSERT_OK(fmu3.SetFloat64(instance, inputs, 2, u, 2));
         }
         fmu3_step(instance, i * h, h);
     }
@@ -117,7 +117,7 @@ static double error_of(const double reference[FMU3_STATES], int with_method, dou
     for (int j = 0; j < FMU3_STATES; j++) {
         error = fmax(error, fabs(x[j] - reference[j]));
     }
-    TEST_ASSERT_EQUAL_INT(fmi3OK, asked.status);
+    ASSERT_OK(asked.status);
     fmu3_free(instance);
     return error;
 }
@@ -327,7 +327,7 @@ EACH_METHOD static void test_an_early_return_is_obeyed(void) {
         importer.updates = 0;
         const fmi3Instance instance = swinging(&with_outputs, method, 0.0);
         const struct fmu3_step early = fmu3_try_step(instance, 0.0, end);
-        TEST_ASSERT_EQUAL_INT(fmi3OK, early.status);
+        ASSERT_OK(early.status);
         TEST_ASSERT_TRUE(early.early);
         TEST_ASSERT_FALSE(early.event || early.terminate);
         TEST_ASSERT_TRUE(early.reached == fmu3_get(instance, RP_MANIPULATOR_time));
@@ -358,20 +358,20 @@ EACH_METHOD static void test_an_early_return_can_be_gone_back_to(void) {
     const fmi3Instance instance = swinging(&with_outputs, method, 0.0);
     const struct fmu3_step early = fmu3_try_step(instance, 0.0, 0.6);
     TEST_ASSERT_TRUE(early.early);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetFMUState(instance, &state));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SerializedFMUStateSize(instance, state, &size));
+    ASSERT_OK(fmu3.GetFMUState(instance, &state));
+    ASSERT_OK(fmu3.SerializedFMUStateSize(instance, state, &size));
     TEST_ASSERT_TRUE(size <= sizeof bytes);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SerializeFMUState(instance, state, bytes, size));
+    ASSERT_OK(fmu3.SerializeFMUState(instance, state, bytes, size));
     for (int i = 0; i < 2; i++) {
         fmu3_step(instance, early.reached, 0.2);
         fmu3_get_states(instance, x[i]);
-        TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFMUState(instance, state));
+        ASSERT_OK(fmu3.SetFMUState(instance, state));
     }
     TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
 
     const fmi3Instance other = swinging(NULL, method, 0.0);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.DeserializeFMUState(other, bytes, size, &state));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFMUState(other, state));
+    ASSERT_OK(fmu3.DeserializeFMUState(other, bytes, size, &state));
+    ASSERT_OK(fmu3.SetFMUState(other, state));
     fmu3_step(other, early.reached, 0.2);
     fmu3_get_states(other, x[2]);
     TEST_ASSERT_EQUAL_MEMORY(x[0], x[2], sizeof x[0]);
@@ -553,8 +553,8 @@ static void test_what_is_not_allowed_makes_the_step_fail(void) {
 
         // terminated: values can be read, and a reset leads out
         (void)fmu3_get(instance, RP_MANIPULATOR_q1);
-        TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3_try_step(instance, 0.0, 0.1).status);
-        TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.Reset(instance));
+        ASSERT_ERROR(fmu3_try_step(instance, 0.0, 0.1).status);
+        ASSERT_OK(fmu3.Reset(instance));
         fmu3_initialize(instance, 0.0);
         fmu3_step(instance, 0.0, 0.1);
         fmu3_free(instance);

@@ -129,9 +129,8 @@ void fmu3_tear_down(void) {
 }
 
 void fmu3_initialize(fmi3Instance instance, double start) {
-    TEST_ASSERT_EQUAL_INT(fmi3OK,
-                          fmu3.EnterInitializationMode(instance, false, 0.0, start, false, 0.0));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.ExitInitializationMode(instance));
+    ASSERT_OK(fmu3.EnterInitializationMode(instance, false, 0.0, start, false, 0.0));
+    ASSERT_OK(fmu3.ExitInitializationMode(instance));
 }
 
 /* ---- Values --------------------------------------------------------------------------------- */
@@ -141,31 +140,30 @@ fmi3Status fmu3_try_set(fmi3Instance instance, fmi3ValueReference reference, dou
 }
 
 void fmu3_set(fmi3Instance instance, fmi3ValueReference reference, double value) {
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3_try_set(instance, reference, value));
+    ASSERT_OK(fmu3_try_set(instance, reference, value));
 }
 
 double fmu3_get(fmi3Instance instance, fmi3ValueReference reference) {
     double value = 0.0;
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetFloat64(instance, &reference, 1, &value, 1));
+    ASSERT_OK(fmu3.GetFloat64(instance, &reference, 1, &value, 1));
     return value;
 }
 
 void fmu3_set_int32(fmi3Instance instance, fmi3ValueReference reference, fmi3Int32 value) {
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetInt32(instance, &reference, 1, &value, 1));
+    ASSERT_OK(fmu3.SetInt32(instance, &reference, 1, &value, 1));
 }
 
 void fmu3_set_method(fmi3Instance instance, int method) {
     const fmi3ValueReference reference = RP_MANIPULATOR_solver_method;
     const fmi3Int64 item = method;
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetInt64(instance, &reference, 1, &item, 1));
+    ASSERT_OK(fmu3.SetInt64(instance, &reference, 1, &item, 1));
 }
 
 const fmi3ValueReference fmu3_states[FMU3_STATES] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
                                                      RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
 
 void fmu3_get_states(fmi3Instance instance, double x[FMU3_STATES]) {
-    TEST_ASSERT_EQUAL_INT(fmi3OK,
-                          fmu3.GetFloat64(instance, fmu3_states, FMU3_STATES, x, FMU3_STATES));
+    ASSERT_OK(fmu3.GetFloat64(instance, fmu3_states, FMU3_STATES, x, FMU3_STATES));
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */

@@ -43,6 +43,11 @@ extern struct fmu3_importer importer;
 void fmu3_clear_messages(struct fmu3_importer *of);
 unsigned fmu3_message_count(const struct fmu3_importer *of);
 
+/* The status of a call; the messages are shown where it is another one. */
+#define ASSERT_OK(call)      TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, call, importer.texts)
+#define ASSERT_DISCARD(call) TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Discard, call, importer.texts)
+#define ASSERT_ERROR(call)   TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3Error, call, importer.texts)
+
 /* Fails the test unless one message contains text. */
 void fmu3_assert_logged(const struct fmu3_importer *of, const char *text);
 

@@ -3,11 +3,87 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const fmi2ValueReference q1 = RP_MANIPULATOR_q1;
+static const fmi2ValueReference ddq1 = RP_MANIPULATOR_ddq1;
+static const fmi2ValueReference tau1 = RP_MANIPULATOR_tau1;
+static const fmi2ValueReference steps = RP_MANIPULATOR_solver_steps;
+static const fmi2Integer order = 1;
+static const double one = 1.0;
+static const double zeros[4];
+
+// where results go
+static fmi2Boolean flags[2];
+static double reals[4];
+static fmi2Integer integer;
+static fmi2String text;
+static fmi2Status pending;
+static fmi2EventInfo info;
+
+/* ---- With these arguments ------------------------------------------------------------------- */
+
+#define CALL_PLAIN(name)                                                                           \
+    static fmi2Status call_##name(fmi2Component c, double now, double step) {                      \
+        return fmu.name(c);                                                                        \
+    }
+#define CALL(name, ...)                                                                            \
+    static fmi2Status call_##name(fmi2Component c, double now, double step) {                      \
+        return fmu.name(c, __VA_ARGS__);                                                           \
+    }
+CALL(SetDebugLogging, fmi2True, 0, NULL)
+CALL(SetupExperiment, fmi2True, 1e-6, 0.0, fmi2True, 100.0)
+CALL_PLAIN(EnterInitializationMode)
+CALL_PLAIN(ExitInitializationMode)
+CALL_PLAIN(Terminate)
+CALL_PLAIN(Reset)
+CALL(GetReal, &q1, 1, reals)
+CALL(GetInteger, &steps, 1, &integer)
+CALL(GetBoolean, NULL, 0, NULL) // there is none of this type, nor of String
+CALL(GetString, NULL, 0, NULL)
+CALL(SetReal, &tau1, 1, &one)
+CALL(SetInteger, NULL, 0, NULL) // none that may be set in all states of the row
+CALL(SetBoolean, NULL, 0, NULL)
+CALL(SetString, NULL, 0, NULL)
+CALL(FreeFMUstate, &(fmi2FMUstate){NULL})
+CALL(GetDirectionalDerivative, &ddq1, 1, &tau1, 1, &one, reals)
+
+// Co-Simulation
+CALL(SetRealInputDerivatives, &tau1, 1, &order, &one)
+CALL(GetRealOutputDerivatives, &q1, 1, &order, reals)
+CALL(DoStep, now, step, fmi2True)
+CALL_PLAIN(CancelStep)
+CALL(GetStatus, fmi2DoStepStatus, &pending)
+CALL(GetRealStatus, fmi2LastSuccessfulTime, reals)
+CALL(GetIntegerStatus, fmi2DoStepStatus, &integer)
+CALL(GetBooleanStatus, fmi2Terminated, flags)
+CALL(GetStringStatus, fmi2PendingStatus, &text)
+
+// Model Exchange
+CALL_PLAIN(EnterEventMode)
+CALL(NewDiscreteStates, &info)
+CALL_PLAIN(EnterContinuousTimeMode)
+CALL(CompletedIntegratorStep, fmi2True, &flags[0], &flags[1])
+CALL(SetTime, now)
+CALL(SetContinuousStates, zeros, 4)
+CALL(GetDerivatives, reals, 4)
+CALL(GetEventIndicators, reals, 0)
+CALL(GetContinuousStates, reals, 4)
+CALL(GetNominalsOfContinuousStates, reals, 4)
+
+/* ---- With more than arguments --------------------------------------------------------------- */
+
 static fmi2Status ok_if(bool condition) {
     return condition ? fmi2OK : fmi2Error;
 }
 
-static fmi2Status call_instantiate(void) {
+static fmi2Status call_GetTypesPlatform(fmi2Component c, double now, double step) {
+    return ok_if(strcmp(fmu.GetTypesPlatform(), fmi2TypesPlatform) == 0);
+}
+
+static fmi2Status call_GetVersion(fmi2Component c, double now, double step) {
+    return ok_if(strcmp(fmu.GetVersion(), "2.0") == 0);
+}
+
+static fmi2Status call_Instantiate(fmi2Component c, double now, double step) {
     static const fmi2Type types[] = {fmi2CoSimulation, fmi2ModelExchange};
     const fmi2CallbackFunctions callbacks = {0};
     bool instantiated = true;
@@ -18,6 +94,11 @@ static fmi2Status call_instantiate(void) {
         fmu.FreeInstance(other);
     }
     return ok_if(instantiated);
+}
+
+static fmi2Status call_FreeInstance(fmi2Component c, double now, double step) {
+    fmu_free(c);
+    return fmi2OK;
 }
 
 /* The status of the last call, made with a state that the instance has given out. */
@@ -50,114 +131,20 @@ static fmi2Status call_with_state(enum fmu_function function, fmi2Component c) {
     return status;
 }
 
-static fmi2Status call_model_exchange(enum fmu_function function, fmi2Component c, double now) {
-    double values[4] = {0};
-    fmi2EventInfo info = {0};
-    fmi2Boolean flags[2];
-    switch (function) {
-    case FMU_EnterEventMode:
-        return fmu.EnterEventMode(c);
-    case FMU_NewDiscreteStates:
-        return fmu.NewDiscreteStates(c, &info);
-    case FMU_EnterContinuousTimeMode:
-        return fmu.EnterContinuousTimeMode(c);
-    case FMU_CompletedIntegratorStep:
-        return fmu.CompletedIntegratorStep(c, fmi2True, &flags[0], &flags[1]);
-    case FMU_SetTime:
-        return fmu.SetTime(c, now);
-    case FMU_SetContinuousStates:
-        return fmu.SetContinuousStates(c, values, 4);
-    case FMU_GetDerivatives:
-        return fmu.GetDerivatives(c, values, 4);
-    case FMU_GetEventIndicators:
-        return fmu.GetEventIndicators(c, values, 0);
-    case FMU_GetContinuousStates:
-        return fmu.GetContinuousStates(c, values, 4);
-    default:
-        return fmu.GetNominalsOfContinuousStates(c, values, 4);
+#define CALL_WITH_STATE(name)                                                                      \
+    static fmi2Status call_##name(fmi2Component c, double now, double step) {                      \
+        return call_with_state(FMU_##name, c);                                                     \
     }
-}
+CALL_WITH_STATE(GetFMUstate)
+CALL_WITH_STATE(SetFMUstate)
+CALL_WITH_STATE(SerializedFMUstateSize)
+CALL_WITH_STATE(SerializeFMUstate)
+CALL_WITH_STATE(DeSerializeFMUstate)
 
 fmi2Status fmu_call(enum fmu_function function, fmi2Component c, double now, double step) {
-    const fmi2ValueReference q1 = RP_MANIPULATOR_q1;
-    const fmi2ValueReference ddq1 = RP_MANIPULATOR_ddq1;
-    const fmi2ValueReference tau1 = RP_MANIPULATOR_tau1;
-    const fmi2ValueReference steps = RP_MANIPULATOR_solver_steps;
-    const fmi2Integer first_order = 1;
-    const double one = 1.0;
-    double real;
-    fmi2Integer integer;
-    fmi2String text;
-    fmi2FMUstate no_state = NULL;
-    fmi2Status pending;
-
-    switch (function) {
-    case FMU_GetTypesPlatform:
-        return ok_if(strcmp(fmu.GetTypesPlatform(), fmi2TypesPlatform) == 0);
-    case FMU_GetVersion:
-        return ok_if(strcmp(fmu.GetVersion(), "2.0") == 0);
-    case FMU_SetDebugLogging:
-        return fmu.SetDebugLogging(c, fmi2True, 0, NULL);
-    case FMU_Instantiate:
-        return call_instantiate();
-    case FMU_FreeInstance:
-        fmu_free(c);
-        return fmi2OK;
-    case FMU_SetupExperiment:
-        return fmu.SetupExperiment(c, fmi2True, 1e-6, 0.0, fmi2True, 100.0);
-    case FMU_EnterInitializationMode:
-        return fmu.EnterInitializationMode(c);
-    case FMU_ExitInitializationMode:
-        return fmu.ExitInitializationMode(c);
-    case FMU_Terminate:
-        return fmu.Terminate(c);
-    case FMU_Reset:
-        return fmu.Reset(c);
-    case FMU_GetReal:
-        return fmu.GetReal(c, &q1, 1, &real);
-    case FMU_GetInteger:
-        return fmu.GetInteger(c, &steps, 1, &integer);
-    case FMU_GetBoolean: // there is none of this type, nor of String
-        return fmu.GetBoolean(c, NULL, 0, NULL);
-    case FMU_GetString:
-        return fmu.GetString(c, NULL, 0, NULL);
-    case FMU_SetReal:
-        return fmu.SetReal(c, &tau1, 1, &one);
-    case FMU_SetInteger: // none that may be set in all states of the row
-        return fmu.SetInteger(c, NULL, 0, NULL);
-    case FMU_SetBoolean:
-        return fmu.SetBoolean(c, NULL, 0, NULL);
-    case FMU_SetString:
-        return fmu.SetString(c, NULL, 0, NULL);
-    case FMU_FreeFMUstate:
-        return fmu.FreeFMUstate(c, &no_state);
-    case FMU_GetFMUstate:
-    case FMU_SetFMUstate:
-    case FMU_SerializedFMUstateSize:
-    case FMU_SerializeFMUstate:
-    case FMU_DeSerializeFMUstate:
-        return call_with_state(function, c);
-    case FMU_GetDirectionalDerivative:
-        return fmu.GetDirectionalDerivative(c, &ddq1, 1, &tau1, 1, &one, &real);
-    case FMU_SetRealInputDerivatives:
-        return fmu.SetRealInputDerivatives(c, &tau1, 1, &first_order, &one);
-    case FMU_GetRealOutputDerivatives:
-        return fmu.GetRealOutputDerivatives(c, &q1, 1, &first_order, &real);
-    case FMU_DoStep:
-        return fmu.DoStep(c, now, step, fmi2True);
-    case FMU_CancelStep:
-        return fmu.CancelStep(c);
-    case FMU_GetStatus:
-        return fmu.GetStatus(c, fmi2DoStepStatus, &pending);
-    case FMU_GetRealStatus:
-        return fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &real);
-    case FMU_GetIntegerStatus:
-        return fmu.GetIntegerStatus(c, fmi2DoStepStatus, &integer);
-    case FMU_GetBooleanStatus:
-        return fmu.GetBooleanStatus(c, fmi2Terminated, &integer);
-    case FMU_GetStringStatus:
-        return fmu.GetStringStatus(c, fmi2PendingStatus, &text);
-    default:
-        return call_model_exchange(function, c, now);
-    }
+#define CALL_OF(name) call_##name,
+    static fmi2Status (*const calls[])(fmi2Component c, double now,
+                                       double step) = {FMU_FUNCTION_LIST(CALL_OF)};
+#undef CALL_OF
+    return calls[function](c, now, step);
 }

@@ -139,11 +139,6 @@ static void FreeInstance(fmi2Component c) {
     free(c);
 }
 
-static fmi2Status SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count,
-                                  const fmi2String categories[]) {
-    return status_of(fmi3.SetDebugLogging(instance_of(c), on != 0, count, categories));
-}
-
 static fmi2Status SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,
                                   fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
     struct adapted *adapted = c;
@@ -172,10 +167,6 @@ static fmi2Status ExitInitializationMode(fmi2Component c) {
         return status_of(fmi3.EnterStepMode(instance_of(c)));
     }
     return status_of(status);
-}
-
-static fmi2Status Terminate(fmi2Component c) {
-    return status_of(fmi3.Terminate(instance_of(c)));
 }
 
 static fmi2Status Reset(fmi2Component c) {
@@ -288,55 +279,7 @@ static fmi2Status SetBoolean(fmi2Component c, const fmi2ValueReference reference
                                      is_usual ? flags : (const fmi3Boolean *)values, count));
 }
 
-static fmi2Status GetString(fmi2Component c, const fmi2ValueReference references[], size_t count,
-                            fmi2String values[]) {
-    return status_of(fmi3.GetString(instance_of(c), references, count, values, count));
-}
-
-static fmi2Status SetString(fmi2Component c, const fmi2ValueReference references[], size_t count,
-                            const fmi2String values[]) {
-    return status_of(fmi3.SetString(instance_of(c), references, count, values, count));
-}
-
-/* ---- FMU state ------------------------------------------------------------------------------ */
-
-static fmi2Status GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
-    return status_of(fmi3.GetFMUState(instance_of(c), state));
-}
-
-static fmi2Status SetFMUstate(fmi2Component c, fmi2FMUstate state) {
-    return status_of(fmi3.SetFMUState(instance_of(c), state));
-}
-
-static fmi2Status FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
-    return status_of(fmi3.FreeFMUState(instance_of(c), state));
-}
-
-static fmi2Status SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
-    return status_of(fmi3.SerializedFMUStateSize(instance_of(c), state, size));
-}
-
-static fmi2Status SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[],
-                                    size_t size) {
-    return status_of(fmi3.SerializeFMUState(instance_of(c), state, (fmi3Byte *)bytes, size));
-}
-
-static fmi2Status DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size,
-                                      fmi2FMUstate *state) {
-    return status_of(
-        fmi3.DeserializeFMUState(instance_of(c), (const fmi3Byte *)bytes, size, state));
-}
-
 /* ---- Derivatives ---------------------------------------------------------------------------- */
-
-static fmi2Status GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[],
-                                           size_t unknown_count, const fmi2ValueReference knowns[],
-                                           size_t known_count, const fmi2Real seed[],
-                                           fmi2Real sensitivity[]) {
-    return status_of(fmi3.GetDirectionalDerivative(instance_of(c), unknowns, unknown_count, knowns,
-                                                   known_count, seed, known_count, sensitivity,
-                                                   unknown_count));
-}
 
 static fmi2Status SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference references[],
                                           size_t count, const fmi2Integer orders[],
@@ -353,13 +296,6 @@ static fmi2Status SetRealInputDerivatives(fmi2Component c, const fmi2ValueRefere
         adapted->input[input][orders[i]] = values[i];
     }
     return fmi2OK;
-}
-
-static fmi2Status GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference references[],
-                                           size_t count, const fmi2Integer orders[],
-                                           fmi2Real values[]) {
-    return status_of(
-        fmi3.GetOutputDerivatives(instance_of(c), references, count, orders, values, count));
 }
 
 /* ---- Steps ---------------------------------------------------------------------------------- */
@@ -385,45 +321,21 @@ static fmi2Status DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Bool
     return event || terminate || early || reached != time + step ? fmi2Fatal : fmi2OK;
 }
 
-/* An error in every state. */
-static fmi2Status CancelStep(fmi2Component c) {
-    return status_of(fmi3.ExitConfigurationMode(instance_of(c)));
-}
-
-static fmi2Status GetStatus(fmi2Component c, fmi2StatusKind kind, fmi2Status *value) {
-    (void)kind;
-    (void)value;
-    return c != NULL ? fmi2Discard : fmi2Error;
-}
-
 static fmi2Status GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Real *value) {
     const fmi2ValueReference time = FMU_TIME;
     return kind == fmi2LastSuccessfulTime ? GetReal(c, &time, 1, value) : fmi2Discard;
 }
 
-static fmi2Status GetIntegerStatus(fmi2Component c, fmi2StatusKind kind, fmi2Integer *value) {
-    (void)kind;
-    (void)value;
-    return c != NULL ? fmi2Discard : fmi2Error;
-}
-
-static fmi2Status GetBooleanStatus(fmi2Component c, fmi2StatusKind kind, fmi2Boolean *value) {
-    (void)kind;
-    (void)value;
-    return c != NULL ? fmi2Discard : fmi2Error;
-}
-
-static fmi2Status GetStringStatus(fmi2Component c, fmi2StatusKind kind, fmi2String *value) {
-    (void)kind;
-    (void)value;
-    return c != NULL ? fmi2Discard : fmi2Error;
-}
+#define NO_STATUS(name, type)                                                                      \
+    static fmi2Status name(fmi2Component c, fmi2StatusKind kind, type *value) {                    \
+        return c != NULL ? fmi2Discard : fmi2Error;                                                \
+    }
+NO_STATUS(GetStatus, fmi2Status)
+NO_STATUS(GetIntegerStatus, fmi2Integer)
+NO_STATUS(GetBooleanStatus, fmi2Boolean)
+NO_STATUS(GetStringStatus, fmi2String)
 
 /* ---- Model Exchange ------------------------------------------------------------------------- */
-
-static fmi2Status EnterEventMode(fmi2Component c) {
-    return status_of(fmi3.EnterEventMode(instance_of(c)));
-}
 
 static fmi2Status NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     fmi3Boolean flags[5] = {true, true, true, true, true};
@@ -435,10 +347,6 @@ static fmi2Status NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
         *info = (fmi2EventInfo){flags[0], flags[1], flags[2], flags[3], flags[4], next};
     }
     return status_of(status);
-}
-
-static fmi2Status EnterContinuousTimeMode(fmi2Component c) {
-    return status_of(fmi3.EnterContinuousTimeMode(instance_of(c)));
 }
 
 static fmi2Status CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_rollback,
@@ -455,30 +363,65 @@ static fmi2Status CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_rollba
     return status_of(status);
 }
 
-static fmi2Status SetTime(fmi2Component c, fmi2Real time) {
-    return status_of(fmi3.SetTime(instance_of(c), time));
-}
+/* ---- The same in both versions ----------------------------------------------------------------
+ */
 
-static fmi2Status SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t count) {
-    return status_of(fmi3.SetContinuousStates(instance_of(c), x, count));
-}
+#define PLAIN(name, name3)                                                                         \
+    static fmi2Status name(fmi2Component c) {                                                      \
+        return status_of(fmi3.name3(instance_of(c)));                                              \
+    }
+PLAIN(Terminate, Terminate)
+PLAIN(EnterEventMode, EnterEventMode)
+PLAIN(EnterContinuousTimeMode, EnterContinuousTimeMode)
+PLAIN(CancelStep, ExitConfigurationMode) // an error in every state
 
-static fmi2Status GetDerivatives(fmi2Component c, fmi2Real dx[], size_t count) {
-    return status_of(fmi3.GetContinuousStateDerivatives(instance_of(c), dx, count));
-}
+#define ARRAY(name, name3, element)                                                                \
+    static fmi2Status name(fmi2Component c, element values[], size_t count) {                      \
+        return status_of(fmi3.name3(instance_of(c), values, count));                               \
+    }
+ARRAY(SetContinuousStates, SetContinuousStates, const fmi2Real)
+ARRAY(GetDerivatives, GetContinuousStateDerivatives, fmi2Real)
+ARRAY(GetEventIndicators, GetEventIndicators, fmi2Real)
+ARRAY(GetContinuousStates, GetContinuousStates, fmi2Real)
+ARRAY(GetNominalsOfContinuousStates, GetNominalsOfContinuousStates, fmi2Real)
 
-static fmi2Status GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t count) {
-    return status_of(fmi3.GetEventIndicators(instance_of(c), indicators, count));
-}
-
-static fmi2Status GetContinuousStates(fmi2Component c, fmi2Real x[], size_t count) {
-    return status_of(fmi3.GetContinuousStates(instance_of(c), x, count));
-}
-
-static fmi2Status GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominals[],
-                                                size_t count) {
-    return status_of(fmi3.GetNominalsOfContinuousStates(instance_of(c), nominals, count));
-}
+/* Parameters and arguments stand in parentheses. */
+#define SAME(name, name3, parameters, arguments)                                                   \
+    static fmi2Status name parameters {                                                            \
+        return status_of(fmi3.name3 arguments);                                                    \
+    }
+SAME(SetTime, SetTime, (fmi2Component c, fmi2Real time), (instance_of(c), time))
+SAME(SetDebugLogging, SetDebugLogging,
+     (fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[]),
+     (instance_of(c), on != 0, count, categories))
+SAME(GetString, GetString,
+     (fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2String values[]),
+     (instance_of(c), references, count, values, count))
+SAME(SetString, SetString,
+     (fmi2Component c, const fmi2ValueReference references[], size_t count,
+      const fmi2String values[]),
+     (instance_of(c), references, count, values, count))
+SAME(GetFMUstate, GetFMUState, (fmi2Component c, fmi2FMUstate *state), (instance_of(c), state))
+SAME(SetFMUstate, SetFMUState, (fmi2Component c, fmi2FMUstate state), (instance_of(c), state))
+SAME(FreeFMUstate, FreeFMUState, (fmi2Component c, fmi2FMUstate *state), (instance_of(c), state))
+SAME(SerializedFMUstateSize, SerializedFMUStateSize,
+     (fmi2Component c, fmi2FMUstate state, size_t *size), (instance_of(c), state, size))
+SAME(SerializeFMUstate, SerializeFMUState,
+     (fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size),
+     (instance_of(c), state, (fmi3Byte *)bytes, size))
+SAME(DeSerializeFMUstate, DeserializeFMUState,
+     (fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
+     (instance_of(c), (const fmi3Byte *)bytes, size, state))
+SAME(GetDirectionalDerivative, GetDirectionalDerivative,
+     (fmi2Component c, const fmi2ValueReference unknowns[], size_t unknown_count,
+      const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[],
+      fmi2Real sensitivity[]),
+     (instance_of(c), unknowns, unknown_count, knowns, known_count, seed, known_count, sensitivity,
+      unknown_count))
+SAME(GetRealOutputDerivatives, GetOutputDerivatives,
+     (fmi2Component c, const fmi2ValueReference references[], size_t count,
+      const fmi2Integer orders[], fmi2Real values[]),
+     (instance_of(c), references, count, orders, values, count))
 
 /* ---- Loading -------------------------------------------------------------------------------- */
 
@@ -490,32 +433,21 @@ void *fmu_version_open(struct fmu_functions *functions) {
 }
 
 const char *fmu_name_of(enum fmu_function function) {
-    switch (function) {
-    case FMU_GetReal:
-        return "fmi3GetFloat64";
-    case FMU_SetReal:
-        return "fmi3SetFloat64";
-    case FMU_GetInteger:
-        return "fmi3GetInt32";
-    case FMU_SetInteger:
-        return "fmi3SetInt32";
-    case FMU_GetFMUstate:
-        return "fmi3GetFMUState";
-    case FMU_SetFMUstate:
-        return "fmi3SetFMUState";
-    case FMU_FreeFMUstate:
-        return "fmi3FreeFMUState";
-    case FMU_SerializedFMUstateSize:
-        return "fmi3SerializedFMUStateSize";
-    case FMU_SerializeFMUstate:
-        return "fmi3SerializeFMUState";
-    case FMU_DeSerializeFMUstate:
-        return "fmi3DeserializeFMUState";
-    case FMU_GetDerivatives:
-        return "fmi3GetContinuousStateDerivatives";
-    default:
-        return fmu_function_names[function] + sizeof "fmi2" - 1;
-    }
+    static const char *const other_names[FMU_FUNCTION_COUNT] = {
+        [FMU_GetReal] = "fmi3GetFloat64",
+        [FMU_SetReal] = "fmi3SetFloat64",
+        [FMU_GetInteger] = "fmi3GetInt32",
+        [FMU_SetInteger] = "fmi3SetInt32",
+        [FMU_GetFMUstate] = "fmi3GetFMUState",
+        [FMU_SetFMUstate] = "fmi3SetFMUState",
+        [FMU_FreeFMUstate] = "fmi3FreeFMUState",
+        [FMU_SerializedFMUstateSize] = "fmi3SerializedFMUStateSize",
+        [FMU_SerializeFMUstate] = "fmi3SerializeFMUState",
+        [FMU_DeSerializeFMUstate] = "fmi3DeserializeFMUState",
+        [FMU_GetDerivatives] = "fmi3GetContinuousStateDerivatives",
+    };
+    return other_names[function] != NULL ? other_names[function]
+                                         : fmu_function_names[function] + sizeof "fmi2" - 1;
 }
 
 /* ---- States --------------------------------------------------------------------------------- */

@@ -175,10 +175,9 @@ void fmu_tear_down(const struct fmu_log *log) {
 }
 
 void fmu_initialize(fmi2Component component, double start, double tolerance) {
-    TEST_ASSERT_EQUAL_INT(
-        fmi2OK, fmu.SetupExperiment(component, tolerance > 0.0, tolerance, start, fmi2False, 0.0));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.EnterInitializationMode(component));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.ExitInitializationMode(component));
+    ASSERT_OK(fmu.SetupExperiment(component, tolerance > 0.0, tolerance, start, fmi2False, 0.0));
+    ASSERT_OK(fmu.EnterInitializationMode(component));
+    ASSERT_OK(fmu.ExitInitializationMode(component));
 }
 
 fmi2Component fmu_initialized_with(fmi2Integer method, struct fmu_log *log, double start) {
@@ -199,22 +198,22 @@ fmi2Status fmu_try_set(fmi2Component component, fmi2ValueReference reference, do
 }
 
 void fmu_set(fmi2Component component, fmi2ValueReference reference, double value) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_try_set(component, reference, value));
+    ASSERT_OK(fmu_try_set(component, reference, value));
 }
 
 double fmu_get(fmi2Component component, fmi2ValueReference reference) {
     double value = 0.0;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(component, &reference, 1, &value));
+    ASSERT_OK(fmu.GetReal(component, &reference, 1, &value));
     return value;
 }
 
 void fmu_set_integer(fmi2Component component, fmi2ValueReference reference, fmi2Integer value) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(component, &reference, 1, &value));
+    ASSERT_OK(fmu.SetInteger(component, &reference, 1, &value));
 }
 
 fmi2Integer fmu_get_integer(fmi2Component component, fmi2ValueReference reference) {
     fmi2Integer value = 0;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetInteger(component, &reference, 1, &value));
+    ASSERT_OK(fmu.GetInteger(component, &reference, 1, &value));
     return value;
 }
 
@@ -257,8 +256,8 @@ void fmu_only_in(unsigned version, const char *reason) {
 
 void fmu_assert_in_error(fmi2Component component) {
     const double time = fmu_get(component, RP_MANIPULATOR_time);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.DoStep(component, time, 0.01, fmi2True));
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu_try_set(component, RP_MANIPULATOR_tau1, 1.0));
+    ASSERT_ERROR(fmu.DoStep(component, time, 0.01, fmi2True));
+    ASSERT_ERROR(fmu_try_set(component, RP_MANIPULATOR_tau1, 1.0));
     (void)fmu_get(component, RP_MANIPULATOR_q1);
 }
 

@@ -52,6 +52,11 @@ void fmu_log_clear(struct fmu_log *log);
 unsigned fmu_log_count(const struct fmu_log *log, const char *category);
 unsigned fmu_log_total(const struct fmu_log *log);
 
+/* The status of a call; the messages are shown where it is another one. */
+#define ASSERT_OK(call)      TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, call, messages.text)
+#define ASSERT_DISCARD(call) TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Discard, call, messages.text)
+#define ASSERT_ERROR(call)   TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2Error, call, messages.text)
+
 /* Fails the test unless one message contains text. */
 void fmu_assert_logged(const struct fmu_log *log, const char *text);
 

@@ -165,7 +165,6 @@ CLOCK_CALL(SetShiftFraction, counters, resolutions)
 
 #define REFUSED(name)                                                                              \
     static void call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {        \
-        (void)session;                                                                             \
         require_refusal(FUZZ_FMI3_CHECKED_PLAIN(instance, name), "fmi3" #name);                    \
     }
 REFUSED(EvaluateDiscreteStates)

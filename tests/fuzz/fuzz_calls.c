@@ -11,8 +11,6 @@ const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 /* ---- Life and logging ------------------------------------------------------------------------ */
 
 void fuzz_call_GetTypesPlatform(struct fuzz_session *session, struct fuzz_instance *instance) {
-    (void)session;
-    (void)instance;
     if (strcmp(FUZZ_CALL(fuzz_fmu.GetTypesPlatform()), fmi2TypesPlatform) != 0) {
         fuzz_fail("fmi2GetTypesPlatform returns another platform");
     }
@@ -58,7 +56,6 @@ void fuzz_call_SetupExperiment(struct fuzz_session *session, struct fuzz_instanc
 }
 
 void fuzz_call_CancelStep(struct fuzz_session *session, struct fuzz_instance *instance) {
-    (void)session;
     FUZZ_CHECKED_PLAIN(instance, CancelStep);
 }
 

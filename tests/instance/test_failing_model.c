@@ -1,18 +1,11 @@
 /* A model that fails to compute its outputs or their derivatives for a while: each call reports it
  * and gives no value. Afterwards it works again. */
 #include "derivatives.h"
-#include "last_text.h"
+#include "one_instance.h"
 #include "oscillator_by_hand.h"
-#include "stepping.h"
-#include "values.h"
-
-#include <math.h>
-#include <string.h>
-#include <unity.h>
 
 static struct model model;
 static struct model_description model_description;
-static struct instance *instance;
 static bool has_outputs;
 static int propagations_left; /* before one fails */
 static bool is_infinite;      /* what propagations give */
@@ -33,7 +26,6 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 }
 
 void setUp(void) {
-    const struct instance_experiment experiment = {.start_time = 0.0};
     model = oscillator_model;
     model.outputs = outputs;
     model.propagate = propagate;
@@ -42,16 +34,10 @@ void setUp(void) {
     has_outputs = true;
     propagations_left = 100;
     is_infinite = false;
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
+    create(&model_description);
+    initialize_at(0.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.1));
     last_text[0] = '\0';
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
 }
 
 static const unsigned energy = OSCILLATOR_ENERGY;
@@ -88,10 +74,8 @@ static void assert_works(enum status call(double *)) {
 
 /* Outputs that are valid already are not computed again, so an input is set first. */
 static void without_outputs(void) {
-    const unsigned input = OSCILLATOR_U;
-    const double u = 0.5;
     has_outputs = false;
-    ASSERT_OK(instance_set_real(instance, &input, 1, &u));
+    set(OSCILLATOR_U, 0.5);
 }
 
 static void test_without_outputs_nothing_is_read_or_derived(void) {
@@ -106,10 +90,8 @@ static void test_without_outputs_nothing_is_read_or_derived(void) {
 }
 
 static void test_states_are_read_without_outputs(void) {
-    double value = NAN;
     without_outputs();
-    ASSERT_OK(instance_get_real(instance, &x, 1, &value));
-    TEST_ASSERT_TRUE(isfinite(value));
+    TEST_ASSERT_TRUE(isfinite(get(OSCILLATOR_X)));
 }
 
 /* Along time the model propagates twice. */

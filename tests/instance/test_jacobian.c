@@ -1,17 +1,10 @@
 /* The Jacobian that the implicit method gets from the model, and the evaluations it saves. */
-#include "instance.h"
-
 #include "derivatives.h"
-#include "last_text.h"
+#include "one_instance.h"
 #include "oscillator_by_hand.h"
 #include "right_hand_side.h"
-#include "stepping.h"
-#include "values.h"
 
 #include <float.h>
-#include <math.h>
-#include <string.h>
-#include <unity.h>
 
 /* The oscillator with a spring that depends on position, time and input, and with damping:
  * x'' = -omega^2 (1 + t + u) sin x - gain x'. */
@@ -37,13 +30,10 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-static struct instance *instance;
 static struct model model;
 static struct model_description model_description;
 
 void setUp(void) {
-    memset(last_text, 0, sizeof last_text);
-    instance = NULL;
     model = oscillator_model;
     model.right_hand_side = right_hand_side;
     model.jacobian = jacobian;
@@ -51,38 +41,20 @@ void setUp(void) {
     model_description.model = &model;
 }
 
-void tearDown(void) {
-    instance_destroy(instance);
-}
-
 static const double start = 5.0; /* s */
 
 static void begin(int method, double omega, double gain) {
-    const unsigned solver_method = OSCILLATOR_SOLVER_METHOD;
-    const unsigned parameters[] = {OSCILLATOR_OMEGA, OSCILLATOR_GAIN};
-    const struct instance_experiment experiment = {.start_time = start};
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
-    ASSERT_OK(instance_set_integer(instance, &solver_method, 1, &method));
-    ASSERT_OK(instance_set_real(instance, parameters, 2, (const double[]){omega, gain}));
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
-}
-
-static void set(unsigned reference, double value) {
-    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
+    create(&model_description);
+    set_int(OSCILLATOR_SOLVER_METHOD, method);
+    set(OSCILLATOR_OMEGA, omega);
+    set(OSCILLATOR_GAIN, gain);
+    initialize_at(start);
 }
 
 static void set_slope(double slope) {
     const unsigned input = OSCILLATOR_U;
     const int order = 1;
     ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &slope));
-}
-
-static int count(unsigned reference) {
-    int value = -1;
-    ASSERT_OK(instance_get_integer(instance, &reference, 1, &value));
-    return value;
 }
 
 /* ---- With which values it is evaluated ------------------------------------------------------ */
@@ -153,13 +125,12 @@ static void run_watched(int method) {
 static void test_it_is_taken_where_the_right_hand_side_was(void) {
     run_watched(INTEGRATOR_CVODE_BDF);
     TEST_ASSERT_GREATER_THAN_INT(32, jacobians);
-    TEST_ASSERT_LESS_THAN_INT(count(OSCILLATOR_EVALUATIONS) / 2, jacobians);
+    TEST_ASSERT_LESS_THAN_INT(get_int(OSCILLATOR_EVALUATIONS) / 2, jacobians);
 }
 
 static void test_explicit_methods_do_without(void) {
     run_watched(INTEGRATOR_CVODE_ADAMS);
     TEST_ASSERT_EQUAL_INT(0, jacobians);
-    instance_destroy(instance);
     run_watched(INTEGRATOR_ERK);
     TEST_ASSERT_EQUAL_INT(0, jacobians);
 }
@@ -183,10 +154,6 @@ static enum status late_jacobian(const void *values, double t, const double x[],
 
 static enum status no_jacobian(const void *values, double t, const double x[], const double u[],
                                double J[]) {
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
     memset(J, 0, sizeof(double[4]));
     return STATUS_OK;
 }
@@ -195,19 +162,18 @@ static enum status no_jacobian(const void *values, double t, const double x[], c
  * whether the steps allowed are enough: those that are not are many evaluations, too. */
 static int evaluations(enum status with(const void *values, double t, const double x[],
                                         const double u[], double J[])) {
-    instance_destroy(instance);
     model.jacobian = with;
     begin(INTEGRATOR_CVODE_BDF, 100.0, 2000.0);
     set(OSCILLATOR_U, 1.0);
     const enum status status = instance_do_step(instance, start, 1.0);
     TEST_ASSERT_TRUE(status == STATUS_OK || (with != jacobian && status == STATUS_TOO_MANY_STEPS));
-    return count(OSCILLATOR_EVALUATIONS);
+    return get_int(OSCILLATOR_EVALUATIONS);
 }
 
 /* With the right one nearly every step takes one evaluation. */
 static void test_a_wrong_one_shows_in_the_evaluations(void) {
     const int right = evaluations(jacobian);
-    TEST_ASSERT_LESS_THAN_INT(count(OSCILLATOR_STEPS) * 11 / 10, right);
+    TEST_ASSERT_LESS_THAN_INT(get_int(OSCILLATOR_STEPS) * 11 / 10, right);
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(late_jacobian));
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(transposed_jacobian));
     TEST_ASSERT_GREATER_THAN_INT(right * 5 / 4, evaluations(no_jacobian));

@@ -3,36 +3,23 @@
 #include "plausibility.h"
 
 #include "fields.h"
-#include "last_text.h"
+#include "one_instance.h"
 #include "oscillator_by_hand.h"
 #include "settings.h"
-#include "stepping.h"
 
 #include <limits.h>
-#include <math.h>
-#include <string.h>
-#include <unity.h>
 
-static struct instance *instance;
 static struct instance_state state; /* of an instance that has taken a step */
 static char block[1024];
 
 void setUp(void) {
-    const struct instance_experiment experiment = {.stop_time_defined = true, .stop_time = 10.0};
-    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &instance));
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
+    create(&oscillator_description);
+    initialize_of(instance, 0.0, 10.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
     ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
     state = instance->state;
     TEST_ASSERT_TRUE(state.has_history && instance->memory.size <= sizeof block);
     memcpy(block, instance->memory.block, instance->memory.size);
-    memset(last_text, 0, sizeof last_text);
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
 }
 
 static bool is_plausible(void) {
@@ -205,19 +192,15 @@ static void test_a_history_does_not_contradict_itself(void) {
 /* A history that does not reach its first time in the steps it names cannot be replayed, though it
  * would reach its latest time from there. */
 static void test_a_history_that_is_too_short_is_found_at_the_next_step(void) {
-    struct instance *forged;
-    const struct instance_experiment experiment = {0};
-    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &forged));
-    ASSERT_OK(instance_setup_experiment(forged, &experiment));
-    ASSERT_OK(instance_enter_initialization(forged));
-    ASSERT_OK(instance_exit_initialization(forged));
+    struct instance *forged = created(&oscillator_description);
+    initialize_of(forged, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(forged, 0.0, 0.5));
     const long needed = forged->state.statistics.steps;
     TEST_ASSERT_GREATER_THAN_INT(2, needed);
     ASSERT_OK(instance_do_step(forged, 0.5, 1e-3));
     forged->state.steps_before_restart = forged->state.statistics.steps - (needed - 1);
     forged->history_is_lost = true;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_do_step(forged, 0.501, 1e-3));
+    ASSERT_REFUSED(instance_do_step(forged, 0.501, 1e-3));
     instance_destroy(forged);
 }
 

@@ -1,53 +1,17 @@
 /* What a step does on its way: inputs at four times, reports of internal steps, and nothing at all
  * where it fails. With each method, on the oscillator. */
-#include "instance.h"
-
 #include "allocations.h"
 #include "each_method.h"
-#include "last_text.h"
+#include "one_instance.h"
 #include "oscillator_by_hand.h"
 #include "polynomial.h"
 #include "snapshot.h"
-#include "stepping.h"
-#include "values.h"
-
-#include <math.h>
-#include <string.h>
-#include <unity.h>
-
-static struct instance *instance;
-
-static void create(void) {
-    const unsigned reference = OSCILLATOR_SOLVER_METHOD;
-    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &instance));
-    ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
-    const unsigned limited = OSCILLATOR_MAX_STEP;
-    const double max_step = 0.25; // so that all methods need some steps
-    ASSERT_OK(instance_set_real(instance, &limited, 1, &max_step));
-    const struct instance_experiment experiment = {.start_time = 1.0};
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
-}
 
 void setUp(void) {
-    memset(last_text, 0, sizeof last_text);
-    create();
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
-}
-
-static double get(unsigned reference) {
-    double value = NAN;
-    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
-    return value;
-}
-
-static void set_input(double value) {
-    const unsigned reference = OSCILLATOR_U;
-    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
+    create(&oscillator_description);
+    set_int(OSCILLATOR_SOLVER_METHOD, method);
+    set(OSCILLATOR_MAX_STEP, 0.25); // so that all methods need some steps
+    initialize_at(1.0);
 }
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
@@ -61,15 +25,12 @@ static double cubic(double time) {
 static unsigned asked;
 
 static enum status set_cubic(void *context, double time) {
-    (void)context;
     asked++;
-    set_input(cubic(time));
+    set(OSCILLATOR_U, cubic(time));
     return STATUS_OK;
 }
 
 static enum status refuse(void *context, double time) {
-    (void)context;
-    (void)time;
     return STATUS_INVALID_ARGUMENT;
 }
 
@@ -103,8 +64,7 @@ EACH_METHOD static void test_a_cubic_input_is_exact(void) {
 
 EACH_METHOD static void test_a_refusal_ends_the_step(void) {
     const struct step_options options = {.ask_inputs = refuse};
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          instance_do_step_with(instance, 1.0, 0.5, &options));
+    ASSERT_REFUSED(instance_do_step_with(instance, 1.0, 0.5, &options));
     TEST_ASSERT_TRUE(instance_time(instance) == 1.0);
 }
 
@@ -167,24 +127,16 @@ EACH_METHOD static void test_a_report_may_end_the_step_at_once(void) {
 
 EACH_METHOD static void test_a_report_may_fail_the_step(void) {
     begin_noting(INFINITY, STATUS_INVALID_ARGUMENT);
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          instance_do_step_with(instance, 1.0, 3.0, &noting));
+    ASSERT_REFUSED(instance_do_step_with(instance, 1.0, 3.0, &noting));
     TEST_ASSERT_EQUAL_UINT(3, reports.count);
 }
 
 /* Asked for the end of internal steps, a step may take as many of them as without. */
 EACH_METHOD static void test_the_limit_of_internal_steps_holds_over_early_ends(void) {
-    const unsigned reference = OSCILLATOR_MAX_STEPS;
-    const int few = 12;
-    tearDown();
-    ASSERT_OK(instance_create(&oscillator_description, &last_text_sink, &instance));
-    const unsigned solver = OSCILLATOR_SOLVER_METHOD;
-    ASSERT_OK(instance_set_integer(instance, &solver, 1, &method));
-    ASSERT_OK(instance_set_integer(instance, &reference, 1, &few));
-    const struct instance_experiment experiment = {.start_time = 1.0};
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
+    create(&oscillator_description);
+    set_int(OSCILLATOR_SOLVER_METHOD, method);
+    set_int(OSCILLATOR_MAX_STEPS, 12);
+    initialize_at(1.0);
     begin_noting(90.0, STATUS_OK);
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS,
                           instance_do_step_with(instance, 1.0, 99.0, &noting));
@@ -201,13 +153,13 @@ EACH_METHOD static void test_a_failed_step_is_undone_and_allocates_nothing(void)
     ASSERT_OK(instance_do_step_with(instance, 1.0, 0.5, &options));
     const double x = get(OSCILLATOR_X);
     const long before = allocation_count();
-    set_input(1.7e308);
+    set(OSCILLATOR_U, 1.7e308);
     const enum status failed = instance_do_step_with(instance, 1.5, 10.0, &options);
     TEST_ASSERT_EQUAL_INT(before, allocation_count());
     TEST_ASSERT_EQUAL_INT(SEVERITY_DISCARD, status_severity(failed));
     TEST_ASSERT_TRUE(instance_time(instance) == 1.5);
     TEST_ASSERT_TRUE(x == get(OSCILLATOR_X));
-    set_input(0.0);
+    set(OSCILLATOR_U, 0.0);
     ASSERT_OK(instance_do_step_with(instance, 1.5, 0.5, &options));
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, cos(2.0), get(OSCILLATOR_X));
 }

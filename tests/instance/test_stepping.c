@@ -1,22 +1,13 @@
 /* From one communication point to the next, with each method, against the solution in closed form.
  */
-#include "instance.h"
-
 #include "allocations.h"
 #include "derivatives.h"
 #include "each_method.h"
-#include "last_text.h"
+#include "one_instance.h"
 #include "oscillator_by_hand.h"
 #include "snapshot.h"
-#include "stepping.h"
-#include "values.h"
 
-#include <math.h>
 #include <stdint.h>
-#include <string.h>
-#include <unity.h>
-
-static struct instance *instance;
 
 /* The oscillator, with a note of how far the integrator has gone. */
 static double latest; /* s: latest time that the right-hand side was evaluated at */
@@ -36,12 +27,11 @@ static enum status watched_extend(const struct series_origin *origin, int first,
     return oscillator_model.series->extend(origin, first, last, row);
 }
 
-static struct instance *create(void) {
+static struct instance *watched(void) {
     static struct series series;
     static struct model model;
     static struct model_description model_description;
     const unsigned reference = OSCILLATOR_SOLVER_METHOD;
-    struct instance *created = NULL;
     model = oscillator_model;
     model.right_hand_side = watched_rhs;
     series = *oscillator_model.series;
@@ -49,19 +39,14 @@ static struct instance *create(void) {
     model.series = &series;
     model_description = oscillator_description;
     model_description.model = &model;
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &created));
-    ASSERT_OK(instance_set_integer(created, &reference, 1, &method));
-    return created;
+    struct instance *made = created(&model_description);
+    ASSERT_OK(instance_set_integer(made, &reference, 1, &method));
+    return made;
 }
 
 void setUp(void) {
-    memset(last_text, 0, sizeof last_text);
     latest = -INFINITY;
-    instance = create();
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
+    instance = watched();
 }
 
 /* Back to what setUp gives. */
@@ -70,43 +55,15 @@ static void begin_anew(void) {
     setUp();
 }
 
-static double get(struct instance *from, unsigned reference) {
-    double value = NAN;
-    ASSERT_OK(instance_get_real(from, &reference, 1, &value));
-    return value;
-}
-
-static int get_integer(unsigned reference) {
-    int value = -1;
-    ASSERT_OK(instance_get_integer(instance, &reference, 1, &value));
-    return value;
-}
-
-static enum status set(struct instance *to, unsigned reference, double value) {
-    return instance_set_real(to, &reference, 1, &value);
-}
-
-static void initialize_until(struct instance *started, double start, double stop) {
-    const struct instance_experiment experiment = {
-        .start_time = start, .stop_time_defined = isfinite(stop), .stop_time = stop};
-    ASSERT_OK(instance_setup_experiment(started, &experiment));
-    ASSERT_OK(instance_enter_initialization(started));
-    ASSERT_OK(instance_exit_initialization(started));
-}
-
-static void initialize(struct instance *started, double start) {
-    initialize_until(started, start, INFINITY);
-}
-
 static void get_states(struct instance *from, double states[2]) {
-    states[0] = get(from, OSCILLATOR_X);
-    states[1] = get(from, OSCILLATOR_V);
+    states[0] = get_of(from, OSCILLATOR_X);
+    states[1] = get_of(from, OSCILLATOR_V);
 }
 
 /* An experiment whose input changes at every third step. */
 static void run(struct instance *stepped, int steps, double states[2]) {
     for (int i = 0; i < steps; i++) {
-        ASSERT_OK(set(stepped, OSCILLATOR_U, sin((i / 3) * 0.1)));
+        set_of(stepped, OSCILLATOR_U, sin((i / 3) * 0.1));
         ASSERT_OK(instance_do_step(stepped, i * 0.01, 0.01));
     }
     get_states(stepped, states);
@@ -117,95 +74,93 @@ static void run(struct instance *stepped, int steps, double states[2]) {
 
 EACH_METHOD static void test_held_inputs_give_the_exact_piecewise_solution(void) {
     double exact[2] = {1.0, 0.0};
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     for (int i = 0; i < 300; i++) {
         const double u = cos(0.3 * i);
-        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        set(OSCILLATOR_U, u);
         ASSERT_OK(instance_do_step(instance, 0.02 * i, 0.02));
         oscillator_solution(2.0, u, 0.02, exact, exact);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(instance, OSCILLATOR_V));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[1], get(OSCILLATOR_V));
     }
-    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(instance, OSCILLATOR_TIME));
+    TEST_ASSERT_EQUAL_DOUBLE(0.02 * 299 + 0.02, get(OSCILLATOR_TIME));
 }
 
 EACH_METHOD static void test_a_tunable_parameter_acts_from_the_next_step_on(void) {
     double exact[2] = {1.0, 0.0};
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     ASSERT_OK(instance_do_step(instance, 0.0, 0.5));
     oscillator_solution(2.0, 0.0, 0.5, exact, exact);
-    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 3.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+    set(OSCILLATOR_OMEGA, 3.0);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
     ASSERT_OK(instance_do_step(instance, 0.5, 0.5));
     oscillator_solution(3.0, 0.0, 0.5, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
 }
 
 EACH_METHOD static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
-    const unsigned reference = OSCILLATOR_MAX_STEPS;
-    const int limit = 20;
     double exact[2] = {1.0, 0.0};
-    ASSERT_OK(instance_set_integer(instance, &reference, 1, &limit));
-    initialize(instance, 5.0);
+    set_int(OSCILLATOR_MAX_STEPS, 20);
+    initialize_at(5.0);
     TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 5.0, 100.0));
     const double t = instance_time(instance);
     TEST_ASSERT_TRUE(t > 5.0 && t < 105.0);
-    TEST_ASSERT_EQUAL_DOUBLE(t, get(instance, OSCILLATOR_TIME));
+    TEST_ASSERT_EQUAL_DOUBLE(t, get(OSCILLATOR_TIME));
     oscillator_solution(2.0, 0.0, t - 5.0, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(instance, OSCILLATOR_X));
-    TEST_ASSERT_EQUAL_INT(20, get_integer(OSCILLATOR_STEPS));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
+    TEST_ASSERT_EQUAL_INT(20, get_int(OSCILLATOR_STEPS));
 }
 
 EACH_METHOD static void test_setting_the_same_values_again_changes_nothing(void) {
-    struct instance *untouched = create();
-    initialize(instance, 0.0);
-    initialize(untouched, 0.0);
+    struct instance *untouched = watched();
+    initialize_at(0.0);
+    initialize_of(untouched, 0.0, INFINITY);
     for (int i = 0; i < 100; i++) {
-        ASSERT_OK(set(instance, OSCILLATOR_U, 5.0)); // set and taken back before the step
-        ASSERT_OK(set(instance, OSCILLATOR_U, 0.0));
-        ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 2.0));
-        (void)get(instance, OSCILLATOR_ENERGY);
+        set(OSCILLATOR_U, 5.0); // set and taken back before the step
+        set(OSCILLATOR_U, 0.0);
+        set(OSCILLATOR_OMEGA, 2.0);
+        (void)get(OSCILLATOR_ENERGY);
         ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
         ASSERT_OK(instance_do_step(untouched, 0.01 * i, 0.01));
-        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_X), get(instance, OSCILLATOR_X));
-        TEST_ASSERT_EQUAL_DOUBLE(get(untouched, OSCILLATOR_V), get(instance, OSCILLATOR_V));
+        TEST_ASSERT_EQUAL_DOUBLE(get_of(untouched, OSCILLATOR_X), get(OSCILLATOR_X));
+        TEST_ASSERT_EQUAL_DOUBLE(get_of(untouched, OSCILLATOR_V), get(OSCILLATOR_V));
     }
     instance_destroy(untouched);
 }
 
 EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
-        ASSERT_OK(set(instance, OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0));
+        set(OSCILLATOR_U, i % 2 == 0 ? 0.0 : -0.0);
         ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
     }
-    const int alternating = get_integer(OSCILLATOR_STEPS);
+    const int alternating = get_int(OSCILLATOR_STEPS);
     begin_anew();
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
         ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
     }
-    TEST_ASSERT_EQUAL_INT(get_integer(OSCILLATOR_STEPS), alternating);
+    TEST_ASSERT_EQUAL_INT(get_int(OSCILLATOR_STEPS), alternating);
 }
 
 EACH_CVODE_METHOD static void test_a_restart_happens_only_where_something_changed(void) {
     double states[2];
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     for (int i = 0; i < 100; i++) {
         ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
     }
-    const int held = get_integer(OSCILLATOR_STEPS);
+    const int held = get_int(OSCILLATOR_STEPS);
 
     begin_anew();
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     run(instance, 100, states);
-    TEST_ASSERT_TRUE(get_integer(OSCILLATOR_STEPS) > 3 * held);
-    TEST_ASSERT_TRUE(get_integer(OSCILLATOR_EVALUATIONS) > get_integer(OSCILLATOR_STEPS));
+    TEST_ASSERT_TRUE(get_int(OSCILLATOR_STEPS) > 3 * held);
+    TEST_ASSERT_TRUE(get_int(OSCILLATOR_EVALUATIONS) > get_int(OSCILLATOR_STEPS));
 }
 
 EACH_METHOD static void test_steps_allocate_nothing(void) {
     double states[2];
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     const long before = allocation_count();
     run(instance, 100, states);
     TEST_ASSERT_EQUAL_INT(before, allocation_count());
@@ -221,11 +176,11 @@ static void step_held(int steps, double h) {
 
 EACH_CVODE_METHOD static void test_internal_steps_pass_points_where_nothing_changes(void) {
     const double h = 1.0 / 1024.0;
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     step_held(1024, h);
     TEST_ASSERT_TRUE(latest > 1.0 + h);
-    TEST_ASSERT_LESS_THAN_INT(512, get_integer(OSCILLATOR_STEPS));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(instance, OSCILLATOR_X));
+    TEST_ASSERT_LESS_THAN_INT(512, get_int(OSCILLATOR_STEPS));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(OSCILLATOR_X));
 }
 
 EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
@@ -233,12 +188,12 @@ EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; i++) {
         const double h = stops[i] / 100.0;
         begin_anew();
-        initialize_until(instance, 0.0, stops[i]);
+        initialize_of(instance, 0.0, stops[i]);
         step_held(100, h);
         TEST_ASSERT_TRUE(latest <= stops[i] * (1.0 + 1e-12));
         // a series is evaluated where a step begins
         TEST_ASSERT_TRUE(method == INTEGRATOR_TAYLOR || latest >= stops[i] * (1.0 - 1e-12));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(instance, OSCILLATOR_X));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0 * stops[i]), get(OSCILLATOR_X));
     }
 }
 
@@ -248,7 +203,7 @@ EACH_METHOD static void test_a_rollback_repeats_one_series_at_most(void) {
     struct instance_snapshot *snapshot = NULL;
     double expected[2];
     double states[2];
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     for (int i = 0; i < 400; i++) {
         const double t = instance_time(instance);
         ASSERT_OK(instance_save(instance, 0, &snapshot));
@@ -272,7 +227,7 @@ EACH_METHOD static void test_no_internal_step_passes_the_end_of_a_polynomial(voi
     const int order = 1;
     const double slope = 0.5;
     const double h = 1.0 / 1024.0;
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     step_held(1024, h);
     for (int i = 1024; i < 1100; i++) {
         latest = -INFINITY;
@@ -288,12 +243,12 @@ EACH_METHOD static void test_a_new_input_acts_from_the_point_on(void) {
     const double length = 0.25;
     double exact[2];
     double states[2];
-    initialize(instance, 0.0);
+    initialize_at(0.0);
     step_held(1024, h);
     for (int i = 0; i < 40; i++) {
         const double u = i % 2 == 0 ? 3.0 : -3.0;
         get_states(instance, states);
-        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        set(OSCILLATOR_U, u);
         ASSERT_OK(instance_do_step(instance, 1.0 + i * length, length));
         oscillator_solution(2.0, u, length, states, exact);
         get_states(instance, states);
@@ -308,17 +263,17 @@ EACH_METHOD static void test_a_new_parameter_makes_a_new_instance(void) {
     const double h = 1.0 / 1024.0;
     double states[2];
     double expected[2];
-    initialize_until(instance, 0.0, 4.0);
+    initialize_of(instance, 0.0, 4.0);
     step_held(1024, h);
     get_states(instance, states);
-    struct instance *fresh = create();
-    ASSERT_OK(set(fresh, OSCILLATOR_X, states[0]));
-    ASSERT_OK(set(fresh, OSCILLATOR_V, states[1]));
-    ASSERT_OK(set(fresh, OSCILLATOR_OMEGA, 3.0));
-    ASSERT_OK(set(fresh, OSCILLATOR_U, 1.5));
-    initialize_until(fresh, 1.0, 4.0);
-    ASSERT_OK(set(instance, OSCILLATOR_OMEGA, 3.0));
-    ASSERT_OK(set(instance, OSCILLATOR_U, 1.5));
+    struct instance *fresh = watched();
+    set_of(fresh, OSCILLATOR_X, states[0]);
+    set_of(fresh, OSCILLATOR_V, states[1]);
+    set_of(fresh, OSCILLATOR_OMEGA, 3.0);
+    set_of(fresh, OSCILLATOR_U, 1.5);
+    initialize_of(fresh, 1.0, 4.0);
+    set(OSCILLATOR_OMEGA, 3.0);
+    set(OSCILLATOR_U, 1.5);
     for (int i = 1024; i < 2048; i++) {
         ASSERT_OK(instance_do_step(instance, i * h, h));
         ASSERT_OK(instance_do_step(fresh, i * h, h));
@@ -348,13 +303,13 @@ static double error_with_jumps(double tolerance, double jump, int every) {
     double error = 0.0;
     double scale = 0.0;
     begin_anew();
-    ASSERT_OK(set(instance, OSCILLATOR_RELATIVE_TOLERANCE, tolerance));
-    initialize(instance, 0.0);
+    set(OSCILLATOR_RELATIVE_TOLERANCE, tolerance);
+    initialize_at(0.0);
     for (int i = 0; i < 1000; i++) {
         if (i % every == 0) {
             u = 1.0 + jump * random_sign(&random);
         }
-        ASSERT_OK(set(instance, OSCILLATOR_U, u));
+        set(OSCILLATOR_U, u);
         ASSERT_OK(instance_do_step(instance, i * h, h));
         oscillator_solution(2.0, u, h, exact, exact);
         get_states(instance, states);
@@ -385,7 +340,7 @@ EACH_METHOD static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
 EACH_METHOD static void test_a_step_that_rounds_to_none_is_refused(void) {
     const double far = 9007199254740992.0;
     TEST_ASSERT_TRUE(far + 1.0 == far && far - 1.0 != far);
-    initialize_until(instance, far, INFINITY);
+    initialize_of(instance, far, INFINITY);
     TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME, instance_do_step(instance, far, 1.0));
     TEST_ASSERT_NOT_NULL(strstr(last_text, "does not change the time"));
     ASSERT_OK(instance_do_step(instance, far, 2.0));
@@ -409,8 +364,8 @@ static int steps_with_nominal(double nominal) {
     description.variables = variables;
     ASSERT_OK(instance_create(&description, &last_text_sink, &scaled));
     ASSERT_OK(instance_set_integer(scaled, &method_reference, 1, &method));
-    ASSERT_OK(set(scaled, OSCILLATOR_X, 1e-6));
-    initialize_until(scaled, 0.0, INFINITY);
+    set_of(scaled, OSCILLATOR_X, 1e-6);
+    initialize_of(scaled, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(scaled, 0.0, 10.0));
     ASSERT_OK(instance_get_integer(scaled, &steps_reference, 1, &steps));
     instance_destroy(scaled);
@@ -423,19 +378,19 @@ EACH_METHOD static void test_nominal_values_scale_the_absolute_tolerance(void) {
 
 /* A restart takes its first step from the last one: it needs no evaluation to find one. */
 EACH_CVODE_METHOD static void test_a_restart_finds_its_first_step_without_evaluations(void) {
-    struct instance *fresh = create();
+    struct instance *fresh = watched();
     const double x = 0.5;
-    initialize_until(instance, 0.0, INFINITY);
+    initialize_of(instance, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(instance, 0.0, 2.0));
-    const int before = get_integer(OSCILLATOR_EVALUATIONS);
-    ASSERT_OK(set(instance, OSCILLATOR_U, x));
+    const int before = get_int(OSCILLATOR_EVALUATIONS);
+    set(OSCILLATOR_U, x);
     ASSERT_OK(instance_do_step(instance, 2.0, 1e-6));
-    const int restarted = get_integer(OSCILLATOR_EVALUATIONS) - before;
+    const int restarted = get_int(OSCILLATOR_EVALUATIONS) - before;
 
-    ASSERT_OK(set(fresh, OSCILLATOR_X, get(instance, OSCILLATOR_X)));
-    ASSERT_OK(set(fresh, OSCILLATOR_V, get(instance, OSCILLATOR_V)));
-    ASSERT_OK(set(fresh, OSCILLATOR_U, x));
-    initialize_until(fresh, 0.0, INFINITY);
+    set_of(fresh, OSCILLATOR_X, get(OSCILLATOR_X));
+    set_of(fresh, OSCILLATOR_V, get(OSCILLATOR_V));
+    set_of(fresh, OSCILLATOR_U, x);
+    initialize_of(fresh, 0.0, INFINITY);
     ASSERT_OK(instance_do_step(fresh, 0.0, 1e-6));
     const unsigned reference = OSCILLATOR_EVALUATIONS;
     int evaluations = 0;

@@ -54,8 +54,8 @@ static void test_what_may_be_set_when(void) {
 
 static void test_bounds_belong_to_the_range(void) {
     const struct variable *omega = get(OSCILLATOR_OMEGA);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, variable_check_value(omega, -10.0, &quiet));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, variable_check_value(omega, 100.0, &quiet));
+    ASSERT_OK(variable_check_value(omega, -10.0, &quiet));
+    ASSERT_OK(variable_check_value(omega, 100.0, &quiet));
     TEST_ASSERT_EQUAL_INT(STATUS_OUT_OF_RANGE, variable_check_value(omega, 100.5, &last_text_sink));
     TEST_ASSERT_EQUAL_STRING("omega = 100.5 is refused: a value from -10 to 100 is expected",
                              last_text);

@@ -254,15 +254,14 @@ static void test_the_rest_allocates_nothing(void) {
             fmi2FMUstate states[] = {fmu_save(c), fmu_save(c)};
             struct fmu_bytes bytes = fmu_serialize(c, states[0]);
             begin_fault(&subject, "everything else", 1, ALLOCATOR_ALL);
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &states[0]));
-            TEST_ASSERT_EQUAL_INT(fmi2OK,
-                                  fmu.SerializeFMUstate(c, states[1], bytes.data, bytes.size));
+            ASSERT_OK(fmu.GetFMUstate(c, &states[0]));
+            ASSERT_OK(fmu.SerializeFMUstate(c, states[1], bytes.data, bytes.size));
             assert_rest_of_run(c, &subject, MIDDLE);
             fmu_forget(c, &states[0]);
-            TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.Terminate(c));
+            ASSERT_OK(fmu.Terminate(c));
             fmu_restore(c, states[1]);
             assert_rest_of_run(c, &subject, MIDDLE);
-            TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.EnterInitializationMode(c));
+            ASSERT_ERROR(fmu.EnterInitializationMode(c));
             assert_reset_is_fresh(c, &subject);
             TEST_ASSERT_EQUAL_INT_MESSAGE(0, allocator_stop(), about);
             fmu.FreeInstance(c);

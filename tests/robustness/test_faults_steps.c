@@ -53,8 +53,7 @@ static void set_input(fmi2Component c, const struct obstacle *obstacle, double t
         return;
     }
     fmu_set(c, f2, obstacle->force_slope * (t - start));
-    TEST_ASSERT_EQUAL_INT(fmi2OK,
-                          fmu.SetRealInputDerivatives(c, &f2, 1, &order, &obstacle->force_slope));
+    ASSERT_OK(fmu.SetRealInputDerivatives(c, &f2, 1, &order, &obstacle->force_slope));
 }
 
 static fmi2Component begin(const struct obstacle *obstacle, fmi2Integer method, bool has_logger) {
@@ -66,9 +65,8 @@ static fmi2Component begin(const struct obstacle *obstacle, fmi2Integer method, 
     const fmi2Component c = fmu.Instantiate("manipulator", fmi2CoSimulation, RP_MANIPULATOR_GUID,
                                             "", &callbacks, fmi2False, fmi2False);
     TEST_ASSERT_NOT_NULL(c);
-    TEST_ASSERT_EQUAL_INT(fmi2OK,
-                          fmu.SetReal(c, set_first, FMU_COUNT(set_first), obstacle->values));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetInteger(c, integers, 2, settings));
+    ASSERT_OK(fmu.SetReal(c, set_first, FMU_COUNT(set_first), obstacle->values));
+    ASSERT_OK(fmu.SetInteger(c, integers, 2, settings));
     fmu_initialize(c, start, 0.0);
     set_input(c, obstacle, start, 0);
     return c;
@@ -86,7 +84,7 @@ static double assert_discarded(fmi2Component c, double t, double h, const char *
                              about);
     TEST_ASSERT_TRUE_MESSAGE(reached == fmu_get(c, RP_MANIPULATOR_time), about);
     if (fmu_version == 2) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
+        ASSERT_OK(fmu.GetBooleanStatus(c, fmi2Terminated, &terminated));
         TEST_ASSERT_EQUAL_INT(fmi2False, terminated);
     }
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, messages.count[fmi2Error], messages.texts);
@@ -108,9 +106,9 @@ static void assert_is_state_at(fmi2Component c, const struct obstacle *obstacle,
     TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.GetReal(c, states, 4, x), about);
     const fmi2Component other = begin(&patient, method, true);
     if (reached > start) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(other, start, reached - start, fmi2True));
+        ASSERT_OK(fmu.DoStep(other, start, reached - start, fmi2True));
     }
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetReal(other, states, 4, expected));
+    ASSERT_OK(fmu.GetReal(other, states, 4, expected));
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(1e-7 * (1.0 + fabs(expected[i])), expected[i], x[i],
                                           about);
@@ -137,7 +135,7 @@ static void halve_to_the_end(fmi2Component c, fmi2Component other,
         double h = fmin(obstacle->length, start + obstacle->end - t);
         set_input(c, obstacle, t, step);
         set_input(other, obstacle, t, step);
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(c, &state));
+        ASSERT_OK(fmu.GetFMUstate(c, &state));
         fmu_log_clear(&messages);
         fmi2Status status = fmu.DoStep(c, t, h, fmi2False);
         while (status == fmi2Discard) {

@@ -7,7 +7,9 @@
 extern char last_text[512];
 extern const struct message_sink last_text_sink;
 
-/* Shows the text of the call that failed. */
-#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, call, last_text)
+/* The status of a call; its text is shown where it is another one. */
+#define ASSERT_STATUS(status, call) TEST_ASSERT_EQUAL_INT_MESSAGE(status, call, last_text)
+#define ASSERT_OK(call)             ASSERT_STATUS(STATUS_OK, call)
+#define ASSERT_REFUSED(call)        ASSERT_STATUS(STATUS_INVALID_ARGUMENT, call)
 
 #endif

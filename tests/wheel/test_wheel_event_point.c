@@ -12,9 +12,9 @@ static void start(void) {
     instance_reset(instance);
     ASSERT_OK(instance_setup_experiment(instance, &experiment));
     ASSERT_OK(instance_enter_initialization(instance));
-    set_real(WHEEL_stop, 2.0);
-    set_real(WHEEL_angle, 1.96);
-    set_real(WHEEL_speed, 1.0);
+    set(WHEEL_stop, 2.0);
+    set(WHEEL_angle, 1.96);
+    set(WHEEL_speed, 1.0);
     ASSERT_OK(instance_exit_initialization(instance));
 }
 
@@ -68,7 +68,7 @@ static void test_a_change_at_the_event_is_noticed(void) {
         start();
         step(EVENTS_LEFT);
         TEST_ASSERT_EQUAL_INT(EVENT_DUE, instance->state.event_point);
-        set_real(WHEEL_speed, changes ? 1.5 : 1.0);
+        set(WHEEL_speed, changes ? 1.5 : 1.0);
         update();
         TEST_ASSERT_EQUAL_INT(changes ? NO_EVENT : EVENT_PASSED, instance->state.event_point);
     }
@@ -81,7 +81,7 @@ static void test_event_mode_without_a_change_changes_nothing(void) {
     values_of(instance)->angle = 2.0; // as rounding could have it
     update();
     TEST_ASSERT_EQUAL_INT(0, values_of(instance)->is_caught);
-    set_real(WHEEL_speed, 1.5);
+    set(WHEEL_speed, 1.5);
     update();
     TEST_ASSERT_EQUAL_INT(1, values_of(instance)->is_caught);
 }

@@ -53,31 +53,28 @@ static void test_other_types_and_references_are_refused(void) {
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         const bool on = true;
         int read = 7;
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set_boolean(cases[i].reference, 1));
+        ASSERT_REFUSED(set_boolean(cases[i].reference, 1));
         assert_text(cases[i].text);
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              instance_set_bool(instance, &cases[i].reference, 1, &on));
+        ASSERT_REFUSED(instance_set_bool(instance, &cases[i].reference, 1, &on));
         assert_text(cases[i].text);
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              instance_get_boolean(instance, &cases[i].reference, 1, &read));
+        ASSERT_REFUSED(instance_get_boolean(instance, &cases[i].reference, 1, &read));
         assert_text(cases[i].text);
         TEST_ASSERT_EQUAL_INT(7, read);
     }
     const unsigned counting = WHEEL_is_counting;
     const double one = 1.0;
     const int on = 1;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, instance_set_real(instance, &counting, 1, &one));
+    ASSERT_REFUSED(instance_set_real(instance, &counting, 1, &one));
     assert_text("is_counting (value reference 21) is accessed as float64: it is of type boolean");
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          instance_set_integer(instance, &counting, 1, &on));
+    ASSERT_REFUSED(instance_set_integer(instance, &counting, 1, &on));
     assert_text("is accessed as int32: it is of type boolean");
 }
 
 static void test_calculated_integers_and_booleans_are_up_to_date(void) {
-    set_real(WHEEL_angle, 20.0); // 3.18 turns
+    set(WHEEL_angle, 20.0); // 3.18 turns
     TEST_ASSERT_EQUAL_INT(3, get_int32(instance, WHEEL_turns));
     TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_turning));
-    set_real(WHEEL_speed, -2.0);
+    set(WHEEL_speed, -2.0);
     TEST_ASSERT_EQUAL_INT(1, get_boolean(instance, WHEEL_is_turning));
     ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
     TEST_ASSERT_EQUAL_INT(0, get_int32(instance, WHEEL_turns));
@@ -96,26 +93,26 @@ static void test_integers_that_cannot_be_calculated_are_not_read(void) {
     const unsigned turning = WHEEL_is_turning;
     int value = 7;
     bool flag = true;
-    set_real(WHEEL_angle, 1e30);
+    set(WHEEL_angle, 1e30);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_get_int32(instance, &turns, 1, &value));
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, instance_get_bool(instance, &turning, 1, &flag));
     TEST_ASSERT_TRUE(value == 7 && flag);
     TEST_ASSERT_EQUAL_INT(0, get_int32(instance, WHEEL_catches));
     TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_caught));
-    TEST_ASSERT_EQUAL_DOUBLE(0.0, get_real(instance, WHEEL_lost_speed));
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get(WHEEL_lost_speed));
 }
 
 static void test_when_booleans_can_be_set(void) {
     ASSERT_OK(instance_exit_initialization(instance));
     ASSERT_OK(set_boolean(WHEEL_is_counting, 0));
     ASSERT_OK(set_boolean(WHEEL_is_reversed, 1)); // tunable
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set_boolean(WHEEL_is_turning, 1));
+    ASSERT_REFUSED(set_boolean(WHEEL_is_turning, 1));
     assert_text("is_turning (value reference 31) cannot be set after initialization");
 
     ASSERT_OK(instance_enter_continuous_time(instance));
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT, set_boolean(WHEEL_is_counting, 1));
+    ASSERT_REFUSED(set_boolean(WHEEL_is_counting, 1));
     assert_text("is_counting (value reference 21) cannot be set while the time is continuous");
-    set_real(WHEEL_speed, 1.0);
+    set(WHEEL_speed, 1.0);
     TEST_ASSERT_EQUAL_INT(0, get_boolean(instance, WHEEL_is_counting));
     instance_enter_event_mode(instance);
     ASSERT_OK(set_boolean(WHEEL_is_counting, 1));
@@ -142,22 +139,16 @@ static void test_only_reals_have_derivatives(void) {
         {WHEEL_turns, WHEEL_speed, "it is of type int32, an output, a local or a derivative"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        TEST_ASSERT_EQUAL_INT(
-            STATUS_INVALID_ARGUMENT,
-            instance_get_directional_derivative(instance, KNOWN_ARGUMENTS, &cases[i].unknown, 1,
-                                                &cases[i].known, 1, &one, &result));
+        ASSERT_REFUSED(instance_get_directional_derivative(
+            instance, KNOWN_ARGUMENTS, &cases[i].unknown, 1, &cases[i].known, 1, &one, &result));
         assert_text(cases[i].text);
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                              instance_get_adjoint_derivative(instance, KNOWN_ARGUMENTS,
-                                                              &cases[i].unknown, 1, &cases[i].known,
-                                                              1, &one, &result));
+        ASSERT_REFUSED(instance_get_adjoint_derivative(instance, KNOWN_ARGUMENTS, &cases[i].unknown,
+                                                       1, &cases[i].known, 1, &one, &result));
         assert_text(cases[i].text);
     }
     const unsigned outputs[] = {WHEEL_is_turning, WHEEL_turns};
     for (size_t i = 0; i < 2; i++) {
-        TEST_ASSERT_EQUAL_INT(
-            STATUS_INVALID_ARGUMENT,
-            instance_get_output_derivatives(instance, &outputs[i], 1, &order, &result));
+        ASSERT_REFUSED(instance_get_output_derivatives(instance, &outputs[i], 1, &order, &result));
         assert_text("is refused: it is ");
     }
     TEST_ASSERT_EQUAL_DOUBLE(1.0, result);
@@ -170,14 +161,12 @@ static void test_only_reals_have_derivatives(void) {
     TEST_ASSERT_EQUAL_DOUBLE(1.0, results[1]);
     ASSERT_OK(instance_get_output_derivatives(instance, both, 1, &order, results));
     TEST_ASSERT_EQUAL_DOUBLE(0.0, results[0]);
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          instance_get_directional_derivative(instance, KNOWN_ARGUMENTS, &rate, 1,
-                                                              both, 1, &one, results));
+    ASSERT_REFUSED(instance_get_directional_derivative(instance, KNOWN_ARGUMENTS, &rate, 1, both, 1,
+                                                       &one, results));
     assert_text("lost_speed (value reference 42) is refused: an input, a state");
 
     const unsigned counting = WHEEL_is_counting;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_ARGUMENT,
-                          instance_set_input_derivatives(instance, &counting, 1, &order, &one));
+    ASSERT_REFUSED(instance_set_input_derivatives(instance, &counting, 1, &order, &one));
     assert_text("it is of type boolean, a continuous input of type float64 is expected");
     TEST_ASSERT_EQUAL_DOUBLE(1.0, result);
 }
