@@ -14,8 +14,16 @@ from cosim.fmu_file import Fmu
 from cosim.reference import bound
 from cosim.scenario import load
 from cosim.simulation import initialize
-from tests.rp_plant.plant_model_exchange import STATES, model
-from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, RIGID, read, started
+from tests.rp_plant.fmu.plant_model_exchange import STATES, model
+from tests.rp_plant.fmu.plant_runs import (
+    AT_REST,
+    BOUNCY_STOPS,
+    FIRM,
+    FRICTION,
+    RIGID,
+    read,
+    started,
+)
 
 STEP = 0.01  # s
 TIGHT = 1e-10  # relative tolerance of CVode
