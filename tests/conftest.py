@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cosim.fmi.fmu_file import Fmu
     from tests.support.browser import Browser
     from tests.support.hosts import Network
+    from tests.support.instances import LoadedFmu
 
 
 @pytest.fixture(scope="session")
@@ -27,11 +28,26 @@ def fmu() -> Path:
 
 
 @pytest.fixture(scope="module")
-def opened(fmu: Path) -> Iterator["Fmu"]:
+def path(request: pytest.FixtureRequest, fmu: Path) -> Path:
+    """The FMU of a test file: the one it names by UNIT, or RPManipulator."""
+    return fmu.with_name(f"{getattr(request.module, 'UNIT', fmu.stem)}.fmu")
+
+
+@pytest.fixture(scope="module")
+def opened(path: Path) -> Iterator["Fmu"]:
+    """The same FMU, opened by cosim."""
     from cosim.fmi.fmu_file import Fmu
 
-    with Fmu(fmu) as opened:
+    with Fmu(path) as opened:
         yield opened
+
+
+@pytest.fixture(scope="module")
+def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> "LoadedFmu":
+    """The same FMU, unpacked for fmpy."""
+    from tests.support.instances import LoadedFmu
+
+    return LoadedFmu(path, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture

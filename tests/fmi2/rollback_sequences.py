@@ -69,20 +69,6 @@ def run(loaded: LoadedFmu, moves: list[Move], start: dict[str, float] = START) -
         return [do(instance, t, move) for t, move in zip(times(moves), moves, strict=False)]
 
 
-def serialized(instance: Instance) -> bytes:
-    """The state as bytes, with the copy in memory freed."""
-    state = instance.fmi.getFMUstate()
-    content = instance.fmi.serializeFMUstate(state)
-    instance.fmi.freeFMUstate(state)
-    return content
-
-
-def restore(instance: Instance, content: bytes) -> None:
-    state = instance.fmi.deSerializeFMUstate(content)
-    instance.fmi.setFMUstate(state)
-    instance.fmi.freeFMUstate(state)
-
-
 def other(loaded: LoadedFmu, chance: random.Random) -> Instance:
     """Another instance in some state, with other values."""
     instance = Instance(loaded)

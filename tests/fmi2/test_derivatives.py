@@ -9,7 +9,6 @@ import itertools
 import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -18,7 +17,7 @@ import sympy as sp
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Integer, fmi2Real, fmi2ValueReference
 
 from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, LoadedFmu, status_of
-from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values
+from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 
 @pytest.fixture(scope="module")
@@ -29,24 +28,9 @@ def model() -> Model:
 # ---- Instances at random points ------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("fmu"))
-
-
 def generic_point(seed: int) -> Values:
     """Parameters, inputs and states, none of them zero; the slide on both sides of the axis."""
     source = random.Random(seed)
-    parameters = dict(
-        m1=10 ** source.uniform(-1.0, 1.5),
-        m2=10 ** source.uniform(-2.0, 1.5),
-        I1z=10 ** source.uniform(-3.0, 1.0),
-        I2z=10 ** source.uniform(-3.0, 1.0),
-        l1=source.uniform(0.1, 2.0),
-        lc1=source.uniform(0.05, 1.5),
-        a=source.choice((-1, 1)) * source.uniform(0.05, 1.5),
-        g=source.uniform(1.0, 25.0),
-    )
     moving = dict(
         tau1=source.uniform(-30.0, 30.0),
         f2=source.uniform(-30.0, 30.0),
@@ -55,7 +39,7 @@ def generic_point(seed: int) -> Values:
         dq1=source.uniform(-4.0, 4.0),
         dq2=source.uniform(-3.0, 3.0),
     )
-    return parameters | moving
+    return random_arm(source) | moving
 
 
 SEEDS = range(6)
@@ -130,13 +114,6 @@ def directional(instance: Instance, unknowns: tuple[str, ...], seed: Values) -> 
 
 
 # ---- Directional derivatives ---------------------------------------------------------------------
-
-
-def test_the_flags_say_what_is_offered(loaded: LoadedFmu) -> None:
-    assert loaded.description.coSimulation.providesDirectionalDerivative
-    assert loaded.description.modelExchange.providesDirectionalDerivative
-    assert loaded.description.coSimulation.maxOutputDerivativeOrder == 2
-    assert loaded.description.coSimulation.canInterpolateInputs
 
 
 def test_the_symbolic_model_has_every_output_and_local_of_the_arm(

@@ -3,7 +3,6 @@
 import ctypes
 from collections.abc import Callable
 from ctypes import byref, c_double
-from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -25,11 +24,6 @@ SECOND = [
     ("dq2", "ddq2"),
 ]  # states and their derivatives
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
-
-
-@pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture

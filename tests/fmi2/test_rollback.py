@@ -23,22 +23,23 @@ from tests.fmi2.rollback_sequences import (
     Move,
     do,
     other,
-    restore,
     run,
     sequence,
-    serialized,
     times,
 )
 from tests.support.cosim_project import declared
-from tests.support.instances import ERROR, STATES, Instance, LoadedFmu, status_of
+from tests.support.instances import (
+    ERROR,
+    STATES,
+    Instance,
+    LoadedFmu,
+    restore,
+    serialized,
+    status_of,
+)
 from tests.support.paths import ROOT
 
 SEQUENCES = 100
-
-
-@pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 # ---- Same bytes

@@ -4,37 +4,22 @@ import ctypes
 import random
 from collections.abc import Callable
 from ctypes import byref
-from pathlib import Path
 
 import pytest
 from fmpy import fmi2
 
-from tests.fmi2.rollback_sequences import (
-    START,
-    do,
+from tests.fmi2.rollback_sequences import START, do, run, sequence, times
+from tests.support.instances import (
+    ERROR,
+    Instance,
+    LoadedFmu,
+    hashed,
     restore,
-    run,
-    sequence,
     serialized,
-    times,
+    status_of,
 )
-from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
-
-
-@pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
-
 
 # ---- What is refused
-
-
-def hashed(content: bytes) -> bytes:
-    """`content` with the checksum that belongs to it: FNV-1a of all before, 64 bit."""
-    value = 0xCBF29CE484222325
-    for byte in content[:-8]:
-        value = (value ^ byte) * 0x100000001B3 % 2**64
-    return content[:-8] + value.to_bytes(8, "little")
 
 
 def with_guid(content: bytes, guid: str, loaded: LoadedFmu) -> bytes:

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from ctypes import c_double
 from itertools import pairwise
-from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import heyoka as hy
@@ -22,11 +21,6 @@ START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
 # In the horizontal plane a constant force draws link 2 in, the spin drives it out: bounded for
 # ever, not chaotic, with two quantities that are conserved.
 WHIRL = {"g": 0.0, "q2": 0.1, "dq1": 4.0, "f2": -5.0}
-
-
-@pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("unit"))
 
 
 @pytest.fixture(scope="module")

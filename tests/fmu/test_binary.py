@@ -1,6 +1,5 @@
 """The shared object in each FMU: its dependencies and its hardening; two builds are the same."""
 
-import ctypes
 import os
 import re
 import subprocess
@@ -9,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.fmu.symbols import libm, listed, standard
 from tests.support.all_fmus import NAMES, SYSTEMS
 from tests.support.paths import ROOT
 from tests.support.source_copy import copy_sources, run, settings_of
@@ -32,24 +32,18 @@ def readelf(*arguments: object) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
 
-def symbols(kind: str, library: object) -> set[str]:
-    """Names of the dynamic symbols that nm lists with this option, without their versions."""
-    command = ["nm", "--dynamic", kind, str(library)]
-    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
-    return {line.split()[-1].partition("@")[0] for line in lines}
-
-
 def test_it_needs_libc_and_nothing_else(binary: Path) -> None:
     needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", readelf("--dynamic", binary)))
     assert needed == {"libc.so.6"}
 
 
 def test_no_result_depends_on_the_elementary_functions_of_the_system(binary: Path) -> None:
-    ctypes.CDLL("libm.so.6")
-    libm = re.search(r"/\S*/libm\.so\.6", Path("/proc/self/maps").read_text()).group()
-    functions = symbols("--defined-only", libm)
-    assert {"sin", "sincos", "pow", "sqrt", "fmin"} <= functions
-    assert not symbols("--undefined-only", binary) & functions
+    assert not listed("--dynamic", "--undefined-only", binary) & libm()
+
+
+def test_it_exports_the_functions_of_the_standard_and_nothing_else(binary: Path) -> None:
+    version = "fmi3" if binary.parent.name == "x86_64-linux" else "fmi2"
+    assert listed("--dynamic", "--defined-only", binary) == standard(version)
 
 
 def test_it_names_no_folder_to_load_from(binary: Path) -> None:

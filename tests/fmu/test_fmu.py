@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -12,18 +13,10 @@ import pytest
 from fmpy.util import create_plotly_figure
 from fmpy.validation import validate_fmu
 
+from tests.support.all_fmus import FOLDERS, NAMES
 from tests.support.paths import ROOT
 
-HEADERS = Path(fmpy.__file__).parent / "c-code"
 CROSS_CHECK = ("_in.csv", "_ref.csv", "_ref.opt")  # endings of a reference's files
-
-
-@pytest.fixture(scope="module")
-def binary(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The shared object, taken out of the archive."""
-    folder = tmp_path_factory.mktemp("fmu")
-    with zipfile.ZipFile(fmu) as archive:
-        return Path(archive.extract("binaries/linux64/RPManipulator.so", folder))
 
 
 def output_of(*command: object) -> str:
@@ -61,23 +54,27 @@ def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
     assert "effective_relative_tolerance" in page and "<math" in page
 
 
-def test_the_binary_exports_the_functions_of_the_standard_and_nothing_else(binary: Path) -> None:
-    symbols = output_of("nm", "-D", "--defined-only", binary).split("\n")
-    exported = {line.split()[-1] for line in symbols if line}
-    header = (HEADERS / "fmi2Functions.h").read_text()
-    standard = set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
-    assert len(standard) == 44
-    assert exported == standard
+EACH = [*(f"{name}.fmu" for name in NAMES), *(f"fmi3/{name}.fmu" for name in NAMES)]
 
 
-def test_fmpy_finds_no_problem(fmu: Path) -> None:
-    assert validate_fmu(str(fmu)) == []
+@pytest.mark.parametrize("name", EACH)
+def test_fmpy_finds_no_problem(fmu: Path, name: str) -> None:
+    """In the schema, the names, the model structure and the units."""
+    assert validate_fmu(str(fmu.parent / name)) == []
+
+
+def test_the_command_of_fmpy_finds_no_problem(fmu: Path) -> None:
     command = Path(sys.executable).parent / "fmpy"
-    assert "No problems found." in output_of(command, "validate", fmu)
+    for path in (fmu, fmu.parent / "fmi3" / fmu.name):
+        assert "No problems found." in output_of(command, "validate", path)
 
 
-def test_the_model_description_follows_the_schema(fmu: Path) -> None:
-    fmpy.read_model_description(str(fmu), validate=True)
+@pytest.mark.parametrize("folder", FOLDERS.values())
+def test_the_page_of_a_model_names_the_variables_that_it_declares(folder: str) -> None:
+    model = ROOT / "models" / folder
+    declared = tomllib.loads((model / "variables.toml").read_text(encoding="utf-8"))["variables"]
+    page = (model / "README.md").read_text(encoding="utf-8")
+    assert declared.keys() <= set(re.findall(r"`(\w+)`", page))
 
 
 def test_fmpy_simulates_it_by_default(fmu: Path, tmp_path: Path) -> None:

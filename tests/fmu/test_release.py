@@ -1,6 +1,5 @@
 """The FMUs of ./release.sh: what is in them, and their binaries as far as files show it."""
 
-import ctypes
 import hashlib
 import io
 import json
@@ -15,13 +14,13 @@ import fmpy.validation
 import lief
 import pytest
 
+from tests.fmu.symbols import libm, standard
 from tests.support.all_fmus import NAMES, SYSTEMS
 from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
 LARGEST = {"fmi2": 2_500_000, "fmi3": 3_500_000}  # bytes of an FMU
-FUNCTIONS = {"fmi2": 44, "fmi3": 75}  # of the standard
 
 # what the loader of each platform has
 KERNEL = re.compile(r"KERNEL32\.dll|api-ms-win-crt-[a-z]+-l1-1-0\.dll")
@@ -58,23 +57,9 @@ def binary(archive: zipfile.ZipFile, folders: dict[str, str], suffix: str) -> by
     return archive.read(f"binaries/{folders[version_of(archive)]}/{name_of(archive)}{suffix}")
 
 
-def functions(archive: zipfile.ZipFile) -> set[str]:
-    """Names of all functions of the standard, from its header."""
-    version = version_of(archive)
-    header = Path(fmpy.__file__).parent / "c-code" / f"{version}Functions.h"
-    names = set(re.findall(rf"{version.upper()}_Export \w+ +({version}\w+);", header.read_text()))
-    assert len(names) == FUNCTIONS[version]
-    return names
-
-
 def elementary_functions() -> set[str]:
     """Names in the system's libm, and those that a compiler may call instead."""
-    ctypes.CDLL("libm.so.6")
-    path = re.search(r"/\S*/libm\.so\.6", Path("/proc/self/maps").read_text()).group()
-    library = lief.ELF.parse(path)  # owns its symbols
-    names = {symbol.name for symbol in library.exported_symbols}
-    assert {"sin", "sincos", "pow", "fmin"} <= names
-    return names | {"__sincos_stret", "__sincosf_stret", "__exp10"}
+    return libm() | {"__sincos_stret", "__sincosf_stret", "__exp10"}
 
 
 # ---- The archives -------------------------------------------------------------------------------
@@ -160,7 +145,7 @@ def elf(request: pytest.FixtureRequest, archive) -> lief.ELF.Binary:
 
 
 def test_linux_exports_the_functions_of_the_standard_only(elf: lief.ELF.Binary, archive) -> None:
-    assert {symbol.name for symbol in elf.exported_symbols} == functions(archive)
+    assert {symbol.name for symbol in elf.exported_symbols} == standard(version_of(archive))
 
 
 def test_linux_needs_glibc_2_17_and_no_libm(elf: lief.ELF.Binary) -> None:
@@ -194,7 +179,7 @@ def pe(archive) -> lief.PE.Binary:
 
 def test_windows_exports_the_functions_of_the_standard_only(pe: lief.PE.Binary, archive) -> None:
     assert pe.header.machine == lief.PE.Header.MACHINE_TYPES.AMD64
-    assert {entry.name for entry in pe.get_export().entries} == functions(archive)
+    assert {entry.name for entry in pe.get_export().entries} == standard(version_of(archive))
 
 
 def test_windows_needs_nothing_to_be_installed(pe: lief.PE.Binary) -> None:
@@ -229,7 +214,7 @@ def macho(request: pytest.FixtureRequest, archive) -> lief.MachO.Binary:
 def test_macos_exports_the_functions_of_the_standard(macho: lief.MachO.Binary, archive) -> None:
     """And two names that its linker adds to every library."""
     exported = {symbol.name for symbol in macho.exported_symbols}
-    expected = {f"_{name}" for name in functions(archive)}
+    expected = {f"_{name}" for name in standard(version_of(archive))}
     assert exported == expected | {"___dso_handle", "__mh_dylib_header"}
 
 

@@ -1,6 +1,5 @@
 """The sources of the FMUs: built by others' tools, with the bits of the build."""
 
-import ctypes
 import os
 import re
 import shutil
@@ -17,6 +16,7 @@ import fmpy
 import numpy as np
 import pytest
 
+from tests.fmu.symbols import libm, listed, standard
 from tests.rp_manipulator.random_motions import random_case, simulate
 from tests.support.all_fmus import FOLDERS, NAMES
 from tests.support.cosim_project import load
@@ -24,7 +24,6 @@ from tests.support.instances import Instance, LoadedFmu
 from tests.support.missing import missing
 from tests.support.paths import ROOT
 
-HEADERS = Path(fmpy.__file__).parent / "c-code"
 TAYLOR = {"RPManipulator"}  # compared with the Taylor method, too
 STEPS = 250  # of each scenario
 
@@ -267,49 +266,26 @@ def test_every_optimizer_gives_the_same_series(
         assert list(trace(rebuilt, scenario, 4)) == list(trace(built[build.fmu], scenario, 4))
 
 
-def symbols(text: str) -> set[str]:
-    """Names in a listing of nm without their versions, and without the names of these."""
-    lines = (line.split() for line in text.splitlines())
-    return {line[-1].partition("@")[0] for line in lines if len(line) > 1 and line[-2] != "A"}
-
-
-@pytest.fixture(scope="module")
-def libm() -> set[str]:
-    """Functions of the system's libm."""
-    ctypes.CDLL("libm.so.6")
-    path = re.search(r"/\S*/libm\.so\.6", Path("/proc/self/maps").read_text()).group()
-    names = symbols(run("nm", "--dynamic", "--defined-only", path))
-    assert {"sin", "sincos", "pow", "sqrt", "fmin"} <= names
-    return names
-
-
 @each(BUILDS)
-def test_no_function_of_libm_is_called(build: Build, library: Path, libm: set[str]) -> None:
+def test_no_function_of_libm_is_called(build: Build, library: Path) -> None:
     objects = sorted(library.parent.glob("*.o"))
-    called = symbols(run(f"{build.tools}nm", "--undefined-only", *objects))
+    called = listed("--undefined-only", *objects, tools=build.tools)
     assert {"fmu_sin", "malloc", "memcpy"} <= called
-    assert called & libm <= (CLASSIFICATIONS if "mingw" in build.compiler else set())
-
-
-@pytest.fixture(scope="module")
-def standard() -> set[str]:
-    """Functions of FMI 2.0."""
-    header = (HEADERS / "fmi2Functions.h").read_text()
-    return set(re.findall(r"fmi2FullName\((fmi2\w+)\)", header))
+    assert called & libm() <= (CLASSIFICATIONS if "mingw" in build.compiler else set())
 
 
 @each(ELF)
 def test_the_functions_of_the_standard_are_exported_and_no_others(
-    build: Build, library: Path, standard: set[str]
+    build: Build, library: Path
 ) -> None:
-    assert symbols(run(f"{build.tools}nm", "--dynamic", "--defined-only", library)) == standard
+    assert listed("--dynamic", "--defined-only", library, tools=build.tools) == standard("fmi2")
 
 
 @each(WINDOWS)
-def test_so_are_they_on_windows(build: Build, library: Path, standard: set[str]) -> None:
+def test_so_are_they_on_windows(build: Build, library: Path) -> None:
     listing = run(f"{build.tools}objdump", "--private-headers", library)
     table = listing.partition("[Ordinal/Name Pointer] Table")[2].partition("\n\n")[0]
-    assert set(re.findall(r"\[ *\d+\].* (\w+)$", table, re.MULTILINE)) == standard
+    assert set(re.findall(r"\[ *\d+\].* (\w+)$", table, re.MULTILINE)) == standard("fmi2")
 
 
 # ---- Fused operations ---------------------------------------------------------------------------

@@ -4,8 +4,6 @@ The closed forms are in test_rp_actuator.c.
 """
 
 import random
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
@@ -13,14 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference
 from cosim.runs.comparison import Runs
-from tests.support.cosim_project import declared, load, names_of
+from tests.support.cosim_project import assert_made_again, declared, load, names_of
 from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
+
+UNIT = "RPActuator"
 
 FOLDER = ROOT / "models" / "rp_actuator"
 SCENARIOS = names_of(FOLDER.name)
@@ -38,16 +37,6 @@ KNOWNS = (*PARAMETERS, *INPUTS, *STATES)
 LIMITS = ("command", "current", "voltage")
 
 Values = dict[str, float]
-
-
-@pytest.fixture(scope="module")
-def path(fmu: Path) -> Path:
-    return fmu.with_name("RPActuator.fmu")
-
-
-@pytest.fixture(scope="module")
-def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(path, tmp_path_factory.mktemp("actuator"))
 
 
 # ---- Derivatives and dependencies ----------------------------------------------------------------
@@ -272,10 +261,6 @@ def test_rollback_at_the_limits_is_exact(loaded: LoadedFmu) -> None:
         assert status_of(instance.fmi.freeFMUState, state) == OK
 
 
-def test_fmpy_finds_nothing_wrong(path: Path) -> None:
-    assert validate_fmu(str(path)) == []
-
-
 def test_units_of_what_is_connected_are_those_of_arm_and_controller(
     fmu: Path, loaded: LoadedFmu, tmp_path: Path
 ) -> None:
@@ -290,12 +275,7 @@ def test_units_of_what_is_connected_are_those_of_arm_and_controller(
 
 
 def test_references_are_those_of_the_script(tmp_path: Path) -> None:
-    script = FOLDER / "references" / "make_references.py"
-    subprocess.run([sys.executable, script, "--output", tmp_path], check=True, cwd=tmp_path)
-    for name in SCENARIOS:
-        for made in (tmp_path / name).iterdir():
-            stored = FOLDER / "references" / name / made.name
-            assert stored.read_bytes() == made.read_bytes(), stored
+    assert_made_again(FOLDER.name, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -343,9 +323,3 @@ def test_scenarios_meet_their_references(path: Path, name: str) -> None:
         scenario = load(name)
         errors = [runs.run(scenario, tolerance).error for tolerance in (1e-5, 1e-8, 1e-11)]
     assert all(np.array(errors) <= [1e-6, 1e-8, 1e-10]), errors
-
-
-def test_page_names_every_variable() -> None:
-    page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    for name in (*PARAMETERS, *INPUTS, *OUTPUTS, *RATES, *LIMITED):
-        assert f"`{name}`" in page, name

@@ -1,7 +1,5 @@
-"""The laws of RPController in sympy, with an arm from positions (rp_symbolic), and random points.
-
-The payload is a third body, whose part of the Lagrangian is added to that of the arm.
-"""
+"""The laws of RPController in sympy, with arm and payload from positions (rp_symbolic), and random
+points."""
 
 import functools
 import itertools
@@ -13,12 +11,17 @@ import mpmath
 import sympy as sp
 
 from tests.support.rp_symbolic import PARAMETERS as ARM
-from tests.support.rp_symbolic import TERMS, Model
+from tests.support.rp_symbolic import (
+    PAYLOAD,
+    Values,
+    derivatives_by_time,
+    random_arm,
+    terms_of_the_motion,
+)
 
 MODES = {"pd": 1, "pd_gravity": 2, "computed_torque": 3}
 LAW = ("Kp1", "Kp2", "Kd1", "Kd2", "Ki1", "Ki2", "inertia1", "inertia2", "tracking_time")
 LIMITS = ("tau1_max", "f2_max")
-PAYLOAD = ("payload_mass", "payload_inertia", "payload_x", "payload_z")
 PARAMETERS = (*ARM, *LAW, *LIMITS, *PAYLOAD)
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 INPUTS = (*REFERENCES, "q1", "q2", "dq1", "dq2")
@@ -32,7 +35,6 @@ UNKNOWNS = (*EFFORTS, *ERRORS, *RATES, *UNLIMITED)
 INPUT_RATES = tuple(tuple(f"{name}_{order}" for name in INPUTS) for order in ("rate", "bend"))
 FREE = (0, 0)
 SIDES = ((0, 0), (1, 0), (0, -1), (-1, 1))  # per joint: free, at the upper or lower limit
-Values = dict[str, float]
 
 
 class Case(NamedTuple):
@@ -49,37 +51,10 @@ CASES = [Case(*case) for case in itertools.product(MODES, SIDES, (False, True))]
 
 
 @functools.cache
-def terms_of_the_arm(is_attached: bool) -> dict[str, sp.Expr]:
-    """Mass matrix, velocity terms and gravity."""
-    if is_attached:
-        payload = terms_of_the_payload()
-        return {name: term + payload[name] for name, term in terms_of_the_arm(False).items()}
-    expressions = Model().expressions
-    return {name: expressions[name] for name in TERMS}
-
-
-def terms_of_the_payload() -> dict[str, sp.Expr]:
-    """The same of the payload, by the Lagrangian."""
-    l1, a, g, m, inertia, cx, cz = sp.symbols(("l1", "a", "g", *PAYLOAD))
-    q, dq = sp.Matrix(sp.symbols("q1 q2")), sp.Matrix(sp.symbols("dq1 dq2"))
-    along = sp.Matrix([sp.cos(q[0]), sp.sin(q[0])])
-    across = sp.Matrix([-sp.sin(q[0]), sp.cos(q[0])])
-    center = (l1 + q[1] + cz) * along + (a + cx) * across
-    velocity = center.jacobian(q) * dq
-    kinetic = sp.Matrix([sp.expand(m * velocity.dot(velocity) + inertia * dq[0] ** 2) / 2])
-    momenta = kinetic.jacobian(dq).T
-    mass = momenta.jacobian(dq)
-    velocity_terms = momenta.jacobian(q) * dq - kinetic.jacobian(q).T
-    gravity = sp.Matrix([m * g * center[1]]).jacobian(q)
-    terms = (mass[0, 0], mass[0, 1], mass[1, 1], *velocity_terms, *gravity)
-    return dict(zip(TERMS, map(sp.trigsimp, terms), strict=True))
-
-
-@functools.cache
 def law(case: Case) -> dict[str, sp.Expr]:
     """Every unknown, with each joint free or at the limit on the side that is given."""
     s = {name: sp.Symbol(name) for name in KNOWNS}
-    arm = terms_of_the_arm(case.is_attached)
+    arm = terms_of_the_motion(case.is_attached)
     e = [s[f"q{i}_ref"] - s[f"q{i}"] for i in (1, 2)]
     de = [s[f"dq{i}_ref"] - s[f"dq{i}"] for i in (1, 2)]
     v = [s[f"Kp{i}"] * e[i - 1] + s[f"Kd{i}"] * de[i - 1] + s[f"integral{i}"] for i in (1, 2)]
@@ -119,18 +94,14 @@ def jacobian(case: Case) -> Callable[..., list]:
 
 @functools.cache
 def along_time(case: Case) -> Callable[..., list]:
-    """Terms of the derivatives of orders 1 and 2 of each output, one per moving variable."""
+    """Terms of the derivatives of orders 1 and 2 of each output."""
     expressions = law(case)
     rates = {
         **dict(zip(STATES, (expressions[name] for name in RATES), strict=True)),
         **dict(zip(INPUTS, sp.symbols(INPUT_RATES[0]), strict=True)),
         **dict(zip(INPUT_RATES[0], sp.symbols(INPUT_RATES[1]), strict=True)),
     }
-    rows = []
-    for name in (*EFFORTS, *ERRORS):
-        once = [expressions[name].diff(sp.Symbol(x)) * rate for x, rate in rates.items()]
-        total = sp.Add(*once)
-        rows += [once, [total.diff(sp.Symbol(x)) * rate for x, rate in rates.items()]]
+    rows = derivatives_by_time((expressions[name] for name in (*EFFORTS, *ERRORS)), rates)
     return compiled((*KNOWNS, *INPUT_RATES[0], *INPUT_RATES[1]), rows)
 
 
@@ -151,14 +122,7 @@ def random_point(source: random.Random) -> Values:
         return source.choice((-1, 1)) * source.uniform(low, high)
 
     return dict(
-        m1=10 ** source.uniform(-1.0, 1.5),
-        m2=10 ** source.uniform(-2.0, 1.5),
-        I1z=10 ** source.uniform(-3.0, 1.0),
-        I2z=10 ** source.uniform(-3.0, 1.0),
-        l1=source.uniform(0.1, 2.0),
-        lc1=source.uniform(0.05, 1.5),
-        a=either(0.05, 1.5),
-        g=source.uniform(1.0, 25.0),
+        **random_arm(source),
         payload_mass=10 ** source.uniform(-2.0, 1.0),
         payload_inertia=10 ** source.uniform(-3.0, 0.0),
         payload_x=either(0.02, 0.5),

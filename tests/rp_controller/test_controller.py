@@ -5,8 +5,6 @@ of the absolute values of the terms that they are made of.
 """
 
 import random
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +13,6 @@ import mpmath
 import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
-from fmpy.validation import validate_fmu
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference
@@ -32,7 +29,6 @@ from tests.rp_controller.controller_symbolic import (
     MODES,
     PARAMETERS,
     RATES,
-    STATES,
     UNKNOWNS,
     Case,
     Values,
@@ -44,23 +40,15 @@ from tests.rp_controller.controller_symbolic import (
     numbers,
     terms_of_values,
 )
-from tests.support.cosim_project import declared, load, names_of
+from tests.support.cosim_project import assert_made_again, declared, load, names_of
 from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
+
+UNIT = "RPController"
 
 FOLDER = ROOT / "models" / "rp_controller"
 SCENARIOS = names_of(FOLDER.name)
 SAMPLED = ("sample_time", "delay", "payload_attached")
-
-
-@pytest.fixture(scope="module")
-def path(fmu: Path) -> Path:
-    return fmu.with_name("RPController.fmu")
-
-
-@pytest.fixture(scope="module")
-def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(path, tmp_path_factory.mktemp("controller"))
 
 
 @contextmanager
@@ -259,10 +247,6 @@ def test_rollback_in_saturation_is_exact(loaded: LoadedFmu) -> None:
         assert status_of(instance.fmi.freeFMUState, state) == OK
 
 
-def test_fmpy_finds_nothing_wrong(path: Path) -> None:
-    assert validate_fmu(str(path)) == []
-
-
 def test_references_and_units_of_the_arm_are_the_arms(
     fmu: Path, loaded: LoadedFmu, tmp_path: Path
 ) -> None:
@@ -279,12 +263,7 @@ def test_references_and_units_of_the_arm_are_the_arms(
 
 
 def test_references_are_those_of_the_script(tmp_path: Path) -> None:
-    script = FOLDER / "references" / "make_references.py"
-    subprocess.run([sys.executable, script, "--output", tmp_path], check=True, cwd=tmp_path)
-    for name in SCENARIOS:
-        for made in (tmp_path / name).iterdir():
-            stored = FOLDER / "references" / name / made.name
-            assert stored.read_bytes() == made.read_bytes(), stored
+    assert_made_again(FOLDER.name, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -305,9 +284,3 @@ def test_scenarios_meet_their_references(path: Path, name: str) -> None:
         scenario = load(name)
         errors = [runs.run(scenario, tolerance).error for tolerance in (1e-5, 1e-8, 1e-11)]
     assert all(np.array(errors) <= [1e-6, 1e-8, 1e-10]), errors
-
-
-def test_page_tells_every_variable() -> None:
-    page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    for name in (*PARAMETERS, *INPUTS, *STATES, *UNKNOWNS, "mode", *MODES, *SAMPLED):
-        assert f"`{name}`" in page, name

@@ -20,6 +20,8 @@ from cosim.runs.comparison import Runs
 from tests.support.cosim_project import declared, fmi3_fmu, load
 from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
 
+UNIT = "RPController"
+
 PD = 1
 GAINS = {"Kp1": 50.0, "Kd1": 8.0, "Ki1": 240.0, "inertia1": 0.75, "tracking_time": 0.125}
 MOTION = {"q1_ref": 0.3125, "q1": 0.0625, "dq1_ref": 0.25, "dq1": 0.75}
@@ -34,16 +36,6 @@ TIMES = {
     "a whole period, off the grid": (0.0017, 0.0017),
 }
 each_times = pytest.mark.parametrize(("period", "delay"), TIMES.values(), ids=TIMES.keys())
-
-
-@pytest.fixture(scope="module")
-def path(fmu: Path) -> Path:
-    return fmu.with_name("RPController.fmu")
-
-
-@pytest.fixture(scope="module")
-def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(path, tmp_path_factory.mktemp("controller"))
 
 
 @pytest.fixture

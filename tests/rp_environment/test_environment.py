@@ -6,10 +6,7 @@ force from the depth below the surface and its rate of change.
 
 import functools
 import math
-import os
 import random
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,14 +16,15 @@ import numpy as np
 import pytest
 import sympy as sp
 from fmpy import fmi2
-from fmpy.validation import validate_fmu
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference
 from cosim.runs.comparison import Runs
-from tests.support.cosim_project import declared, load, names_of
+from tests.support.cosim_project import assert_made_again, declared, load, names_of
 from tests.support.instances import DISCARD, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
+
+UNIT = "RPEnvironment"
 
 FOLDER = ROOT / "models" / "rp_environment"
 SCENARIOS = names_of(FOLDER.name)
@@ -108,18 +106,6 @@ def generic_point(case: str, seed: int) -> Values:
 
 
 # ---- Instances -----------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def path() -> Path:
-    """The FMU, built beside that of the manipulator."""
-    build = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
-    return build / "RPEnvironment.fmu"
-
-
-@pytest.fixture(scope="module")
-def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(path, tmp_path_factory.mktemp("environment"))
 
 
 @contextmanager
@@ -292,10 +278,6 @@ def test_power_of_the_wrench_is_what_the_plant_receives(loaded: LoadedFmu, path:
 # ---- As a unit -----------------------------------------------------------------------------------
 
 
-def test_fmpy_finds_nothing_wrong(path: Path) -> None:
-    assert validate_fmu(str(path)) == []
-
-
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 def test_fmpy_simulates_it(path: Path, kind: str) -> None:
     times = np.linspace(0.0, 1.0, 11)
@@ -364,13 +346,7 @@ def test_states_are_saved_and_restored(loaded: LoadedFmu) -> None:
 
 
 def test_references_are_those_of_the_script(tmp_path: Path) -> None:
-    script = FOLDER / "references" / "make_references.py"
-    subprocess.run([sys.executable, script, "--output", tmp_path], check=True, cwd=tmp_path)
-    assert sorted(made.name for made in tmp_path.iterdir()) == sorted(SCENARIOS)
-    for name in SCENARIOS:
-        for made in (tmp_path / name).iterdir():
-            stored = FOLDER / "references" / name / made.name
-            assert stored.read_bytes() == made.read_bytes(), stored
+    assert_made_again(FOLDER.name, tmp_path)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)
@@ -400,9 +376,3 @@ def test_velocities_of_the_scenarios_are_those_of_the_positions(name: str) -> No
         slope = np.diff(scenario.input(position)) / np.diff(times)
         rate = np.interp(middle, times, scenario.input(velocity))
         assert abs(slope - rate).max() <= 0.02 * max(abs(rate).max(), 1e-3), position
-
-
-def test_page_names_every_variable() -> None:
-    page = (FOLDER / "README.md").read_text(encoding="utf-8")
-    for name in (*KNOWNS, *OUTPUTS):
-        assert f"`{name}`" in page, name

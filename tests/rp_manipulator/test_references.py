@@ -1,17 +1,22 @@
 """The reference trajectories: made again they come out the same, and they conserve energy."""
 
 import csv
-import importlib.util
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 import sympy as sp
 
 from cosim.scenarios.scenario import Scenario
+from models.rp_manipulator.references.make_references import (
+    INPUTS,
+    PARAMETERS,
+    STATES,
+    Reference,
+    derive,
+)
 from tests.support.cosim_project import declared, load, names_of
 from tests.support.paths import ROOT
 
@@ -23,18 +28,8 @@ each_scenario = pytest.mark.parametrize("run", SCENARIOS.values(), ids=SCENARIOS
 
 
 @pytest.fixture(scope="session")
-def maker() -> ModuleType:
-    """make_references.py as a module."""
-    spec = importlib.util.spec_from_file_location("make_references", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture(scope="session")
-def reference(maker: ModuleType):
-    return maker.Reference()
+def reference() -> Reference:
+    return Reference()
 
 
 @pytest.fixture(scope="session")
@@ -78,9 +73,8 @@ def test_nothing_is_left_over(made: Path) -> None:
 
 
 def test_made_by_itself_or_after_another_gives_identical_bytes(
-    maker: ModuleType, made: Path, tmp_path: Path
+    reference: Reference, made: Path, tmp_path: Path
 ) -> None:
-    reference = maker.Reference()
     for name in ("sixtieth", "early_start", "sixtieth"):
         reference.write(SCENARIOS[name], tmp_path / name)
         for file in FILES:
@@ -140,7 +134,7 @@ def test_rows_have_the_inputs_of_the_step_that_ends_there(run: Scenario) -> None
 
 
 @each_scenario
-def test_energy_changes_by_the_work_of_the_efforts(run: Scenario, reference) -> None:
+def test_energy_changes_by_the_work_of_the_efforts(run: Scenario, reference: Reference) -> None:
     """Over a step with held inputs the work is tau1 (change of q1) + f2 (change of q2), exactly."""
     values = dict(zip(reference.outputs, reference.simulate(run).T, strict=True))
     moved = np.diff(np.stack([values["q1"], values["q2"]], axis=1), axis=0)
@@ -182,13 +176,13 @@ def test_outputs_in_the_files_belong_together(run: Scenario) -> None:
         assert np.all(np.abs(c[name] - column) <= 1e-14 * scale), name
 
 
-def test_equations_agree_with_the_notes(maker: ModuleType) -> None:
+def test_equations_agree_with_the_notes() -> None:
     """Equations (14) and (15) hold for the accelerations that follow from the positions."""
-    equations = maker.derive()
+    equations = derive()
     ddq1, ddq2 = equations.accelerations
-    m1, m2, i1, i2, l1, lc1, a, g = sp.symbols(maker.PARAMETERS)
-    q1, q2, dq1, dq2 = sp.symbols(maker.STATES)
-    tau1, f2 = sp.symbols(maker.INPUTS)
+    m1, m2, i1, i2, l1, lc1, a, g = sp.symbols(PARAMETERS)
+    q1, q2, dq1, dq2 = sp.symbols(STATES)
+    tau1, f2 = sp.symbols(INPUTS)
     s, c = sp.sin(q1), sp.cos(q1)
     d11 = m2 * a**2 + m2 * l1**2 + 2 * m2 * l1 * q2 + m1 * lc1**2 + m2 * q2**2 + i1 + i2
     c211 = c121 = l1 * m2 + m2 * q2

@@ -1,7 +1,5 @@
 """The Taylor method on the built FMU, at motions that could mislead it, against heyoka."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -27,11 +25,6 @@ each_tolerance = pytest.mark.parametrize("tolerance", TOLERANCES)
 @pytest.fixture(scope="module")
 def exact() -> Exact:
     return Exact()
-
-
-@pytest.fixture(scope="module")
-def loaded(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(fmu, tmp_path_factory.mktemp("fmu"))
 
 
 def case(

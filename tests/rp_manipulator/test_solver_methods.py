@@ -1,7 +1,6 @@
 """Every method of integration, on the built FMU, against solutions that share no code with it."""
 
 import dataclasses
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from cosim.runs.comparison import Runs
 from cosim.runs.reference import Reference
 from cosim.runs.tolerance_sweep import TOLERANCES, sweep
 from cosim.scenarios.scenario import Scenario
+from models.rp_manipulator.references import make_references
 from tests.support.cosim_project import load as load_scenario
 from tests.support.cosim_project import names_of
 from tests.support.paths import ROOT
@@ -74,11 +74,6 @@ def jumping(size: float, **parameters: float) -> Scenario:
 @pytest.fixture(scope="module")
 def exact() -> dict[float, Reference]:
     """Solutions of the independent equations, by the size of the jumps."""
-    folder = str(ROOT / "models" / "rp_manipulator" / "references")
-    sys.path.insert(0, folder)
-    import make_references
-
-    sys.path.remove(folder)
     equations = make_references.Reference()
     summed = reference.read_summed(ROOT / "models" / "rp_manipulator")
     found = {}

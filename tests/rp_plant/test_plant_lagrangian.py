@@ -6,9 +6,9 @@ import mpmath
 import numpy as np
 import pytest
 
+from tests.rp_plant.fmu.plant_runs import COMPLIANT
 from tests.rp_plant.plant_rows import FREE, STUCK, evaluate
-from tests.rp_plant.plant_runs import COMPLIANT
-from tests.rp_plant.plant_symbolic import SmoothPlant
+from tests.support.rp_symbolic import SmoothPlant
 
 CASES = 400
 Case = dict[str, float]

@@ -14,8 +14,8 @@ import pytest
 import sympy as sp
 
 from tests.rp_plant.plant_rows import FREE, INPUTS, ORDERS, STATES, STUCK, expand
-from tests.rp_plant.plant_symbolic import NAMES, SmoothPlant
 from tests.rp_plant.test_plant_lagrangian import Case, in_stops, random_case
+from tests.support.rp_symbolic import NAMES, SmoothPlant
 
 CASES = 64
 MODES = (-1.0, STUCK, 1.0, FREE)
@@ -101,7 +101,7 @@ class Reference:
         symbols = sp.symbols(NAMES)
         modules: list[Any] = [{"sin": sine, "cos": cosine}]
         self._functions = [
-            sp.lambdify(symbols, list(plant.expression(name)), modules, cse=True)
+            sp.lambdify(symbols, list(plant.expressions[name]), modules, cse=True)
             for name in ("mass_matrix", "applied", "coriolis", "gravity")
         ]
 

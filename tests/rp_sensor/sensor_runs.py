@@ -1,11 +1,8 @@
 """Runs of the built FMUs of the sensor: started by name, moved along cubics, read."""
 
-import importlib.util
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
-from types import ModuleType
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
@@ -13,7 +10,6 @@ from tests.support.cosim_project import declared
 from tests.support.paths import ROOT
 
 MODEL = ROOT / "models" / "rp_sensor"
-SCRIPT = MODEL / "references" / "make_references.py"
 INPUTS = ("q1", "q2")
 OUTPUTS = ("q1_measured", "q2_measured", "dq1_measured", "dq2_measured")
 COUNTS = ("counts1", "counts2")
@@ -21,18 +17,6 @@ DEGREE = 3
 
 Cubic = Sequence[float]  # coefficients from order 0 on, rad or m per power of s
 Shown = tuple[tuple[int, ...], tuple[float, ...]]  # COUNTS and OUTPUTS
-
-
-def module_of_references() -> ModuleType:
-    """make_references.py as a module."""
-    spec = importlib.util.spec_from_file_location("make_sensor_references", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-independent = module_of_references()
 
 
 def start_values() -> dict[str, float]:

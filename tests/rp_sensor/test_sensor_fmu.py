@@ -1,19 +1,17 @@
 """RPSensor.fmu: what is refused, Model Exchange by time events, event mode, references."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy.simulation import instantiate_fmu
-from fmpy.validation import validate_fmu
 
 from cosim.errors import UserError
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_sensor.sensor_runs import COUNTS, MODEL, SCRIPT, independent, start_values, started
-from tests.support.cosim_project import declared, fmi3_fmu, load, names_of
+from models.rp_sensor.references.make_references import Encoder
+from tests.rp_sensor.sensor_runs import COUNTS, MODEL, start_values, started
+from tests.support.cosim_project import assert_made_again, declared, fmi3_fmu, load, names_of
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 
 SCENARIOS = names_of(MODEL.name)
@@ -88,15 +86,11 @@ def test_positions_that_overflow_within_a_step(fmu: Path, tmp_path: Path) -> Non
 # ---- Model Exchange ----------------------------------------------------------------------------
 
 
-def test_fmpy_finds_no_problem(sensor: Fmu) -> None:
-    assert validate_fmu(str(sensor.path)) == []
-
-
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 def test_fmpy_simulates_it(sensor: Fmu, kind: str) -> None:
     """In Model Exchange, ticks are time events at which the inputs are those of the time itself."""
     values = {"sample_time": 0.00737, "noise1": 0.01, "seed": 4, "latency": 1}
-    encoder = independent.Encoder(start_values() | values)
+    encoder = Encoder(start_values() | values)
     result = fmpy.simulate_fmu(
         str(sensor.path),
         fmi_type=kind,
@@ -148,7 +142,7 @@ def test_in_model_exchange_ticks_sample_the_inputs_of_their_time(sensor: Fmu) ->
 def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: bool) -> None:
     """The counts are the same; a step that may return early does so at each tick within it."""
     values = {"sample_time": 0.00737, "noise1": 0.01, "noise2": 1e-4, "seed": 9, "latency": 1}
-    encoder = independent.Encoder(start_values() | values)
+    encoder = Encoder(start_values() | values)
     result = fmpy.simulate_fmu(
         str(fmi3_fmu(fmu.with_name("RPSensor.fmu"))),
         fmi_type="CoSimulation",
@@ -204,13 +198,7 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Pat
 
 
 def test_references_made_again_are_the_same(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, SCRIPT, "--output", tmp_path], check=True, cwd=tmp_path)
-    kept = [folder.name for folder in (MODEL / "references").iterdir() if folder.is_dir()]
-    assert sorted(set(kept) - {"__pycache__"}) == sorted(SCENARIOS)
-    for name in SCENARIOS:
-        for file in ("RPSensor_ref.csv", "RPSensor_in.csv", "RPSensor_ref.opt"):
-            made = (tmp_path / name / file).read_bytes()
-            assert made == (MODEL / "references" / name / file).read_bytes(), (name, file)
+    assert_made_again(MODEL.name, tmp_path)
 
 
 def test_scenarios_cover_the_parameters() -> None:

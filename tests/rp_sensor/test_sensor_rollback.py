@@ -8,8 +8,8 @@ import pytest
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.test_plant_forged_states import with_hash
-from tests.rp_plant.test_plant_rollback import packed, unpack
+from tests.rp_plant.fmu.test_plant_forged_states import with_hash
+from tests.rp_plant.fmu.test_plant_rollback import packed, unpack
 from tests.rp_sensor.sensor_runs import Shown, Stepper, shown, started
 from tests.support.instances import ERROR, status_of
 

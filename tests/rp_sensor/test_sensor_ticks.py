@@ -10,11 +10,11 @@ from fmpy.fmi1 import FMICallException
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
+from models.rp_sensor.references.make_references import Encoder
 from tests.rp_sensor.sensor_runs import (
     INPUTS,
     Cubic,
     Stepper,
-    independent,
     shown,
     start_values,
     started,
@@ -73,7 +73,7 @@ def test_random_motions(sensor: Fmu, seed: int) -> None:
     start = chance.choice([0.0, -3.7, 12.5])
     cubics = [random_cubic(chance, values[f"resolution{i}"]) for i in (1, 2)]
     cubics[0][0] += chance.uniform(-1.0, 1.0)
-    encoder = independent.Encoder(start_values() | values)
+    encoder = Encoder(start_values() | values)
     sample_time, begin = Fraction(values["sample_time"]), Fraction(start)
 
     def sample_until(end: float) -> None:

@@ -1,14 +1,9 @@
 """RPTrajectory.fmu: exact motions and derivatives, refused parameters, a unit without states."""
 
 import ctypes
-import importlib.util
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 
 import fmpy
 import mpmath as mp
@@ -16,14 +11,15 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
-from fmpy.validation import validate_fmu
 
-from tests.support.cosim_project import declared, load, names_of
+from models.rp_trajectory.references import make_references
+from tests.support.cosim_project import assert_made_again, declared, load, names_of
 from tests.support.instances import ERROR, Instance, LoadedFmu
 from tests.support.paths import ROOT
 
+UNIT = "RPTrajectory"
+
 MODEL = ROOT / "models" / "rp_trajectory"
-SCRIPT = MODEL / "references" / "make_references.py"
 DECLARED = declared(MODEL.name).variables
 START = {name: v.start for name, v in DECLARED.items() if v.causality == "parameter"}
 OUTPUTS = [n for n, v in DECLARED.items() if v.causality == "output" and v.type == "Real"]
@@ -45,28 +41,6 @@ MOTIONS = {
     | {"frequency": 0.4},
 }
 each_motion = pytest.mark.parametrize("motion", MOTIONS)
-
-
-@pytest.fixture(scope="module")
-def path() -> Path:
-    """The FMU, built beside that of the manipulator."""
-    build = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
-    return build / "RPTrajectory.fmu"
-
-
-@pytest.fixture(scope="module")
-def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(path, tmp_path_factory.mktemp("unit"))
-
-
-@pytest.fixture(scope="module")
-def maker() -> ModuleType:
-    """make_references.py as a module: the same motions, from sympy and mpmath."""
-    spec = importlib.util.spec_from_file_location("make_trajectory_references", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(autouse=True)
@@ -146,12 +120,12 @@ def assert_close(got: np.ndarray, expected: np.ndarray, bound: float) -> None:
 
 
 @each_motion
-def test_outputs_and_their_derivatives(loaded: LoadedFmu, maker: ModuleType, motion: str) -> None:
+def test_outputs_and_their_derivatives(loaded: LoadedFmu, motion: str) -> None:
     """At random times of each segment, against derivatives of the same motion in 40 digits."""
     parameters = MOTIONS[motion]
     times = random_times(parameters)
-    exact = maker.Motion(START | numbered(parameters))
-    assert list(maker.OUTPUTS) == OUTPUTS
+    exact = make_references.Motion(START | numbered(parameters))
+    assert list(make_references.OUTPUTS) == OUTPUTS
     got, expected = {0: [], 1: [], 2: []}, {0: [], 1: [], 2: []}
     with running(loaded, parameters, start=times[0] - 0.01) as instance:
         t = times[0] - 0.01
@@ -177,7 +151,7 @@ def test_outputs_and_their_derivatives(loaded: LoadedFmu, maker: ModuleType, mot
 
 
 @each_motion
-def test_derivatives_by_parameters(loaded: LoadedFmu, maker: ModuleType, motion: str) -> None:
+def test_derivatives_by_parameters(loaded: LoadedFmu, motion: str) -> None:
     """Directional derivatives in initialization mode, against differences in 40 digits."""
     parameters = START | numbered(MOTIONS[motion])
     names = [name for name in START if DECLARED[name].type == "Real"]
@@ -185,7 +159,7 @@ def test_derivatives_by_parameters(loaded: LoadedFmu, maker: ModuleType, motion:
     expected = np.empty((len(times), len(names), len(OUTPUTS)))
     for k, name in enumerate(names):
         value = mp.mpf(parameters[name])
-        sides = (maker.Motion(parameters | {name: value + side * h}) for side in (-1, 1))
+        sides = (make_references.Motion(parameters | {name: value + side * h}) for side in (-1, 1))
         rows = [[follow(moved, t) for t in times] for moved in sides]
         difference = (np.array(rows[1]) - np.array(rows[0])) / (2 * h)
         expected[:, k] = difference.astype(float)
@@ -315,12 +289,8 @@ def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(loaded: LoadedFmu)
 # ---- a unit without states and inputs ----------------------------------------------------------
 
 
-def test_fmpy_finds_no_problem(path: Path) -> None:
-    assert validate_fmu(str(path)) == []
-
-
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-def test_fmpy_simulates_it(path: Path, maker: ModuleType, kind: str) -> None:
+def test_fmpy_simulates_it(path: Path, kind: str) -> None:
     result = fmpy.simulate_fmu(
         str(path),
         fmi_type=kind,
@@ -329,7 +299,7 @@ def test_fmpy_simulates_it(path: Path, maker: ModuleType, kind: str) -> None:
         start_values={"motion": "2", "branch": "1", "duration": 2.0},
     )
     line = numbered({"motion": "line", "branch": "forward", "duration": 2.0})
-    exact = maker.Motion(START | line)
+    exact = make_references.Motion(START | line)
     assert len(result) == 49
     expected = np.array([[float(x) for x in exact.outputs(t)] for t in result["time"]])
     got = np.array([result[name] for name in OUTPUTS]).T
@@ -380,13 +350,7 @@ def test_only_the_start_is_settable(loaded: LoadedFmu) -> None:
 
 
 def test_references_made_again_are_the_same(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, SCRIPT, "--output", tmp_path], check=True, cwd=tmp_path)
-    kept = [folder.name for folder in (MODEL / "references").iterdir() if folder.is_dir()]
-    assert sorted(set(kept) - {"__pycache__"}) == sorted(SCENARIOS)
-    for name in SCENARIOS:
-        for file in ("RPTrajectory_ref.csv", "RPTrajectory_in.csv", "RPTrajectory_ref.opt"):
-            made = (tmp_path / name / file).read_bytes()
-            assert made == (MODEL / "references" / name / file).read_bytes(), (name, file)
+    assert_made_again(MODEL.name, tmp_path)
 
 
 def test_every_motion_and_branch_has_a_scenario() -> None:

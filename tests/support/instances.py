@@ -3,7 +3,7 @@
 import struct
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import fmpy
 from fmpy import fmi2
@@ -121,6 +121,29 @@ class Instance:
         """Make a step from `t`; return the time at its end."""
         self.fmi.doStep(t, h)
         return t + h
+
+
+def serialized(instance: Any) -> bytes:
+    """The state of an instance of either version, by fmpy or cosim, as bytes."""
+    state = instance.fmi.getFMUState()
+    content = instance.fmi.serializeFMUState(state)
+    instance.fmi.freeFMUState(state)
+    return content
+
+
+def restore(instance: Any, content: bytes) -> None:
+    """Put an instance into a serialized state."""
+    state = instance.fmi.deserializeFMUState(content)
+    instance.fmi.setFMUState(state)
+    instance.fmi.freeFMUState(state)
+
+
+def hashed(content: bytes) -> bytes:
+    """A state with the checksum that fits: FNV-1a of all before the last 8 bytes."""
+    value = 0xCBF29CE484222325
+    for byte in content[:-8]:
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    return content[:-8] + value.to_bytes(8, "little")
 
 
 def status_of(call: Callable, *arguments: object) -> int:

@@ -1,28 +1,31 @@
-"""The arm in sympy, from positions: values and exact derivatives of every output and local.
+"""Arm and plant in sympy, from positions, evaluated with 40 digits.
 
-Shares nothing with the C code: equations of motion and outputs are those of make_references.py,
-local variables are derived here. Evaluated with 40 digits.
+Shares nothing with the C code: equations of motion and outputs are those of the references, joint
+loads are derived here by Newton's and Euler's laws.
 """
 
-import importlib.util
+import functools
 import itertools
-import sys
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import mpmath
 import sympy as sp
 
-from tests.support.instances import INPUTS, STATES
-from tests.support.paths import ROOT
+from models.rp_manipulator.references.make_references import PARAMETERS, derive
+from models.rp_plant.references import equations as plant
+from models.rp_plant.references.equations import ACCELERATIONS, PAYLOAD, STATES
+from tests.support.instances import INPUTS
 
-SCRIPT = ROOT / "models" / "rp_manipulator" / "references" / "make_references.py"
-PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
 KNOWNS = (*PARAMETERS, *INPUTS, *STATES)
 TERMS = ("D11", "D12", "D22", "coriolis1", "coriolis2", "gravity1", "gravity2")
+LOADS = ("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")
 # derivatives of the inputs with respect to time: orders 1 and 2
 INPUT_RATES = (("tau1_rate", "f2_rate"), ("tau1_bend", "f2_bend"))
+DRIVES = ("armature1", "armature2", "damping1", "damping2")
+NAMES = (*PARAMETERS, *DRIVES, *PAYLOAD, "attached", *plant.INPUTS, *STATES, *ACCELERATIONS)
 
 mpmath.mp.dps = 40
 
@@ -34,56 +37,101 @@ def cross(u: sp.Matrix, v: sp.Matrix) -> sp.Expr:
     return u[0] * v[1] - u[1] * v[0]
 
 
-def terms_of_the_motion(outputs: dict[str, sp.Expr]) -> dict[str, sp.Expr]:
-    """D, C dq and g(q), by differentiation of the energies."""
-    kinetic = sp.Matrix([outputs["kinetic_energy"]])
-    potential = sp.Matrix([outputs["potential_energy"]])
-    q, dq = sp.Matrix(sp.symbols(STATES[:2])), sp.Matrix(sp.symbols(STATES[2:]))
-    momenta = kinetic.jacobian(dq).T
-    inertia = momenta.jacobian(dq)
-    coriolis = momenta.jacobian(q) * dq - kinetic.jacobian(q).T
-    gravity = potential.jacobian(q)
-    return dict(
-        zip(TERMS, (inertia[0, 0], inertia[0, 1], inertia[1, 1], *coriolis, *gravity), strict=True)
-    )
+def loads_by_newton() -> sp.Matrix:
+    """LOADS of the plant in NAMES; moments about joint 1 and about the end of link 1.
 
-
-def loads_by_newton(accelerations: tuple[sp.Expr, sp.Expr]) -> dict[str, sp.Expr]:
-    """Forces and moments in the joints that give both links the motion that they have.
-
-    Newton's and Euler's laws in frame 0, from twice differentiated positions; a force on link 2
-    acts at the end of link 1.
+    Forces and moments that give the bodies their accelerations, in frame 0.
     """
-    m1, m2, I1z, I2z, l1, lc1, a, g = sp.symbols(PARAMETERS)
+    s = {name: sp.Symbol(name) for name in NAMES}
     t = sp.Symbol("t")
     angle, slide = sp.Function("angle")(t), sp.Function("slide")(t)
     along = sp.Matrix([sp.cos(angle), sp.sin(angle)])
     across = sp.Matrix([-sp.sin(angle), sp.cos(angle)])
-    center1, end1 = lc1 * along, l1 * along + a * across
-    center2 = end1 + slide * along
-    weightless = sp.Matrix([0, g])
+    end1 = s["l1"] * along + s["a"] * across
+    effector = end1 + slide * along
+    payload = effector + s["payload_x"] * across + s["payload_z"] * along
+    carried = s["attached"] * s["payload_mass"], s["attached"] * s["payload_inertia"], payload
+    weightless, alpha = sp.Matrix([0, s["g"]]), angle.diff(t, 2)
 
-    force2 = m2 * (center2.diff(t, 2) + weightless)
-    force1 = force2 + m1 * (center1.diff(t, 2) + weightless)
-    moment2 = I2z * angle.diff(t, 2) + cross(center2 - end1, force2)
-    moment1 = (
-        I1z * angle.diff(t, 2) + moment2 + cross(center1, force1) + cross(end1 - center1, force2)
-    )
-    loads = {
-        "f1_x": across.dot(force1),
-        "f1_z": along.dot(force1),
-        "tau1_y": moment1,
-        "f2_x": across.dot(force2),
-        "f2_z": along.dot(force2),
-        "tau2_y": moment2,
+    wrench = sp.Matrix([s["ee_fx"], s["ee_fy"]])
+    force2, moment2 = -wrench, -s["ee_mz"] - cross(effector - end1, wrench)
+    for m, inertia, x in (s["m2"], s["I2z"], effector), carried:
+        inertial = m * (x.diff(t, 2) + weightless)
+        force2 = force2 + inertial
+        moment2 += inertia * alpha + cross(x - end1, inertial)
+    center1 = s["lc1"] * along
+    inertial1 = s["m1"] * (center1.diff(t, 2) + weightless)
+    force1 = force2 + inertial1
+    moment1 = s["I1z"] * alpha + moment2 + cross(center1, inertial1) + cross(end1, force2)
+    frame = (across, along)
+    loads = [*(x.dot(force1) for x in frame), moment1, *(x.dot(force2) for x in frame), moment2]
+    moving = (alpha, slide.diff(t, 2), angle.diff(t), slide.diff(t), angle, slide)
+    plain = zip(moving, sp.symbols((*ACCELERATIONS, *STATES[2:], *STATES[:2])), strict=True)
+    return sp.Matrix(loads).subs(list(plain))
+
+
+class SmoothPlant:
+    """Mass matrix, forces, energies, joint loads and end effector of the plant, in NAMES."""
+
+    def __init__(self) -> None:
+        equations = plant.derive()
+        q, dq = (sp.Matrix(sp.symbols(names)) for names in (STATES[:2], STATES[2:]))
+        kinetic, potential = (equations.outputs[f"{x}_energy"] for x in ("kinetic", "potential"))
+        coriolis = (equations.inertia * dq).jacobian(q) * dq - sp.Matrix([kinetic]).jacobian(q).T
+        gravity = sp.Matrix([potential]).jacobian(q).T
+        self.expressions = {
+            "mass_matrix": equations.inertia,
+            "coriolis": coriolis.expand(),
+            "gravity": gravity,
+            "applied": (equations.forces + coriolis + gravity).expand(),
+            "kinetic_energy": kinetic,
+            "potential_energy": potential,
+            "acceleration": sp.Matrix([equations.outputs[name] for name in ("ee_ax", "ee_ay")]),
+            "loads": loads_by_newton(),
+        }
+        self._functions = {
+            name: sp.lambdify(sp.symbols(NAMES), expression, "mpmath", cse=True)
+            for name, expression in self.expressions.items()
+        }
+
+    def evaluate(self, name: str, case: Mapping[str, float]) -> mpmath.matrix | mpmath.mpf:
+        """An expression at exact rationals."""
+        return self._functions[name](*(mpmath.mpf(case.get(key, 0.0)) for key in NAMES))
+
+
+@functools.cache
+def terms_of_the_motion(is_attached: bool = False) -> dict[str, sp.Expr]:
+    """D, C dq and g(q) of the arm, alone or with the payload."""
+    e = SmoothPlant().expressions
+    D = e["mass_matrix"].subs(dict.fromkeys(DRIVES, 0))
+    terms = (D[0, 0], D[0, 1], D[1, 1], *e["coriolis"], *e["gravity"])
+    return {n: x.subs("attached", int(is_attached)) for n, x in zip(TERMS, terms, strict=True)}
+
+
+def derivatives_by_time(
+    expressions: Iterable[sp.Expr], rates: Mapping[str, sp.Expr]
+) -> list[list[sp.Expr]]:
+    """Terms of the derivatives of orders 1 and 2 of each expression, one per moving variable."""
+
+    def terms(expression: sp.Expr) -> list[sp.Expr]:
+        return [expression.diff(sp.Symbol(name)) * rate for name, rate in rates.items()]
+
+    once = [terms(expression) for expression in expressions]
+    return [row for first in once for row in (first, terms(sp.Add(*first)))]
+
+
+def random_arm(source: random.Random) -> Values:
+    """Parameters of the arm, none of them zero."""
+    return {
+        **{name: 10 ** source.uniform(*low_high) for name, low_high in DECADES.items()},
+        "l1": source.uniform(0.1, 2.0),
+        "lc1": source.uniform(0.05, 1.5),
+        "a": source.choice((-1, 1)) * source.uniform(0.05, 1.5),
+        "g": source.uniform(1.0, 25.0),
     }
-    q, dq = sp.symbols(STATES[:2]), sp.symbols(STATES[2:])
-    plain = [
-        *zip((angle.diff(t, 2), slide.diff(t, 2)), accelerations, strict=True),
-        *zip((angle.diff(t), slide.diff(t)), dq, strict=True),
-        *zip((angle, slide), q, strict=True),
-    ]
-    return {name: load.subs(plain) for name, load in loads.items()}
+
+
+DECADES = {"m1": (-1.0, 1.5), "m2": (-2.0, 1.5), "I1z": (-3.0, 1.0), "I2z": (-3.0, 1.0)}
 
 
 @dataclass(frozen=True)
@@ -102,17 +150,15 @@ class Model:
     """Every output and local in terms of parameters, inputs and states, with its derivatives."""
 
     def __init__(self) -> None:
-        spec = importlib.util.spec_from_file_location("make_references", SCRIPT)
-        maker = importlib.util.module_from_spec(spec)
-        sys.modules.setdefault(spec.name, maker)
-        spec.loader.exec_module(maker)
-        equations = maker.derive()
+        equations = derive()
         self.outputs = tuple(equations.outputs)
         self.accelerations = equations.accelerations
+        arm = dict.fromkeys((*PAYLOAD, "attached", *plant.INPUTS[2:]), 0)
+        arm |= dict(zip(ACCELERATIONS, equations.accelerations, strict=True))
         self.expressions = (
             equations.outputs
-            | terms_of_the_motion(equations.outputs)
-            | loads_by_newton(equations.accelerations)
+            | terms_of_the_motion()
+            | dict(zip(LOADS, loads_by_newton().subs(arm), strict=True))
         )
 
     @cached_property
@@ -132,20 +178,13 @@ class Model:
 
     @cached_property
     def _along_the_motion(self) -> Callable[..., list]:
-        """Terms of the derivatives of orders 1 and 2 of each output, one per moving variable."""
+        """Terms of the derivatives of orders 1 and 2 of each output."""
         rates = {
             **dict(zip(STATES, (*sp.symbols(STATES[2:]), *self.accelerations), strict=True)),
             **dict(zip(INPUTS, sp.symbols(INPUT_RATES[0]), strict=True)),
             **dict(zip(INPUT_RATES[0], sp.symbols(INPUT_RATES[1]), strict=True)),
         }
-
-        def terms(expression: sp.Expr) -> list[sp.Expr]:
-            return [expression.diff(sp.Symbol(name)) * rate for name, rate in rates.items()]
-
-        rows = []
-        for name in self.outputs:
-            once = terms(self.expressions[name])
-            rows += [once, terms(sp.Add(*once))]
+        rows = derivatives_by_time((self.expressions[name] for name in self.outputs), rates)
         names = (*KNOWNS, *INPUT_RATES[0], *INPUT_RATES[1])
         return sp.lambdify(sp.symbols(names), rows, "mpmath", cse=True)
 

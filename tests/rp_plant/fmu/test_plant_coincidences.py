@@ -6,7 +6,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_runs import (
+from tests.rp_plant.fmu.plant_runs import (
     FIRM,
     METHODS,
     RIGID,
@@ -16,7 +16,7 @@ from tests.rp_plant.plant_runs import (
     read,
     started,
 )
-from tests.rp_plant.test_plant_rollback import busy, sequence, times
+from tests.rp_plant.fmu.test_plant_rollback import busy, sequence, times
 
 each_method = pytest.mark.parametrize("method", METHODS)
 

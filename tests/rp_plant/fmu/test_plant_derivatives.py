@@ -6,8 +6,8 @@ import pytest
 from fmpy import read_model_description
 
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_model_exchange import STATES, PlantModel, model, unknowns
-from tests.rp_plant.plant_runs import COMPLIANT, RIGID, modes, started
+from tests.rp_plant.fmu.plant_model_exchange import STATES, PlantModel, model, unknowns
+from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID, modes, started
 
 FRICTION = {
     "coulomb_friction1": 1.0,

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_model_exchange import STATES, PlantModel, model
-from tests.rp_plant.plant_runs import COMPLIANT, RIGID
+from tests.rp_plant.fmu.plant_model_exchange import STATES, PlantModel, model
+from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID
 
 LOWER, UPPER = -0.2, 0.3
 LOOSE = {"g": 0.0, "a": 0.0}  # the joints do not move each other

@@ -14,7 +14,7 @@ import pytest
 from fmpy import extract, read_model_description
 from fmpy.simulation import instantiate_fmu
 
-from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, METHODS, RIGID
+from tests.rp_plant.fmu.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, METHODS, RIGID
 from tests.support.cosim_project import fmi3_fmu
 
 STEP, STOP = 0.01, 1.5  # s

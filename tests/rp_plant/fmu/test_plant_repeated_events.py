@@ -8,7 +8,7 @@ import pytest
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_runs import (
+from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,
     FIRM,
     METHODS,

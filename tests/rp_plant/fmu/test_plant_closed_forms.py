@@ -10,7 +10,7 @@ import mpmath
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_runs import (
+from tests.rp_plant.fmu.plant_runs import (
     FIRM,
     METHODS,
     RIGID,

@@ -25,7 +25,7 @@ from cosim.fmi.fmu_file import Fmu
 from models.rp_plant.references.equations import INPUTS, STATES
 from models.rp_plant.references.motion import Event, Motion
 from models.rp_plant.references.solver import Solver
-from tests.rp_plant.plant_runs import (
+from tests.rp_plant.fmu.plant_runs import (
     AT_REST,
     COMPLIANT,
     KEEP_VELOCITY,

@@ -17,8 +17,8 @@ from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs import simulation
 from models.rp_plant.references.equations import INPUTS
-from tests.rp_plant.plant_runs import AT_REST, COMPLIANT, METHODS, RIGID, read, started
-from tests.rp_plant.random_motions import Case, compliant_case, random_case
+from tests.rp_plant.fmu.plant_runs import AT_REST, COMPLIANT, METHODS, RIGID, read, started
+from tests.rp_plant.fmu.random_motions import Case, compliant_case, random_case
 from tests.support.cosim_project import load, names_of
 from tests.support.paths import ROOT
 

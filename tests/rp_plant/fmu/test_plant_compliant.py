@@ -13,8 +13,8 @@ from fmpy.fmi1 import FMICallException
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_model_exchange import model
-from tests.rp_plant.plant_runs import (
+from tests.rp_plant.fmu.plant_model_exchange import model
+from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,
     FIRM,
     METHODS,

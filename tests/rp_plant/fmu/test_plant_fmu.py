@@ -1,6 +1,5 @@
 """RPPlant beside RPManipulator: the same interface, and with start values the same bits."""
 
-import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
@@ -8,16 +7,14 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 
 from cosim.errors import UserError
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs.simulation import initialize
 from cosim.scenarios.scenario import Scenario
-from tests.rp_plant.plant_runs import COMPLIANT, METHODS, NONE, RIGID, started
+from tests.rp_plant.fmu.plant_runs import COMPLIANT, METHODS, NONE, RIGID, started
 from tests.support.cosim_project import load, names_of
-from tests.support.paths import ROOT
 
 COUNTS = (
     "solver_steps",
@@ -34,10 +31,6 @@ INDICATORS = [
 
 
 # ---- Interface -------------------------------------------------------------------------------
-
-
-def test_fmpy_finds_no_problem(plant: Fmu) -> None:
-    assert validate_fmu(str(plant.path)) == []
 
 
 def test_every_variable_of_the_arm_is_there(plant: Fmu, arm: Fmu) -> None:
@@ -171,13 +164,6 @@ def test_values_that_do_not_fit_each_other_are_refused(
 def test_limits_play_no_role_without_stops(plant: Fmu) -> None:
     with started(plant, stops2=NONE, lower2=1.0, upper2=-1.0, q2=5.0) as instance:
         instance.do_step(0.0, 1e-3)
-
-
-def test_the_page_names_every_variable(plant: Fmu, arm: Fmu) -> None:
-    """Of those that the arm does not have."""
-    page = (ROOT / "models" / "rp_plant" / "README.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"`(\w+)`", page))
-    assert set(plant.model.variables) - set(arm.model.variables) <= named
 
 
 def test_terminals_fit_those_of_the_arm(fmu: Path) -> None:

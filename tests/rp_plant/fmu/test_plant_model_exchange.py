@@ -14,8 +14,16 @@ from cosim.fmi.fmu_file import Fmu
 from cosim.runs.reference import bound
 from cosim.runs.simulation import initialize
 from cosim.scenarios.scenario import load
-from tests.rp_plant.plant_model_exchange import STATES, model
-from tests.rp_plant.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, RIGID, read, started
+from tests.rp_plant.fmu.plant_model_exchange import STATES, model
+from tests.rp_plant.fmu.plant_runs import (
+    AT_REST,
+    BOUNCY_STOPS,
+    FIRM,
+    FRICTION,
+    RIGID,
+    read,
+    started,
+)
 
 STEP = 0.01  # s
 TIGHT = 1e-10  # relative tolerance of CVode

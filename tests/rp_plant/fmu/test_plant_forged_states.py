@@ -7,8 +7,8 @@ import pytest
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.plant_runs import COMPLIANT, RIGID, last_event, modes, started
-from tests.rp_plant.test_plant_rollback import Run, packed, unpack
+from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID, last_event, modes, started
+from tests.rp_plant.fmu.test_plant_rollback import Run, packed, unpack
 from tests.support.instances import ERROR, status_of
 
 HASH = 8  # bytes at the end: FNV-1a of all before
