@@ -31,7 +31,7 @@ from fmi3.model_description import model_description as fmi3_model_description  
 from fmi3.terminals import terminals_and_icons  # noqa: E402
 from provenance import Provenance  # noqa: E402
 
-from cosim import reference  # noqa: E402
+from cosim.runs import reference  # noqa: E402
 from cosim.errors import UserError  # noqa: E402
 from cosim.fmi.fmu_file import read_model  # noqa: E402
 from cosim.fmi.model import Model  # noqa: E402
