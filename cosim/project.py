@@ -17,7 +17,7 @@ build/report/                           what the commands write: index.html, fol
 
 from pathlib import Path
 
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, did_you_mean, hint
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -67,8 +67,7 @@ def model(name: str) -> Path:
     for folder in known.values():
         if name == folder.name or is_built_from(name, folder):
             return folder
-    guess = did_you_mean(name, known)
-    raise UserError(f"no model {name!r}{guess} (known: {', '.join(known) or 'none'})")
+    raise UserError(f"no model {name!r}{hint(name, known)}")
 
 
 def is_in_model(file: Path) -> bool:

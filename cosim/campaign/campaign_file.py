@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from cosim.campaign.expressions import Expression, parsed
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, WrongValueError, hint
 from cosim.input_files import read_toml, show
 from cosim.units import SECONDS, quantity
 
@@ -322,9 +322,7 @@ def _explained(error: ValidationError) -> str:
     if first["type"] == "missing":
         return f"{_where(place[:-1])}missing key {key!r}"
     if first["type"] == "extra_forbidden":
-        known = _keys(place)
-        guess = did_you_mean(key, known)
-        return f"{_where(place[:-1])}unknown key {key!r}{guess} (known: {', '.join(known)})"
+        return f"{_where(place[:-1])}unknown key {key!r}{hint(key, _keys(place))}"
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "value_error":
         return f"{where}{message}"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from distributed import Security
 
-from cosim.errors import UserError, reason
-from cosim.input_files import UnreadableError, check_regular
+from cosim.errors import UserError, placed, reason
+from cosim.input_files import check_regular
 
 TLS = "tls://"
 OPTIONS = ("--tls-ca", "--tls-cert", "--tls-key")
@@ -65,10 +65,9 @@ def _check(ca: Path, cert: Path, key: Path) -> None:
     """Load the files as Dask does, but never ask for a password on the terminal."""
     for path in (ca, cert, key):
         try:
-            check_regular(path)
+            with placed(path):
+                check_regular(path)
             os.close(os.open(path, os.O_RDONLY))
-        except UnreadableError as error:
-            raise UserError(f"{path}: {error}") from None
         except OSError as error:
             raise UserError(f"{path}: cannot be read: {reason(error)}") from None
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)

@@ -9,7 +9,7 @@ from pathlib import Path
 from cosim import project
 from cosim.command_line import PROGRAM
 from cosim.commands import Ended
-from cosim.errors import UserError, did_you_mean, together
+from cosim.errors import UserError, did_you_mean, hint, together
 from cosim.options import add_open, add_report, add_system
 from cosim.output import console
 from cosim.output.result_tables import VariantTable
@@ -117,8 +117,7 @@ def _opened(path: Path, stack: ExitStack) -> _System:
     unpacked = stack.enter_context(ssp.unpacked(path))
     name, folders = unpacked.system.name, project.systems()
     if name not in folders:
-        known = f"{did_you_mean(name, folders)} (known: {', '.join(folders)})"
-        raise UserError(f"{path}: no system {name!r} has references{known}")
+        raise UserError(f"{path}: no system {name!r} has references{hint(name, folders)}")
     return _System(folders[name], unpacked)
 
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.errors import UserError, WrongValueError
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from cosim.errors import UserError, placed
+from cosim.fmi.fmi_instance import Instance, UnpackedFmu
 from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
 
 
@@ -85,7 +84,7 @@ class ConnectedInstance:
         self._slopes[self._slope_places] = self._output_slopes.view
 
 
-def start_value(fmu: Fmu, component: str, name: str, value: Value) -> Value:
+def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
     """Value to set before initialization: an Enumeration's item may be given by its name.
 
     Raises
@@ -99,10 +98,8 @@ def start_value(fmu: Fmu, component: str, name: str, value: Value) -> Value:
     is_item = variable.type == "Enumeration" and isinstance(value, str)
     if not is_item and variable.type != "Boolean":
         return value
-    try:
+    with placed(f"{component}.{name}"):
         return variable.checked(value)
-    except WrongValueError as error:
-        raise UserError(f"{component}.{name}: {error}") from None
 
 
 def _can_start(variable: Variable) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable, SimpleType
 
-from cosim.errors import WrongValueError, did_you_mean
+from cosim.errors import WrongValueError, did_you_mean, hint
 from cosim.input_files import show
 from cosim.texts import number as short_number
 from cosim.texts import short
@@ -177,10 +177,9 @@ class Model:
         if variable is not None and variable.is_a(kind):
             return variable
         meant = [other.name for other in self.variables.values() if other.is_a(kind)]
-        known = ", ".join(meant) or "none"
         if variable is None:
-            guess = did_you_mean(name, meant)
-            raise WrongValueError(f"the model has no variable {name!r}{guess} (known: {known})")
+            raise WrongValueError(f"the model has no variable {name!r}{hint(name, meant)}")
+        known = ", ".join(meant) or "none"
         raise WrongValueError(f"{name!r} is not {KINDS[kind]} of the model (known: {known})")
 
 

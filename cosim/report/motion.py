@@ -70,8 +70,8 @@ def of_result(
 ) -> dict | None:
     """The same of a run that may have stopped early, with the references that there are."""
     # a row holds the outputs at the end of a step, so the inputs too are those of this step
-    held = np.maximum(scenario.reference_rows[: len(result.times)] - 1, 0)
-    inputs = {name: values[held] for name, values in scenario.inputs.items()}
+    steps = scenario.input_rows[: len(result.times)]
+    inputs = {name: values[steps] for name, values in scenario.inputs.items()}
     outputs = dict(zip(result.names, result.values.T, strict=True))
     recorded = Recorded(
         result.times, inputs | outputs | result.integers, references, scenario.start_values

@@ -59,8 +59,8 @@ class Problem:
         """Communication steps that are run, s, longest first."""
         return self.scenario.steps[0] * np.array(FACTORS)
 
-    def error(self, states: dict[str, float]) -> float:
-        """Largest error of the final `states`, each relative to the largest value on the way."""
+    def final_error(self, states: dict[str, float]) -> float:
+        """Largest difference of final `states`, each relative to its largest value on the way."""
         return max(abs(states[name] - self.exact[name]) / self.largest[name] for name in self.exact)
 
 
@@ -220,7 +220,7 @@ def study(
     errors = np.empty((len(fmus), len(FACTORS)))
     for i, of_case in enumerate(fmus):
         for j, factor in enumerate(FACTORS):
-            errors[i, j] = problem.error(final_state(of_case, problem, i, factor))
+            errors[i, j] = problem.final_error(final_state(of_case, problem, i, factor))
             progress((len(problem.scenario.times) - 1) // factor)
     return Convergence(problem, errors)
 

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from cosim.errors import UserError
+from cosim.errors import StoppedError, UserError
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from cosim.scenarios.scenario import Scenario
@@ -30,14 +30,6 @@ class Result:
     solver_rhs_evaluations: int | None
     messages: tuple[str, ...]  # warnings from the FMU, the last ones
     integers: dict[str, np.ndarray] = field(default_factory=dict)  # (rows,): those to be drawn
-
-
-class StoppedError(UserError):
-    """A run that failed in a step; `result` has its rows up to there."""
-
-    def __init__(self, text: str, result: Result) -> None:
-        super().__init__(text)
-        self.result = result
 
 
 def simulate(

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.errors import UserError, did_you_mean
-from cosim.input_files import UnreadableError, decoded, read_bytes, show
+from cosim.errors import UserError, did_you_mean, placed
+from cosim.input_files import decoded, read_bytes, show
 
 LARGEST = 50_000_000  # bytes
 DELIMITERS = ",;\t"
@@ -106,10 +106,9 @@ def read(path: Path) -> Log:
         If it cannot be read, or has no columns.
     """
     try:
-        content = read_bytes(path, LARGEST)
+        with placed(path):
+            content = read_bytes(path, LARGEST)
         text = decoded(content)
-    except UnreadableError as error:
-        raise UserError(f"{path}: {error}") from None
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: not UTF-8 text, at byte {error.start}") from None
     headers = {delimiter: _header(path, text, delimiter) for delimiter in DELIMITERS}

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim import project
-from cosim.errors import UserError, one_line
+from cosim.errors import StoppedError, UserError, one_line
 from cosim.interruption import temporary_folder, uninterrupted
 
 if TYPE_CHECKING:  # the child does not need these modules
@@ -57,14 +57,6 @@ class Run:
     messages: tuple[str, ...]  # warnings of the components
     # by component.variable, of those in STATISTICS that there are
     statistics: Mapping[str, float] = field(default_factory=dict)
-
-
-class StoppedError(UserError):
-    """A run that a component did not finish; `run` has its rows up to there, if there are any."""
-
-    def __init__(self, text: str, run: Run | None = None) -> None:
-        super().__init__(text)
-        self.run = run
 
 
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:

@@ -34,10 +34,10 @@ def test_the_limit_is_the_solution(
 ) -> None:
     expected = continuous.reference(variant)
     runs = [continuous.run(opened, fmus, method, variant, n) for n in method.per_second]
-    errors = np.array([continuous.error(columns, expected)[0] for columns in runs])
+    errors = np.array([continuous.largest_error(columns, expected)[0] for columns in runs])
     assert slope(1 / np.array(method.per_second), errors) == pytest.approx(method.power, abs=0.1)
     left, _ = continuous.limit(runs, method.per_second, method.power)
-    reached, name = continuous.error(left, expected)
+    reached, name = continuous.largest_error(left, expected)
     assert reached <= BOUND, name
     tracking = continuous.tracking_error(left)
     assert abs(tracking - continuous.tracking_error(expected)) <= BOUND * SMALLEST

@@ -68,12 +68,12 @@ def test_errors_fall_by_the_order_and_vanish_in_the_limit(
 ) -> None:
     expected, found = continuous.reference(variant), runs[variant, method.name]
     per_second = SHORT[method.name]
-    errors = np.array([continuous.error(columns, expected)[0] for columns in found])
+    errors = np.array([continuous.largest_error(columns, expected)[0] for columns in found])
     assert slope(1 / np.array(per_second), errors) == pytest.approx(method.power, abs=0.1)
     assert errors.min() > 100 * BOUND  # so the step is not short enough by itself
     left, enlarged = continuous.limit(found, per_second, method.power)
     assert enlarged < 200
-    reached, name = continuous.error(left, expected)
+    reached, name = continuous.largest_error(left, expected)
     assert reached <= BOUND, name
 
 
