@@ -21,9 +21,7 @@ class UnreadableError(UnplacedError):
 def check_regular(path: Path) -> None:
     """Refuse what may never end when it is read: devices, pipes, sockets; not a folder.
 
-    Raises
-    ------
-    UnreadableError
+    Raises UnreadableError.
     """
     try:
         mode = Path(path).stat().st_mode
@@ -59,11 +57,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
 def read_text(path: Path, largest: int) -> str:
     """Text of a file of at most `largest` bytes in UTF-8, without a byte order mark.
 
-    Raises
-    ------
-    UnreadableError
-    UnicodeDecodeError
-        With the position in the file.
+    UnreadableError, or UnicodeDecodeError with the position in the file.
     """
     return decoded(read_bytes(path, largest))
 
@@ -76,10 +70,7 @@ def decoded(content: bytes) -> str:
 def read_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file.
 
-    Raises
-    ------
-    UserError
-        Whatever keeps the file from being read.
+    UserError for whatever keeps the file from being read.
     """
     try:
         with placed(path):

@@ -31,13 +31,7 @@ VERSIONS = tuple(BUILD_FOLDERS)
 
 
 def scenario_files() -> dict[str, Path]:
-    """All scenarios by name.
-
-    Raises
-    ------
-    UserError
-        If two scenarios have the same name.
-    """
+    """All scenarios by name; UserError if two scenarios have the same name."""
     found: dict[str, Path] = {}
     for path in sorted(ROOT.glob("models/*/scenarios/*.toml")):
         if path.stem in found:
@@ -89,10 +83,7 @@ def convergence_files() -> list[Path]:
 def model_folder(scenario: Path) -> Path:
     """Folder of the model that a scenario or problem belongs to.
 
-    Raises
-    ------
-    UserError
-        If the file is in no such folder.
+    UserError if the file is in no such folder.
     """
     folder = scenario.absolute().parent
     if folder.name not in SCENARIO_FOLDERS:
@@ -153,10 +144,7 @@ def is_built_from(name: str, folder: Path) -> bool:
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
     """What has been built from the folder of a model (.fmu) or system (.ssp), of a version of FMI.
 
-    Raises
-    ------
-    UserError
-        If it is not there; names `option`, which takes another file, if it is given.
+    UserError if it is not there; names `option`, which takes another file, if it is given.
     """
     build = ROOT / BUILD_FOLDERS[version]
     for path in sorted(build.glob(f"*{suffix}")):

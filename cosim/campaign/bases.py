@@ -280,10 +280,7 @@ def _sha256(content: bytes) -> str:
 def opened(campaign: Campaign, given: Path | None, where: object = "campaign") -> Iterator[Base]:
     """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one.
 
-    Raises
-    ------
-    UserError
-        If it cannot be opened; beginning with `where` if the campaign's text is wrong.
+    UserError if it cannot be opened; beginning with `where` if the campaign's text is wrong.
     """
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:

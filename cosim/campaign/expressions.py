@@ -25,10 +25,7 @@ class Expression:
     def value(self, values: Mapping[str, float]) -> float:
         """The number for the values of the names.
 
-        Raises
-        ------
-        ArithmeticError, ValueError
-            If it is not defined or too large.
+        ArithmeticError, ValueError if it is not defined or too large.
         """
         result = _evaluated(self.tree, values)
         if isinstance(result, complex) or not math.isfinite(result):

@@ -30,10 +30,7 @@ MAX_RECORDED = 100_000_000  # numbers that a run records
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
     """The job of a campaign, which records the variables `also`, too.
 
-    Raises
-    ------
-    UserError
-        For the first mistake, beginning with `where`.
+    UserError for the first mistake, beginning with `where`.
     """
     return _Planner(campaign, base, where).job(also)
 

@@ -12,10 +12,8 @@ from cosim.units import quantity
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
     """The campaign with numbers for all values that have a unit.
 
-    Raises
-    ------
-    UserError
-        If one is in no unit of its variable, or the campaign is wrong then; beginning with `where`.
+    UserError if one is in no unit of its variable, or the campaign is wrong then; beginning with
+    `where`.
     """
     converter = _Converter(base, where)
     content = campaign.model_dump(exclude_unset=True)

@@ -84,13 +84,7 @@ def run(options: argparse.Namespace) -> Ended:
             label, steps = f"{name} by HELICS", system.system.steps
             with Progress(label, steps) as progress:
                 record = federation.run(
-                    system,
-                    name,
-                    address,
-                    options.elsewhere,
-                    options.silence,
-                    progress,
-                    connected,
+                    system, name, address, options.elsewhere, options.silence, progress, connected
                 )
             difference, master_time = _master(system, name, record)
             ecos_time = ecos.run(system, name, comparison.recorded(system)).wall_time

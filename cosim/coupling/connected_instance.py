@@ -30,7 +30,6 @@ class ConnectedInstance:
     ----------
     instance : Instance
         Instantiated.
-    wiring : Wiring
     values, slopes : ctypes array of double, ndarray
         The system's values, and their derivatives with respect to time.
     """
@@ -87,10 +86,7 @@ class ConnectedInstance:
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
     """Value to set before initialization: an Enumeration's item may be given by its name.
 
-    Raises
-    ------
-    UserError
-        If it is not a parameter, the start value of a state or a Boolean input.
+    UserError if it is not a parameter, the start value of a state or a Boolean input.
     """
     variable = fmu.model.variables.get(name)
     if variable is None or not _can_start(variable):

@@ -79,11 +79,13 @@ class Snapshot:
 class Master:
     """A system of connected components; a context manager that frees their instances.
 
+    UserError if names are unknown, a Real input is connected not once, or an FMU cannot do what is
+    asked.
+
     Parameters
     ----------
     fmus : mapping of str to Fmu
         By name of the component. Their order is that of stepping in Gauss-Seidel order.
-    connections : iterable of Connection
     order : str
         One of ORDERS.
     inputs : str
@@ -105,11 +107,6 @@ class Master:
         s.
     do_steps : int
         Steps of components so far, rolled back ones included.
-
-    Raises
-    ------
-    UserError
-        If names are unknown, a Real input is connected not once, or an FMU cannot do what is asked.
     """
 
     def __init__(

@@ -71,22 +71,18 @@ def run(
 ) -> Controlled:
     """Step `master`, which is initialized, to the time `stop`.
 
+    UserError if a signal is unknown, a step would have to be shorter than the shortest, or an FMU
+    fails or has no state to go back to.
+
     Parameters
     ----------
     master : Master
         Its order is 1 with zero-order hold of the inputs, with extrapolated ones 2.
     stop : float
         s; the last step ends exactly there.
-    control : Control
     before : callable, optional
         Called with the length of each accepted step while the system is back at the beginning of
         that step; it may step the system.
-
-    Raises
-    ------
-    UserError
-        If a signal is unknown, a step would have to be shorter than the shortest, or an FMU fails
-        or has no state to go back to.
     """
     steps = _Steps(master, control)
     times, rows, estimates, limited = [master.time], [master.values.copy()], [], []

@@ -16,30 +16,21 @@ from cosim.fmi.fmu_file import Fmu
 
 
 def run(
-    part: Part,
-    fmu: Fmu,
-    address: str,
-    silence: float,
-    is_gone: Callable[[], bool] = lambda: False,
+    part: Part, fmu: Fmu, address: str, silence: float, is_gone: Callable[[], bool] = lambda: False
 ) -> None:
     """Step a component from the first to the last communication point.
 
+    UserError if the FMU fails, the federation steps something else or ends, or an output changes
+    that must not.
+
     Parameters
     ----------
-    part : Part
-    fmu : Fmu
     address : str
         Of the federation.
     silence : float
         s, that a call of the FMU may take, and the broker be silent.
     is_gone : callable, optional
         Whether the process is gone that started this one.
-
-    Raises
-    ------
-    UserError
-        If the FMU fails, the federation steps something else or ends, or an output changes that
-        must not.
     """
     name = part.component
     federate = Federate(name, address, sorted({s.component for s in part.sources}))

@@ -54,10 +54,7 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
 
     Only Real values are exchanged in the steps.
 
-    Raises
-    ------
-    UserError
-        If the variant is unknown.
+    UserError if the variant is unknown.
     """
     system = ssp.system
     if variant not in system.parameters:

@@ -88,9 +88,7 @@ class Described:
 def describe(path: Path) -> Described:
     """Read what an FMU of a known version of FMI, for co-simulation, declares.
 
-    Raises
-    ------
-    UnreadableError
+    Raises UnreadableError.
     """
     with temporary_folder() as folder:
         sizes = unpack(path, folder, "FMU", DESCRIPTION)

@@ -57,10 +57,7 @@ class Variable:
 
         That is a number, a text with a number and its unit, or the name of an Enumeration's item.
 
-        Raises
-        ------
-        WrongValueError
-            If it is not of the variable's type or out of range.
+        WrongValueError if it is not of the variable's type or out of range.
         """
         if self.type not in TYPES.values():
             raise WrongValueError(f"is of type {self.type}, which cannot be set here")
@@ -153,10 +150,7 @@ class Model:
     def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
         """Check a relative tolerance to run at, with `values` for start values.
 
-        Raises
-        ------
-        WrongValueError
-            If the method that integrates cannot be so exact.
+        WrongValueError if the method that integrates cannot be so exact.
         """
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
@@ -168,10 +162,7 @@ class Model:
     def find(self, name: str, kind: str) -> Variable:
         """Variable called `name`.
 
-        Raises
-        ------
-        WrongValueError
-            If it is not of the kind, one of `KINDS`; lists those that are.
+        WrongValueError if it is not of the kind, one of `KINDS`; lists those that are.
         """
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
@@ -186,10 +177,7 @@ class Model:
 def described(description: ModelDescription) -> Model:
     """Model that a description of FMI 2.0 or 3.0, for co-simulation, declares.
 
-    Raises
-    ------
-    ValueError
-        If a start value or a limit is not a number.
+    ValueError if a start value or a limit is not a number.
     """
     capabilities = description.coSimulation
     displays = {

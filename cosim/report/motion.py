@@ -54,7 +54,6 @@ def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> 
 
     Parameters
     ----------
-    run : Run
     rows : sequence of int or slice, optional
         Those of the recorded rows that the page holds.
     """
@@ -80,10 +79,7 @@ def of_result(
 
 
 def of_outcome(
-    system: str,
-    ssp: Ssp,
-    outcome: Outcome,
-    rows: Sequence[int] | np.ndarray | slice = slice(None),
+    system: str, ssp: Ssp, outcome: Outcome, rows: Sequence[int] | np.ndarray | slice = slice(None)
 ) -> dict | None:
     """Data of the player for a run of a system's variant; None: nothing to animate.
 
@@ -91,8 +87,6 @@ def of_outcome(
     ----------
     system : str
         Name of the system's folder.
-    ssp : Ssp
-    outcome : Outcome
     rows : sequence of int or slice, optional
         Those of the recorded rows that the page holds.
     """

@@ -106,12 +106,11 @@ def write(report: Path) -> Path:
     for folder, title in SECTIONS.items():
         entries = read(report, folder)
         if entries:
-            summary = _summary(entries)
-            sections.append({"folder": folder, "title": title, "summary": summary})
             groups: dict[str, list[Entry]] = {}
             for entry in entries:
                 groups.setdefault(entry.group, []).append(entry)
-            sections[-1]["groups"] = groups
+            section = {"folder": folder, "title": title, "summary": _summary(entries)}
+            sections.append(section | {"groups": groups})
     statuses = [entry.status for folder in SECTIONS for entry in read(report, folder)]
     return pages.write_page(
         report / pages.INDEX,

@@ -46,11 +46,7 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
         for model, own in models.items()
     ]
     rows = [
-        [
-            sweep.scenario.name,
-            *(f"{error:.1e}" for error in sweep.errors),
-            verdict(sweep.passed),
-        ]
+        [sweep.scenario.name, *(f"{error:.1e}" for error in sweep.errors), verdict(sweep.passed)]
         for sweep in sweeps
     ]
     passed = all(sweep.passed for sweep in sweeps)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from cosim.system import ecos
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
 from cosim.system.structure import System
-from cosim.system.study import Diagram, Study
+from cosim.system.study import Diagram, Study, load
 from cosim.texts import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
@@ -34,7 +35,16 @@ class Section:
 
     folder: Path
     ssp: Ssp
-    study: Study
+
+    @cached_property
+    def study(self) -> Study:
+        """What its folder says of it."""
+        return load(self.folder)
+
+    @property
+    def variants(self) -> list[str]:
+        """Names of its variants."""
+        return list(self.ssp.system.parameters)
 
     @property
     def name(self) -> str:

@@ -105,10 +105,7 @@ class Runs:
         return times * len(missing) * (len(scenario.times) - 1)
 
     def run(
-        self,
-        scenario: Scenario,
-        tolerance: float,
-        progress: Callable[[int], object] | None = None,
+        self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
         """`scenario` at `tolerance`, simulated now unless it was before."""
         key = scenario.name, tolerance
@@ -120,10 +117,7 @@ class Runs:
         return self._runs[key]
 
     def compared(
-        self,
-        scenario: Scenario,
-        tolerance: float,
-        progress: Callable[[int], object] | None = None,
+        self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
         """`scenario` at `tolerance`, compared with its twin too, if there is one."""
         run, twin = self.run(scenario, tolerance, progress), self._twins.get(scenario.model)
@@ -141,10 +135,7 @@ class Runs:
         return Failure(scenario, self._fmus[scenario.model], tolerance, str(error), rows)
 
     def estimated(
-        self,
-        scenario: Scenario,
-        tolerance: float,
-        progress: Callable[[int], object] | None = None,
+        self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
         """`scenario`, which has no reference, compared with itself at another tolerance."""
         fmu = self._fmus[scenario.model]

@@ -148,10 +148,7 @@ def slope(steps: np.ndarray, errors: np.ndarray) -> float:
 def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
     """Inputs of `scenario` as smooth functions of time.
 
-    Raises
-    ------
-    UserError
-        If one of them is no sum of sines.
+    UserError if one of them is no sum of sines.
     """
     for name, signal in scenario.signals.items():
         if not isinstance(signal, Sines):
@@ -162,10 +159,7 @@ def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
 def load(path: Path, model: Model) -> Problem:
     """Read the problem at `path` and its exact final state.
 
-    Raises
-    ------
-    UserError
-        If one of the two files is missing or wrong.
+    UserError if one of the two files is missing or wrong.
     """
     scenario = scenarios.load(path, model)
     if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
@@ -201,20 +195,16 @@ def study(
 ) -> Convergence:
     """Run `problem` in every case and with every communication step.
 
+    UserError if a function of an FMU fails.
+
     Parameters
     ----------
     fmu : Fmu
         For all orders of input derivatives.
-    problem : Problem
     progress : callable, optional
         Called with the number of steps that each run has made.
     updated : Fmu, optional
         For intermediate update; without it, this case is left out.
-
-    Raises
-    ------
-    UserError
-        If a function of an FMU fails.
     """
     fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
     errors = np.empty((len(fmus), len(FACTORS)))
@@ -230,8 +220,6 @@ def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str,
 
     Parameters
     ----------
-    fmu : Fmu
-    problem : Problem
     case : int
         Highest derivative of the inputs that is set, along with all lower ones, 0: none; or
         INTERMEDIATE_UPDATE.

@@ -68,17 +68,13 @@ class Reference:
 def load(scenario: Scenario, model: Model) -> Reference:
     """Read and check the reference of `scenario`.
 
+    UserError if the file is missing, damaged, or not of this scenario; names the line and the
+    command that makes references.
+
     Parameters
     ----------
-    scenario : Scenario
     model : Model
         What the scenario was checked against.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, or not of this scenario; names the line and the command
-        that makes references.
     """
     path = project.reference_file(scenario.path, model.name)
     folder = project.model_folder(scenario.path)
@@ -102,10 +98,7 @@ def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
 def read_summed(folder: Path) -> Summed:
     """Which errors of a model or system, by its folder, have the scale of a sum; maybe none.
 
-    Raises
-    ------
-    UserError
-        If the file is wrong.
+    UserError if the file is wrong.
     """
     path = project.scales_file(folder)
     if not is_file(path):
@@ -124,7 +117,6 @@ def scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float
     ----------
     columns : mapping of str to ndarray
         Reference of all variables, (rows,) each.
-    name : str
     summed : mapping
         As `read_summed` gives it; a sum of which a term is missing does not count.
     """

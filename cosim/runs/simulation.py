@@ -40,21 +40,17 @@ def simulate(
 ) -> Result:
     """Run `scenario` on `fmu` and record its Real outputs.
 
+    UserError if the FMU has no Real outputs, or if one of its functions fails; the text holds the
+    FMU's own message. In a step it is a `StoppedError`.
+
     Parameters
     ----------
     fmu : Fmu
         The one that the scenario was checked against.
-    scenario : Scenario
     tolerance : float, optional
         Relative tolerance; None: that of the scenario.
     progress : callable, optional
         Called now and then with the number of steps done since the last call.
-
-    Raises
-    ------
-    UserError
-        If the FMU has no Real outputs, or if one of its functions fails; the text holds the FMU's
-        own message. In a step it is a `StoppedError`.
     """
     tolerance = scenario.tolerance if tolerance is None else tolerance
     if not fmu.model.real_outputs:

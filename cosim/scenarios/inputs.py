@@ -27,7 +27,6 @@ class InputReader:
     ----------
     reader : Reader
         Of the scenario's file.
-    model : Model
     times : ndarray, shape (n + 1,)
         Communication points in s.
     """

@@ -33,10 +33,7 @@ class Log:
     def columns(self, time: str, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Times (rows,), which increase, and values (rows,) of a column; all finite.
 
-        Raises
-        ------
-        UserError
-            If there is no such column, or anything in it is wrong; names the line.
+        UserError if there is no such column, or anything in it is wrong; names the line.
         """
         first, second = self._place(time), self._place(name)
         found = array("d")
@@ -100,10 +97,7 @@ class Log:
 def read(path: Path) -> Log:
     """Read a log with commas, semicolons or tabs between its columns.
 
-    Raises
-    ------
-    UserError
-        If it cannot be read, or has no columns.
+    UserError if it cannot be read, or has no columns.
     """
     try:
         with placed(path):

@@ -99,10 +99,7 @@ def title(path: Path) -> str:
 def folder_of(path: Path) -> Path:
     """Folder of the model of a scenario: that its key `model` names, or else the one it lies in.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be read, or names no model.
+    UserError if the file cannot be read, or names no model.
     """
     content, reader = read_toml(path), Reader(path)
     if MODEL not in content:
@@ -120,18 +117,14 @@ def folder_of(path: Path) -> Path:
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
     """Read and check the scenario at `path`, of the project or of a user.
 
+    UserError if the file cannot be read, or if anything in it is wrong.
+
     Parameters
     ----------
-    path : Path
     model : Model
         What the model's FMU declares.
     times : mapping, optional
         Values that replace those of section [time].
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, or if anything in it is wrong.
     """
     path = Path(path)
     content = read_toml(path)

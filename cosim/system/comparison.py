@@ -88,20 +88,15 @@ def load_reference(
 ) -> Reference:
     """Read and check the reference of a variant.
 
+    UserError if the file is missing, damaged, or not of this system; names the line and the command
+    that makes references.
+
     Parameters
     ----------
-    ssp : Ssp
-    variant : str
     system : Path
         Folder of the system.
     experiment : tuple of float
         Start, stop and step in s that the references are for.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, or not of this system; names the line and the command
-        that makes references.
     """
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)

@@ -42,10 +42,8 @@ class Ssp:
 def unpacked(path: Path) -> Iterator[Ssp]:
     """Unpack an SSP to a temporary folder, which is removed at the end, and read it.
 
-    Raises
-    ------
-    UserError
-        If it is damaged, or no system that can be run (what that is: `cosim.system.ssp_checks`).
+    UserError if it is damaged, or no system that can be run (what that is:
+    `cosim.system.ssp_checks`).
     """
     path = Path(path)
     with temporary_folder() as folder:

@@ -29,18 +29,14 @@ def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]
     unit, connections go from an output to an input of the same type and unit, every input of every
     FMU is connected exactly once, and parameters are variables that can be set.
 
+    UserError if not; the text names component and variable.
+
     Parameters
     ----------
     path : Path
         The SSP, for messages.
     folder : Path
         Where it is unpacked.
-    system : System
-
-    Raises
-    ------
-    UserError
-        If not; the text names component and variable.
     """
     checker = _Checker(path, system)
     for component in system.components:

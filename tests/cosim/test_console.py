@@ -46,10 +46,7 @@ def run() -> Run:
 
 @pytest.mark.parametrize("columns", [200, 80, 60])
 def test_no_table_is_wider_than_the_terminal(
-    run: Run,
-    columns: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run: Run, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whatever the names, the numbers and what has failed."""
     monkeypatch.setenv("COLUMNS", str(columns))

@@ -351,11 +351,7 @@ def test_run_of_all_measures_the_order(
 
 @pytest.mark.parametrize("arguments", [[], ["--fmi", "3"]])
 def test_intermediate_update_is_measured_with_fmi3(
-    project: Path,
-    fmu: Path,
-    updated: Fmu,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
+    project: Path, fmu: Path, updated: Fmu, capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
     """Beside the FMU of FMI 2.0, and with that of FMI 3.0 only."""
     (project / "build/fmi3").mkdir(parents=True)

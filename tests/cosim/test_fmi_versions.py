@@ -167,9 +167,7 @@ def test_a_twin_without_a_variable_of_the_scenario_is_reported_before_anything_r
 ) -> None:
     (built / "fmi3" / NAME).unlink()
     repacked(
-        fmi3_fmu(fmu),
-        built / "fmi3" / NAME,
-        lambda xml: xml.replace('name="l1"', 'name="length1"'),
+        fmi3_fmu(fmu), built / "fmi3" / NAME, lambda xml: xml.replace('name="l1"', 'name="length1"')
     )
     code, out, err = call(capsys, "run", SHORT)
     assert (code, out) == (2, "") and "the model has no variable 'l1'" in err
