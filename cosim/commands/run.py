@@ -5,7 +5,7 @@ Files of users are run in the same way; they have no references.
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -266,15 +266,10 @@ def _runs(
         for tolerance in dict.fromkeys(own[scenario]):
             label = f"{scenario.name} at {tolerance:g}"
             ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
-            try:
-                with Progress(label, ahead) as progress:
-                    run = runs.compared(scenario, tolerance, progress)
-            except UserError as error:
-                failures.append(runs.failure(scenario, tolerance, error))
+            found = _one(runs, failures, runs.compared, scenario, tolerance, label, ahead)
+            ended += found
+            if not found:
                 why.append(f"tolerance {short(tolerance)}: did not run to its end")
-                continue
-            console.messages(f"{label}: the FMU says", run.result.messages)
-            ended.append(run)
         table.row(scenario.name, own[scenario][0], ended, why)
         done += ended
     if with_twins:
@@ -282,6 +277,26 @@ def _runs(
         same = {run.scenario.name for run in done} - differ
         print(f"\nsame bits in FMI {FIRST} and {TWIN}: {counted(same, 'scenario')}")
     return done
+
+
+def _one(
+    runs: Runs,
+    failures: list[Failure],
+    run: Callable[..., Run],
+    scenario: Scenario,
+    tolerance: float,
+    label: str,
+    steps: int,
+) -> list[Run]:
+    """The run that `run` makes; none, but a failure, if the FMU does not finish it."""
+    try:
+        with Progress(label, steps) as progress:
+            found = run(scenario, tolerance, progress)
+    except UserError as error:
+        failures.append(runs.failure(scenario, tolerance, error))
+        return []
+    console.messages(f"{label}: the FMU says", found.result.messages)
+    return [found]
 
 
 def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
@@ -304,15 +319,10 @@ def _estimated(
     table = RunTable([scenario.name for scenario in own], used)
     done = []
     for scenario, at in zip(own, used, strict=True):
-        why = []
-        try:
-            with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
-                done.append(runs.estimated(scenario, at, progress))
-            console.messages(f"{scenario.name}: the FMU says", done[-1].result.messages)
-        except UserError as error:
-            failures.append(runs.failure(scenario, at, error))
-            why = ["did not run to its end"]
-        table.row(scenario.name, at, [] if why else done[-1:], why)
+        steps = 2 * (len(scenario.times) - 1)
+        found = _one(runs, failures, runs.estimated, scenario, at, scenario.name, steps)
+        table.row(scenario.name, at, found, [] if found else ["did not run to its end"])
+        done += found
     return done
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.errors import UserError, placed
-from cosim.fmi.fmi_instance import Instance, UnpackedFmu
+from cosim.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
 
 
@@ -57,11 +57,7 @@ class ConnectedInstance:
 
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
         """From instantiated into initialization mode."""
-        instance = self.instance
-        instance.set_up(start, stop)
-        for name, value in parameters.items():
-            instance.set(name, start_value(instance.fmu, self.name, name, value))
-        instance.enter_initialization()
+        begin(self.instance, start, stop, parameters)
 
     def set_inputs(self, values: np.ndarray) -> None:
         """Set the inputs, (inputs,), in their units."""
@@ -81,6 +77,24 @@ class ConnectedInstance:
         """Read the derivatives of the connected outputs into the system's slopes."""
         self._output_slopes.get()
         self._slopes[self._slope_places] = self._output_slopes.view
+
+
+def begin(
+    instance: Instance, start: float, stop: float | None, parameters: Mapping[str, Value]
+) -> None:
+    """Bring an instance of a component into initialization mode."""
+    instance.set_up(start, stop)
+    for name, value in parameters.items():
+        instance.set(name, start_value(instance.fmu, instance.name, name, value))
+    instance.enter_initialization()
+
+
+def check_finite(component: str, outputs: Reals, when: str) -> None:
+    """Refuse outputs that are not finite."""
+    bad = np.flatnonzero(~np.isfinite(outputs.view))
+    if len(bad):
+        name, value = f"{component}.{outputs.names[bad[0]]}", outputs.view[bad[0]]
+        raise UserError(f"{name} is {value} {when}: a finite value is expected")
 
 
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:

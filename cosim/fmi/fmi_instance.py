@@ -192,6 +192,15 @@ class Instance(ABC):
         except FMICallException as error:
             raise self.failure(error, when) from error
 
+    @contextmanager
+    def explained_early(self) -> Iterator[None]:
+        """The same in initialization mode, at whose end FMUs explain which parameters are wrong."""
+        try:
+            yield
+        except FMICallException as error:
+            self.exit_initialization()
+            raise self.failure(error, "in initialization") from error
+
     # ---- Initialization --------------------------------------------------------------------------
 
     @abstractmethod

@@ -117,7 +117,7 @@ def _write_values(
 ) -> str:
     """Write the file of values; its name."""
     values = np.column_stack([column.astype(float) for column in columns.values()])
-    trajectory_csv.write_short(file, result.times, list(columns), values, digits)
+    trajectory_csv.write(file, result.times, list(columns), values, digits, True)
     return file.name
 
 

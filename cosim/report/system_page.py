@@ -161,7 +161,7 @@ def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
 def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     """Write the file of values; what the page says of it."""
     run, csv = outcome.run, f"{outcome.variant}.csv"
-    trajectory_csv.write_short(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS)
+    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
     every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
     note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
     return {"csv": csv, "csv_note": note}

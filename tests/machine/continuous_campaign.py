@@ -1,30 +1,13 @@
 """The whole motion with all methods and steps of the study: five minutes, with `ctest -C Long`."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs.convergence import slope
-from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import continuous
 from models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, Method
-from models.machine.systems import fmus_of
-from tests.machine.test_machine import SSP
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Ssp]:
-    with ssp.unpacked(SSP) as machine:
-        yield machine
-
-
-@pytest.fixture(scope="module")
-def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    with fmus_of(opened) as found:
-        yield found
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

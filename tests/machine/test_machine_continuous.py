@@ -1,18 +1,13 @@
 """What co-simulations of the machine without encoders and sampling converge to."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs.convergence import slope
-from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import continuous
 from models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, Columns, Method
-from models.machine.systems import fmus_of
-from tests.machine.test_machine import SSP
 
 STOP = 0.4  # s: the start and the grasp
 # steps per second of the runs here, by method
@@ -21,18 +16,6 @@ SHORT = {
     "Gauss-Seidel, inputs extrapolated": (4000, 6000, 8000, 12000),
 }
 SHORT_METHODS = [method for method in METHODS if method.name in SHORT]
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Ssp]:
-    with ssp.unpacked(SSP) as machine:
-        yield machine
-
-
-@pytest.fixture(scope="module")
-def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    with fmus_of(opened) as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
