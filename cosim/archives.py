@@ -31,9 +31,10 @@ CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines, o
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
     """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
 
+    UnreadableError for whatever is wrong with the archive.
+
     Parameters
     ----------
-    path, folder : Path
     kind : str
         What it should be, FMU or SSP.
     only : str, optional
@@ -43,11 +44,6 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
     -------
     dict
         Bytes of all files in the archive, by their names: relative paths with "/".
-
-    Raises
-    ------
-    UnreadableError
-        Whatever is wrong with the archive.
     """
     check_regular(path)
     if path.is_dir():
@@ -75,10 +71,8 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
 def read_xml(path: Path) -> etree._ElementTree:
     """Parse an XML file of an archive that was unpacked, without its comments.
 
-    Raises
-    ------
-    UnreadableError
-        If it is none, too large, or has a DOCTYPE: entities could grow, or read other files.
+    UnreadableError if it is none, too large, or has a DOCTYPE: entities could grow, or read other
+    files.
     """
     size = path.stat().st_size
     if size > LARGEST_XML:
@@ -112,9 +106,7 @@ def wrong_name(name: str) -> str:
 def check_library(path: Path) -> None:
     """Refuse a shared object (ELF, 64 bit) that is cut off: using it would kill the process.
 
-    Raises
-    ------
-    UnreadableError
+    Raises UnreadableError.
     """
     with path.open("rb") as file:
         header = file.read(64)

@@ -58,12 +58,7 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     Names and options without a command are those of `run`. Only the module of the command is
     imported, because some take long.
 
-    Raises
-    ------
-    UserError
-        If something in them is wrong.
-    SystemExit
-        After help has been printed.
+    UserError if something in them is wrong. SystemExit after help has been printed.
     """
     first, *rest = arguments
     while first in COMMON and rest:  # may stand in front of the command
@@ -87,11 +82,7 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _parser(command: str) -> argparse.ArgumentParser:
     module = import_module(f"cosim.commands.{command}")
-    parser = _Parser(
-        prog=f"{PROGRAM} {command}",
-        description=module.DESCRIPTION,
-        epilog=EPILOG,
-    )
+    parser = _Parser(prog=f"{PROGRAM} {command}", description=module.DESCRIPTION, epilog=EPILOG)
     module.add_options(parser)
     add_common(parser)
     return parser

@@ -1,7 +1,9 @@
 """Errors whose text is meant for the user, and functions that form such texts."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 SHORTEST_PART = 3  # letters of a longer name that may be meant
 
@@ -13,8 +15,29 @@ class UserError(Exception):
     """
 
 
-class WrongValueError(Exception):
-    """Why a variable does not take a value, or is not of a kind, in one line."""
+class StoppedError(UserError):
+    """A run that failed after its start; `result` has its rows up to there, or is None."""
+
+    def __init__(self, text: str, result: Any) -> None:
+        super().__init__(text)
+        self.result = result
+
+
+class UnplacedError(Exception):
+    """What is wrong, in one line that does not say where: `placed` does."""
+
+
+class WrongValueError(UnplacedError):
+    """Why a variable does not take a value, or is not of a kind."""
+
+
+@contextmanager
+def placed(where: object) -> Iterator[None]:
+    """Turn an `UnplacedError` inside into the user's error, which begins with `where`."""
+    try:
+        yield
+    except UnplacedError as error:
+        raise UserError(f"{where}: {error}") from error
 
 
 def together(errors: Sequence[UserError]) -> UserError:
@@ -29,6 +52,12 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     if not close and len(name) >= SHORTEST_PART:
         close = [other for other in known if name.lower() in other.lower()]
     return f", did you mean {close[0]!r}?" if close else ""
+
+
+def hint(name: str, known: Iterable[str], label: str = "known") -> str:
+    """Return the end of an error message that proposes one of `known`, and names them all."""
+    known = list(known)
+    return f"{did_you_mean(name, known)} ({label}: {', '.join(known) or 'none'})"
 
 
 def reason(error: Exception) -> str:

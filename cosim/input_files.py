@@ -7,23 +7,21 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import UserError, reason
+from cosim.errors import UnplacedError, UserError, placed, reason
 
 LARGEST_TOML = 10_000_000  # bytes: some seconds of parsing
 # the parser's time grows with the square of a key's parts: a.b.c
 LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){32}""")
 
 
-class UnreadableError(Exception):
+class UnreadableError(UnplacedError):
     """Why a file cannot be read, in a few words without its name."""
 
 
 def check_regular(path: Path) -> None:
     """Refuse what may never end when it is read: devices, pipes, sockets; not a folder.
 
-    Raises
-    ------
-    UnreadableError
+    Raises UnreadableError.
     """
     try:
         mode = Path(path).stat().st_mode
@@ -59,11 +57,7 @@ def read_bytes(path: Path, largest: int) -> bytes:
 def read_text(path: Path, largest: int) -> str:
     """Text of a file of at most `largest` bytes in UTF-8, without a byte order mark.
 
-    Raises
-    ------
-    UnreadableError
-    UnicodeDecodeError
-        With the position in the file.
+    UnreadableError, or UnicodeDecodeError with the position in the file.
     """
     return decoded(read_bytes(path, largest))
 
@@ -76,20 +70,16 @@ def decoded(content: bytes) -> str:
 def read_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file.
 
-    Raises
-    ------
-    UserError
-        Whatever keeps the file from being read.
+    UserError for whatever keeps the file from being read.
     """
     try:
-        text = read_text(path, LARGEST_TOML)
+        with placed(path):
+            text = read_text(path, LARGEST_TOML)
         long = LONG_KEY.search(text)
         if long:
             line = text.count("\n", 0, long.start()) + 1
             raise UserError(f"{path}, line {line}: a key of more than 32 parts")
         return tomllib.loads(text)
-    except UnreadableError as error:
-        raise UserError(f"{path}: {error}") from None
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: not UTF-8 text, at byte {error.start}") from None
     except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError

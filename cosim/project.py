@@ -17,7 +17,7 @@ build/report/                           what the commands write: index.html, fol
 
 from pathlib import Path
 
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, did_you_mean, hint
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -31,13 +31,7 @@ VERSIONS = tuple(BUILD_FOLDERS)
 
 
 def scenario_files() -> dict[str, Path]:
-    """All scenarios by name.
-
-    Raises
-    ------
-    UserError
-        If two scenarios have the same name.
-    """
+    """All scenarios by name; UserError if two scenarios have the same name."""
     found: dict[str, Path] = {}
     for path in sorted(ROOT.glob("models/*/scenarios/*.toml")):
         if path.stem in found:
@@ -67,8 +61,7 @@ def model(name: str) -> Path:
     for folder in known.values():
         if name == folder.name or is_built_from(name, folder):
             return folder
-    guess = did_you_mean(name, known)
-    raise UserError(f"no model {name!r}{guess} (known: {', '.join(known) or 'none'})")
+    raise UserError(f"no model {name!r}{hint(name, known)}")
 
 
 def is_in_model(file: Path) -> bool:
@@ -90,10 +83,7 @@ def convergence_files() -> list[Path]:
 def model_folder(scenario: Path) -> Path:
     """Folder of the model that a scenario or problem belongs to.
 
-    Raises
-    ------
-    UserError
-        If the file is in no such folder.
+    UserError if the file is in no such folder.
     """
     folder = scenario.absolute().parent
     if folder.name not in SCENARIO_FOLDERS:
@@ -154,10 +144,7 @@ def is_built_from(name: str, folder: Path) -> bool:
 def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
     """What has been built from the folder of a model (.fmu) or system (.ssp), of a version of FMI.
 
-    Raises
-    ------
-    UserError
-        If it is not there; names `option`, which takes another file, if it is given.
+    UserError if it is not there; names `option`, which takes another file, if it is given.
     """
     build = ROOT / BUILD_FOLDERS[version]
     for path in sorted(build.glob(f"*{suffix}")):

@@ -8,21 +8,15 @@ SMALLEST = 1e-99  # number that is written as it is
 GAP = ".."  # in a text that is shortened
 
 
-def short(number: float) -> str:
-    """1e-8 for 1e-08."""
-    if not math.isfinite(number):
-        return f"{number:g}"
-    mantissa, exponent = f"{number:.3e}".split("e")
-    return f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
-
-
-def brief(number: float, digits: int = 1) -> str:
-    """1.2e-8 for 1.234e-08, with so many digits behind the point; 0 for 0, ~0 for tiny numbers."""
+def short(number: float, digits: int | None = None) -> str:
+    """1e-8 for 1e-08: so many digits behind the point, or up to three as needed; 0, ~0 if tiny."""
     if not number or not math.isfinite(number):
         return f"{number:g}"
     if abs(number) < SMALLEST:
         return "~0"
-    mantissa, exponent = f"{number:.{digits}e}".split("e")
+    mantissa, exponent = f"{number:.{3 if digits is None else digits}e}".split("e")
+    if digits is None:
+        mantissa = mantissa.rstrip("0").rstrip(".")
     return f"{mantissa}e{int(exponent)}"
 
 

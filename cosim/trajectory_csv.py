@@ -16,51 +16,37 @@ LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
 Failure = Callable[[str, int | None], Exception]
 
 
-def write(path: Path, times: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
-    """Write trajectories with 17 significant digits; the file appears complete or not at all.
+def write(
+    path: Path,
+    times: np.ndarray,
+    names: Sequence[str],
+    values: np.ndarray,
+    digits: int | None = 17,
+    short_times: bool = False,
+) -> None:
+    """Write trajectories; the file appears complete or not at all.
 
     Parameters
     ----------
-    path : Path
-        Its folder exists.
     times : ndarray, shape (rows,)
         s.
     names : sequence of str
         One name per column of `values`.
     values : ndarray, shape (rows, len(names))
         In the variables' units.
-    """
-    with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        table = np.column_stack((times, values))
-        np.savetxt(file, table, fmt="%.17g", delimiter=",", header=_header(names), comments="")
-
-
-def write_short(
-    path: Path,
-    times: np.ndarray,
-    names: Sequence[str],
-    values: np.ndarray,
-    digits: int | None = None,
-) -> None:
-    """Write trajectories in fewer bytes, otherwise as `write`.
-
-    Parameters
-    ----------
-    path, times, names, values
-        As of `write`.
     digits : int, optional
-        Significant digits of the values. Without it, values too have the digits that they need to
-        be read back as they are; times always have them.
+        Significant ones; None: those that values need to be read back as they are.
+    short_times : bool, optional
+        Whether times have those that they need, too.
     """
     form = _shortest if digits is None else f"{{:.{digits}g}}".format
+    of_time = _shortest if short_times else form
     with whole(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(_header(names) + "\n")
-        for time, row in zip(times.tolist(), values.tolist(), strict=True):
-            file.write(",".join([_shortest(time), *map(form, row)]) + "\n")
-
-
-def _header(names: Sequence[str]) -> str:
-    return ",".join(f'"{name}"' for name in ("time", *names))
+        file.write(",".join(f'"{name}"' for name in ("time", *names)) + "\n")
+        for time, row in zip(
+            *(np.asarray(x, float).tolist() for x in (times, values)), strict=True
+        ):
+            file.write(",".join([of_time(time), *map(form, row)]) + "\n")
 
 
 def _shortest(value: float) -> str:

@@ -117,10 +117,7 @@ def finite_number(given: Any) -> float:
 def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
     """Value of a number, or of a text with a number and one of the `known` units.
 
-    Raises
-    ------
-    WrongValueError
-        If it is neither, or not finite; names the known units.
+    WrongValueError if it is neither, or not finite; names the known units.
     """
     if not isinstance(given, str):
         return finite_number(given)
@@ -136,10 +133,7 @@ def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
 def typed_quantity(text: str, known: Units) -> float:
     """Value of a text of the command line: a number, with a unit or without one.
 
-    Raises
-    ------
-    WrongValueError
-        As `quantity`.
+    WrongValueError: as `quantity`.
     """
     number, unit = _parts(text, known)
     return _value(text, number, unit or next(iter(known), ""), known)

@@ -16,7 +16,7 @@ from cosim.campaign.campaign_file import Campaign
 from cosim.campaign.job import Component, Held
 from cosim.campaign.loop import Part
 from cosim.coupling.connected_instance import start_value
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, WrongValueError, did_you_mean, hint
 from cosim.fmi.fmu_file import describe, read_model
 from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
 from cosim.scenarios import scenario
@@ -280,10 +280,7 @@ def _sha256(content: bytes) -> str:
 def opened(campaign: Campaign, given: Path | None, where: object = "campaign") -> Iterator[Base]:
     """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one.
 
-    Raises
-    ------
-    UserError
-        If it cannot be opened; beginning with `where` if the campaign's text is wrong.
+    UserError if it cannot be opened; beginning with `where` if the campaign's text is wrong.
     """
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
@@ -297,19 +294,14 @@ def opened(campaign: Campaign, given: Path | None, where: object = "campaign") -
         return
     folders = project.systems()
     if campaign.system not in folders:
-        guess = did_you_mean(campaign.system, folders)
-        raise UserError(
-            f"{where}: system: no system {campaign.system!r}{guess} (known: {', '.join(folders)})"
-        )
+        known = hint(campaign.system, folders)
+        raise UserError(f"{where}: system: no system {campaign.system!r}{known}")
     path = given or project.built(folders[campaign.system], ".ssp", "--fmu")
     with ssp.unpacked(path) as system:
         variants = system.system.parameter_sets
         if campaign.variant not in variants:
-            guess = did_you_mean(campaign.variant, variants)
-            known = ", ".join(variants)
-            raise UserError(
-                f"{where}: variant: no variant {campaign.variant!r}{guess} (known: {known})"
-            )
+            known = hint(campaign.variant, variants)
+            raise UserError(f"{where}: variant: no variant {campaign.variant!r}{known}")
         with _said_of(where):
             given_times = _system_times(system, times)
         yield SystemBase(campaign.system, system, campaign.variant, given_times)

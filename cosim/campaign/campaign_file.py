@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from cosim.campaign.expressions import Expression, parsed
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, WrongValueError, hint
 from cosim.input_files import read_toml, show
 from cosim.units import SECONDS, quantity
 
@@ -128,17 +128,17 @@ class Tracking(_Table):
 class Keep(_Table):
     """What is kept of each run, and of which runs everything."""
 
-    start: tuple[Name, ...] = ()
-    final: tuple[Name, ...] = ()
-    minimum: tuple[Name, ...] = ()
-    maximum: tuple[Name, ...] = ()
-    rms: tuple[Name, ...] = ()
-    integral: tuple[Name, ...] = ()
+    start: list[Name] = []
+    final: list[Name] = []
+    minimum: list[Name] = []
+    maximum: list[Name] = []
+    rms: list[Name] = []
+    integral: list[Name] = []
     settling: dict[Name, Settling] = {}
     tracking: dict[Name, Tracking] = {}
     crossings: dict[Name, Crossings] = {}
     lyapunov: bool = False
-    trajectories: tuple[NonNegativeInt, ...] = ()  # numbers of the runs
+    trajectories: list[NonNegativeInt] = []  # numbers of the runs
 
 
 class Map(_Table):
@@ -170,13 +170,13 @@ class Campaign(_Table):
     runs: PositiveInt | None = None
     block: Annotated[int, Field(ge=1, le=MAX_BLOCK)] = 200  # runs of a file of results
     output: Name | None = None  # folder, beside this file
-    worst: tuple[Name, ...] = ()  # columns whose largest values the page lists
+    worst: list[Name] = []  # columns whose largest values the page lists
     time: Time = Time()
     set: dict[Name, Number] = {}
     parameters: Annotated[dict[Name, Distribution], Field(min_length=1, max_length=MAX_PARAMETERS)]
     derived: dict[Name, str] = {}
     keep: Keep
-    maps: tuple[Map, ...] = ()
+    maps: list[Map] = []
 
     @property
     def count(self) -> int:
@@ -267,12 +267,9 @@ def grid_value(distribution: Distribution, place: int) -> float:
 def read(path: Path) -> Campaign:
     """Read and check the campaign at `path`.
 
-    Raises
-    ------
-    UserError
-        If it cannot be read or anything in it is wrong: the first mistake, with its place.
+    UserError if it cannot be read or anything in it is wrong: the first mistake, with its place.
     """
-    return checked(_as_tuples(read_toml(path)), path)
+    return checked(read_toml(path), path)
 
 
 def checked(content: Mapping[str, Any], where: object) -> Campaign:
@@ -283,24 +280,6 @@ def checked(content: Mapping[str, Any], where: object) -> Campaign:
         raise UserError(f"{where}: {_explained(error)}") from None
 
 
-def _as_tuples(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Lists of names as tuples, which strict models want."""
-
-    def lists(table: Any, names: tuple[str, ...]) -> Any:
-        if not isinstance(table, dict):
-            return table
-        return {
-            key: tuple(value) if key in names and isinstance(value, list) else value
-            for key, value in table.items()
-        }
-
-    result = lists(content, ("worst", "maps"))
-    plain = ("start", "final", "minimum", "maximum", "rms", "integral", "trajectories")
-    if "keep" in result:
-        result["keep"] = lists(result["keep"], plain)
-    return result
-
-
 # what pydantic says in words of Python, by the type of the mistake
 EXPECTED = {
     "dict_type": "expected a table",
@@ -308,7 +287,6 @@ EXPECTED = {
     "model_type": "expected a table",
     "string_pattern_mismatch": "expected one line of text",
     "too_short": "expected a longer list",
-    "tuple_type": "expected a list",
 }
 
 
@@ -322,9 +300,7 @@ def _explained(error: ValidationError) -> str:
     if first["type"] == "missing":
         return f"{_where(place[:-1])}missing key {key!r}"
     if first["type"] == "extra_forbidden":
-        known = _keys(place)
-        guess = did_you_mean(key, known)
-        return f"{_where(place[:-1])}unknown key {key!r}{guess} (known: {', '.join(known)})"
+        return f"{_where(place[:-1])}unknown key {key!r}{hint(key, _keys(place))}"
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "value_error":
         return f"{where}{message}"

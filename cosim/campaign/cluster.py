@@ -47,6 +47,8 @@ def opened(
 ) -> Iterator[Client]:
     """A cluster's client.
 
+    UserError if the scheduler cannot be reached.
+
     Parameters
     ----------
     scheduler : str, optional
@@ -59,11 +61,6 @@ def opened(
         Certificates for a scheduler elsewhere.
     dashboard : bool
         Whether Dask shows its pages, on this machine: to all its users, who can change nothing.
-
-    Raises
-    ------
-    UserError
-        If the scheduler cannot be reached.
     """
     logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
     try:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from distributed import Security
 
-from cosim.errors import UserError, reason
-from cosim.input_files import UnreadableError, check_regular
+from cosim.errors import UserError, placed, reason
+from cosim.input_files import check_regular
 
 TLS = "tls://"
 OPTIONS = ("--tls-ca", "--tls-cert", "--tls-key")
@@ -17,17 +17,13 @@ EXPECTED = "an address as tls://192.168.0.1:8786"
 def of(address: str, ca: Path | None, cert: Path | None, key: Path | None) -> Security | None:
     """What a client of the scheduler at `address` needs; None for one without certificates.
 
+    UserError if they do not fit the address or cannot be used.
+
     Parameters
     ----------
-    address : str
     ca, cert, key : Path, optional
         Files in PEM form: the certificate of the authority that signs those of all, and the
         client's own with its private key. Without them, those of Dask's configuration.
-
-    Raises
-    ------
-    UserError
-        If they do not fit the address or cannot be used.
     """
     given = dict(zip(OPTIONS, (ca, cert, key), strict=True))
     named = [option for option, path in given.items() if path is not None]
@@ -65,10 +61,9 @@ def _check(ca: Path, cert: Path, key: Path) -> None:
     """Load the files as Dask does, but never ask for a password on the terminal."""
     for path in (ca, cert, key):
         try:
-            check_regular(path)
+            with placed(path):
+                check_regular(path)
             os.close(os.open(path, os.O_RDONLY))
-        except UnreadableError as error:
-            raise UserError(f"{path}: {error}") from None
         except OSError as error:
             raise UserError(f"{path}: cannot be read: {reason(error)}") from None
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)

@@ -99,10 +99,7 @@ class Engine:
     def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
         """Run blocks and keep their results; `done` is called with the number of runs of each.
 
-        Raises
-        ------
-        UserError
-            If the cluster is lost or the results cannot be written.
+        UserError if the cluster is lost or the results cannot be written.
         """
         watch = PeriodicCallback(self._watch, COUNT_EVERY)
         try:

@@ -2,12 +2,19 @@
 
 import ast
 import math
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "sin", "cos", "exp", "log")}
 CONSTANTS = {"pi": math.pi}
-OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow)
+OPERATORS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+}
 LONGEST = 1000  # characters
 
 
@@ -25,10 +32,7 @@ class Expression:
     def value(self, values: Mapping[str, float]) -> float:
         """The number for the values of the names.
 
-        Raises
-        ------
-        ArithmeticError, ValueError
-            If it is not defined or too large.
+        ArithmeticError, ValueError if it is not defined or too large.
         """
         result = _evaluated(self.tree, values)
         if isinstance(result, complex) or not math.isfinite(result):
@@ -57,7 +61,7 @@ def _names(node: ast.expr) -> set[str]:
             return set() if name in CONSTANTS else {name}
         case ast.UnaryOp(op=ast.USub() | ast.UAdd()):
             return _names(node.operand)
-        case ast.BinOp() if isinstance(node.op, OPERATORS):
+        case ast.BinOp() if type(node.op) in OPERATORS:
             return _names(node.left) | _names(node.right)
         case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
             return _names(argument)
@@ -82,16 +86,7 @@ def _evaluated(node: ast.expr, values: Mapping[str, float]) -> float:
             return -value if isinstance(node.op, ast.USub) else value
         case ast.BinOp():
             left, right = _evaluated(node.left, values), _evaluated(node.right, values)
-            match node.op:
-                case ast.Add():
-                    return left + right
-                case ast.Sub():
-                    return left - right
-                case ast.Mult():
-                    return left * right
-                case ast.Div():
-                    return left / right
-            return left**right
+            return OPERATORS[type(node.op)](left, right)
         case ast.Call(func=ast.Name(id=name)):
             return FUNCTIONS[name](_evaluated(node.args[0], values))
     name = _name(node)

@@ -8,6 +8,7 @@ held over a step, which the file gives, then the outputs of each component.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -39,8 +40,7 @@ class Part:
     outputs: tuple[int, ...]  # value references of what is read after each step
 
 
-@dataclass(frozen=True)
-class Wires:
+class Wires(NamedTuple):
     """Inputs and outputs of one type of all components, as the loop takes them."""
 
     inputs: np.ndarray  # (inputs,) value references
@@ -64,18 +64,6 @@ class Wires:
             np.cumsum([0, *(len(part.outputs) for part in parts)]),
             np.zeros(held + len(outputs), kind),
             np.zeros(len(inputs), kind),
-        )
-
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        """All of it, for compiled code."""
-        return (
-            self.inputs,
-            self.first_input,
-            self.sources,
-            self.outputs,
-            self.first_output,
-            self.values,
-            self.to_set,
         )
 
 
@@ -224,9 +212,9 @@ def advance(calls, times, held, held_switches, reals, switches, watched, record,
     ----------
     calls : (components, 2 * COLUMNS) of component_calls
     times : (n + 1,) s
-    held, held_switches : (n + 1, held values), held over the step from times[i]
-    reals, switches : Wires.arrays()
-    watched : (variables,) places among the Reals
+    held, held_switches : (n + 1, held values), zero-order hold: over the step from times[i]
+    reals, switches : tuples of Wires
+    watched : (variables,) columns among the Reals
     record : (n + 1, variables)
         What an importer reads after the step to times[i].
     tangent : (derivatives, states, deviation), empty if none is carried along

@@ -47,14 +47,10 @@ class Measure:
             return float(np.max(distance)) if largest else _rms(times, distance)
         values = rows[:, places[0]]
         match self.kind:
-            case "start":
-                return float(values[0])
-            case "final":
-                return float(values[-1])
-            case "minimum":
-                return float(np.min(values))
-            case "maximum":
-                return float(np.max(values))
+            case "start" | "final":
+                return float(values[0 if self.kind == "start" else -1])
+            case "minimum" | "maximum":
+                return float((np.min if self.kind == "minimum" else np.max)(values))
             case "rms":
                 return _rms(times, values)
             case "integral":

@@ -23,19 +23,9 @@ WIDE = 0.5  # half a confidence interval of an index that says little
 NOTHING = "–"
 
 
-def write(
-    campaign: Campaign,
-    job: Job,
-    results: Results,
-    units: Mapping[str, str],
-    command: str,
-    digest: str,
-) -> Path:
-    """Write the page into the folder of the results; its path. `command` makes it again."""
-    return _Page(campaign, job, results, units, command).write(digest)
+class Page:
+    """Written into the folder of the results; `command` makes it again."""
 
-
-class _Page:
     def __init__(
         self,
         campaign: Campaign,
@@ -52,6 +42,7 @@ class _Page:
         self.failed = sum(failure.count for failure in self.failures)
 
     def write(self, digest: str) -> Path:
+        """Write the page, on a table with this digest; its path."""
         manifest = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         found = self.indices()
         assets.write(self.folder)

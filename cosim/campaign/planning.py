@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import NoReturn
 
 import numpy as np
@@ -18,7 +19,7 @@ from cosim.campaign.measures import (
     final_integer,
     plain,
 )
-from cosim.errors import UserError, WrongValueError, did_you_mean, one_line
+from cosim.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
 from cosim.fmi.model import INPUTS, TOLERANCE, Value, Variable
 from cosim.texts import unit
 
@@ -29,10 +30,7 @@ MAX_RECORDED = 100_000_000  # numbers that a run records
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
     """The job of a campaign, which records the variables `also`, too.
 
-    Raises
-    ------
-    UserError
-        For the first mistake, beginning with `where`.
+    UserError for the first mistake, beginning with `where`.
     """
     return _Planner(campaign, base, where).job(also)
 
@@ -43,6 +41,9 @@ class _Planner:
 
     def fail(self, place: str, message: object) -> NoReturn:
         raise UserError(f"{self.where}: {place}: {message}")
+
+    def placed(self, place: str) -> AbstractContextManager[None]:
+        return placed(f"{self.where}: {place}")
 
     def job(self, also: Sequence[str]) -> Job:
         campaign, base = self.campaign, self.base
@@ -99,16 +100,16 @@ class _Planner:
             if found is not None:
                 self.check_distribution(distribution, found[1], place)
                 targets[name] = self.target(name, *found)
-        constants, varying = self.constants(), set(campaign.parameters)
+        known_numbers, varying = constants(self.campaign, self.base), set(campaign.parameters)
         for name, expression in campaign.expressions.items():
             place = f"[derived] {name}"
-            known = varying | set(constants)
+            known = varying | set(known_numbers)
             for other in expression.names - known:
                 self.fail(place, f"unknown name {other!r}{did_you_mean(other, known)}")
             if expression.names & varying:
                 varying.add(name)
             else:
-                constants[name] = self.constant(expression, constants, place)
+                known_numbers[name] = self.constant(expression, known_numbers, place)
             found = self.settable(name, place, name in used)
             if found is not None:
                 if found[1].type != "Real":
@@ -131,10 +132,8 @@ class _Planner:
             if used:
                 return None
             self.fail(place, f"{error}, and no derived value uses it")
-        try:
+        with self.placed(place):
             return self.base.settable(name)
-        except WrongValueError as error:
-            self.fail(place, error)
 
     def target(self, name: str, component: int, variable: Variable) -> Target:
         held = None
@@ -146,7 +145,7 @@ class _Planner:
         self, distribution: Distribution, variable: Variable, place: str
     ) -> None:
         numbers = distribution.numbers
-        try:
+        with self.placed(f"{place} {distribution.kind}"):
             if variable.type == "Integer" and distribution.kind == "values":
                 for number in numbers:
                     variable.checked(number)
@@ -154,8 +153,6 @@ class _Planner:
                 self.fail(place, f"is of type {variable.type}, expected Real, or Integer by values")
             elif distribution.kind != "normal":
                 variable.check_range(min(numbers), max(numbers))
-        except WrongValueError as error:
-            self.fail(f"{place} {distribution.kind}", error)
 
     def check_tolerances(
         self, components: Sequence[Component], targets: Mapping[str, Target]
@@ -178,25 +175,16 @@ class _Planner:
                 place, distribution = f"[parameters.{name}]", self.campaign.parameters[name]
                 numbers = [] if distribution.kind == "normal" else distribution.numbers
             for number in filter(None, numbers):  # 0: that of the scenario
-                try:
+                with self.placed(place):
                     model.check_tolerance(number, component.values)
-                except WrongValueError as error:
-                    self.fail(place, error)
-
-    def constants(self) -> dict[str, float]:
-        """Numbers that expressions may name."""
-        return constants(self.campaign, self.base)
 
     def fixed(self) -> dict[tuple[int, str], Value]:
         """Section [set]."""
         result: dict[tuple[int, str], Value] = {}
         for name, given in self.campaign.set.items():
-            place = f"[set] {name}"
-            try:
+            with self.placed(f"[set] {name}"):
                 component, variable = self.base.settable(name)
                 value = variable.checked(given)
-            except WrongValueError as error:
-                self.fail(place, error)
             if variable.is_a(INPUTS) and isinstance(self.base, ScenarioBase):
                 self.base.hold(name, float(value))
             else:
@@ -235,10 +223,8 @@ class _Planner:
         return found
 
     def readable(self, name: str, place: str, types: Sequence[str] = ("Real",)) -> Variable:
-        try:
+        with self.placed(place):
             _, variable = self.base.variable(name)
-        except WrongValueError as error:
-            self.fail(place, error)
         if variable.type not in types or variable.causality == "independent":
             self.fail(place, f"{name!r} is not a {' or '.join(types)} variable")
         return variable
@@ -253,10 +239,8 @@ class _Planner:
             return None
         if not isinstance(self.base, ScenarioBase):
             self.fail("[keep] lyapunov", "goes with a scenario only")
-        try:
+        with self.placed("[keep] lyapunov"):
             pairs = self.base.derivatives()
-        except WrongValueError as error:
-            self.fail("[keep] lyapunov", error)
         if not pairs:
             self.fail("[keep] lyapunov", "the model has no continuous states")
         derivatives, states = zip(*pairs, strict=True)
@@ -278,9 +262,7 @@ class _Planner:
             asked += [(f"maps[{i}]", name) for name in (drawn.x, drawn.y, drawn.colour)]
         for place, name in asked:
             if name not in columns:
-                guess = did_you_mean(name, columns)
-                known = ", ".join(columns)
-                self.fail(place, f"no column {name!r}{guess} (there are: {known})")
+                self.fail(place, f"no column {name!r}{hint(name, columns, 'there are')}")
 
 
 def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:

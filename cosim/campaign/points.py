@@ -12,7 +12,6 @@ class Points:
 
     Parameters
     ----------
-    campaign : Campaign
     constants : dict
         Numbers that expressions may name.
     """

@@ -5,17 +5,15 @@ from typing import Any
 
 from cosim.campaign.bases import Base
 from cosim.campaign.campaign_file import Campaign, checked
-from cosim.errors import UserError, WrongValueError
+from cosim.errors import WrongValueError, placed
 from cosim.units import quantity
 
 
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
     """The campaign with numbers for all values that have a unit.
 
-    Raises
-    ------
-    UserError
-        If one is in no unit of its variable, or the campaign is wrong then; beginning with `where`.
+    UserError if one is in no unit of its variable, or the campaign is wrong then; beginning with
+    `where`.
     """
     converter = _Converter(base, where)
     content = campaign.model_dump(exclude_unset=True)
@@ -73,13 +71,7 @@ class _Converter:
         """What is given for a variable: a text with a unit as a number."""
         if not isinstance(given, str):
             return given
-        try:
+        with placed(f"{self._where}: {place}: without a variable no unit"):
             known = self._base.variable(name)[1].units
-        except WrongValueError as error:
-            raise UserError(
-                f"{self._where}: {place}: without a variable no unit: {error}"
-            ) from None
-        try:
+        with placed(f"{self._where}: {place}"):
             return quantity(given, known, is_difference)
-        except WrongValueError as error:
-            raise UserError(f"{self._where}: {place}: {error}") from None

@@ -56,10 +56,7 @@ def replay(
 ) -> Replay:
     """Run again. The page shows `command`, which does it again.
 
-    Raises
-    ------
-    UserError
-        If there is no such run.
+    UserError if there is no such run.
     """
     if run >= campaign.count:
         raise UserError(f"no run {run}: the campaign has runs 0 to {campaign.count - 1}")

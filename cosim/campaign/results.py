@@ -65,10 +65,7 @@ class Results:
     def begin(self) -> None:
         """Make the folder, or check that it holds results of the same campaign.
 
-        Raises
-        ------
-        UserError
-            If it holds those of another one, or has no room for these.
+        UserError if it holds those of another one, or has no room for these.
         """
         check_writable(self.folder)
         path = self.folder / MANIFEST
@@ -206,10 +203,7 @@ class Results:
     def write(self, block: int, points: np.ndarray, rows: Rows) -> None:
         """Keep a block: parameters and derived values (rows, columns), and its runs.
 
-        Raises
-        ------
-        UserError
-            If the disk does not take it.
+        UserError if the disk does not take it.
         """
         numbers = np.column_stack([points, rows.measures])
         columns = [pa.array(rows.runs), *(pa.array(column) for column in numbers.T)]

@@ -36,7 +36,6 @@ class Runner:
 
     Parameters
     ----------
-    job : Job
     fmus : mapping of str to Fmu
         By their hash.
     """
@@ -162,7 +161,7 @@ class Runner:
     # ---- Steps -----------------------------------------------------------------------------------
 
     def _state(self) -> tuple:
-        return self._calls, self._reals.arrays(), self._switches.arrays()
+        return self._calls, tuple(self._reals), tuple(self._switches)
 
     def _advance(self) -> None:
         job, tangent = self._job, self._tangent

@@ -4,7 +4,7 @@ import argparse
 import shlex
 import sys
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +21,6 @@ from cosim.output_files import from_here, written
 if TYPE_CHECKING:
     from distributed import Security
 
-    from cosim.campaign.bases import Base
     from cosim.campaign.campaign_file import Campaign
     from cosim.campaign.job import Job
     from cosim.campaign.points import Points
@@ -109,7 +108,7 @@ def run(options: argparse.Namespace) -> Ended:
             return Ended(1 if made.failure else 0, verdict, made.document)
         runs.check(job, base.archives, base.path)
         results.begin()
-        _run_missing(options, _Plan(campaign, base, job, points, results, security))
+        _run_missing(options, security, campaign, job, base.archives, points, results)
         failed = results.failed()
         digest = results.digest()
         print(f"table: {digest}")
@@ -122,7 +121,7 @@ def run(options: argparse.Namespace) -> Ended:
         units = planning.units(campaign, base, job.measures)
         try:
             with written(folder):
-                index = page.write(campaign, job, results, units, _command(options), digest)
+                index = page.Page(campaign, job, results, units, _command(options)).write(digest)
         except UserError:
             raise
         except Exception as error:  # the libraries that draw raise what they like
@@ -165,48 +164,38 @@ def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:
     return project.ROOT / "build" / "campaigns" / options.file.stem
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """A campaign that is ready to run."""
-
-    campaign: "Campaign"
-    base: "Base"
-    job: "Job"
-    points: "Points"
-    results: "Results"
-    security: "Security | None"
-
-
-def _run_missing(options: argparse.Namespace, plan: _Plan) -> None:
+def _run_missing(
+    options: argparse.Namespace,
+    security: "Security | None",
+    campaign: "Campaign",
+    job: "Job",
+    archives: Mapping[str, bytes],
+    points: "Points",
+    results: "Results",
+) -> None:
     """Run the blocks whose results are not there."""
-    blocks = plan.results.missing()
+    blocks = results.missing()
     if not blocks:
         return
     from cosim.campaign import cluster, engine  # takes long
 
-    count = plan.campaign.count
-    ahead = sum(len(plan.campaign.block_range(block)) for block in blocks)
+    count = campaign.count
+    ahead = sum(len(campaign.block_range(block)) for block in blocks)
     console.stage("starting workers" if options.scheduler is None else "calling the scheduler")
     if ahead < count:
         print(f"goes on: {count - ahead} of {count} runs are there")
     try:
         with (
-            plan.results.workers_folder() as files,
+            results.workers_folder() as files,
             cluster.opened(
-                options.scheduler,
-                options.workers,
-                files,
-                plan.security,
-                not options.no_dashboard,
+                options.scheduler, options.workers, files, security, not options.no_dashboard
             ) as client,
         ):
             if not options.no_dashboard:
                 print(f"dashboard: {client.dashboard_link}", flush=True)
-            made = engine.Engine(
-                client, plan.campaign, plan.job, plan.base.archives, plan.points, plan.results
-            )
+            made = engine.Engine(client, campaign, job, archives, points, results)
             begin = time.perf_counter()
-            with Progress(plan.campaign.title, ahead, "runs") as progress:
+            with Progress(campaign.title, ahead, "runs") as progress:
                 made.run(blocks, progress)
             seconds = time.perf_counter() - begin
     except BaseException:  # Dask may turn that of a signal into another one

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from cosim.commands import Ended
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, hint
 from cosim.federation import SILENCE, addresses, component, screen, watching
 from cosim.federation.network import KEY, key
 from cosim.federation.parts import parts
@@ -39,11 +39,8 @@ def run(options: argparse.Namespace) -> Ended:
     with ssp.unpacked(options.ssp) as system:
         made = parts(system, options.variant)
         if options.component not in made:
-            hint = did_you_mean(options.component, made)
-            raise UserError(
-                f"{options.ssp}: has no component {options.component!r}{hint} (there are: "
-                f"{', '.join(made)})"
-            )
+            known = hint(options.component, made, "there are")
+            raise UserError(f"{options.ssp}: has no component {options.component!r}{known}")
         with system.unpacked_fmu(options.component) as fmu:
             if not options.owned:
                 addresses.wait_for(

@@ -11,7 +11,7 @@ import numpy as np
 from cosim import project
 from cosim.commands import Ended
 from cosim.coupling.master import Master
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, hint
 from cosim.federation import SILENCE, addresses, federation, screen
 from cosim.federation.federation import Record
 from cosim.federation.network import KEY, key
@@ -84,13 +84,7 @@ def run(options: argparse.Namespace) -> Ended:
             label, steps = f"{name} by HELICS", system.system.steps
             with Progress(label, steps) as progress:
                 record = federation.run(
-                    system,
-                    name,
-                    address,
-                    options.elsewhere,
-                    options.silence,
-                    progress,
-                    connected,
+                    system, name, address, options.elsewhere, options.silence, progress, connected
                 )
             difference, master_time = _master(system, name, record)
             ecos_time = ecos.run(system, name, comparison.recorded(system)).wall_time
@@ -119,10 +113,8 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
     ):
         for name in given:
             if name not in known:
-                hint = did_you_mean(name, known)
-                raise UserError(
-                    f"{system.path}: has no {kind} {name!r}{hint} (there are: {', '.join(known)})"
-                )
+                known = hint(name, known, "there are")
+                raise UserError(f"{system.path}: has no {kind} {name!r}{known}")
     if options.elsewhere and len(options.names) != 1:
         raise UserError("--elsewhere: name one variant, which the other machine steps too")
 

@@ -5,22 +5,22 @@ Files of users are run in the same way; they have no references.
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from cosim import project
 from cosim.command_line import COMMANDS, PROGRAM
 from cosim.commands import Ended
 from cosim.commands import list as scenario_list
-from cosim.errors import UserError, WrongValueError, did_you_mean, together
+from cosim.errors import UserError, did_you_mean, placed, together
 from cosim.fmi.fmu_file import Fmu
 from cosim.options import add_fmi, add_open, add_report, relative_tolerance
 from cosim.output import console, results
 from cosim.output.progress import Progress
 from cosim.output.result_tables import RunTable, SweepTable, measured
 from cosim.output.result_tables import convergence as convergence_table
+from cosim.output.results import Done
 from cosim.output_files import check_writable, from_here, written
 from cosim.project import VERSIONS
 from cosim.report import pages
@@ -91,7 +91,7 @@ def run(options: argparse.Namespace) -> Ended:
             writer.begin()
             if chosen:
                 writer.forget({scenario.name for scenario in chosen} if options.names else None)
-        done = _Done(chosen, own)
+        done = Done(chosen, own)
         if options.tolerance is not None:
             done.runs = _runs(runs, chosen, bool(twins), done.failures, options.tolerance)
         else:
@@ -113,34 +113,23 @@ def run(options: argparse.Namespace) -> Ended:
     print(f"report: {from_here(index)}")
     if options.open:
         show(page)
-    return done.ended({"report": index.absolute()})
+    return _ended(done, index.absolute())
 
 
-@dataclass
-class _Done:
-    """What has been run."""
-
-    chosen: Sequence[Scenario]  # of the project
-    own: Sequence[Scenario]  # of users, which are not compared with anything
-    runs: list[Run] = field(default_factory=list)
-    failures: list[Failure] = field(default_factory=list)
-    sweeps: list[Sweep] = field(default_factory=list)
-    studies: list[Convergence] = field(default_factory=list)
-
-    def ended(self, more: Mapping[str, object]) -> Ended:
-        """The end of the command, `more` in its document."""
-        wrong = [x.scenario.name for x in (*self.runs, *self.sweeps, *self.studies) if not x.passed]
-        wrong += [failure.scenario.name for failure in self.failures]
-        everything = [*self.chosen, *self.own]
-        verdict = console.verdict_line(wrong, everything, "scenario")
-        if not wrong and self.own:
-            verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
-            verdict = f"{verdict} of {len(self.own)}" if self.chosen else verdict
-        document = {"passed": not wrong, **results.document(self), **more}
-        if self.failures:
-            error = together([UserError(failure.text) for failure in self.failures])
-            return Ended(2, verdict, document, error)
-        return Ended(1 if wrong else 0, verdict, document)
+def _ended(done: Done, report: Path) -> Ended:
+    """How the command ends."""
+    wrong = [x.scenario.name for x in (*done.runs, *done.sweeps, *done.studies) if not x.passed]
+    wrong += [failure.scenario.name for failure in done.failures]
+    everything = [*done.chosen, *done.own]
+    verdict = console.verdict_line(wrong, everything, "scenario")
+    if not wrong and done.own:
+        verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
+        verdict = f"{verdict} of {len(done.own)}" if done.chosen else verdict
+    document = {"passed": not wrong, **results.document(done), "report": report}
+    if done.failures:
+        error = together([UserError(failure.text) for failure in done.failures])
+        return Ended(2, verdict, document, error)
+    return Ended(1 if wrong else 0, verdict, document)
 
 
 def _check(
@@ -153,11 +142,9 @@ def _check(
     if options.tolerance is None:
         return
     for scenario in (*chosen, *own):
-        try:
+        with placed(f"--tolerance: {scenario.name}"):
             model = fmus[scenario.model].model
             model.check_tolerance(options.tolerance, scenario.parameters)
-        except WrongValueError as error:
-            raise UserError(f"--tolerance: {scenario.name}: {error}") from None
 
 
 def _open(
@@ -279,15 +266,10 @@ def _runs(
         for tolerance in dict.fromkeys(own[scenario]):
             label = f"{scenario.name} at {tolerance:g}"
             ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
-            try:
-                with Progress(label, ahead) as progress:
-                    run = runs.compared(scenario, tolerance, progress)
-            except UserError as error:
-                failures.append(runs.failure(scenario, tolerance, error))
+            found = _one(runs, failures, runs.compared, scenario, tolerance, label, ahead)
+            ended += found
+            if not found:
                 why.append(f"tolerance {short(tolerance)}: did not run to its end")
-                continue
-            console.messages(f"{label}: the FMU says", run.result.messages)
-            ended.append(run)
         table.row(scenario.name, own[scenario][0], ended, why)
         done += ended
     if with_twins:
@@ -295,6 +277,26 @@ def _runs(
         same = {run.scenario.name for run in done} - differ
         print(f"\nsame bits in FMI {FIRST} and {TWIN}: {counted(same, 'scenario')}")
     return done
+
+
+def _one(
+    runs: Runs,
+    failures: list[Failure],
+    run: Callable[..., Run],
+    scenario: Scenario,
+    tolerance: float,
+    label: str,
+    steps: int,
+) -> list[Run]:
+    """The run that `run` makes; none, but a failure, if the FMU does not finish it."""
+    try:
+        with Progress(label, steps) as progress:
+            found = run(scenario, tolerance, progress)
+    except UserError as error:
+        failures.append(runs.failure(scenario, tolerance, error))
+        return []
+    console.messages(f"{label}: the FMU says", found.result.messages)
+    return [found]
 
 
 def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
@@ -317,15 +319,10 @@ def _estimated(
     table = RunTable([scenario.name for scenario in own], used)
     done = []
     for scenario, at in zip(own, used, strict=True):
-        why = []
-        try:
-            with Progress(scenario.name, 2 * (len(scenario.times) - 1)) as progress:
-                done.append(runs.estimated(scenario, at, progress))
-            console.messages(f"{scenario.name}: the FMU says", done[-1].result.messages)
-        except UserError as error:
-            failures.append(runs.failure(scenario, at, error))
-            why = ["did not run to its end"]
-        table.row(scenario.name, at, [] if why else done[-1:], why)
+        steps = 2 * (len(scenario.times) - 1)
+        found = _one(runs, failures, runs.estimated, scenario, at, scenario.name, steps)
+        table.row(scenario.name, at, found, [] if found else ["did not run to its end"])
+        done += found
     return done
 
 

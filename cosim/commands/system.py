@@ -3,13 +3,12 @@
 import argparse
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 from cosim import project
 from cosim.command_line import PROGRAM
 from cosim.commands import Ended
-from cosim.errors import UserError, did_you_mean, together
+from cosim.errors import UserError, did_you_mean, hint, together
 from cosim.options import add_open, add_report, add_system
 from cosim.output import console
 from cosim.output.result_tables import VariantTable
@@ -18,37 +17,14 @@ from cosim.report import overview, system_page
 from cosim.report.browser import show
 from cosim.report.overview import Entry
 from cosim.report.system_page import Section
-from cosim.system import comparison, ssp, study
+from cosim.system import comparison, ssp
 from cosim.system.comparison import Outcome, Reference
-from cosim.system.ssp import Ssp
-from cosim.system.study import Study
 from cosim.texts import counted
 
 DESCRIPTION = (
     "Runs the variants of the systems in Ecos and compares every variable with the reference. Exit "
     "code: 0 all within the bound, 1 not, 2 wrong use, a wrong system or a component that fails."
 )
-
-
-@dataclass(frozen=True)
-class _System:
-    """A system that is unpacked."""
-
-    folder: Path
-    ssp: Ssp
-
-    @property
-    def variants(self) -> list[str]:
-        return list(self.ssp.system.parameters)
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """What to run of a system."""
-
-    system: _System
-    study: Study
-    references: Mapping[str, Reference]  # by variant
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -90,14 +66,14 @@ def run(options: argparse.Namespace) -> Ended:
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
-                system_page.remove(options.report, system.folder.name, names)
-        plans = [_planned(system, names) for system, names in chosen]
+                system_page.remove(options.report, system.name, names)
+        plans = [(system, _references(system, names)) for system, names in chosen]
         return _run(plans, options)
 
 
-def _listed(chosen: Sequence[tuple[_System, Sequence[str]]]) -> Ended:
+def _listed(chosen: Sequence[tuple[Section, Sequence[str]]]) -> Ended:
     """The names of systems and variants."""
-    found = {system.folder.name: names for system, names in chosen}
+    found = {system.name: names for system, names in chosen}
     lines = [line for name, names in found.items() for line in (name, *(f"  {n}" for n in names))]
     return Ended(0, "\n".join(lines), {"systems": found})
 
@@ -112,31 +88,27 @@ def _paths(options: argparse.Namespace) -> list[Path]:
     return [project.built(folder, ".ssp", "--ssp", options.fmi) for folder in folders.values()]
 
 
-def _opened(path: Path, stack: ExitStack) -> _System:
+def _opened(path: Path, stack: ExitStack) -> Section:
     """The system in an SSP, with the folder that it is from."""
     unpacked = stack.enter_context(ssp.unpacked(path))
     name, folders = unpacked.system.name, project.systems()
     if name not in folders:
-        known = f"{did_you_mean(name, folders)} (known: {', '.join(folders)})"
-        raise UserError(f"{path}: no system {name!r} has references{known}")
-    return _System(folders[name], unpacked)
+        raise UserError(f"{path}: no system {name!r} has references{hint(name, folders)}")
+    return Section(folders[name], unpacked)
 
 
-def _choose(systems: Sequence[_System], names: Sequence[str]) -> list[tuple[_System, list[str]]]:
+def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Section, list[str]]]:
     """Variants to run of each system: those named, all of a system that is named, or all.
 
-    Raises
-    ------
-    UserError
-        If a name is unknown, or stands for two things.
+    UserError if a name is unknown, or stands for two things.
     """
-    owners: dict[str, str] = {system.folder.name: "a system" for system in systems}
+    owners: dict[str, str] = {system.name: "a system" for system in systems}
     for system in systems:
         for variant in system.variants:
             if variant in owners:
                 where = f"{system.ssp.path}: the name of variant {variant!r}"
                 raise UserError(f"{where} is taken by {owners[variant]}")
-            owners[variant] = f"a variant of {system.folder.name}"
+            owners[variant] = f"a variant of {system.name}"
     for name in names:
         if name not in owners:
             guess = did_you_mean(name, owners)
@@ -144,48 +116,44 @@ def _choose(systems: Sequence[_System], names: Sequence[str]) -> list[tuple[_Sys
     chosen = []
     for system in systems:
         own = [name for name in dict.fromkeys(names) if name in system.variants]
-        if not names or system.folder.name in names:
+        if not names or system.name in names:
             own = system.variants
         if own:
             chosen.append((system, own))
     return chosen
 
 
-def _planned(system: _System, names: Sequence[str]) -> _Plan:
-    known = study.load(system.folder)
-    return _Plan(
-        system,
-        known,
-        {
-            name: comparison.load_reference(system.ssp, name, system.folder, known.EXPERIMENT)
-            for name in names
-        },
-    )
+def _references(section: Section, names: Sequence[str]) -> dict[str, Reference]:
+    """References by variant."""
+    return {
+        name: comparison.load_reference(section.ssp, name, section.folder, section.study.EXPERIMENT)
+        for name in names
+    }
 
 
-def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> Ended:
+def _run(
+    plans: Sequence[tuple[Section, Mapping[str, Reference]]], options: argparse.Namespace
+) -> Ended:
     """Run the plans; a row appears as a variant ends, and its files are written then."""
     outcomes: list[Outcome] = []
     failures: dict[str, UserError] = {}
     entries: list[Entry] = []
     rows: list[dict[str, object]] = []
-    for plan in plans:
-        section = Section(plan.system.folder, plan.system.ssp, plan.study)
-        count = counted(plan.references, "variant")
-        console.stage(f"simulating {count} of {plan.system.folder.name} in Ecos")
-        table = VariantTable(plan.references, plan.study.MEASURES)
-        for name, reference in plan.references.items():
+    for section, references in plans:
+        console.stage(f"simulating {counted(references, 'variant')} of {section.name} in Ecos")
+        table = VariantTable(references, section.study.MEASURES)
+        for name, reference in references.items():
             try:
                 outcome = comparison.simulate(section.ssp, name, reference)
             except UserError as error:
                 failures[name] = error
                 table.failed(name)
-                rows.append({"system": plan.system.folder.name, "name": name, "error": str(error)})
+                rows.append({"system": section.name, "name": name, "error": str(error)})
                 with written(options.report):
                     entries.append(system_page.write_failed(options.report, section, name, error))
                 continue
             table.row(outcome)
-            rows.append(_row(plan, outcome))
+            rows.append(_row(section, outcome))
             console.messages(name, outcome.run.messages)
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
@@ -207,17 +175,17 @@ def _run(plans: Sequence[_Plan], options: argparse.Namespace) -> Ended:
     return Ended(1 if failed else 0, verdict, document)
 
 
-def _row(plan: _Plan, outcome: Outcome) -> dict[str, object]:
+def _row(section: Section, outcome: Outcome) -> dict[str, object]:
     """A variant for programs."""
     return {
-        "system": plan.system.folder.name,
+        "system": section.name,
         "name": outcome.variant,
         "steps": outcome.steps,
         "error": outcome.error,
         "worst": outcome.worst,
         "bound": comparison.BOUND,
         "measures": {
-            m.name: {"value": m.value(outcome), "unit": m.unit} for m in plan.study.MEASURES
+            m.name: {"value": m.value(outcome), "unit": m.unit} for m in section.study.MEASURES
         },
         "seconds": outcome.run.wall_time,
         "passed": outcome.passed,

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.errors import UserError, WrongValueError
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from cosim.errors import UserError, placed
+from cosim.fmi.fmi_instance import Instance, Reals, UnpackedFmu
 from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
 
 
@@ -31,7 +30,6 @@ class ConnectedInstance:
     ----------
     instance : Instance
         Instantiated.
-    wiring : Wiring
     values, slopes : ctypes array of double, ndarray
         The system's values, and their derivatives with respect to time.
     """
@@ -59,11 +57,7 @@ class ConnectedInstance:
 
     def begin(self, start: float, stop: float | None, parameters: Mapping[str, Value]) -> None:
         """From instantiated into initialization mode."""
-        instance = self.instance
-        instance.set_up(start, stop)
-        for name, value in parameters.items():
-            instance.set(name, start_value(instance.fmu, self.name, name, value))
-        instance.enter_initialization()
+        begin(self.instance, start, stop, parameters)
 
     def set_inputs(self, values: np.ndarray) -> None:
         """Set the inputs, (inputs,), in their units."""
@@ -85,13 +79,28 @@ class ConnectedInstance:
         self._slopes[self._slope_places] = self._output_slopes.view
 
 
-def start_value(fmu: Fmu, component: str, name: str, value: Value) -> Value:
+def begin(
+    instance: Instance, start: float, stop: float | None, parameters: Mapping[str, Value]
+) -> None:
+    """Bring an instance of a component into initialization mode."""
+    instance.set_up(start, stop)
+    for name, value in parameters.items():
+        instance.set(name, start_value(instance.fmu, instance.name, name, value))
+    instance.enter_initialization()
+
+
+def check_finite(component: str, outputs: Reals, when: str) -> None:
+    """Refuse outputs that are not finite."""
+    bad = np.flatnonzero(~np.isfinite(outputs.view))
+    if len(bad):
+        name, value = f"{component}.{outputs.names[bad[0]]}", outputs.view[bad[0]]
+        raise UserError(f"{name} is {value} {when}: a finite value is expected")
+
+
+def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
     """Value to set before initialization: an Enumeration's item may be given by its name.
 
-    Raises
-    ------
-    UserError
-        If it is not a parameter, the start value of a state or a Boolean input.
+    UserError if it is not a parameter, the start value of a state or a Boolean input.
     """
     variable = fmu.model.variables.get(name)
     if variable is None or not _can_start(variable):
@@ -99,10 +108,8 @@ def start_value(fmu: Fmu, component: str, name: str, value: Value) -> Value:
     is_item = variable.type == "Enumeration" and isinstance(value, str)
     if not is_item and variable.type != "Boolean":
         return value
-    try:
+    with placed(f"{component}.{name}"):
         return variable.checked(value)
-    except WrongValueError as error:
-        raise UserError(f"{component}.{name}: {error}") from None
 
 
 def _can_start(variable: Variable) -> bool:

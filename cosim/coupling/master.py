@@ -24,7 +24,7 @@ from ctypes import c_double
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from cosim.coupling.connected_instance import ConnectedInstance, Wiring
+from cosim.coupling.connected_instance import ConnectedInstance, Wiring, check_finite
 from cosim.coupling.switches import Switches, split
 from cosim.errors import UserError
 from cosim.fmi.fmi_instance import Instance
@@ -79,11 +79,13 @@ class Snapshot:
 class Master:
     """A system of connected components; a context manager that frees their instances.
 
+    UserError if names are unknown, a Real input is connected not once, or an FMU cannot do what is
+    asked.
+
     Parameters
     ----------
     fmus : mapping of str to Fmu
         By name of the component. Their order is that of stepping in Gauss-Seidel order.
-    connections : iterable of Connection
     order : str
         One of ORDERS.
     inputs : str
@@ -105,11 +107,6 @@ class Master:
         s.
     do_steps : int
         Steps of components so far, rolled back ones included.
-
-    Raises
-    ------
-    UserError
-        If names are unknown, a Real input is connected not once, or an FMU cannot do what is asked.
     """
 
     def __init__(
@@ -236,13 +233,9 @@ class Master:
         raise UserError(f"the connections form an algebraic loop: {names}")
 
     def _read_early(self, component: ConnectedInstance) -> None:
-        """Read in initialization mode; at its end FMUs explain which parameters are wrong."""
-        try:
+        with component.instance.explained_early():
             component.read()
-        except FMICallException as error:
-            component.instance.exit_initialization()
-            raise component.instance.failure(error, "in initialization") from error
-        self._check_finite(component)
+        check_finite(component.name, component.outputs, "in initialization")
 
     def _propagate_slopes(self) -> None:
         """Slopes at one time: once per component, since those of inputs show in outputs'."""
@@ -300,15 +293,7 @@ class Master:
                 component.read_slopes()
         except FMICallException as error:
             raise component.instance.failure(error, f"at t = {end!r} s") from error
-        self._check_finite(component, end)
-
-    def _check_finite(self, component: ConnectedInstance, time: float | None = None) -> None:
-        values = component.outputs.view
-        if not np.isfinite(values).all():
-            i = int(np.flatnonzero(~np.isfinite(values))[0])
-            when = "in initialization" if time is None else f"at t = {time!r} s"
-            name = f"{component.name}.{component.outputs.names[i]}"
-            raise UserError(f"{name} is {values[i]} {when}: a finite value is expected")
+        check_finite(component.name, component.outputs, f"at t = {end!r} s")
 
     def run(
         self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None

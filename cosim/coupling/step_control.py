@@ -43,9 +43,7 @@ class Control:
     first: float  # s
     shortest: float  # s
     longest: float  # s
-    corners: Sequence[
-        float
-    ] = ()  # s, at which inputs of the system are not smooth: steps end there
+    corners: Sequence[float] = ()  # s, where inputs of the system are not smooth: steps end there
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,99 +71,108 @@ def run(
 ) -> Controlled:
     """Step `master`, which is initialized, to the time `stop`.
 
+    UserError if a signal is unknown, a step would have to be shorter than the shortest, or an FMU
+    fails or has no state to go back to.
+
     Parameters
     ----------
     master : Master
-        With held inputs its order is 1, with extrapolated ones 2.
+        Its order is 1 with zero-order hold of the inputs, with extrapolated ones 2.
     stop : float
         s; the last step ends exactly there.
-    control : Control
     before : callable, optional
         Called with the length of each accepted step while the system is back at the beginning of
         that step; it may step the system.
-
-    Raises
-    ------
-    UserError
-        If a signal is unknown, a step would have to be shorter than the shortest, or an FMU fails
-        or has no state to go back to.
     """
-    order = 2 if master.extrapolates else 1
-    places, scales = _norm(master, control)
+    steps = _Steps(master, control)
     times, rows, estimates, limited = [master.time], [master.values.copy()], [], []
-    rejected, do_steps, wanted, was_rejected = 0, 0, control.first, True
     ends = deque(sorted(t for t in {*control.corners, stop} if master.time < t <= stop))
     with Snapshot(master) as begin, Snapshot(master) as end:
         begin.take()
         while ends:
             start = times[-1]
-            target, cut = _fit(start, ends[0], wanted)
-            length = target - start
-
-            # the step at once, and in two halves
-            calls = master.do_steps
-            master.advance(target)
-            coarse = master.values[places]
-            begin.restore()
-            master.advance(start + length / 2)
-            master.advance(target)
-            do_steps += master.do_steps - calls
-
-            # the error, and the step that would meet the tolerance
-            difference = np.abs(master.values[places] - coarse) / scales
-            estimate = float(difference.max()) / (2**order - 1)
-            factor = _factor(estimate, control.tolerance, order)
-
-            # rejected: back to the beginning, with a shorter step
+            target, cut = _fit(start, ends[0], steps.wanted)
+            estimate = steps.attempt(begin, start, target)
             if estimate > control.tolerance:
-                rejected, was_rejected = rejected + 1, True
-                wanted = length * min(factor, SAFETY)
-                if wanted < control.shortest:
-                    raise UserError(
-                        f"the step from t = {start!r} s would have to be below "
-                        f"{control.shortest:g} s for an error of {control.tolerance:g}"
-                    )
+                steps.reject(start, target - start, estimate)
                 begin.restore()
                 continue
-
-            # accepted
             times.append(target)
             rows.append(master.values.copy())
             estimates.append(estimate)
-            limited.append(cut or length >= control.longest or was_rejected)
+            limited.append(cut or target - start >= control.longest or steps.was_rejected)
 
             # to the beginning and back, for `before`
             end.take()
             begin.restore()
-            before(length)
+            before(target - start)
             end.restore()
             begin.take()
 
-            # the next step
-            limits = control.longest, LARGEST_FACTOR * length
-            grown = length * factor if not was_rejected else length * min(factor, 1.0)
-            wanted = max(min(grown if not cut else max(grown, wanted), *limits), control.shortest)
-            was_rejected = False
+            steps.accept(target - start, estimate, cut)
             if target == ends[0]:
                 ends.popleft()
-                wanted = control.first
-    return Controlled(
-        np.array(times),
-        np.array(rows),
-        np.array(estimates),
-        np.array(limited),
-        rejected,
-        do_steps,
-    )
+                steps.wanted = control.first
+    found = map(np.array, (times, rows, estimates, limited))
+    return Controlled(*found, steps.rejected, steps.do_steps)
+
+
+class _Steps:
+    """Makes steps, each at once and in two halves, and chooses the length of the next one."""
+
+    def __init__(self, master: Master, control: Control) -> None:
+        self._master, self._control = master, control
+        self._order = 2 if master.extrapolates else 1
+        self._columns, self._scales = _norm(master, control)
+        self.wanted, self.was_rejected = control.first, True  # s; whether the last attempt was
+        self.rejected, self.do_steps = 0, 0
+
+    def attempt(self, begin: Snapshot, start: float, target: float) -> float:
+        """Make a step at once, then in two halves, which are kept; the estimate of its error."""
+        master, calls = self._master, self._master.do_steps
+        master.advance(target)
+        coarse = master.values[self._columns]
+        begin.restore()
+        master.advance(start + (target - start) / 2)
+        master.advance(target)
+        self.do_steps += master.do_steps - calls
+        difference = np.abs(master.values[self._columns] - coarse) / self._scales
+        return float(difference.max()) / (2**self._order - 1)
+
+    def reject(self, start: float, length: float, estimate: float) -> None:
+        """Want a shorter step from `start`."""
+        control = self._control
+        self.rejected, self.was_rejected = self.rejected + 1, True
+        self.wanted = length * min(self._factor(estimate), SAFETY)
+        if self.wanted < control.shortest:
+            raise UserError(
+                f"the step from t = {start!r} s would have to be below {control.shortest:g} s for "
+                f"an error of {control.tolerance:g}"
+            )
+
+    def accept(self, length: float, estimate: float, cut: bool) -> None:
+        """Want the next step, after one of this length that the end may have `cut`."""
+        factor, control = self._factor(estimate), self._control
+        limits = control.longest, LARGEST_FACTOR * length
+        grown = length * factor if not self.was_rejected else length * min(factor, 1.0)
+        grown = grown if not cut else max(grown, self.wanted)
+        self.wanted, self.was_rejected = max(min(grown, *limits), control.shortest), False
+
+    def _factor(self, estimate: float) -> float:
+        """Of the step: the one whose error is expected to be a little below the tolerance."""
+        if estimate == 0.0:
+            return LARGEST_FACTOR
+        factor = SAFETY * (self._control.tolerance / estimate) ** (1 / (self._order + 1))
+        return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)
 
 
 def _norm(master: Master, control: Control) -> tuple[np.ndarray, np.ndarray]:
-    """Places of the signals among the values, and their scales."""
+    """Columns of the signals among the values, and their scales."""
     for name in control.scales:
         if name not in master.names:
             raise UserError(f"{name}: the system has no such value to control the step by")
-    places = [master.names.index(name) for name in control.scales]
-    return np.array(places, dtype=int), np.array([*control.scales.values()])
+    columns = [master.names.index(name) for name in control.scales]
+    return np.array(columns, dtype=int), np.array([*control.scales.values()])
 
 
 def _fit(start: float, stop: float, wanted: float) -> tuple[float, bool]:
@@ -176,11 +183,3 @@ def _fit(start: float, stop: float, wanted: float) -> tuple[float, bool]:
     if left < 2 * wanted:
         return start + left / 2, True
     return start + wanted, False
-
-
-def _factor(estimate: float, tolerance: float, order: int) -> float:
-    """Of the present step: the one whose error is expected to be a little below the tolerance."""
-    if estimate == 0.0:
-        return LARGEST_FACTOR
-    factor = SAFETY * (tolerance / estimate) ** (1 / (order + 1))
-    return min(max(factor, SMALLEST_FACTOR), LARGEST_FACTOR)

@@ -42,10 +42,7 @@ def split(
 ) -> tuple[list[Connection], list[Connection]]:
     """Connections that begin at a Boolean output, and the others.
 
-    Raises
-    ------
-    UserError
-        If one of the first does not end at a Boolean input, or two end at the same one.
+    UserError if one of the first does not end at a Boolean input, or two end at the same one.
     """
     switches: list[Connection] = []
     others: list[Connection] = []

@@ -3,43 +3,33 @@
 from collections.abc import Callable
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 
-from cosim.coupling.connected_instance import start_value
+from cosim.coupling.connected_instance import begin, check_finite
 from cosim.errors import UserError
 from cosim.federation import watching
 from cosim.federation.network import Federate
 from cosim.federation.parts import Part
 from cosim.federation.watching import Silence
-from cosim.fmi.fmi_instance import Instance, Reals
+from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 
 
 def run(
-    part: Part,
-    fmu: Fmu,
-    address: str,
-    silence: float,
-    is_gone: Callable[[], bool] = lambda: False,
+    part: Part, fmu: Fmu, address: str, silence: float, is_gone: Callable[[], bool] = lambda: False
 ) -> None:
     """Step a component from the first to the last communication point.
 
+    UserError if the FMU fails, the federation steps something else or ends, or an output changes
+    that must not.
+
     Parameters
     ----------
-    part : Part
-    fmu : Fmu
     address : str
         Of the federation.
     silence : float
         s, that a call of the FMU may take, and the broker be silent.
     is_gone : callable, optional
         Whether the process is gone that started this one.
-
-    Raises
-    ------
-    UserError
-        If the FMU fails, the federation steps something else or ends, or an output changes that
-        must not.
     """
     name = part.component
     federate = Federate(name, address, sorted({s.component for s in part.sources}))
@@ -95,10 +85,7 @@ class _Stepper:
 
     def _initialize(self) -> None:
         part, instance = self._part, self._instance
-        instance.set_up(part.times[0], part.times[-1])
-        for name, value in part.parameters.items():
-            instance.set(name, start_value(instance.fmu, part.component, name, value))
-        instance.enter_initialization()
+        begin(instance, part.times[0], part.times[-1], part.parameters)
         self._federate.enter_initialization()
         self._give_early()
         for _ in range(part.rounds):
@@ -120,17 +107,13 @@ class _Stepper:
             self._inputs.set()
 
     def _give_early(self) -> None:
-        """Publish in initialization mode; at its end FMUs explain which parameters are wrong."""
-        try:
+        with self._instance.explained_early():
             self._give("in initialization")
-        except FMICallException as error:
-            self._instance.exit_initialization()
-            raise self._instance.failure(error, "in initialization") from error
 
     def _give(self, when: str) -> None:
         """Read the outputs and publish them."""
         self._outputs.get()
-        _check_finite(self._part, self._outputs, when)
+        check_finite(self._part.component, self._outputs, when)
         self._federate.publish(self._outputs.view)
 
     def _constants(self) -> list[object]:
@@ -141,10 +124,3 @@ class _Stepper:
             else self._instance.integer(name)
             for name in self._part.constant
         ]
-
-
-def _check_finite(part: Part, outputs: Reals, when: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(outputs.view))
-    if len(bad):
-        name = f"{part.component}.{outputs.names[bad[0]]}"
-        raise UserError(f"{name} is {outputs.view[bad[0]]} {when}: a finite value is expected")

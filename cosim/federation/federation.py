@@ -50,10 +50,10 @@ def run(
 ) -> Record:
     """Run a variant, each component in its own process.
 
+    UserError if a process fails; its text is the first one that one of them gave.
+
     Parameters
     ----------
-    ssp : Ssp
-    variant : str
     address : str
         Where the broker listens, as "tcp://127.0.0.1:23404".
     elsewhere : collection of str
@@ -64,11 +64,6 @@ def run(
         Called with the number of steps made.
     connected : callable, optional
         Called when all components have been initialized and the first step begins.
-
-    Raises
-    ------
-    UserError
-        If a process fails; its text is the first one that one of them gave.
     """
     made = parts(ssp, variant)
     whole = next(iter(made.values())).system

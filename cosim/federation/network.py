@@ -51,10 +51,7 @@ def helics() -> Any:
 def key() -> str:
     """What processes must know to join the federation; made if this one does not know any.
 
-    Raises
-    ------
-    UserError
-        If it could be guessed, or HELICS would not take it.
+    UserError if it could be guessed, or HELICS would not take it.
     """
     found = os.environ.setdefault(KEY, secrets.token_hex(16))
     if not re.fullmatch(r"[0-9A-Za-z]{16,128}", found):
@@ -185,7 +182,6 @@ class Federate:
         Of the broker.
     sources : sequence of str
         Names of federates whose values it reads.
-    publishes : bool
     """
 
     def __init__(
@@ -277,10 +273,7 @@ class Federate:
     def read(self) -> Mapping[str, Sequence[float]]:
         """What the sources published before the last exchange.
 
-        Raises
-        ------
-        UserError
-            If HELICS has not passed it on.
+        UserError if HELICS has not passed it on.
         """
         values = {}
         for source, place in self._subscriptions.items():

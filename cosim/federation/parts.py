@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.errors import UserError, did_you_mean
+from cosim.errors import UserError, hint
 from cosim.fmi.model import Value
 from cosim.system.ssp import Ssp
 from cosim.system.structure import Connection
@@ -54,16 +54,12 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
 
     Only Real values are exchanged in the steps.
 
-    Raises
-    ------
-    UserError
-        If the variant is unknown.
+    UserError if the variant is unknown.
     """
     system = ssp.system
     if variant not in system.parameters:
-        known = ", ".join(system.parameters)
-        hint = did_you_mean(variant, system.parameters)
-        raise UserError(f"{ssp.path}: has no variant {variant!r}{hint} (there are: {known})")
+        known = hint(variant, system.parameters, "there are")
+        raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
     times = system.start + system.step * np.arange(system.steps + 1)
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"

@@ -9,15 +9,12 @@ import numpy as np
 from fmpy import fmi2
 
 from cosim.fmi.fmi_instance import (
+    Call,
     InputPolynomials,
     Instance,
-    OutputDerivatives,
-    Reals,
     SavedState,
     UnpackedFmu,
     doubles,
-    no_call,
-    view,
 )
 
 
@@ -64,27 +61,13 @@ class Fmi2Instance(Instance):
     def _integer(self, reference: int) -> int:
         return self.fmi.getInteger([reference])[0]
 
-    def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
-        fmi, count = self.fmi, len(names)
-        values = (c_double * count)() if memory is None else memory
-        if not count:
-            return Reals([], view(values), no_call, no_call)
-        arguments = fmi.component, self._references(names), count, values
-        return Reals(
-            list(names),
-            view(values),
-            partial(fmi.fmi2GetReal, *arguments),
-            partial(fmi.fmi2SetReal, *arguments),
-        )
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
+        fmi, arguments = self.fmi, (self.fmi.component, references, len(references), values)
+        return partial(fmi.fmi2GetReal, *arguments), partial(fmi.fmi2SetReal, *arguments)
 
-    def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
-        fmi, count = self.fmi, len(names)
-        values, numbers = doubles(count)
-        if not count:
-            return OutputDerivatives(numbers, no_call)
-        orders = (fmi2.fmi2Integer * count)(*[order] * count)
-        arguments = fmi.component, self._references(names), count, orders, values
-        return OutputDerivatives(numbers, partial(fmi.fmi2GetRealOutputDerivatives, *arguments))
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
+        arguments = self.fmi.component, references, len(references), orders, values
+        return partial(self.fmi.fmi2GetRealOutputDerivatives, *arguments)
 
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         fmi, count = self.fmi, len(names)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from ctypes import Array, byref, c_double
+from ctypes import Array, byref
 from functools import partial
 
 import fmpy
@@ -12,16 +12,7 @@ from fmpy import fmi3
 from fmpy.fmi1 import FMICallException
 
 from cosim.errors import UserError
-from cosim.fmi.fmi_instance import (
-    InputPolynomials,
-    Instance,
-    OutputDerivatives,
-    Reals,
-    SavedState,
-    doubles,
-    no_call,
-    view,
-)
+from cosim.fmi.fmi_instance import Call, InputPolynomials, Instance, Reals, SavedState
 
 # Without them FMUs send errors only. They cost nothing as long as all is well.
 LOGGED = ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal")
@@ -80,27 +71,15 @@ class Fmi3Instance(Instance):
     def _integer(self, reference: int) -> int:
         return self.fmi.getInt32([reference])[0]
 
-    def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
-        fmi, count = self.fmi, len(names)
-        values = (c_double * count)() if memory is None else memory
-        if not count:
-            return Reals([], view(values), no_call, no_call)
-        arguments = fmi.component, self._references(names), count, values, count
-        return Reals(
-            list(names),
-            view(values),
-            partial(fmi.fmi3GetFloat64, *arguments),
-            partial(fmi.fmi3SetFloat64, *arguments),
-        )
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
+        fmi, count = self.fmi, len(references)
+        arguments = fmi.component, references, count, values, count
+        return partial(fmi.fmi3GetFloat64, *arguments), partial(fmi.fmi3SetFloat64, *arguments)
 
-    def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
-        fmi, count = self.fmi, len(names)
-        values, numbers = doubles(count)
-        if not count:
-            return OutputDerivatives(numbers, no_call)
-        orders = (fmi3.fmi3Int32 * count)(*[order] * count)
-        arguments = fmi.component, self._references(names), count, orders, values, count
-        return OutputDerivatives(numbers, partial(fmi.fmi3GetOutputDerivatives, *arguments))
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
+        count = len(references)
+        arguments = self.fmi.component, references, count, orders, values, count
+        return partial(self.fmi.fmi3GetOutputDerivatives, *arguments)
 
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         coefficients = np.zeros((order + 1, len(names)))

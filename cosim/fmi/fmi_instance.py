@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager
-from ctypes import Array, byref, c_double, c_uint, c_void_p
+from ctypes import Array, byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
@@ -23,6 +23,8 @@ from cosim.fmi.model import Model, Value
 OK, ERROR, FATAL = 0, 3, 4
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
 MESSAGES_KEPT = 20
+
+Call = Callable[[], object]  # of a function of an FMU; FMICallException if it fails
 
 
 class UnpackedFmu(Protocol):
@@ -46,8 +48,8 @@ class Reals:
 
     names: list[str]
     view: np.ndarray  # (len(names),) in the variables' units
-    get: Callable[[], object]
-    set: Callable[[], object]
+    get: Call
+    set: Call
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ class OutputDerivatives:
     """Derivatives of some Real outputs with respect to time; FMICallException if `get` fails."""
 
     view: np.ndarray  # (outputs,) in the outputs' units per power of s
-    get: Callable[[], object]
+    get: Call
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class InputPolynomials:
     """
 
     view: np.ndarray  # (order + 1, inputs): values at the beginning of the step, then derivatives
-    set: Callable[[], object]
+    set: Call
 
 
 class SavedState:
@@ -190,6 +192,15 @@ class Instance(ABC):
         except FMICallException as error:
             raise self.failure(error, when) from error
 
+    @contextmanager
+    def explained_early(self) -> Iterator[None]:
+        """The same in initialization mode, at whose end FMUs explain which parameters are wrong."""
+        try:
+            yield
+        except FMICallException as error:
+            self.exit_initialization()
+            raise self.failure(error, "in initialization") from error
+
     # ---- Initialization --------------------------------------------------------------------------
 
     @abstractmethod
@@ -239,20 +250,32 @@ class Instance(ABC):
         with self.explained(f"({name})"):
             return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
 
-    @abstractmethod
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
         """The Real variables `names`, to get or set at once, many times.
 
         Parameters
         ----------
-        names : sequence of str
         memory : ctypes array of double, optional
             Memory for their values; made if it is not given.
         """
+        values = (c_double * len(names))() if memory is None else memory
+        calls = self._real_calls(self._references(names), values) if names else (no_call, no_call)
+        return Reals(list(names), view(values), *calls)
 
     @abstractmethod
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
+        """Calls that get and set Real variables."""
+
     def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
         """The derivatives of one order of the Real outputs `names`, to get at once, many times."""
+        values, numbers = doubles(len(names))
+        references, orders = self._references(names), (c_int * len(names))(*[order] * len(names))
+        call = self._derivative_call(references, orders, values) if names else no_call
+        return OutputDerivatives(numbers, call)
+
+    @abstractmethod
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
+        """Call that gets derivatives of Real outputs."""
 
     @abstractmethod
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
@@ -268,9 +291,7 @@ class Instance(ABC):
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
         """Make a step from `start` (s); `goes_back`: it may be undone by a saved state.
 
-        Raises
-        ------
-        FMICallException
+        Raises FMICallException.
         """
 
     @abstractmethod

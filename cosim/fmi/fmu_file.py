@@ -11,7 +11,7 @@ from fmpy.model_description import ModelDescription, ValidationError
 from lxml import etree
 
 from cosim.archives import check_library, read_xml, unpack
-from cosim.errors import UserError, one_line, reason
+from cosim.errors import UserError, one_line, placed, reason
 from cosim.fmi.fmi2_instance import Fmi2Instance
 from cosim.fmi.fmi3_instance import Fmi3Instance
 from cosim.fmi.fmi_instance import Instance
@@ -45,10 +45,8 @@ class Fmu:
             self.folder = unpacked.enter_context(temporary_folder(within))
             library = f"{self.identifier}{LIBRARY_SUFFIX}"
             self.library = self.folder / "binaries" / platform / library
-            try:
+            with placed(self.path):
                 unpack(Path(path), self.folder, "FMU")
-            except UnreadableError as error:
-                raise UserError(f"{self.path}: {error}") from error
             try:
                 check_library(self.library)
             except (OSError, UnreadableError) as error:
@@ -90,9 +88,7 @@ class Described:
 def describe(path: Path) -> Described:
     """Read what an FMU of a known version of FMI, for co-simulation, declares.
 
-    Raises
-    ------
-    UnreadableError
+    Raises UnreadableError.
     """
     with temporary_folder() as folder:
         sizes = unpack(path, folder, "FMU", DESCRIPTION)
@@ -140,10 +136,8 @@ def _read(folder: Path) -> ModelDescription:
 
 def _for_this_platform(path: Path, shown: Path) -> tuple[Described, str]:
     """What an FMU declares that can be run here, and the folder of its binary."""
-    try:
+    with placed(shown):
         found = describe(path)
-    except UnreadableError as error:
-        raise UserError(f"{shown}: {error}") from error
     identifier = found.description.coSimulation.modelIdentifier
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
         raise UserError(

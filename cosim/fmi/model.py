@@ -8,7 +8,7 @@ from typing import Any
 
 from fmpy.model_description import ModelDescription, ModelVariable, SimpleType
 
-from cosim.errors import WrongValueError, did_you_mean
+from cosim.errors import WrongValueError, did_you_mean, hint
 from cosim.input_files import show
 from cosim.texts import number as short_number
 from cosim.texts import short
@@ -57,10 +57,7 @@ class Variable:
 
         That is a number, a text with a number and its unit, or the name of an Enumeration's item.
 
-        Raises
-        ------
-        WrongValueError
-            If it is not of the variable's type or out of range.
+        WrongValueError if it is not of the variable's type or out of range.
         """
         if self.type not in TYPES.values():
             raise WrongValueError(f"is of type {self.type}, which cannot be set here")
@@ -153,10 +150,7 @@ class Model:
     def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
         """Check a relative tolerance to run at, with `values` for start values.
 
-        Raises
-        ------
-        WrongValueError
-            If the method that integrates cannot be so exact.
+        WrongValueError if the method that integrates cannot be so exact.
         """
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
@@ -168,29 +162,22 @@ class Model:
     def find(self, name: str, kind: str) -> Variable:
         """Variable called `name`.
 
-        Raises
-        ------
-        WrongValueError
-            If it is not of the kind, one of `KINDS`; lists those that are.
+        WrongValueError if it is not of the kind, one of `KINDS`; lists those that are.
         """
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable
         meant = [other.name for other in self.variables.values() if other.is_a(kind)]
-        known = ", ".join(meant) or "none"
         if variable is None:
-            guess = did_you_mean(name, meant)
-            raise WrongValueError(f"the model has no variable {name!r}{guess} (known: {known})")
+            raise WrongValueError(f"the model has no variable {name!r}{hint(name, meant)}")
+        known = ", ".join(meant) or "none"
         raise WrongValueError(f"{name!r} is not {KINDS[kind]} of the model (known: {known})")
 
 
 def described(description: ModelDescription) -> Model:
     """Model that a description of FMI 2.0 or 3.0, for co-simulation, declares.
 
-    Raises
-    ------
-    ValueError
-        If a start value or a limit is not a number.
+    ValueError if a start value or a limit is not a number.
     """
     capabilities = description.coSimulation
     displays = {

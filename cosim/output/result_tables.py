@@ -10,7 +10,7 @@ from cosim.runs.measured import comparisons
 from cosim.runs.tolerance_sweep import TIGHTEST, Sweep
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.study import Measure
-from cosim.texts import brief, milliseconds, seconds, short, unit, verdict
+from cosim.texts import milliseconds, seconds, short, unit, verdict
 
 NONE = "-"
 
@@ -40,7 +40,7 @@ class RunTable:
             *([_error(tight)] if self._with_tight else []),
             seconds(first.result.wall_time) if first else NONE,
         ]
-        problems = [*failures, *(run.problem for run in runs if not run.passed)]
+        problems = [*failures, *(run.violation for run in runs if not run.passed)]
         compared = all(run.compared for run in runs)
         good = verdict(True) if compared else "ran"
         self._table.row(name, cells, verdict(False) if problems else good)
@@ -49,7 +49,7 @@ class RunTable:
 
 
 def _error(run: Run | None) -> str:
-    return NONE if run is None else brief(run.error)
+    return NONE if run is None else short(run.error, 1)
 
 
 def _count(number: int) -> str:
@@ -66,7 +66,7 @@ class SweepTable:
         self._table = Table("error at tolerance", names, columns, gap=1, result=0)
 
     def row(self, sweep: Sweep) -> None:
-        self._table.row(sweep.scenario.name, [brief(error, 0) for error in sweep.errors])
+        self._table.row(sweep.scenario.name, [short(error, 0) for error in sweep.errors])
         for text in sweep.violations:
             console.remark(f"{verdict(False)}: {text}")
 
@@ -84,9 +84,11 @@ class FederationTable:
         self, name: str, steps: int, difference: float, times: Sequence[float], passed: bool
     ) -> None:
         shown = [f"{us:.1f}" if us < 10_000 else f"{us:.0f}" for us in times]
-        self._table.row(name, [_count(steps), brief(difference), *shown], verdict(passed))
+        self._table.row(name, [_count(steps), short(difference, 1), *shown], verdict(passed))
         if not passed:
-            console.remark(f"difference {brief(difference)}, above its bound {short(self._bound)}")
+            console.remark(
+                f"difference {short(difference, 1)}, above its bound {short(self._bound)}"
+            )
 
 
 class VariantTable:
@@ -100,11 +102,11 @@ class VariantTable:
 
     def row(self, outcome: Outcome) -> None:
         measured = (f"{_short(m.value(outcome))} {m.unit}" for m in self._measures)
-        cells = [brief(outcome.error), *measured, seconds(outcome.run.wall_time)]
+        cells = [short(outcome.error, 1), *measured, seconds(outcome.run.wall_time)]
         self._table.row(outcome.variant, cells, verdict(outcome.passed))
         if not outcome.passed:
             bound = f"above its bound {short(BOUND)}"
-            console.remark(f"error {brief(outcome.error)} of {outcome.worst}, {bound}")
+            console.remark(f"error {short(outcome.error, 1)} of {outcome.worst}, {bound}")
 
     def failed(self, name: str) -> None:
         """A variant that a component did not finish."""
@@ -125,7 +127,7 @@ def convergence(study: Convergence) -> None:
     names = [row.name for row in study.rows]
     table = Table(study.scenario.name, names, {**columns, "slope": 5}, gap=1)
     for row in study.rows:
-        cells = [*(brief(error, 0) for error in row.errors), f"{row.slope:.2f}"]
+        cells = [*(short(error, 0) for error in row.errors), f"{row.slope:.2f}"]
         table.row(row.name, cells, verdict(row.holds))
     for text in study.violations:
         console.remark(f"{study.scenario.name}: {text}")

@@ -1,7 +1,7 @@
 """Results of scenarios for programs: what --json prints of them."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from dataclasses import dataclass, field
 
 from cosim.runs.comparison import Failure, Run
 from cosim.runs.convergence import Convergence
@@ -10,15 +10,16 @@ from cosim.runs.tolerance_sweep import Sweep
 from cosim.scenarios.scenario import Scenario
 
 
-class Done(Protocol):
+@dataclass
+class Done:
     """What has been run."""
 
-    chosen: Sequence[Scenario]
-    own: Sequence[Scenario]
-    runs: Sequence[Run]
-    failures: Sequence[Failure]
-    sweeps: Sequence[Sweep]
-    studies: Sequence[Convergence]
+    chosen: Sequence[Scenario]  # of the project
+    own: Sequence[Scenario]  # of users, which are not compared with anything
+    runs: list[Run] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    sweeps: list[Sweep] = field(default_factory=list)
+    studies: list[Convergence] = field(default_factory=list)
 
 
 def document(done: Done) -> dict[str, object]:

@@ -54,7 +54,6 @@ def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> 
 
     Parameters
     ----------
-    run : Run
     rows : sequence of int or slice, optional
         Those of the recorded rows that the page holds.
     """
@@ -70,8 +69,8 @@ def of_result(
 ) -> dict | None:
     """The same of a run that may have stopped early, with the references that there are."""
     # a row holds the outputs at the end of a step, so the inputs too are those of this step
-    held = np.maximum(scenario.reference_rows[: len(result.times)] - 1, 0)
-    inputs = {name: values[held] for name, values in scenario.inputs.items()}
+    steps = scenario.input_rows[: len(result.times)]
+    inputs = {name: values[steps] for name, values in scenario.inputs.items()}
     outputs = dict(zip(result.names, result.values.T, strict=True))
     recorded = Recorded(
         result.times, inputs | outputs | result.integers, references, scenario.start_values
@@ -80,10 +79,7 @@ def of_result(
 
 
 def of_outcome(
-    system: str,
-    ssp: Ssp,
-    outcome: Outcome,
-    rows: Sequence[int] | np.ndarray | slice = slice(None),
+    system: str, ssp: Ssp, outcome: Outcome, rows: Sequence[int] | np.ndarray | slice = slice(None)
 ) -> dict | None:
     """Data of the player for a run of a system's variant; None: nothing to animate.
 
@@ -91,8 +87,6 @@ def of_outcome(
     ----------
     system : str
         Name of the system's folder.
-    ssp : Ssp
-    outcome : Outcome
     rows : sequence of int or slice, optional
         Those of the recorded rows that the page holds.
     """

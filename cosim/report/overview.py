@@ -12,7 +12,9 @@ from pathlib import Path
 
 from cosim.output_files import whole
 from cosim.report import assets, pages
-from cosim.report.sparkline import HEIGHT, WIDTH
+from cosim.report.pages import RunPage
+from cosim.report.sparkline import HEIGHT, WIDTH, scale_of
+from cosim.report.sparkline import path as sparkline
 
 ENTRIES = "entries.json"
 PASSED, FAILED, RAN = "passed", "FAILED", "ran"  # RAN: there was nothing to compare with
@@ -36,14 +38,28 @@ class Entry:
     group: str  # model or system, with its version of FMI
     page: str  # file name in the section's folder
     status: str  # PASSED, FAILED or RAN
-    error: float | None  # the worst one; None: not a number, or there is none
-    bound: float | None
-    detail: str  # what the error is of
-    line: str  # path of the sparkline
-    line_text: str  # what it shows
+    error: float | None = None  # the worst one; None: not a number, or there is none
+    bound: float | None = None
+    detail: str = ""  # what the error is of, or why there is none
+    line: str = ""  # path of the sparkline
+    line_text: str = ""  # what it shows
     line_of: str = ""  # the variable of the sparkline
     source: str = ""  # file of a user
-    line_scale: str = ""  # its smallest and largest value, and its span
+    line_scale: str = ""  # its smallest and largest value, and how long it is
+
+
+def write_page(folder: Path, name: str, page: RunPage, group: str, **more: object) -> Entry:
+    """Write a page of a section; its entry, with `more` in place of what follows from the page."""
+    folder.mkdir(parents=True, exist_ok=True)
+    pages.write_run(folder / f"{name}.html", page)
+    fields = {"name": name, "title": page.title, "group": group, "status": page.status}
+    fields["page"] = f"{name}.html"
+    if page.data is not None:
+        plot, x = page.data.plots[0], page.data.x
+        curve = plot.curves[0]
+        fields |= {"line": sparkline(x, curve.values), "line_text": plot.text}
+        fields |= {"line_of": curve.name, "line_scale": scale_of(x, plot, page.data.axis.unit)}
+    return Entry(**fields | more)
 
 
 def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:
@@ -90,12 +106,11 @@ def write(report: Path) -> Path:
     for folder, title in SECTIONS.items():
         entries = read(report, folder)
         if entries:
-            summary = _summary(entries)
-            sections.append({"folder": folder, "title": title, "summary": summary})
             groups: dict[str, list[Entry]] = {}
             for entry in entries:
                 groups.setdefault(entry.group, []).append(entry)
-            sections[-1]["groups"] = groups
+            section = {"folder": folder, "title": title, "summary": _summary(entries)}
+            sections.append(section | {"groups": groups})
     statuses = [entry.status for folder in SECTIONS for entry in read(report, folder)]
     return pages.write_page(
         report / pages.INDEX,

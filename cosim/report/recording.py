@@ -93,10 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def data_of(name: str) -> dict[str, Any]:
     """Run a scenario, or a variant of a system: what its player gets.
 
-    Raises
-    ------
-    UserError
-        If there is none of this name, if it has nothing to animate, or if the run fails.
+    UserError if there is none of this name, if it has nothing to animate, or if the run fails.
     """
     files = project.scenario_files()
     data = _of_scenario(files[name]) if name in files else _of_variant(name, list(files))
@@ -182,17 +179,12 @@ def _chromium() -> "Iterator[Chrome]":
 def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:
     """Write frames as an animated PNG, complete or not at all; its size in bytes.
 
+    UserError if it would be larger than `LARGEST`.
+
     Parameters
     ----------
-    file : Path
-    drawn : sequence of Image
     duration : float
         Of a frame, s.
-
-    Raises
-    ------
-    UserError
-        If it would be larger than `LARGEST`.
     """
     first, *others = _with_few_colours(drawn)
     times = [round(1000 * duration)] * len(others) + [round(1000 * REST)]

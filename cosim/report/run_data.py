@@ -133,15 +133,10 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
 
 
 def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
-    """Rows to show of a run: at most `most`, unless its columns have more extremes.
+    """Rows to show of columns (rows,): at most `most`, unless the columns have more extremes.
 
     Rows at equal distances, half of `most` at least, and those where a column is smallest and
     largest in each of many equal intervals: as many intervals as `most` permits, at least one.
-
-    Parameters
-    ----------
-    columns : sequence of ndarray, shape (rows,)
-    most : int, optional
     """
     table = np.nan_to_num(np.column_stack(columns).astype(float), posinf=1e300, neginf=-1e300)
     count = len(table)

@@ -7,15 +7,13 @@ from types import MappingProxyType
 import numpy as np
 
 from cosim import trajectory_csv
-from cosim.fmi.model import Model, Variable
-from cosim.report import motion, pages
+from cosim.fmi.model import Model, Value, Variable
+from cosim.report import motion, overview
 from cosim.report.measured_data import measured_tables, with_measured
 from cosim.report.overview import FAILED, PASSED, RAN, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData, thinned, without_rounding
 from cosim.report.signal_texts import describe
-from cosim.report.sparkline import path as sparkline
-from cosim.report.sparkline import scale_of
 from cosim.runs.comparison import Failure, Run, estimated_from
 from cosim.runs.measured import comparisons
 from cosim.runs.simulation import Result
@@ -46,59 +44,50 @@ def write(
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario
     columns = recorded(scenario, first.fmu.model, first.result)
-    csv = f"{name}.csv"
-    values = np.column_stack([column.astype(float) for column in columns.values()])
     digits = DIGITS if first.compared else None
-    trajectory_csv.write_short(folder / csv, first.result.times, list(columns), values, digits)
-    plots = _plots(runs, columns)
-    rows, plots = _thinned(plots)
-    data = RunData(
-        scenario.name,
-        scenario.title,
-        first.result.times[rows],
-        plots,
-        motion=motion.of_run(first, rows),
-    )
+    csv = _write_values(folder / f"{name}.csv", first.result, columns, digits)
+    rows, plots = _thinned(_plots(runs, columns))
+    moving, times = motion.of_run(first, rows), first.result.times[rows]
     page = RunPage(
         title=scenario.title,
         description=scenario.description,
         status=FAILED if failures or not all(run.passed for run in runs) else status(first),
         facts=_facts(first),
-        data=data,
+        data=RunData(scenario.name, scenario.title, times, plots, motion=moving),
         tables=_tables(runs),
         notes=_notes(runs),
         failures=[
-            *(sentence(run.problem) for run in runs if run.problem),
-            *(describe_failure(failure) for failure in failures),
+            *(sentence(run.violation) for run in runs if run.violation),
+            *map(_described, failures),
         ],
         csv=csv,
         csv_note=_csv_note(first, len(rows)),
         again=again,
     )
-    pages.write_run(folder / f"{name}.html", page)
-    return _entry(name, page, runs, plots[0])
+    return overview.write_page(
+        folder,
+        name,
+        page,
+        _group(first.fmu.model),
+        error=first.error if np.isfinite(first.error) else None,
+        bound=first.bound if first.compared else None,
+        detail=f"worst output: {first.worst}",
+    )
 
 
 def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry:
     """Write the page of a scenario that did not run to its end: what there is of it."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
-    csv, data, line, text, scale, plots = f"{name}.csv", None, "", "", "", []
-    (folder / csv).unlink(missing_ok=True)  # of an earlier run
-    facts = [
-        ("model", f"{model.name} (FMI {model.fmi_version})"),
-        ("time", f"{number(scenario.start)} to {number(scenario.stop)} s"),
-        ("tolerance", short(failure.tolerance)),
-    ]
+    csv, data = "", None
+    (folder / f"{name}.csv").unlink(missing_ok=True)  # of an earlier run
+    facts = [*_common_facts(scenario, model), ("tolerance", short(failure.tolerance))]
     if result is not None:
         columns = recorded(scenario, model, result)
-        values = np.column_stack([column.astype(float) for column in columns.values()])
-        trajectory_csv.write_short(folder / csv, result.times, list(columns), values)
+        csv = _write_values(folder / f"{name}.csv", result, columns)
         rows, plots = _thinned(_value_plots(scenario, model, result, columns))
         moving = motion.of_result(scenario, result, {}, rows)
         data = RunData(scenario.name, scenario.title, result.times[rows], plots, motion=moving)
-        line, text = sparkline(data.x, plots[0].curves[0].values), plots[0].text
-        scale = scale_of(data.x, plots[0], data.axis.unit)
         facts.insert(2, ("results until", f"{number(result.times[-1])} s"))
     page = RunPage(
         title=scenario.title,
@@ -107,30 +96,29 @@ def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry
         facts=facts,
         data=data,
         tables=_start_tables(scenario, model),
-        failures=[describe_failure(failure)],
-        csv=csv if data else "",
+        failures=[_described(failure)],
+        csv=csv,
         again=again,
     )
-    pages.write_run(folder / f"{name}.html", page)
-    return Entry(
-        name=name,
-        title=page.title,
-        group=f"{model.name} (FMI {model.fmi_version})",
-        page=f"{name}.html",
-        status=FAILED,
-        error=None,
-        bound=None,
-        detail=failure.text,
-        line=line,
-        line_text=text,
-        line_of=plots[0].curves[0].name if data else "",
-        line_scale=scale,
-    )
+    return overview.write_page(folder, name, page, _group(model), detail=failure.text)
 
 
-def describe_failure(failure: Failure) -> str:
+def _described(failure: Failure) -> str:
     """Which run failed, and why."""
     return f"Tolerance {short(failure.tolerance)}: {failure.text}"
+
+
+def _group(model: Model) -> str:
+    return f"{model.name} (FMI {model.fmi_version})"
+
+
+def _write_values(
+    file: Path, result: Result, columns: dict[str, np.ndarray], digits: int | None = None
+) -> str:
+    """Write the file of values; its name."""
+    values = np.column_stack([column.astype(float) for column in columns.values()])
+    trajectory_csv.write(file, result.times, list(columns), values, digits, True)
+    return file.name
 
 
 def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.ndarray]:
@@ -138,7 +126,7 @@ def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.n
 
     A row holds what an importer reads after a step, so it holds the inputs of that step too.
     """
-    held = np.maximum(scenario.reference_rows[: len(result.times)] - 1, 0)
+    rows = scenario.input_rows[: len(result.times)]
     drawn = {name for panel in scenario.panels for name in panel}
     inputs = [
         name
@@ -148,7 +136,7 @@ def recorded(scenario: Scenario, model: Model, result: Result) -> dict[str, np.n
     return {
         **dict(zip(result.names, result.values.T, strict=True)),
         **result.integers,
-        **{name: scenario.input(name)[held] for name in inputs},
+        **{name: scenario.input(name)[rows] for name in inputs},
     }
 
 
@@ -233,12 +221,16 @@ def _error_plot(runs: Sequence[Run]) -> Plot:
     return Plot("largest relative error of all outputs", "", curves, True, levels)
 
 
+def _common_facts(scenario: Scenario, model: Model) -> list[tuple[str, str]]:
+    time = f"{number(scenario.start)} to {number(scenario.stop)} s"
+    return [("model", _group(model)), ("time", time)]
+
+
 def _facts(run: Run) -> list[tuple[str, str]]:
     result, model = run.result, run.fmu.model
     bound = f" of {short(run.bound)}" if run.compared else ", estimated"
     return [
-        ("model", f"{model.name} (FMI {model.fmi_version})"),
-        ("time", f"{number(run.scenario.start)} to {number(run.scenario.stop)} s"),
+        *_common_facts(run.scenario, model),
         ("steps", f"{result.steps} {_lengths(run.scenario.steps)}"),
         ("tolerance", short(result.tolerance)),
         ("worst error", f"{run.error:.1e}{bound} ({run.worst})"),
@@ -314,17 +306,15 @@ def _start_tables(scenario: Scenario, model: Model) -> list[Table]:
 
 
 def _values(title: str, model: Model, values: dict, folded: bool = False) -> Table:
-    variables = model.variables
-    rows = [
-        (name, _cell(known.written(value)), unit(known.unit), known.description)
-        for name, value in values.items()
-        if (known := variables[name])
-    ]
+    rows = [cells(model.variables[name], value) for name, value in values.items()]
     return Table(title, ("name", "value", "unit", "meaning"), rows, folded=folded)
 
 
-def _cell(value: object) -> object:
-    return str(value).lower() if isinstance(value, bool) else value
+def cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
+    """Name, value, unit and meaning of a variable, as tables show them."""
+    shown = variable.written(value)
+    text = str(shown).lower() if isinstance(shown, bool) else shown
+    return variable.name, text, unit(variable.unit), variable.description
 
 
 def _solver(runs: Sequence[Run]) -> Table:
@@ -355,22 +345,3 @@ def _errors(runs: Sequence[Run]) -> Table:
     ]
     note = "Largest difference from the reference, relative to the output's largest value."
     return Table("Errors of all outputs", head, rows, note=note, folded=True)
-
-
-def _entry(name: str, page: RunPage, runs: Sequence[Run], plot: Plot) -> Entry:
-    first = runs[0]
-    model, curve = first.fmu.model, plot.curves[0]
-    return Entry(
-        name=name,
-        title=page.title,
-        group=f"{model.name} (FMI {model.fmi_version})",
-        page=f"{name}.html",
-        status=page.status,
-        error=first.error if np.isfinite(first.error) else None,
-        bound=first.bound if first.compared else None,
-        detail=f"worst output: {first.worst}",
-        line=sparkline(page.data.x, curve.values),
-        line_text=plot.text,
-        line_of=curve.name,
-        line_scale=scale_of(page.data.x, plot, page.data.axis.unit),
-    )

@@ -21,13 +21,9 @@ def scale_of(x: np.ndarray, plot: Plot, unit: str) -> str:
 
 
 def path(x: np.ndarray, y: np.ndarray) -> str:
-    """Path of an SVG in a view box of `WIDTH` by `HEIGHT`; empty if nothing is finite.
+    """Path of an SVG in a view box of `WIDTH` by `HEIGHT` through points (rows,), `x` in order.
 
-    Parameters
-    ----------
-    x : ndarray, shape (rows,)
-        In order.
-    y : ndarray, shape (rows,)
+    It is empty if nothing is finite.
     """
     finite = np.isfinite(y)
     x, y = x[finite], y[finite]

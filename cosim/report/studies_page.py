@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim import project
-from cosim.report import pages
+from cosim.report import overview
 from cosim.report.overview import FAILED, PASSED, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Axis, Curve, Plot, RunData
@@ -46,11 +46,7 @@ def write_sweeps(folder: Path, sweeps: Sequence[Sweep]) -> Entry:
         for model, own in models.items()
     ]
     rows = [
-        [
-            sweep.scenario.name,
-            *(f"{error:.1e}" for error in sweep.errors),
-            verdict(sweep.passed),
-        ]
+        [sweep.scenario.name, *(f"{error:.1e}" for error in sweep.errors), verdict(sweep.passed)]
         for sweep in sweeps
     ]
     passed = all(sweep.passed for sweep in sweeps)
@@ -106,25 +102,17 @@ def write_convergence(folder: Path, study: Convergence) -> Entry:
 
 
 def _write(folder: Path, page: RunPage, error: float, detail: str) -> Entry:
-    folder.mkdir(parents=True, exist_ok=True)
-    name = page.data.name
-    pages.write_run(folder / f"{name}.html", page)
-    plot = page.data.plots[0]
-    x, errors = page.data.x, plot.curves[0].values
+    x, errors = page.data.x, page.data.plots[0].curves[0].values
     with np.errstate(divide="ignore"):
         line = sparkline(-np.log10(x), np.log10(errors))
     axis = f"{short(x[0])} to {short(x[-1])} {page.data.axis.unit}".strip()
-    return Entry(
-        name=name,
+    return overview.write_page(  # without error and bound: those of studies cannot be compared
+        folder,
+        page.data.name,
+        page,
+        "Errors over all scenarios",
         title=f"{page.title}: {error:.1e} {detail}",
-        group="Errors over all scenarios",
-        page=f"{name}.html",
-        status=page.status,
-        error=None,  # errors of studies are no bounds of each other
-        bound=None,
         detail=detail,
         line=line,
-        line_text=plot.text,
-        line_of=plot.curves[0].name,
         line_scale=f"{short(errors[0])} to {short(errors[-1])}, {page.data.axis.title} {axis}",
     )

@@ -3,27 +3,26 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cosim import project, trajectory_csv
-from cosim.errors import UserError
-from cosim.fmi.model import KINDS, Value, Variable
+from cosim.errors import StoppedError, UserError
+from cosim.fmi.model import KINDS
 from cosim.output_files import whole
-from cosim.report import assets, motion, overview, pages
+from cosim.report import assets, motion, overview
 from cosim.report.overview import FAILED, PASSED, SYSTEM, Entry
 from cosim.report.pages import RunPage, Table
 from cosim.report.run_data import Curve, Plot, RunData, thinned, without_rounding
-from cosim.report.scenario_page import meanings
-from cosim.report.sparkline import path as sparkline
-from cosim.report.sparkline import scale_of
+from cosim.report.scenario_page import cells, meanings
 from cosim.system import ecos
 from cosim.system.comparison import BOUND, Outcome
 from cosim.system.ssp import Ssp
 from cosim.system.structure import System
-from cosim.system.study import Diagram, Study
+from cosim.system.study import Diagram, Study, load
 from cosim.texts import milliseconds, short, unit
 
 MOST_ROWS = 350  # of a file of values, which has many columns
@@ -36,7 +35,16 @@ class Section:
 
     folder: Path
     ssp: Ssp
-    study: Study
+
+    @cached_property
+    def study(self) -> Study:
+        """What its folder says of it."""
+        return load(self.folder)
+
+    @property
+    def variants(self) -> list[str]:
+        """Names of its variants."""
+        return list(self.ssp.system.parameters)
 
     @property
     def name(self) -> str:
@@ -84,34 +92,28 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
         **_values(folder, outcome, rows),
         **_texts(section, outcome.variant),
     )
-    pages.write_run(folder / f"{outcome.variant}.html", page)
-    return Entry(
-        name=outcome.variant,
+    return overview.write_page(
+        folder,
+        outcome.variant,
+        page,
+        section.title,
         title=", ".join(f"{name} {value}" for name, value in _measures(section, outcome)),
-        group=section.title,
-        page=f"{outcome.variant}.html",
-        status=page.status,
         error=float(outcome.error) if np.isfinite(outcome.error) else None,
         bound=BOUND,
         detail=f"worst variable: {outcome.worst}",
-        line=sparkline(data.x, data.plots[0].curves[0].values),
-        line_text=data.plots[0].text,
-        line_of=data.plots[0].curves[0].name,
-        line_scale=scale_of(data.x, data.plots[0], data.axis.unit),
     )
 
 
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
     """Write the page of a variant that did not run to its end: what there is of it."""
     folder, system = _folder(report, section), section.ssp.system
-    run = error.run if isinstance(error, ecos.StoppedError) else None
+    run = error.result if isinstance(error, StoppedError) else None
     facts = [("system", section.title), ("time", f"{system.start:g} to {system.stop:g} s")]
-    data, values, line, text = None, {}, "", ""
+    data, values = None, {}
     if run is not None:
         outcome = Outcome(variant, len(run.times) - 1, run, {})
         rows, data = _data(section, outcome)
         values = _values(folder, outcome, rows)
-        line, text = sparkline(data.x, data.plots[0].curves[0].values), data.plots[0].text
         facts.append(("results until", f"{run.times[-1]:g} s"))
     page = RunPage(
         status=FAILED,
@@ -122,12 +124,7 @@ def write_failed(report: Path, section: Section, variant: str, error: UserError)
         **values,
         **_texts(section, variant),
     )
-    pages.write_run(folder / f"{variant}.html", page)
-    name = f"{variant}.html"
-    first = data.plots[0].curves[0].name if data else ""
-    known = section.title, name, FAILED, None, None, str(error), line, text, first
-    scale = scale_of(data.x, data.plots[0], data.axis.unit) if data else ""
-    return Entry(variant, "", *known, line_scale=scale)
+    return overview.write_page(folder, variant, page, section.title, title="", detail=str(error))
 
 
 def _folder(report: Path, section: Section) -> Path:
@@ -164,7 +161,7 @@ def _data(section: Section, outcome: Outcome) -> tuple[np.ndarray, RunData]:
 def _values(folder: Path, outcome: Outcome, rows: np.ndarray) -> dict[str, str]:
     """Write the file of values; what the page says of it."""
     run, csv = outcome.run, f"{outcome.variant}.csv"
-    trajectory_csv.write_short(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS)
+    trajectory_csv.write(folder / csv, run.times[rows], run.names, run.values[rows], DIGITS, True)
     every = milliseconds(np.diff(run.times[rows]).max(initial=0.0))
     note = f"It has a row every {every}, the extremes of the plots in between, and {DIGITS} digits."
     return {"csv": csv, "csv_note": note}
@@ -224,9 +221,9 @@ def _parameters(ssp: Ssp, variant: str) -> list[Table]:
     others = []
     for component, model in ssp.models.items():
         values = given.get(component, {})
-        rows += [(component, *_cells(model.variables[name], values[name])) for name in values]
+        rows += [(component, *cells(model.variables[name], values[name])) for name in values]
         rest = [
-            _cells(variable, value)
+            cells(variable, value)
             for name, value in model.start_values.items()
             if name not in values and (component, name) not in connected
             for variable in [model.variables[name]]
@@ -238,12 +235,6 @@ def _parameters(ssp: Ssp, variant: str) -> list[Table]:
     head = ("component", "name", "value", "unit", "meaning")
     own = [Table("Parameters of this variant", head, rows)] if rows else []
     return own + others
-
-
-def _cells(variable: Variable, value: Value) -> tuple[str, object, str, str]:
-    shown = variable.written(value)
-    text = str(shown).lower() if isinstance(shown, bool) else shown
-    return variable.name, text, unit(variable.unit), variable.description
 
 
 def _solvers(ssp: Ssp, run: ecos.Run) -> list[Table]:

@@ -52,8 +52,6 @@ class ReportWriter:
         ----------
         groups : mapping
             Runs by scenario; the first one of each is drawn.
-        sweeps : sequence of Sweep, optional
-        studies : sequence of Convergence, optional
         progress : callable, optional
             Called with 1 after each scenario.
         failures : sequence of Failure, optional

@@ -3,14 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from cosim import project
-from cosim.errors import UserError
+from cosim.errors import StoppedError, UserError
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference, simulation
-from cosim.runs.reference import Reference
-from cosim.runs.simulation import Result, StoppedError
+from cosim.runs.reference import Compared, Reference
+from cosim.runs.simulation import Result
 from cosim.scenarios.scenario import Scenario
 from cosim.texts import short
 
@@ -26,26 +24,16 @@ class Twin:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Compared):
     """One scenario at one tolerance, compared with its reference."""
 
     scenario: Scenario
     fmu: Fmu
     result: Result
     reference: Reference
-    errors: dict[str, float]  # relative, per Real output
+    errors: dict[str, float]  # of each Real output, as `reference.errors` gives them
     twin: Twin | None = None
     compared: bool = True  # False: the reference is the same FMU at another tolerance
-
-    @property
-    def worst(self) -> str:
-        """The variable with the largest error."""
-        return list(self.errors)[int(np.argmax(list(self.errors.values())))]
-
-    @property
-    def error(self) -> float:
-        """The largest relative error of all Real outputs; NaN if one of them is."""
-        return self.errors[self.worst]
 
     @property
     def bound(self) -> float:
@@ -54,23 +42,22 @@ class Run:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within its bound, and the twin gives the same bits.
+        """Whether the error is within its bound, and the twin gives the same bits."""
+        return not self.violation
+
+    @property
+    def violation(self) -> str:
+        """Why the run has not passed, after its tolerance; empty if it has.
 
         An error that is only estimated has no bound.
         """
-        within = not self.compared or self.error <= self.bound
-        return within and not (self.twin and self.twin.differing)
-
-    @property
-    def problem(self) -> str:
-        """What is wrong with it, or nothing."""
-        place = f"tolerance {short(self.result.tolerance)}:"
+        at = f"tolerance {short(self.result.tolerance)}:"
         if self.twin is not None and self.twin.differing:
             others = ", ".join(self.twin.differing)
-            return f"{place} other bits in FMI {self.twin.fmi_version}: {others}"
-        if not self.passed:
+            return f"{at} other bits in FMI {self.twin.fmi_version}: {others}"
+        if self.compared and not self.error <= self.bound:
             bound = f"above its bound {short(self.bound)}"
-            return f"{place} error {self.error:.1e} of {self.worst}, {bound}"
+            return f"{at} error {self.error:.1e} of {self.worst}, {bound}"
         return ""
 
 
@@ -118,10 +105,7 @@ class Runs:
         return times * len(missing) * (len(scenario.times) - 1)
 
     def run(
-        self,
-        scenario: Scenario,
-        tolerance: float,
-        progress: Callable[[int], object] | None = None,
+        self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
         """`scenario` at `tolerance`, simulated now unless it was before."""
         key = scenario.name, tolerance
@@ -133,10 +117,7 @@ class Runs:
         return self._runs[key]
 
     def compared(
-        self,
-        scenario: Scenario,
-        tolerance: float,
-        progress: Callable[[int], object] | None = None,
+        self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
         """`scenario` at `tolerance`, compared with its twin too, if there is one."""
         run, twin = self.run(scenario, tolerance, progress), self._twins.get(scenario.model)
@@ -154,10 +135,7 @@ class Runs:
         return Failure(scenario, self._fmus[scenario.model], tolerance, str(error), rows)
 
     def estimated(
-        self,
-        scenario: Scenario,
-        tolerance: float,
-        progress: Callable[[int], object] | None = None,
+        self, scenario: Scenario, tolerance: float, progress: Callable[[int], object] | None = None
     ) -> Run:
         """`scenario`, which has no reference, compared with itself at another tolerance."""
         fmu = self._fmus[scenario.model]

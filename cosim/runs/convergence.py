@@ -59,8 +59,8 @@ class Problem:
         """Communication steps that are run, s, longest first."""
         return self.scenario.steps[0] * np.array(FACTORS)
 
-    def error(self, states: dict[str, float]) -> float:
-        """Largest error of the final `states`, each relative to the largest value on the way."""
+    def final_error(self, states: dict[str, float]) -> float:
+        """Largest difference of final `states`, each relative to its largest value on the way."""
         return max(abs(states[name] - self.exact[name]) / self.largest[name] for name in self.exact)
 
 
@@ -148,10 +148,7 @@ def slope(steps: np.ndarray, errors: np.ndarray) -> float:
 def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
     """Inputs of `scenario` as smooth functions of time.
 
-    Raises
-    ------
-    UserError
-        If one of them is no sum of sines.
+    UserError if one of them is no sum of sines.
     """
     for name, signal in scenario.signals.items():
         if not isinstance(signal, Sines):
@@ -162,10 +159,7 @@ def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
 def load(path: Path, model: Model) -> Problem:
     """Read the problem at `path` and its exact final state.
 
-    Raises
-    ------
-    UserError
-        If one of the two files is missing or wrong.
+    UserError if one of the two files is missing or wrong.
     """
     scenario = scenarios.load(path, model)
     if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
@@ -201,26 +195,22 @@ def study(
 ) -> Convergence:
     """Run `problem` in every case and with every communication step.
 
+    UserError if a function of an FMU fails.
+
     Parameters
     ----------
     fmu : Fmu
         For all orders of input derivatives.
-    problem : Problem
     progress : callable, optional
         Called with the number of steps that each run has made.
     updated : Fmu, optional
         For intermediate update; without it, this case is left out.
-
-    Raises
-    ------
-    UserError
-        If a function of an FMU fails.
     """
     fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
     errors = np.empty((len(fmus), len(FACTORS)))
     for i, of_case in enumerate(fmus):
         for j, factor in enumerate(FACTORS):
-            errors[i, j] = problem.error(final_state(of_case, problem, i, factor))
+            errors[i, j] = problem.final_error(final_state(of_case, problem, i, factor))
             progress((len(problem.scenario.times) - 1) // factor)
     return Convergence(problem, errors)
 
@@ -230,8 +220,6 @@ def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str,
 
     Parameters
     ----------
-    fmu : Fmu
-    problem : Problem
     case : int
         Highest derivative of the inputs that is set, along with all lower ones, 0: none; or
         INTERMEDIATE_UPDATE.

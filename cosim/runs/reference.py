@@ -1,6 +1,6 @@
 """Reference trajectories, the error of a run against them, and the bounds on it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +21,22 @@ BOUNDS = {1e-8: 1e-6, 1e-11: 1e-8}
 
 # name -> names whose absolute values are summed up to the scale of its error
 Summed = Mapping[str, tuple[str, ...]]
+
+
+class Compared:
+    """A run that has been compared: which of its variables is farthest from the reference."""
+
+    errors: dict[str, float]  # by name, as `errors` gives them
+
+    @property
+    def worst(self) -> str:
+        """The variable with the largest error; NaN counts as larger than all."""
+        return list(self.errors)[int(np.argmax(list(self.errors.values())))]
+
+    @property
+    def error(self) -> float:
+        """The largest error of all variables; NaN if one of them is."""
+        return self.errors[self.worst]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,34 +68,37 @@ class Reference:
 def load(scenario: Scenario, model: Model) -> Reference:
     """Read and check the reference of `scenario`.
 
+    UserError if the file is missing, damaged, or not of this scenario; names the line and the
+    command that makes references.
+
     Parameters
     ----------
-    scenario : Scenario
     model : Model
         What the scenario was checked against.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, or not of this scenario; names the line and the command
-        that makes references.
     """
     path = project.reference_file(scenario.path, model.name)
-    reader = _Reader(path, scenario)
-    names, table = trajectory_csv.read(path, reader.fail)
-    reader.check_names(names[1:], model)
-    reader.check_times(table[:, 0])
-    summed = read_summed(project.model_folder(scenario.path))
-    return Reference(path, table[:, 0], names[1:], table[:, 1:], summed)
+    folder = project.model_folder(scenario.path)
+    wrong = failure(path, folder, scenario.name)
+    (_, *names), table = trajectory_csv.read(path, wrong)
+    _check_names(names, model, wrong)
+    _check_times(table[:, 0], scenario, wrong)
+    return Reference(path, table[:, 0], tuple(names), table[:, 1:], read_summed(folder))
+
+
+def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
+    """What makes errors of the reference `name` of a model or system, which say how to make it."""
+
+    def wrong(message: str, line: int | None = None) -> UserError:
+        where = f"{path}, line {line}" if line else f"{path}"
+        return UserError(f"{where}: {message}; {project.making_references(folder, name)}")
+
+    return wrong
 
 
 def read_summed(folder: Path) -> Summed:
     """Which errors of a model or system, by its folder, have the scale of a sum; maybe none.
 
-    Raises
-    ------
-    UserError
-        If the file is wrong.
+    UserError if the file is wrong.
     """
     path = project.scales_file(folder)
     if not is_file(path):
@@ -98,7 +117,6 @@ def scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float
     ----------
     columns : mapping of str to ndarray
         Reference of all variables, (rows,) each.
-    name : str
     summed : mapping
         As `read_summed` gives it; a sum of which a term is missing does not count.
     """
@@ -110,7 +128,7 @@ def scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float
 
 
 def errors(result: Result, reference: Reference) -> dict[str, float]:
-    """Relative error of each variable of `result`: max |value - reference| / scale."""
+    """Error of each variable of `result`, relative: its largest difference over time / `scale`."""
     return {
         name: float(np.max(np.abs(values - reference.column(name)))) / reference.scale(name)
         for name, values in zip(result.names, result.values.T, strict=True)
@@ -127,49 +145,30 @@ def bound(tolerance: float) -> float:
     return min([ERROR_PER_TOLERANCE * tolerance, *applying])
 
 
-class _Reader:
-    """Checks one file; errors name the file, the line and the way out."""
+def _check_names(names: Sequence[str], model: Model, wrong: trajectory_csv.Failure) -> None:
+    """Check that every Real output is there, and nothing else: all columns are compared."""
+    for name in names:
+        if name not in model.variables or model.variables[name].type != "Real":
+            raise wrong(f"the model has no Real variable {name!r}", 1)
+        if names.count(name) > 1:
+            raise wrong(f"column {name!r} is there twice", 1)
+    for name in model.real_outputs:
+        if name not in names:
+            raise wrong(f"has no column {name!r}", 1)
+    for name in names:
+        if name not in model.real_outputs:
+            raise wrong(f"{name!r} is not an output of the model", 1)
 
-    def __init__(self, path: Path, scenario: Scenario) -> None:
-        self.path = path
-        self.scenario = scenario
 
-    def fail(self, message: str, line: int | None = None) -> UserError:
-        place = f"{self.path}, line {line}" if line else f"{self.path}"
-        folder = project.model_folder(self.scenario.path)
-        return UserError(
-            f"{place}: {message}; {project.making_references(folder, self.scenario.name)}"
-        )
-
-    def check_names(self, names: tuple[str, ...], model: Model) -> None:
-        """Check that every Real output is there, and nothing else: all columns are compared."""
-        for name in names:
-            if name not in model.variables or model.variables[name].type != "Real":
-                raise self.fail(f"the model has no Real variable {name!r}", 1)
-            if names.count(name) > 1:
-                raise self.fail(f"column {name!r} is there twice", 1)
-        for name in model.real_outputs:
-            if name not in names:
-                raise self.fail(f"has no column {name!r}", 1)
-        for name in names:
-            if name not in model.real_outputs:
-                raise self.fail(f"{name!r} is not an output of the model", 1)
-
-    def check_times(self, times: np.ndarray) -> None:
-        """Check that the times are those communication points that the scenario asks for."""
-        expected = self.scenario.times[self.scenario.reference_rows]
-        shared = min(len(times), len(expected))
-        wrong = np.flatnonzero(times[:shared] != expected[:shared])
-        if len(wrong):
-            row = wrong[0]
-            raise self.fail(
-                f"does not match {self.scenario.path}: expected time {float(expected[row])!r} s, "
-                f"found {float(times[row])!r} s",
-                int(row) + 2,
-            )
-        if len(times) != len(expected):
-            raise self.fail(
-                f"does not match {self.scenario.path}: expected {len(expected)} rows, "
-                f"found {len(times)}",
-                shared + 1,
-            )
+def _check_times(times: np.ndarray, scenario: Scenario, wrong: trajectory_csv.Failure) -> None:
+    """Check that the times are those communication points that the scenario asks for."""
+    expected = scenario.times[scenario.reference_rows]
+    shared = min(len(times), len(expected))
+    differing = np.flatnonzero(times[:shared] != expected[:shared])
+    other = f"does not match {scenario.path}: expected"
+    if len(differing):
+        row = int(differing[0])
+        found = f"found {float(times[row])!r} s"
+        raise wrong(f"{other} time {float(expected[row])!r} s, {found}", row + 2)
+    if len(times) != len(expected):
+        raise wrong(f"{other} {len(expected)} rows, found {len(times)}", shared + 1)

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
-from cosim.errors import UserError
+from cosim.errors import StoppedError, UserError
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from cosim.scenarios.scenario import Scenario
@@ -32,14 +32,6 @@ class Result:
     integers: dict[str, np.ndarray] = field(default_factory=dict)  # (rows,): those to be drawn
 
 
-class StoppedError(UserError):
-    """A run that failed in a step; `result` has its rows up to there."""
-
-    def __init__(self, text: str, result: Result) -> None:
-        super().__init__(text)
-        self.result = result
-
-
 def simulate(
     fmu: Fmu,
     scenario: Scenario,
@@ -48,21 +40,17 @@ def simulate(
 ) -> Result:
     """Run `scenario` on `fmu` and record its Real outputs.
 
+    UserError if the FMU has no Real outputs, or if one of its functions fails; the text holds the
+    FMU's own message. In a step it is a `StoppedError`.
+
     Parameters
     ----------
     fmu : Fmu
         The one that the scenario was checked against.
-    scenario : Scenario
     tolerance : float, optional
         Relative tolerance; None: that of the scenario.
     progress : callable, optional
         Called now and then with the number of steps done since the last call.
-
-    Raises
-    ------
-    UserError
-        If the FMU has no Real outputs, or if one of its functions fails; the text holds the FMU's
-        own message. In a step it is a `StoppedError`.
     """
     tolerance = scenario.tolerance if tolerance is None else tolerance
     if not fmu.model.real_outputs:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, hint
 from cosim.fmi.model import INPUTS, Model, Variable
 from cosim.input_files import show
 from cosim.scenarios import logs
@@ -27,7 +27,6 @@ class InputReader:
     ----------
     reader : Reader
         Of the scenario's file.
-    model : Model
     times : ndarray, shape (n + 1,)
         Communication points in s.
     """
@@ -46,10 +45,8 @@ class InputReader:
         """Section [inputs] as functions of time."""
         result = {}
         for name, given in self._reader.table(content.get(INPUTS, {}), f"[{INPUTS}]").items():
-            try:
+            with self._reader.placed(f"[{INPUTS}]"):
                 variable = self._model.find(name, INPUTS)
-            except WrongValueError as error:
-                self._reader.fail(f"[{INPUTS}]: {error}")
             where = f"[{INPUTS}.{name}]"
             if variable.type not in ("Real", "Boolean"):
                 self._reader.fail(f"{where}: is of type {variable.type}, expected Real or Boolean")
@@ -62,10 +59,8 @@ class InputReader:
         outputs = self._model.real_outputs
         for name, given in self._reader.table(content.get(MEASURED, {}), f"[{MEASURED}]").items():
             if name not in outputs:
-                guess, known = did_you_mean(name, outputs), ", ".join(outputs) or "none"
-                self._reader.fail(
-                    f"[{MEASURED}]: the model has no Real output {name!r}{guess} (known: {known})"
-                )
+                missing = f"the model has no Real output {name!r}{hint(name, outputs)}"
+                self._reader.fail(f"[{MEASURED}]: {missing}")
             where = f"[{MEASURED}.{name}]"
             table = self._reader.table(given, where)
             beside = (key for key, shape in BESIDE.items() if shape == FILE)
@@ -84,10 +79,8 @@ class InputReader:
                 values = signal.values(self._elapsed)
             if not np.all(np.isfinite(values)):
                 self._reader.fail(f"{where}: expected finite values, got an overflow")
-            try:
+            with self._reader.placed(where):
                 self._model.variables[name].check_range(float(values.min()), float(values.max()))
-            except WrongValueError as error:
-                self._reader.fail(f"{where}: {error}")
             values.setflags(write=False)
             result[name] = values
         return result
@@ -120,10 +113,8 @@ class InputReader:
         return Switches(tuple((t, self._boolean(v, key, variable)) for t, v, key in rows))
 
     def _boolean(self, given: Any, key: str, variable: Variable) -> bool:
-        try:
+        with self._reader.placed(key):
             return bool(variable.checked(given))
-        except WrongValueError as error:
-            self._reader.fail(f"{key}: {error}")
 
     def _constant(self, table: dict[str, Any], where: str, variable: Variable) -> Constant:
         key = f"{where} {CONSTANT}"

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.errors import UserError, did_you_mean
-from cosim.input_files import UnreadableError, decoded, read_bytes, show
+from cosim.errors import UserError, did_you_mean, placed
+from cosim.input_files import decoded, read_bytes, show
 
 LARGEST = 50_000_000  # bytes
 DELIMITERS = ",;\t"
@@ -33,10 +33,7 @@ class Log:
     def columns(self, time: str, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Times (rows,), which increase, and values (rows,) of a column; all finite.
 
-        Raises
-        ------
-        UserError
-            If there is no such column, or anything in it is wrong; names the line.
+        UserError if there is no such column, or anything in it is wrong; names the line.
         """
         first, second = self._place(time), self._place(name)
         found = array("d")
@@ -100,16 +97,12 @@ class Log:
 def read(path: Path) -> Log:
     """Read a log with commas, semicolons or tabs between its columns.
 
-    Raises
-    ------
-    UserError
-        If it cannot be read, or has no columns.
+    UserError if it cannot be read, or has no columns.
     """
     try:
-        content = read_bytes(path, LARGEST)
+        with placed(path):
+            content = read_bytes(path, LARGEST)
         text = decoded(content)
-    except UnreadableError as error:
-        raise UserError(f"{path}: {error}") from None
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: not UTF-8 text, at byte {error.start}") from None
     headers = {delimiter: _header(path, text, delimiter) for delimiter in DELIMITERS}

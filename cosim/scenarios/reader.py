@@ -1,10 +1,11 @@
 """Takes checked values from the TOML file of a scenario."""
 
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, NoReturn
 
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, hint, placed
 from cosim.input_files import show
 from cosim.units import Units, finite_number, quantity
 
@@ -18,18 +19,18 @@ class Reader:
     def fail(self, message: str) -> NoReturn:
         raise UserError(f"{self.path}: {message}")
 
+    def placed(self, key: str) -> AbstractContextManager[None]:
+        """Where values are checked that this key has."""
+        return placed(f"{self.path}: {key}")
+
     def number(self, value: Any, key: str) -> float:
-        try:
+        with self.placed(key):
             return finite_number(value)
-        except WrongValueError as error:
-            self.fail(f"{key}: {error}")
 
     def quantity(self, value: Any, key: str, known: Units, is_difference: bool = False) -> float:
         """A number, or a text with a number and one of the `known` units."""
-        try:
+        with self.placed(key):
             return quantity(value, known, is_difference)
-        except WrongValueError as error:
-            self.fail(f"{key}: {error}")
 
     def text(self, value: Any, key: str) -> str:
         if not isinstance(value, str) or not value.strip():
@@ -50,11 +51,10 @@ class Reader:
         self, table: dict, where: str, required: Iterable[str] = (), optional: Iterable[str] = ()
     ) -> None:
         known = [*required, *optional]
-        place = f"{where}: " if where else ""
+        begin = f"{where}: " if where else ""
         for key in table:
             if key not in known:
-                guess = did_you_mean(key, known)
-                self.fail(f"{place}unknown key {key!r}{guess} (known: {', '.join(known)})")
+                self.fail(f"{begin}unknown key {key!r}{hint(key, known)}")
         for key in required:
             if key not in table:
-                self.fail(f"{place}missing key {key!r}")
+                self.fail(f"{begin}missing key {key!r}")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cosim import project
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, did_you_mean
 from cosim.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
 from cosim.input_files import read_toml, show
 from cosim.scenarios.inputs import MEASURED, InputReader
@@ -48,7 +48,7 @@ class Scenario:
     tolerance: float  # relative
     times: np.ndarray  # (n + 1,) communication points in s, from start to stop
     signals: dict[str, Signal]  # inputs as functions of time
-    inputs: dict[str, np.ndarray]  # (n + 1,) each: held over the step that begins at times[i]
+    inputs: dict[str, np.ndarray]  # (n + 1,) each, zero-order hold: over the step from times[i]
     reference_every: int  # every k-th communication point is in the reference
     defaults: dict[str, Value]  # start values in the FMU
     panels: tuple[tuple[str, ...], ...] = ()  # variables to draw beside the states, by diagram
@@ -81,6 +81,11 @@ class Scenario:
         last = len(self.times) - 1
         return np.append(np.arange(0, last, self.reference_every), last)
 
+    @property
+    def input_rows(self) -> np.ndarray:
+        """Indices (rows,) into the inputs of the step that ends at each point in the reference."""
+        return np.maximum(self.reference_rows - 1, 0)
+
 
 def title(path: Path) -> str:
     """Title of the scenario at `path`; the rest of the file is not checked."""
@@ -94,10 +99,7 @@ def title(path: Path) -> str:
 def folder_of(path: Path) -> Path:
     """Folder of the model of a scenario: that its key `model` names, or else the one it lies in.
 
-    Raises
-    ------
-    UserError
-        If the file cannot be read, or names no model.
+    UserError if the file cannot be read, or names no model.
     """
     content, reader = read_toml(path), Reader(path)
     if MODEL not in content:
@@ -115,18 +117,14 @@ def folder_of(path: Path) -> Path:
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
     """Read and check the scenario at `path`, of the project or of a user.
 
+    UserError if the file cannot be read, or if anything in it is wrong.
+
     Parameters
     ----------
-    path : Path
     model : Model
         What the model's FMU declares.
     times : mapping, optional
         Values that replace those of section [time].
-
-    Raises
-    ------
-    UserError
-        If the file cannot be read, or if anything in it is wrong.
     """
     path = Path(path)
     content = read_toml(path)
@@ -191,15 +189,12 @@ class _Reader(Reader):
         """Section [parameters] or [initial]: name = value, as `Variable.checked` takes it."""
         result = {}
         for name, given in self.table(content.get(section, {}), f"[{section}]").items():
-            where = f"[{section}]"
-            try:
+            with self.placed(f"[{section}]"):
                 variable = model.find(name, section)
-                where = f"[{section}] {name}"
+            with self.placed(f"[{section}] {name}"):
                 result[name] = variable.checked(given)
-                if question := variable.question(given):
-                    self.questions.append(f"{where}: {question}")
-            except WrongValueError as error:
-                self.fail(f"{where}: {error}")
+            if question := variable.question(given):
+                self.questions.append(f"[{section}] {name}: {question}")
         return result
 
     def tolerances(self, tolerance: float, parameters: dict[str, Value], model: Model) -> None:
@@ -208,10 +203,8 @@ class _Reader(Reader):
         if parameters.get(TOLERANCE):  # 0: that of the scenario
             given.append((f"[{PARAMETERS}] {TOLERANCE}", parameters[TOLERANCE]))
         for key, value in given:
-            try:
+            with self.placed(key):
                 model.check_tolerance(value, parameters)
-            except WrongValueError as error:
-                self.fail(f"{key}: {error}")
 
     # pictures
 
@@ -232,10 +225,8 @@ class _Reader(Reader):
                 if name not in drawn:
                     guess = did_you_mean(name, drawn) if isinstance(name, str) else ""
                     self.fail(f"{key}: {show(name)} cannot be drawn{guess}")
-            if (
-                len({(model.variables[name].type, model.variables[name].unit) for name in names})
-                > 1
-            ):
+            variables = [model.variables[name] for name in names]
+            if len({(variable.type, variable.unit) for variable in variables}) > 1:
                 self.fail(f"{key}: expected variables of one type and unit")
             result.append(tuple(names))
         return tuple(result)

@@ -8,7 +8,7 @@ import numpy as np
 from cosim import project, trajectory_csv
 from cosim.errors import UserError
 from cosim.runs import reference
-from cosim.runs.reference import Summed
+from cosim.runs.reference import Compared, Summed
 from cosim.system import ecos
 from cosim.system.ssp import Ssp
 
@@ -30,23 +30,13 @@ class Reference:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class Outcome(Compared):
     """A run of one variant, and how far it is from its reference."""
 
     variant: str
     steps: int
     run: ecos.Run
     errors: dict[str, float]  # largest of each variable, relative
-
-    @property
-    def worst(self) -> str:
-        """Variable with the largest error."""
-        return max(self.errors, key=self.errors.__getitem__)
-
-    @property
-    def error(self) -> float:
-        """Largest error of all variables."""
-        return self.errors[self.worst]
 
     @property
     def passed(self) -> bool:
@@ -98,30 +88,20 @@ def load_reference(
 ) -> Reference:
     """Read and check the reference of a variant.
 
+    UserError if the file is missing, damaged, or not of this system; names the line and the command
+    that makes references.
+
     Parameters
     ----------
-    ssp : Ssp
-    variant : str
     system : Path
         Folder of the system.
     experiment : tuple of float
         Start, stop and step in s that the references are for.
-
-    Raises
-    ------
-    UserError
-        If the file is missing, damaged, or not of this system; names the line and the command
-        that makes references.
     """
     _check_experiment(ssp, experiment)
     path = project.variant_reference_file(system, variant)
-
-    def wrong(message: str, line: int | None = None) -> UserError:
-        place = f"{path}, line {line}" if line else f"{path}"
-        return UserError(f"{place}: {message}; {project.making_references(system, variant)}")
-
-    columns, table = trajectory_csv.read(path, wrong)
-    names = columns[1:]
+    wrong = reference.failure(path, system, variant)
+    (_, *names), table = trajectory_csv.read(path, wrong)
     known = recorded(ssp)
     possible = {*known, *discrete(ssp)}
     for name in names:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim import project
-from cosim.errors import UserError, one_line
+from cosim.errors import StoppedError, UserError, one_line
 from cosim.interruption import temporary_folder, uninterrupted
 
 if TYPE_CHECKING:  # the child does not need these modules
@@ -59,30 +59,18 @@ class Run:
     statistics: Mapping[str, float] = field(default_factory=dict)
 
 
-class StoppedError(UserError):
-    """A run that a component did not finish; `run` has its rows up to there, if there are any."""
-
-    def __init__(self, text: str, run: Run | None = None) -> None:
-        super().__init__(text)
-        self.run = run
-
-
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     """Run a system from its start to its stop time with one of its parameter sets.
 
+    UserError if a component fails or gives a value that is not finite (the text names component,
+    variable and time), or if Ecos itself fails. After the start it is a `StoppedError`.
+
     Parameters
     ----------
-    ssp : Ssp
     variant : str
         Name of a parameter set; must exist: for an unknown name Ecos sets nothing.
     names : sequence of str
         Variables to read, ``component.variable``: Real, Integer or Boolean.
-
-    Raises
-    ------
-    UserError
-        If a component fails or gives a value that is not finite (the text names component,
-        variable and time), or if Ecos itself fails. After the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:

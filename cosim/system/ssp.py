@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.archives import unpack
-from cosim.errors import UserError
+from cosim.errors import placed
 from cosim.fmi.fmu_file import Fmu
 from cosim.fmi.model import Model, Variable
-from cosim.input_files import UnreadableError
 from cosim.interruption import temporary_folder
 from cosim.system import ssp_checks
 from cosim.system.ssp_reader import SspReader
@@ -43,16 +42,12 @@ class Ssp:
 def unpacked(path: Path) -> Iterator[Ssp]:
     """Unpack an SSP to a temporary folder, which is removed at the end, and read it.
 
-    Raises
-    ------
-    UserError
-        If it is damaged, or no system that can be run (what that is: `cosim.system.ssp_checks`).
+    UserError if it is damaged, or no system that can be run (what that is:
+    `cosim.system.ssp_checks`).
     """
     path = Path(path)
     with temporary_folder() as folder:
-        try:
+        with placed(path):
             unpack(path, folder, "SSP")
-        except UnreadableError as error:
-            raise UserError(f"{path}: {error}") from error
         system = SspReader(path, folder).system()
         yield Ssp(path, folder, system, ssp_checks.checked_models(path, folder, system))

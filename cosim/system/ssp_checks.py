@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from cosim.archives import LARGEST_SYSTEM
-from cosim.errors import UserError, WrongValueError, did_you_mean
+from cosim.errors import UserError, did_you_mean, placed
 from cosim.fmi.fmu_file import describe
 from cosim.fmi.model import TOLERANCE, Model, Variable
-from cosim.input_files import UnreadableError, is_file
+from cosim.input_files import is_file
 from cosim.system.structure import Component, Connector, Parameter, System
 
 # type of a variable -> types of a parameter's value that engines can give it
@@ -29,18 +29,14 @@ def checked_models(path: Path, folder: Path, system: System) -> dict[str, Model]
     unit, connections go from an output to an input of the same type and unit, every input of every
     FMU is connected exactly once, and parameters are variables that can be set.
 
+    UserError if not; the text names component and variable.
+
     Parameters
     ----------
     path : Path
         The SSP, for messages.
     folder : Path
         Where it is unpacked.
-    system : System
-
-    Raises
-    ------
-    UserError
-        If not; the text names component and variable.
     """
     checker = _Checker(path, system)
     for component in system.components:
@@ -77,10 +73,8 @@ class _Checker:
         where = f"component {component.name!r}: {component.source}"
         if not is_file(path):
             self.fail(f"{where} is missing in the SSP")
-        try:
+        with placed(f"{self.path}: {where}"):
             found = describe(path)
-        except UnreadableError as error:
-            self.fail(f"{where}: {error}")
         self.bytes += sum(found.sizes.values())
         if self.bytes > LARGEST_SYSTEM:
             most = f"{LARGEST_SYSTEM / 1e6:.0f} MB"
@@ -159,12 +153,10 @@ class _Checker:
     def tolerance(self, variant: str, component: str, values: Mapping[str, Parameter]) -> None:
         """Refuse a tolerance that the component's method of integration cannot reach."""
         given = {name: parameter.value for name, parameter in values.items()}
-        try:
-            if given.get(TOLERANCE):
+        where = f"parameter set {variant!r}: component {component!r}: {TOLERANCE!r}"
+        if given.get(TOLERANCE):
+            with placed(f"{self.path}: {where}"):
                 self.models[component].check_tolerance(given[TOLERANCE], given)
-        except WrongValueError as error:
-            where = f"parameter set {variant!r}: component {component!r}: {TOLERANCE!r}"
-            self.fail(f"{where}: {error}")
 
 
 def _unit(unit: str | None) -> str:

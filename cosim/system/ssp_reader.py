@@ -15,9 +15,9 @@ import fmpy
 from lxml import etree
 
 from cosim.archives import read_xml, wrong_name
-from cosim.errors import UserError
+from cosim.errors import UserError, placed
 from cosim.fmi.model import Value
-from cosim.input_files import UnreadableError, is_file
+from cosim.input_files import is_file
 from cosim.project import STRUCTURE
 from cosim.scenarios.scenario import MAX_STEPS
 from cosim.system.structure import Component, Connection, Connector, Parameter, System
@@ -63,10 +63,8 @@ class SspReader:
         path = self.folder / file
         if not is_file(path):
             self.fail(file, "is missing in the SSP")
-        try:
+        with placed(f"{self.path}: {file}"):
             tree = read_xml(path)
-        except UnreadableError as error:
-            self.fail(file, str(error))
         validator = _schema(schema)
         if not validator.validate(tree):
             first = validator.error_log[0]

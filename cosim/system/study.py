@@ -71,10 +71,7 @@ def load(folder: Path) -> Study:
 def of_coupling() -> tuple[Path, CouplingStudy]:
     """Folder and module of the system that has a study of its coupling.
 
-    Raises
-    ------
-    UserError
-        If there is not exactly one.
+    UserError if there is not exactly one.
     """
     loaded = {folder: load(folder) for folder in project.systems().values()}
     found = {folder: known for folder, known in loaded.items() if hasattr(known, "study_coupling")}

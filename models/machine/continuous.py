@@ -133,10 +133,11 @@ def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tup
     return columns, float(np.abs(weights).sum())
 
 
-def error(columns: Columns, expected: Columns) -> tuple[float, str]:
-    """Largest error of all variables, relative to the largest value of each, and whose it is.
+def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
+    """Largest difference of all variables, relative to the largest value of each, and whose it is.
 
-    `columns` have the first rows of `expected`, or all.
+    As the errors of `cosim.runs.reference`, but never relative to a sum. `columns` have the first
+    rows of `expected`, or all.
     """
     errors = {
         name: float(
@@ -192,9 +193,9 @@ def main() -> None:
             print(f"{variant}: tracking error {1e3 * tracking_error(expected):.4g} mm")
             for method in METHODS:
                 runs = [run(opened, fmus, method, variant, n) for n in method.per_second]
-                errors = [error(columns, expected)[0] for columns in runs]
+                errors = [largest_error(columns, expected)[0] for columns in runs]
                 at_zero, enlarged = limit(runs, method.per_second, method.power)
-                left, worst = error(at_zero, expected)
+                left, worst = largest_error(at_zero, expected)
                 measured[variant, method.name] = errors, left
                 print(
                     f"  {method.name}: {', '.join(f'{x:.3g}' for x in errors)}; limit: {left:.3g} "

@@ -131,9 +131,7 @@ def test_systems_show_arm_and_reference_motion(
         assert data["arm"]["l1"] == 0.5  # the start value in the FMU
 
 
-def test_the_machine_has_payload_and_wall(
-    variants: tuple[str, ssp.Ssp, list[Outcome]],
-) -> None:
+def test_the_machine_has_payload_and_wall(variants: tuple[str, ssp.Ssp, list[Outcome]]) -> None:
     system, opened, outcomes = variants
     if system != "machine":
         assert all(motion.of_outcome(system, opened, x)["arm"]["wall"] is None for x in outcomes)

@@ -142,8 +142,7 @@ def test_keys_of_the_list_of_speeds_stay_its_own(page: Browser) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "shown"),
-    [(0.304, 30), (0.306, 31), (-5, 0), (7, LAST), (1, LAST), (0.5, 50)],
+    ("asked", "shown"), [(0.304, 30), (0.306, 31), (-5, 0), (7, LAST), (1, LAST), (0.5, 50)]
 )
 def test_seek_shows_the_nearest_row(page: Browser, asked: float, shown: int) -> None:
     page.run("player.seek(arguments[0])", asked)

@@ -18,10 +18,7 @@ RUNS = 6
 @pytest.mark.parametrize("work", WORKS)
 def test_rows_are_those_of_a_loop_in_c(work: str, tmp_path: Path) -> None:
     given = campaign(tmp_path, WORKS[work].format(runs=RUNS))
-    with (
-        bases.opened(given, None) as base,
-        open_fmus(base.archives, tmp_path) as fmus,
-    ):
+    with bases.opened(given, None) as base, open_fmus(base.archives, tmp_path) as fmus:
         job = planning.plan(given, base, work)
         points = Points(given, planning.constants(given, base))
         targets = points.targets(points.of(range(RUNS)), job)

@@ -30,10 +30,7 @@ MISTAKES = {
     "no parameter": ([("[parameters.m2]", "[parameters.ee_x]")], "is not a parameter"),
     "no runs": ([("runs = 40\n", "")], "missing key 'runs'"),
     "too many runs": ([("runs = 40", "runs = 2000000000")], "runs: makes 2e+09, expected at most"),
-    "block of nothing": (
-        [("block = 8", "block = 0")],
-        "block: expected greater than or equal",
-    ),
+    "block of nothing": ([("block = 8", "block = 0")], "block: expected greater than or equal"),
     "points without a grid": ([("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3")], "goes with a grid only"),
     "empty grid": (
         [("sobol", "grid"), ("runs = 40\n", "")],
@@ -44,10 +41,7 @@ MISTAKES = {
         "parameters.m2.points: expected greater than 0, got 0",
     ),
     "no power of 2": ([("sobol", "indices")], "runs: expected a power of 2"),
-    "nothing kept": (
-        [(ARM[ARM.index("final") :], "")],
-        "[keep]: keeps nothing of a run",
-    ),
+    "nothing kept": ([(ARM[ARM.index("final") :], "")], "[keep]: keeps nothing of a run"),
     "unknown variable": ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
     "no number": (
         [('"q1", "q2"', '"solver_method"')],
@@ -85,16 +79,10 @@ MISTAKES = {
         "[derived] dq1: has no value: ",
     ),
     "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
-    "unknown column": (
-        [("seed = 3", 'worst = ["final(q3)"]')],
-        "worst: no column 'final(q3)'",
-    ),
+    "unknown column": ([("seed = 3", 'worst = ["final(q3)"]')], "worst: no column 'final(q3)'"),
     "unknown name": ([("[keep]", '[derived]\ndq1 = "2 * q9"\n[keep]')], "unknown name 'q9'"),
     "no expression": ([("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')], "[derived] dq1: is not an"),
-    "forbidden": (
-        [("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')],
-        "'open(1)': expected",
-    ),
+    "forbidden": ([("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')], "'open(1)': expected"),
     "run": (
         [("[keep]", '[parameters.run]\nuniform = [0.0, 1.0]\n[derived]\ndq1 = "run"\n[keep]')],
         "[parameters.run]: every table has a column of that name",

@@ -91,10 +91,7 @@ def test_commands_of_files_of_the_project_have_short_paths(monkeypatch: pytest.M
 
 
 def test_an_error_of_the_page_loses_no_results(
-    done: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = copied(done, tmp_path)
     with monkeypatch.context() as patched:

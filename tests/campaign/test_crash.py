@@ -71,10 +71,7 @@ def test_a_run_that_takes_its_worker_down(
         points = Points(campaign, planning.constants(campaign, base))
         results = Results(tmp_path / "output", campaign, job, "")
         results.begin()
-        with (
-            results.workers_folder() as folder,
-            cluster.opened(None, 1, folder) as client,
-        ):
+        with results.workers_folder() as folder, cluster.opened(None, 1, folder) as client:
             made = engine.Engine(client, campaign, job, base.archives, points, results)
             made.run(range(campaign.blocks), lambda _: None)
     table = results.table(["final(y)", "failure"])

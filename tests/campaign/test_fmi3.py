@@ -131,8 +131,7 @@ def test_a_step_that_fails_says_why(tmp_path: Path) -> None:
 
 
 STEP3 = CFUNCTYPE(
-    *(c_int, c_void_p, c_double, c_double, c_bool),
-    *(*[POINTER(c_bool)] * 3, POINTER(c_double)),
+    *(c_int, c_void_p, c_double, c_double, c_bool), *(*[POINTER(c_bool)] * 3, POINTER(c_double))
 )
 
 

@@ -88,25 +88,6 @@ def failure(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
     return err
 
 
-def test_a_component_that_fails_in_initialization_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A path through the joint axis; Ecos itself would go on."""
-    edits = {"resources/trajectory_nominal.ssv": replace('value="0.1"', 'value="0.4"')}
-    err = failure(edited(SSP3, tmp_path / "unreachable.ssp", edits), capsys)
-    assert "component 'trajectory' failed in initialization (error): " in err
-    assert "0.1 m" in err  # the smallest reachable distance
-
-
-def test_a_component_that_fails_in_a_step_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    limited = '<ssv:Parameter name="max_internal_steps"><ssv:Integer value="1"/></ssv:Parameter>'
-    edits = {"resources/arm_nominal.ssv": replace("<ssv:Parameters>", f"<ssv:Parameters>{limited}")}
-    err = failure(edited(SSP3, tmp_path / "impatient.ssp", edits), capsys)
-    assert "component 'arm' failed by t = 0.00" in err
-
-
 @pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
 def test_what_ecos_would_not_set_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path

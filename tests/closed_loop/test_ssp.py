@@ -253,10 +253,7 @@ BAD: dict[str, tuple[dict[str, Edit], list[str]]] = {
         {NOMINAL_ARM: replace('name="nominal"', 'name="nominl"')},
         ["has no parameter set 'nominl'"],
     ),
-    "no parameter file": (
-        {NOMINAL_ARM: lambda _: None},
-        [f"{NOMINAL_ARM}: is missing in the SSP"],
-    ),
+    "no parameter file": ({NOMINAL_ARM: lambda _: None}, [f"{NOMINAL_ARM}: is missing in the SSP"]),
     "no structure": ({STRUCTURE: lambda _: None}, [f"{STRUCTURE}: is missing in the SSP"]),
     "structure cut off": (
         {STRUCTURE: lambda content: content[:-200]},
@@ -274,10 +271,7 @@ BAD: dict[str, tuple[dict[str, Edit], list[str]]] = {
         structure('<osp:FixedStepAlgorithm baseStepSize="0.001"/>', ""),
         [STRUCTURE, "baseStepSize"],
     ),
-    "stop before start": (
-        structure('stopTime="6"', 'stopTime="-6"'),
-        [STRUCTURE, "stop -6.0 s"],
-    ),
+    "stop before start": (structure('stopTime="6"', 'stopTime="-6"'), [STRUCTURE, "stop -6.0 s"]),
 }
 
 

@@ -19,10 +19,7 @@ import package  # noqa: E402
 
 SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"
 STRUCTURE = "SystemStructure.ssd"
-KINDS = {
-    ".ssd": "SystemStructureDescription.xsd",
-    ".ssv": "SystemStructureParameterValues.xsd",
-}
+KINDS = {".ssd": "SystemStructureDescription.xsd", ".ssv": "SystemStructureParameterValues.xsd"}
 
 
 @pytest.fixture(scope="module", params=VERSIONS)

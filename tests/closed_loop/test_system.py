@@ -18,8 +18,9 @@ from cosim.report import overview
 from cosim.system import comparison, ecos, ssp
 from models.closed_loop.study import EXPERIMENT
 from tests.support.paths import ROOT
-from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, replace
+from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace
 
+SSP3 = SSP.parent / "fmi3" / SSP.name
 FMUS = ("RPTrajectory", "RPController", "RPManipulator")
 VARIANTS = (
     *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
@@ -37,13 +38,6 @@ REPORT = ("{0}.html", "{0}.csv")
 def is_built() -> None:
     if not SSP.is_file():
         pytest.fail(f"{SSP}: no such file, ./run.sh builds it")
-
-
-def read_csv(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV file by name."""
-    with path.open(encoding="utf-8") as file:
-        names = [name.strip('"') for name in file.readline().strip().split(",")]
-        return dict(zip(names, np.loadtxt(file, delimiter=",").T, strict=True))
 
 
 def reference(variant: str, name: str) -> dict[str, np.ndarray]:
@@ -241,6 +235,13 @@ def broken(component: str, fmu: str, reference: int, folder: Path) -> Path:
     return edited(SSP, folder / f"{component}.ssp", {f"resources/{fmu}.fmu": fmu_edit})
 
 
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Temporary files are those of the test."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
+
+@pytest.mark.usefixtures("temporary")
 @pytest.mark.parametrize(
     ("component", "fmu", "variable", "reference"),
     [
@@ -256,41 +257,39 @@ def test_a_component_that_gives_nan_is_named(
     reference: int,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     path = broken(component, fmu, reference, tmp_path)
     err = fails(path, "nominal", tmp_path, capsys)
     assert err == f"error: nominal: component '{component}': '{variable}' is nan at t = 0.01 s\n"
 
 
+@pytest.mark.usefixtures("temporary")
+@pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
 def test_a_component_that_fails_in_initialization_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path
 ) -> None:
     """A path through the joint axis; Ecos itself would go on."""
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     edits = {"resources/trajectory_nominal.ssv": replace('value="0.1"', 'value="0.4"')}
-    path = edited(SSP, tmp_path / "unreachable.ssp", edits)
+    path = edited(source, tmp_path / "unreachable.ssp", edits)
     err = fails(path, "nominal", tmp_path, capsys)
-    assert "component 'trajectory' failed in initialization" in err
+    assert "component 'trajectory' failed in initialization (error): " in err
     assert "0.1 m" in err  # the smallest reachable distance
 
 
+@pytest.mark.usefixtures("temporary")
+@pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
 def test_a_component_that_fails_in_a_step_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path
 ) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     limited = '<ssv:Parameter name="max_internal_steps"><ssv:Integer value="1"/></ssv:Parameter>'
     edits = {"resources/arm_nominal.ssv": replace("<ssv:Parameters>", f"<ssv:Parameters>{limited}")}
-    path = edited(SSP, tmp_path / "impatient.ssp", edits)
+    path = edited(source, tmp_path / "impatient.ssp", edits)
     err = fails(path, "nominal", tmp_path, capsys)
-    assert "component 'arm' failed by t = 0.001 s" in err
+    assert f"component 'arm' failed by t = 0.00{'1 s' if source is SSP else ''}" in err
 
 
-def test_ecos_that_crashes_is_reported(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+@pytest.mark.usefixtures("temporary")
+def test_ecos_that_crashes_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     library: Edit = lambda _: b"no shared object"  # noqa: E731
     fmu_edit = edited_fmu({"binaries/linux64/RPController.so": library})
     path = edited(SSP, tmp_path / "crash.ssp", {"resources/RPController.fmu": fmu_edit})

@@ -1,8 +1,6 @@
 """The references of the closed loop: physics, closed forms, another integrator, made again."""
 
-import csv
 from collections.abc import Callable
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -15,6 +13,7 @@ from models.closed_loop.references.closed_loop import COLUMNS, STATE, Columns, m
 from tests.support.cosim_project import declared
 from tests.support.paths import ROOT
 from tests.support.rp_symbolic import PARAMETERS, STATES, TERMS, terms_of_the_motion
+from tests.support.ssp_files import read_csv
 
 FOLDER = ROOT / "models" / "closed_loop" / "references"
 VARIANTS = make_references.variants()
@@ -22,13 +21,6 @@ FILES = ("monolithic.csv", "sampled.csv", "ecos.csv")
 BELIEVED = dict(
     zip(sp.symbols(PARAMETERS), equations.symbols("controller", PARAMETERS), strict=True)
 ) | dict(zip(sp.symbols(STATES), equations.symbols("controller", STATES), strict=True))
-
-
-def read(path: Path) -> tuple[list[str], np.ndarray]:
-    """Names and values, (names, rows), of a CSV file."""
-    with path.open(newline="") as file:
-        rows = list(csv.reader(file))
-    return rows[0], np.array(rows[1:], dtype=float).T
 
 
 def largest(columns: Columns, other: Columns, names: tuple[str, ...]) -> float:
@@ -408,8 +400,9 @@ def test_made_again_is_the_same(variant: str) -> None:
     assert {path.name for path in (FOLDER / variant).iterdir()} == set(FILES) == set(made)
     for file, (times, columns) in made.items():
         path = FOLDER / variant / file
-        names, old = read(path)
-        assert names == ["time", *COLUMNS]
+        kept = read_csv(path)
+        assert list(kept) == ["time", *COLUMNS]
+        old = np.array([*kept.values()])
         assert path.stat().st_size < 1_000_000 and path.read_text().startswith('"time","traj')
         new = np.array([times, *(columns[name] for name in COLUMNS)], float)
         assert old.shape == new.shape and np.array_equal(old[0], times)

@@ -18,12 +18,7 @@ from cosim.runs.reference import Reference
 from cosim.runs.tolerance_sweep import Sweep
 from tests.report.sizes import OF_SCENARIOS
 from tests.support.all_fmus import FOLDERS
-from tests.support.cosim_project import (
-    LONG,
-    NAMES,
-    SHORT,
-    load,
-)
+from tests.support.cosim_project import LONG, NAMES, SHORT, load
 
 
 @pytest.fixture(scope="module")

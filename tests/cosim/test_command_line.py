@@ -146,10 +146,7 @@ def test_report_that_cannot_be_written(
 @pytest.mark.parametrize("command", [("run", SHORT), ("system", "nominal"), ("coupling",)])
 @pytest.mark.parametrize("folder", ["{}/new", "{}"], ids=["in it", "itself"])
 def test_report_in_a_folder_that_takes_no_files(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    command: tuple[str, ...],
-    folder: str,
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...], folder: str
 ) -> None:
     """Root may write everywhere but to /proc; systems without it have folders without rights."""
     closed = Path("/proc")
@@ -162,10 +159,7 @@ def test_report_in_a_folder_that_takes_no_files(
 
 
 def test_interruption(
-    project: Path,
-    fmu: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt

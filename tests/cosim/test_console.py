@@ -19,7 +19,7 @@ from cosim.output import console, result_tables, streams
 from cosim.output.result_tables import RunTable, SweepTable
 from cosim.runs.comparison import Run, Runs
 from cosim.runs.tolerance_sweep import TOLERANCES, Sweep
-from cosim.texts import brief, seconds, shortened
+from cosim.texts import seconds, short, shortened
 from tests.support.cosim_project import FMUS, LONG, SHORT, assert_one_line, call, load
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP
@@ -46,10 +46,7 @@ def run() -> Run:
 
 @pytest.mark.parametrize("columns", [200, 80, 60])
 def test_no_table_is_wider_than_the_terminal(
-    run: Run,
-    columns: int,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run: Run, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whatever the names, the numbers and what has failed."""
     monkeypatch.setenv("COLUMNS", str(columns))
@@ -89,11 +86,11 @@ def test_the_verdict_is_first_on_the_last_line() -> None:
 
 def test_numbers_and_names_in_few_characters() -> None:
     for value in (*ERRORS, *(10 ** RANDOM.uniform(-90, 5) for _ in range(100))):
-        text = brief(value)
+        text = short(value, 1)
         assert len(text) <= 7
         if value != 1e-300:
             assert float(text) == pytest.approx(value, rel=0.05, nan_ok=True)
-        assert len(brief(value, 0)) <= 5
+        assert len(short(value, 0)) <= 5
     assert all(len(seconds(10 ** RANDOM.uniform(-6, 5))) <= 7 for _ in range(100))
     for width in range(4, 30):
         cut = shortened("constant_effort_single_step", width)

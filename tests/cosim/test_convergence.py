@@ -96,7 +96,7 @@ def test_exact_state_made_again_is_the_same(tmp_path: Path) -> None:
 
 def test_exact_state_does_not_depend_on_the_precision(maker: ModuleType, problem: Problem) -> None:
     final, largest = maker.final_state(problem.scenario, np.float64)
-    assert problem.error(final) < 1e-12
+    assert problem.final_error(final) < 1e-12
     assert largest == pytest.approx(problem.largest, rel=1e-12)
 
 
@@ -106,7 +106,7 @@ def test_motion_is_bounded_and_not_chaotic(maker: ModuleType, problem: Problem) 
     initial = problem.scenario.initial
     for name in problem.exact:
         changed = replace(problem.scenario, initial=initial | {name: initial[name] + 1e-6})
-        assert problem.error(maker.final_state(changed)[0]) < 5e-5
+        assert problem.final_error(maker.final_state(changed)[0]) < 5e-5
 
 
 def test_derivatives_of_the_inputs_are_exact() -> None:
@@ -196,7 +196,7 @@ def test_error_of_the_integration_by_itself(
         exact = dict(zip(problem.exact, motion.state.astype(float).tolist(), strict=True))
         fmu = updated if case == INTERMEDIATE_UPDATE else opened
         states = convergence.final_state(fmu, problem, case, factor)
-        errors.append(replace(problem, exact=exact).error(states))
+        errors.append(replace(problem, exact=exact).final_error(states))
     largest, found = max(errors), study.errors[case]
     assert largest <= 2 * study.integration_error
     assert np.all(found[study.fitted[case]] >= 100 * largest)
@@ -351,11 +351,7 @@ def test_run_of_all_measures_the_order(
 
 @pytest.mark.parametrize("arguments", [[], ["--fmi", "3"]])
 def test_intermediate_update_is_measured_with_fmi3(
-    project: Path,
-    fmu: Path,
-    updated: Fmu,
-    capsys: pytest.CaptureFixture[str],
-    arguments: list[str],
+    project: Path, fmu: Path, updated: Fmu, capsys: pytest.CaptureFixture[str], arguments: list[str]
 ) -> None:
     """Beside the FMU of FMI 2.0, and with that of FMI 3.0 only."""
     (project / "build/fmi3").mkdir(parents=True)

@@ -20,7 +20,6 @@ from tests.support.cosim_project import (
     FMUS,
     SHORT,
     declared,
-    edit,
     fmi3_fmu,
     load,
     names_of,
@@ -102,22 +101,6 @@ def test_a_state_brings_an_instance_back(opened3: Fmu) -> None:
 
 
 # ---- failures ------------------------------------------------------------------------------------
-
-
-def test_a_step_that_fails_is_explained(project: Path, opened3: Fmu) -> None:
-    """By the FMU's message, which FMUs of FMI 3.0 send only if they are asked to."""
-    path = project / f"models/rp_manipulator/scenarios/{SHORT}.toml"
-    edit(path, "[parameters]", "[parameters]\nmax_internal_steps = 3")
-    refused = rf"^{SHORT}: fmi3DoStep in the step from t = 0\.0 s failed \(discard\): .*3"
-    with pytest.raises(UserError, match=refused):
-        simulation.simulate(opened3, load(SHORT, project))
-
-
-def test_a_failing_initialization_is_explained(project: Path, opened3: Fmu) -> None:
-    path = project / f"models/rp_manipulator/scenarios/{SHORT}.toml"
-    edit(path, "I2z = 0.1", "I1z = 0.0\nI2z = 0.0\nm1 = 0.0")
-    with pytest.raises(UserError, match=r"fmi3ExitInitializationMode .* failed \(error\): .*m1"):
-        simulation.simulate(opened3, load(SHORT, project))
 
 
 def test_fmu_with_another_token(fmu: Path, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """The command line with FMUs of FMI 2.0 and 3.0: bits compared, one of them chosen, mistakes."""
 
 import shutil
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -143,34 +144,34 @@ def test_mistakes_of_the_user(
     assert_one_line(err)
 
 
-def test_a_missing_twin_is_reported_before_anything_runs(
-    built: Path, capsys: pytest.CaptureFixture[str]
+def remove(twin: Path) -> None:
+    twin.unlink()
+
+
+def damage(twin: Path) -> None:
+    twin.write_text("not a zip archive")
+
+
+def rename_a_variable(twin: Path) -> None:
+    older = twin.rename(twin.with_name("older.fmu"))
+    repacked(older, twin, lambda xml: xml.replace('name="l1"', 'name="length1"'))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (remove, "build/fmi3: has no FMU of rp_manipulator: ./run.sh builds it\n"),
+        (damage, f"fmi3/{NAME}: not an FMU"),
+        (rename_a_variable, "the model has no variable 'l1'"),
+    ],
+)
+def test_a_wrong_twin_is_reported_before_anything_runs(
+    built: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: Callable[[Path], None],
+    reason: str,
 ) -> None:
-    (built / "fmi3" / NAME).unlink()
+    change(built / "fmi3" / NAME)
     code, out, err = call(capsys, "run", SHORT)
-    assert (code, out) == (2, "")
-    assert "build/fmi3: has no FMU of rp_manipulator: ./run.sh builds it\n" in err
-    assert_one_line(err)
-
-
-def test_a_twin_that_is_no_fmu_is_reported_before_anything_runs(
-    built: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (built / "fmi3" / NAME).write_text("not a zip archive")
-    code, out, err = call(capsys, "run", SHORT)
-    assert (code, out) == (2, "") and f"fmi3/{NAME}: not an FMU" in err
-    assert_one_line(err)
-
-
-def test_a_twin_without_a_variable_of_the_scenario_is_reported_before_anything_runs(
-    built: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (built / "fmi3" / NAME).unlink()
-    repacked(
-        fmi3_fmu(fmu),
-        built / "fmi3" / NAME,
-        lambda xml: xml.replace('name="l1"', 'name="length1"'),
-    )
-    code, out, err = call(capsys, "run", SHORT)
-    assert (code, out) == (2, "") and "the model has no variable 'l1'" in err
+    assert (code, out) == (2, "") and reason in err
     assert_one_line(err)

@@ -45,10 +45,7 @@ def exact_step(
     rest, drift = gain * u / omega**2, gain * slope / omega**2
     c, s = np.cos(omega * h), np.sin(omega * h)
     x, v = state[0] - rest, state[1] - drift
-    return (
-        rest + drift * h + x * c + v / omega * s,
-        drift - x * omega * s + v * c,
-    )
+    return (rest + drift * h + x * c + v / omega * s, drift - x * omega * s + v * c)
 
 
 def recurrence(order: str, inputs: str, sequence: str = "ab") -> np.ndarray:
@@ -172,9 +169,7 @@ def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatc
             fmi = component.instance.fmi
             free = getattr(fmi, name)
             monkeypatch.setattr(
-                fmi,
-                name,
-                lambda *arguments, free=free: (freed.append(arguments), free(*arguments)),
+                fmi, name, lambda *arguments, free=free: (freed.append(arguments), free(*arguments))
             )
         with pytest.raises(RuntimeError), Snapshot(master) as snapshot:
             snapshot.take()

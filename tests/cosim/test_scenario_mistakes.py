@@ -11,6 +11,9 @@ from tests.support.toy_model import HEAD, TIME, TOY, timed
 
 # mistakes: the text of the file, what the message says
 
+PARAMETERS, INITIAL, FORCE = (
+    f"{HEAD}{TIME}[{section}]\n" for section in ("parameters", "initial", "inputs.force")
+)
 MISTAKES = {
     "not TOML": ("title = ", "not valid TOML: Invalid value (at end of document)"),
     "missing key": (TIME, "missing key 'title'"),
@@ -92,22 +95,19 @@ MISTAKES = {
         "[time] step: makes 1e+09 steps, expected at most 10000000",
     ),
     "misspelt parameter": (
-        f"{HEAD}{TIME}[parameters]\nmas = 1",
+        f"{PARAMETERS}mas = 1",
         "[parameters]: the model has no variable 'mas', did you mean 'mass'? (known: mass, ",
     ),
     "input as parameter": (
-        f"{HEAD}{TIME}[parameters]\nforce = 1",
+        f"{PARAMETERS}force = 1",
         "[parameters]: 'force' is not a parameter of the model (known: mass, gear, max_steps, ",
     ),
     "parameter as initial": (
-        f"{HEAD}{TIME}[initial]\nmass = 1",
+        f"{INITIAL}mass = 1",
         "[initial]: 'mass' is not a state of the model (known: speed)",
     ),
-    "output as initial": (f"{HEAD}{TIME}[initial]\npower = 1", "'power' is not a state"),
-    "unknown initial": (
-        f"{HEAD}{TIME}[initial]\nx = 1",
-        "[initial]: the model has no variable 'x'",
-    ),
+    "output as initial": (f"{INITIAL}power = 1", "'power' is not a state"),
+    "unknown initial": (f"{INITIAL}x = 1", "[initial]: the model has no variable 'x'"),
     "output as input": (
         f"{HEAD}{TIME}[inputs.power]\nconstant = 1",
         "[inputs]: 'power' is not an input of the model (known: force)",
@@ -117,34 +117,34 @@ MISTAKES = {
         "[inputs]: the model has no variable 'forse', did you mean 'force'?",
     ),
     "parameter is text": (
-        f"{HEAD}{TIME}[parameters]\nmass = 'x'",
+        f"{PARAMETERS}mass = 'x'",
         "[parameters] mass: expected a number, or a number and its unit (known: kg), got 'x'",
     ),
-    "parameter is bool": (f"{HEAD}{TIME}[parameters]\nmass = true", "mass: expected a number"),
-    "parameter nan": (f"{HEAD}{TIME}[parameters]\nmass = nan", "mass: expected a finite number"),
+    "parameter is bool": (f"{PARAMETERS}mass = true", "mass: expected a number"),
+    "parameter nan": (f"{PARAMETERS}mass = nan", "mass: expected a finite number"),
     "parameter below min": (
-        f"{HEAD}{TIME}[parameters]\nmass = 0.25",
+        f"{PARAMETERS}mass = 0.25",
         "[parameters] mass: expected at least 0.5 kg, got 0.25",
     ),
     "initial above max": (
-        f"{HEAD}{TIME}[initial]\nspeed = 101",
+        f"{INITIAL}speed = 101",
         "[initial] speed: expected at most 100.0, got 101.0",
     ),
     "fraction for an integer": (
-        f"{HEAD}{TIME}[parameters]\nmax_steps = 1.5",
+        f"{PARAMETERS}max_steps = 1.5",
         "[parameters] max_steps: expected a whole number, got 1.5",
     ),
     "integer beyond 32 bits": (
-        f"{HEAD}{TIME}[parameters]\nmax_steps = 4294967297",
+        f"{PARAMETERS}max_steps = 4294967297",
         "[parameters] max_steps: expected at most 2147483647, got 4294967297",
     ),
     "number for a Boolean": (
-        f"{HEAD}{TIME}[parameters]\nquiet = 1",
+        f"{PARAMETERS}quiet = 1",
         "[parameters] quiet: expected true or false, got 1",
     ),
-    "initial inf": (f"{HEAD}{TIME}[initial]\nspeed = inf", "[initial] speed: expected a finite"),
+    "initial inf": (f"{INITIAL}speed = inf", "[initial] speed: expected a finite"),
     "input below min": (
-        f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 0], [1, -11]]",
+        f"{FORCE}table = [[0, 0], [1, -11]]",
         "[inputs.force]: expected at least -10.0, got -11.0",
     ),
     "input is a number": (
@@ -152,68 +152,62 @@ MISTAKES = {
         "[inputs.force]: expected a table, got 1",
     ),
     "input of no kind": (
-        f"{HEAD}{TIME}[inputs.force]\n",
+        FORCE,
         "[inputs.force]: expected exactly one of constant, sines, table, file, got 0",
     ),
     "input of two kinds": (
-        f"{HEAD}{TIME}[inputs.force]\nconstant = 1\ntable = [[0, 1]]",
+        f"{FORCE}constant = 1\ntable = [[0, 1]]",
         "[inputs.force]: expected exactly one of constant, sines, table, file, got 2",
     ),
     "misspelt kind": (
-        f"{HEAD}{TIME}[inputs.force]\nsine = []",
+        f"{FORCE}sine = []",
         "[inputs.force]: unknown key 'sine', did you mean 'sines'?",
     ),
     "offset without sines": (
-        f"{HEAD}{TIME}[inputs.force]\nconstant = 1\noffset = 2",
+        f"{FORCE}constant = 1\noffset = 2",
         "[inputs.force] offset: goes with sines only",
     ),
     "constant nan": (
-        f"{HEAD}{TIME}[inputs.force]\nconstant = nan",
+        f"{FORCE}constant = nan",
         "[inputs.force] constant: expected a finite number, got nan",
     ),
-    "constant is a list": (f"{HEAD}{TIME}[inputs.force]\nconstant = [1]", "number, got [1]"),
-    "no sines": (
-        f"{HEAD}{TIME}[inputs.force]\nsines = []",
-        "[inputs.force] sines: expected a list of tables, got []",
-    ),
-    "sine is a number": (
-        f"{HEAD}{TIME}[inputs.force]\nsines = [1]",
-        "[inputs.force] sines[0]: expected a table, got 1",
-    ),
+    "constant is a list": (f"{FORCE}constant = [1]", "number, got [1]"),
+    "no sines": (f"{FORCE}sines = []", "[inputs.force] sines: expected a list of tables, got []"),
+    "sine is a number": (f"{FORCE}sines = [1]", "[inputs.force] sines[0]: expected a table, got 1"),
     "sine without frequency": (
-        f"{HEAD}{TIME}[inputs.force]\nsines = [{{amplitude = 1}}]",
+        f"{FORCE}sines = [{{amplitude = 1}}]",
         "[inputs.force] sines[0]: missing key 'frequency'",
     ),
     "misspelt sine": (
-        f"{HEAD}{TIME}[inputs.force]\nsines = [{{amplitude = 1, frequensy = 1}}]",
+        f"{FORCE}sines = [{{amplitude = 1, frequensy = 1}}]",
         "[inputs.force] sines[0]: unknown key 'frequensy', did you mean 'frequency'?",
     ),
     "sine inf": (
-        f"{HEAD}{TIME}[inputs.force]\nsines = [{{amplitude = inf, frequency = 1}}]",
+        f"{FORCE}sines = [{{amplitude = inf, frequency = 1}}]",
         "[inputs.force] sines[0] amplitude: expected a finite number",
     ),
     "sines overflow": (
-        f"{HEAD}{TIME}[inputs.force]\noffset=1e308\nsines = [{{amplitude = 1e308, frequency = 9}}]",
+        f"{FORCE}offset=1e308\nsines = [{{amplitude = 1e308, frequency = 9}}]",
         "[inputs.force]: expected finite values, got an overflow",
     ),
     "no table": (
-        f"{HEAD}{TIME}[inputs.force]\ntable = []",
+        f"{FORCE}table = []",
         "[inputs.force] table: expected a list of [time, value] pairs, got []",
     ),
     "table of triples": (
-        f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 1], [1, 2, 3]]",
+        f"{FORCE}table = [[0, 1], [1, 2, 3]]",
         "[inputs.force] table[1]: expected [time, value], got [1, 2, 3]",
     ),
     "table with text": (
-        f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 'a']]",
+        f"{FORCE}table = [[0, 'a']]",
         "[inputs.force] table[0]: expected a number, got 'a'",
     ),
     "unordered table": (
-        f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 1], [2, 1], [1, 1]]",
+        f"{FORCE}table = [[0, 1], [2, 1], [1, 1]]",
         "[inputs.force] table[2]: expected a time after 2.0 s, got [1, 1]",
     ),
     "repeated time": (
-        f"{HEAD}{TIME}[inputs.force]\ntable = [[0, 1], [0, 2]]",
+        f"{FORCE}table = [[0, 1], [0, 2]]",
         "[inputs.force] table[1]: expected a time after 0.0 s",
     ),
 }

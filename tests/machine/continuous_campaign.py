@@ -1,30 +1,13 @@
 """The whole motion with all methods and steps of the study: five minutes, with `ctest -C Long`."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs.convergence import slope
-from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import continuous
 from models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, Method
-from models.machine.systems import fmus_of
-from tests.machine.test_machine import SSP
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Ssp]:
-    with ssp.unpacked(SSP) as machine:
-        yield machine
-
-
-@pytest.fixture(scope="module")
-def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    with fmus_of(opened) as found:
-        yield found
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
@@ -34,10 +17,10 @@ def test_the_limit_is_the_solution(
 ) -> None:
     expected = continuous.reference(variant)
     runs = [continuous.run(opened, fmus, method, variant, n) for n in method.per_second]
-    errors = np.array([continuous.error(columns, expected)[0] for columns in runs])
+    errors = np.array([continuous.largest_error(columns, expected)[0] for columns in runs])
     assert slope(1 / np.array(method.per_second), errors) == pytest.approx(method.power, abs=0.1)
     left, _ = continuous.limit(runs, method.per_second, method.power)
-    reached, name = continuous.error(left, expected)
+    reached, name = continuous.largest_error(left, expected)
     assert reached <= BOUND, name
     tracking = continuous.tracking_error(left)
     assert abs(tracking - continuous.tracking_error(expected)) <= BOUND * SMALLEST

@@ -10,8 +10,9 @@ from cosim.__main__ import main
 from cosim.system import comparison, ecos, ssp
 from models.machine.experiment import STEPS_PER_SECOND, STOP
 from tests.support.paths import ROOT
+from tests.support.ssp_files import MACHINE as SSP
+from tests.support.ssp_files import read_csv
 
-SSP = ROOT / "build" / "Machine.ssp"
 VARIANTS = (
     *("pick_and_place", "pick_and_place_untold", "stick_slip", "wall_contact", "noisy_sensor"),
 )
@@ -22,13 +23,6 @@ DISCRETE = ("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2")
 DISCRETE = (*DISCRETE, "trajectory.payload_attached")
 
 Columns = dict[str, np.ndarray]
-
-
-def read_csv(path: Path) -> Columns:
-    """Columns of a CSV file by name."""
-    with path.open(encoding="utf-8") as file:
-        names = [name.strip('"') for name in file.readline().strip().split(",")]
-        return dict(zip(names, np.loadtxt(file, delimiter=",").T, strict=True))
 
 
 def reference(variant: str, name: str = "ecos.csv") -> Columns:

@@ -1,18 +1,13 @@
 """What co-simulations of the machine without encoders and sampling converge to."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs.convergence import slope
-from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import continuous
 from models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, Columns, Method
-from models.machine.systems import fmus_of
-from tests.machine.test_machine import SSP
 
 STOP = 0.4  # s: the start and the grasp
 # steps per second of the runs here, by method
@@ -21,18 +16,6 @@ SHORT = {
     "Gauss-Seidel, inputs extrapolated": (4000, 6000, 8000, 12000),
 }
 SHORT_METHODS = [method for method in METHODS if method.name in SHORT]
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Ssp]:
-    with ssp.unpacked(SSP) as machine:
-        yield machine
-
-
-@pytest.fixture(scope="module")
-def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
-    with fmus_of(opened) as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -68,12 +51,12 @@ def test_errors_fall_by_the_order_and_vanish_in_the_limit(
 ) -> None:
     expected, found = continuous.reference(variant), runs[variant, method.name]
     per_second = SHORT[method.name]
-    errors = np.array([continuous.error(columns, expected)[0] for columns in found])
+    errors = np.array([continuous.largest_error(columns, expected)[0] for columns in found])
     assert slope(1 / np.array(per_second), errors) == pytest.approx(method.power, abs=0.1)
     assert errors.min() > 100 * BOUND  # so the step is not short enough by itself
     left, enlarged = continuous.limit(found, per_second, method.power)
     assert enlarged < 200
-    reached, name = continuous.error(left, expected)
+    reached, name = continuous.largest_error(left, expected)
     assert reached <= BOUND, name
 
 

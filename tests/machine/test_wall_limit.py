@@ -7,21 +7,13 @@ import numpy as np
 import pytest
 
 from cosim.fmi.fmu_file import Fmu
-from cosim.system import ssp
 from cosim.system.ssp import Ssp
 from models.machine import wall_limit
 from models.machine.stability import Contact, exact_least_damping, least_damping
 from models.machine.wall_limit import CASES, DEPTH, MASS, MOVED, PUSH, STEP, STEPS, Measure
-from tests.machine.test_machine import SSP
 from tests.support.libcosim import libcosim
 
 STIFFNESS = 1e4  # N/m
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Ssp]:
-    with ssp.unpacked(SSP) as machine:
-        yield machine
 
 
 @pytest.fixture(scope="module")

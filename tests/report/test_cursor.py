@@ -7,16 +7,11 @@ import numpy as np
 import pytest
 from selenium.webdriver.common.keys import Keys
 
-from cosim import trajectory_csv
 from cosim.report.run_data import ROUNDING
 from cosim.runs.reference import SMALLEST_SCALE
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
-
-
-def read_csv(path: Path) -> dict[str, np.ndarray]:
-    names, table = trajectory_csv.read(path, lambda message, _: AssertionError(message))
-    return dict(zip(names, table.T, strict=True))
+from tests.support.ssp_files import read_csv
 
 
 @pytest.mark.parametrize(

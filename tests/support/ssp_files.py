@@ -7,12 +7,21 @@ from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
+import numpy as np
 
 from tests.support.paths import ROOT
 
 SSP = ROOT / "build" / "ClosedLoop.ssp"
+MACHINE = ROOT / "build" / "Machine.ssp"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 Edit = Callable[[bytes], bytes | None]  # None: the file is left out
+
+
+def read_csv(path: Path) -> dict[str, np.ndarray]:
+    """Columns of a CSV file by name."""
+    with path.open(encoding="utf-8") as file:
+        names = [name.strip('"') for name in file.readline().strip().split(",")]
+        return dict(zip(names, np.loadtxt(file, delimiter=",").T, strict=True))
 
 
 def edited(source: Path, target: Path, edits: dict[str, Edit]) -> Path:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosim.texts import brief, short, verdict
+from cosim.texts import short, verdict
 from models.closed_loop.coupling.delays import LARGEST_ERROR, Tracking, tracking_passed
 from models.closed_loop.coupling.payload import Payload
 from models.closed_loop.coupling.step_doubling import Doubling
@@ -22,7 +22,7 @@ def step_error_lines(study: StepErrors) -> list[str]:
         head = f"{'':<{width}}{steps} slope  result"
         lines += [title, head, "-" * len(head)]
         for i, (method, row) in enumerate(zip(study.methods, values, strict=True)):
-            cells = "".join(f"{brief(value):>8}" for value in row)
+            cells = "".join(f"{short(value, 1):>8}" for value in row)
             slope = study.slopes(values)[i]
             good = verdict(method.expects(slope))
             lines.append(f"{method.name:<{width}}{cells} {slope:>5.2f}  {good}")

@@ -1,0 +1,23 @@
+"""The machine, unpacked."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from cosim.fmi.fmu_file import Fmu
+from cosim.system import ssp
+from cosim.system.ssp import Ssp
+from models.machine.systems import fmus_of
+from tests.support.ssp_files import MACHINE
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Ssp]:
+    with ssp.unpacked(MACHINE) as machine:
+        yield machine
+
+
+@pytest.fixture(scope="module")
+def fmus(opened: Ssp) -> Iterator[dict[str, Fmu]]:
+    with fmus_of(opened) as found:
+        yield found
