@@ -40,7 +40,7 @@ endif()
 set(CMAKE_C_VISIBILITY_PRESET hidden)
 
 # Fused multiply-adds would give other bits from one compiler to the next, and break the exact sums of
-# src/instance/clock.c.
+# src/instance/state/clock.c.
 set(language_options -ffp-contract=off)
 set(warning_options -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wmissing-prototypes -Werror)
 

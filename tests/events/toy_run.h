@@ -2,6 +2,7 @@
 #ifndef TOY_RUN_H
 #define TOY_RUN_H
 
+#include "instance.h"
 #include "last_text.h"
 #include "snapshot.h"
 #include "stepping.h"

@@ -1,5 +1,6 @@
 #include "continuous_states.h"
 #include "derivatives.h"
+#include "instance.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
 #include "stepping.h"

@@ -1,6 +1,7 @@
 /* A model that fails to compute its outputs or their derivatives for a while: each call reports it
  * and gives no value. Afterwards it works again. */
 #include "derivatives.h"
+#include "instance.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
 #include "stepping.h"

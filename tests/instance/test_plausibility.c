@@ -3,6 +3,7 @@
 #include "plausibility.h"
 
 #include "fields.h"
+#include "instance.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
 #include "settings.h"

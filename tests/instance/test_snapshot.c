@@ -2,6 +2,7 @@
 
 #include "derivatives.h"
 #include "each_method.h"
+#include "instance.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
 #include "serialization.h"

@@ -2,6 +2,7 @@
 #ifndef WHEEL_INSTANCE_H
 #define WHEEL_INSTANCE_H
 
+#include "instance.h"
 #include "internals.h"
 #include "last_text.h"
 #include "model_description.h"

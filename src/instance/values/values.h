@@ -2,7 +2,7 @@
 #ifndef INSTANCE_VALUES_H
 #define INSTANCE_VALUES_H
 
-#include "instance.h"
+#include "instance_types.h"
 
 #include <stdbool.h>
 #include <stdint.h>
