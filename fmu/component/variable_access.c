@@ -6,132 +6,20 @@
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
-enum component_status access_get_real(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count, double values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
+#define ACCESS(access, of_instance, element)                                                       \
+    enum component_status access(struct component *component, unsigned call,                       \
+                                 const unsigned references[], size_t count, element values[]) {    \
+        if (!component_enter(component, call) ||                                                   \
+            !component_has_arrays(component, call, count, references, values)) {                   \
+            return COMPONENT_ERROR;                                                                \
+        }                                                                                          \
+        return component_result(component,                                                         \
+                                of_instance(component->instance, references, count, values));      \
     }
-    return component_result(component,
-                            instance_get_real(component->instance, references, count, values));
-}
-
-enum component_status access_set_real(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count,
-                                      const double values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_set_real(component->instance, references, count, values));
-}
-
-enum component_status access_get_integer(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count, int values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_get_integer(component->instance, references, count, values));
-}
-
-enum component_status access_set_integer(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count,
-                                         const int values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_set_integer(component->instance, references, count, values));
-}
-
-enum component_status access_get_int32(struct component *component, unsigned call,
-                                       const unsigned references[], size_t count, int values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_get_int32(component->instance, references, count, values));
-}
-
-enum component_status access_set_int32(struct component *component, unsigned call,
-                                       const unsigned references[], size_t count,
-                                       const int values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_set_int32(component->instance, references, count, values));
-}
-
-enum component_status access_get_enumeration(struct component *component, unsigned call,
-                                             const unsigned references[], size_t count,
-                                             int64_t values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(
-        component, instance_get_enumeration(component->instance, references, count, values));
-}
-
-enum component_status access_set_enumeration(struct component *component, unsigned call,
-                                             const unsigned references[], size_t count,
-                                             const int64_t values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(
-        component, instance_set_enumeration(component->instance, references, count, values));
-}
-
-enum component_status access_get_boolean(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count, int values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_get_boolean(component->instance, references, count, values));
-}
-
-enum component_status access_get_bool(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count, bool values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_get_bool(component->instance, references, count, values));
-}
-
-enum component_status access_set_boolean(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count,
-                                         const int values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_set_boolean(component->instance, references, count, values));
-}
-
-enum component_status access_set_bool(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count,
-                                      const bool values[]) {
-    if (!component_enter(component, call) ||
-        !component_has_arrays(component, call, count, references, values)) {
-        return COMPONENT_ERROR;
-    }
-    return component_result(component,
-                            instance_set_bool(component->instance, references, count, values));
-}
+#define GET_AND_SET(name, constant, element)                                                       \
+    ACCESS(access_get_##name, instance_get_##name, element)                                        \
+    ACCESS(access_set_##name, instance_set_##name, const element)
+VALUE_TYPE_LIST(GET_AND_SET)
 
 enum component_status access_none(struct component *component, unsigned call, const char *type,
                                   const unsigned references[], size_t count, const void *values) {

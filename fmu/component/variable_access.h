@@ -4,51 +4,20 @@
 #define VARIABLE_ACCESS_H
 
 #include "component.h"
-
-#include <stdbool.h>
-#include <stdint.h>
+#include "value_types.h"
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
-enum component_status access_get_real(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count, double values[]);
-enum component_status access_set_real(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count,
-                                      const double values[]);
-
-/* Integers and enumerations, by one function. */
-enum component_status access_get_integer(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count, int values[]);
-enum component_status access_set_integer(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count,
-                                         const int values[]);
-
-/* Integers only. */
-enum component_status access_get_int32(struct component *component, unsigned call,
-                                       const unsigned references[], size_t count, int values[]);
-enum component_status access_set_int32(struct component *component, unsigned call,
-                                       const unsigned references[], size_t count,
-                                       const int values[]);
-
-/* Enumerations only. */
-enum component_status access_get_enumeration(struct component *component, unsigned call,
-                                             const unsigned references[], size_t count,
-                                             int64_t values[]);
-enum component_status access_set_enumeration(struct component *component, unsigned call,
-                                             const unsigned references[], size_t count,
-                                             const int64_t values[]);
-
-/* Booleans, as ints and as bools. */
-enum component_status access_get_boolean(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count, int values[]);
-enum component_status access_set_boolean(struct component *component, unsigned call,
-                                         const unsigned references[], size_t count,
-                                         const int values[]);
-enum component_status access_get_bool(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count, bool values[]);
-enum component_status access_set_bool(struct component *component, unsigned call,
-                                      const unsigned references[], size_t count,
-                                      const bool values[]);
+/* For each type of value: access_get_real, access_set_real and so on. */
+#define ACCESS(name, constant, element)                                                            \
+    enum component_status access_get_##name(struct component *component, unsigned call,            \
+                                            const unsigned references[], size_t count,             \
+                                            element values[]);                                     \
+    enum component_status access_set_##name(struct component *component, unsigned call,            \
+                                            const unsigned references[], size_t count,             \
+                                            const element values[]);
+VALUE_TYPE_LIST(ACCESS)
+#undef ACCESS
 
 /* Of a type that no variable has: succeeds for no values only. */
 enum component_status access_none(struct component *component, unsigned call, const char *type,

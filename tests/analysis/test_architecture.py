@@ -64,7 +64,7 @@ PUBLIC_HEADERS = {
     "src/integrator": {"integrator.h", "ode.h"},
     "src/instance": {
         "continuous_states.h", "derivatives.h", "instance.h", "serialization.h", "snapshot.h",
-        "stepping.h", "values.h", "variables.h",
+        "stepping.h", "value_types.h", "values.h", "variables.h",
     },
 }  # fmt: skip
 

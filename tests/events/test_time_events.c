@@ -325,7 +325,6 @@ static void test_a_stroke_ends_rest(void) {
 
 /* An integrator outside goes to the time that it was given. */
 static enum status rising_force(void *context, double time) {
-    (void)context;
     set(TOY_INPUT, 2.0 * time);
     return STATUS_OK;
 }

@@ -8,7 +8,6 @@
 static enum status ball_rhs(const void *values, double t, const double x[], const double u[],
                             double dx[]) {
     const struct ball_values *ball = values;
-    (void)t;
     dx[0] = ball->is_resting ? 0.0 : x[1];
     dx[1] = ball->is_resting ? 0.0 : u[0] - ball->g;
     return STATUS_OK;
@@ -17,10 +16,6 @@ static enum status ball_rhs(const void *values, double t, const double x[], cons
 /* Both models are two integrals: x' = v, v' = a. */
 static enum status jacobian(const void *values, double t, const double x[], const double u[],
                             double J[]) {
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
     memset(J, 0, 4 * sizeof *J);
     J[2] = 1.0;
     return STATUS_OK;
@@ -50,15 +45,11 @@ static const struct series ball_series = {.row_count = 2, .extend = ball_extend}
 
 static enum status ball_outputs(void *values, double t) {
     struct ball_values *ball = values;
-    (void)t;
     ball->a = ball->is_resting ? 0.0 : ball->lift - ball->g;
     return STATUS_OK;
 }
 
 static enum status no_check(const void *values, char *text, size_t size) {
-    (void)values;
-    (void)text;
-    (void)size;
     return STATUS_OK;
 }
 
@@ -94,7 +85,6 @@ static void ball_describe(const void *values, struct indicator indicators[]) {
 static enum status ball_indicators(const void *values, double t, const double x[], const double u[],
                                    double z[]) {
     const struct ball_values *ball = values;
-    (void)t;
     z[BALL_HEIGHT] = ball->is_resting ? 1.0 : x[0];
     z[BALL_LOAD] = ball->is_resting ? ball->g - u[0] : 1.0;
     return STATUS_OK;
@@ -163,7 +153,6 @@ static double block_acceleration(const struct block_values *block, double f) {
 static enum status block_rhs(const void *values, double t, const double x[], const double u[],
                              double dx[]) {
     const struct block_values *block = values;
-    (void)t;
     dx[0] = block->direction == 0 ? 0.0 : x[1];
     dx[1] = block_acceleration(block, u[0]);
     return STATUS_OK;
@@ -184,13 +173,11 @@ static const struct series block_series = {.row_count = 2, .extend = block_exten
 
 static enum status block_outputs(void *values, double t) {
     struct block_values *block = values;
-    (void)t;
     block->a = block_acceleration(block, block->f);
     return STATUS_OK;
 }
 
 static bool block_always(const void *values) {
-    (void)values;
     return true;
 }
 
@@ -222,7 +209,6 @@ static void block_describe(const void *values, struct indicator indicators[]) {
 static enum status block_indicators(const void *values, double t, const double x[],
                                     const double u[], double z[]) {
     const struct block_values *block = values;
-    (void)t;
     z[BLOCK_SPEED] = block->direction == 0 ? 1.0 : block->direction * x[1];
     z[BLOCK_FORWARD] = block->direction == 0 ? block->breakaway - u[0] : 1.0;
     z[BLOCK_BACKWARD] = block->direction == 0 ? block->breakaway + u[0] : 1.0;
@@ -280,8 +266,6 @@ static const struct model block_model = {
 
 static enum status hammer_rhs(const void *values, double t, const double x[], const double u[],
                               double dx[]) {
-    (void)values;
-    (void)t;
     dx[0] = x[1];
     dx[1] = u[0];
     return STATUS_OK;
@@ -299,7 +283,6 @@ static const struct series hammer_series = {.row_count = 2, .extend = hammer_ext
 
 static enum status hammer_outputs(void *values, double t) {
     struct hammer_values *hammer = values;
-    (void)t;
     hammer->a = hammer->f;
     return STATUS_OK;
 }
@@ -311,13 +294,11 @@ static double hammer_next_time(const void *values) {
 }
 
 static bool hammer_is_never_at_rest(const void *values) {
-    (void)values;
     return false;
 }
 
 static bool hammer_modes_are_possible(const void *values, bool is_held) {
     const struct hammer_values *hammer = values;
-    (void)is_held;
     return hammer->is_started == 1 && hammer->strokes >= 0 && hammer->hits >= 0;
 }
 
@@ -332,9 +313,6 @@ static void hammer_describe(const void *values, struct indicator indicators[]) {
 
 static enum status hammer_indicators(const void *values, double t, const double x[],
                                      const double u[], double z[]) {
-    (void)values;
-    (void)t;
-    (void)u;
     z[0] = x[0];
     return STATUS_OK;
 }

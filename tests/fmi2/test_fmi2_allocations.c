@@ -27,8 +27,6 @@ static fmi2Status set_slopes(fmi2Component c, int i) {
 typedef fmi2Status change(fmi2Component c, int i);
 
 static fmi2Status change_nothing(fmi2Component c, int i) {
-    (void)c;
-    (void)i;
     return fmi2OK;
 }
 

@@ -264,7 +264,6 @@ static struct {
 
 static void meddle(fmi2ComponentEnvironment environment, fmi2String instance_name,
                    fmi2Status status, fmi2String category, fmi2String message, ...) {
-    (void)environment, (void)instance_name, (void)status, (void)category;
     const bool is_note = strstr(message, "refused inside the logger") != NULL;
     meddler.messages++;
     meddler.notes += is_note && strstr(message, fmu_function_names[meddler.function]) != NULL;

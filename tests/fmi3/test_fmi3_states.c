@@ -173,7 +173,6 @@ static void assert_in_state(enum kind kind, char state, fmi3Instance c, double n
         {'N', FMU3_CompletedIntegratorStep},
         {'S', FMU3_DoStep},
     };
-    (void)kind;
     for (size_t i = 0; i < FMU3_COUNT(proofs); i++) {
         if (proofs[i].state == state) {
             TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, fmu3_call(proofs[i].proof, c, now), text);
@@ -312,7 +311,6 @@ static struct {
 static void meddle(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                    fmi3String message) {
     const fmi3Instance c = ((struct fmu3_importer *)environment)->instance;
-    (void)status, (void)category;
     meddler.messages++;
     meddler.notes += strstr(message, "refused inside the logger") != NULL;
     if (c == NULL) {
@@ -332,7 +330,6 @@ static void get_while_updating(fmi3InstanceEnvironment environment, fmi3Float64 
                                fmi3Float64 *early_time) {
     const fmi3ValueReference q1 = RP_MANIPULATOR_q1;
     double value = 0.0;
-    (void)time, (void)set, (void)finished, (void)can_return_early, (void)early_time;
     *return_early = false;
     if (get) {
         (void)fmu3.GetFloat64(((struct fmu3_importer *)environment)->instance, &q1, 1, &value, 1);

@@ -391,8 +391,6 @@ static fmi2Status CancelStep(fmi2Component c) {
 }
 
 static fmi2Status GetStatus(fmi2Component c, fmi2StatusKind kind, fmi2Status *value) {
-    (void)kind;
-    (void)value;
     return c != NULL ? fmi2Discard : fmi2Error;
 }
 
@@ -402,20 +400,14 @@ static fmi2Status GetRealStatus(fmi2Component c, fmi2StatusKind kind, fmi2Real *
 }
 
 static fmi2Status GetIntegerStatus(fmi2Component c, fmi2StatusKind kind, fmi2Integer *value) {
-    (void)kind;
-    (void)value;
     return c != NULL ? fmi2Discard : fmi2Error;
 }
 
 static fmi2Status GetBooleanStatus(fmi2Component c, fmi2StatusKind kind, fmi2Boolean *value) {
-    (void)kind;
-    (void)value;
     return c != NULL ? fmi2Discard : fmi2Error;
 }
 
 static fmi2Status GetStringStatus(fmi2Component c, fmi2StatusKind kind, fmi2String *value) {
-    (void)kind;
-    (void)value;
     return c != NULL ? fmi2Discard : fmi2Error;
 }
 
@@ -483,8 +475,8 @@ static fmi2Status GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nomina
 /* ---- Loading -------------------------------------------------------------------------------- */
 
 void *fmu_version_open(struct fmu_functions *functions) {
-#define ADAPTED(name) name,
-    *functions = (struct fmu_functions){FMU_FUNCTION_LIST(ADAPTED)};
+#define ADAPTED(name, kinds, states) name,
+    *functions = (struct fmu_functions){FMI2_FUNCTION_LIST(ADAPTED)};
 #undef ADAPTED
     return fmu3_library_open(FMU_LIBRARY, &fmi3);
 }

@@ -43,8 +43,6 @@ void fuzz_fail(const char *format, ...) {
 }
 
 int LLVMFuzzerInitialize(int *argc, char ***argv) {
-    (void)argc;
-    (void)argv;
     timespec_get(&began, TIME_UTC);
     return atexit(print_final_figures);
 }

@@ -147,7 +147,6 @@ enum { CLOCKS = 7 }; /* the most of fuzz_any_count */
         static fmi3UInt64 counters[CLOCKS];                                                        \
         static fmi3UInt64 resolutions[CLOCKS];                                                     \
         static fmi3IntervalQualifier qualifiers[CLOCKS];                                           \
-        (void)active, (void)times, (void)counters, (void)resolutions, (void)qualifiers;            \
         require_refusal(FUZZ_FMI3_CHECKED(instance, name, clocks, count, __VA_ARGS__),             \
                         "fmi3" #name);                                                             \
         free(clocks);                                                                              \
@@ -165,7 +164,6 @@ CLOCK_CALL(SetShiftFraction, counters, resolutions)
 
 #define REFUSED(name)                                                                              \
     static void call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {        \
-        (void)session;                                                                             \
         require_refusal(FUZZ_FMI3_CHECKED_PLAIN(instance, name), "fmi3" #name);                    \
     }
 REFUSED(EvaluateDiscreteStates)

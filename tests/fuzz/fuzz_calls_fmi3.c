@@ -207,12 +207,10 @@ static void call_EnterInitializationMode(struct fuzz_session *session,
 
 static void call_ExitInitializationMode(struct fuzz_session *session,
                                         struct fuzz_instance *instance) {
-    (void)session;
     FUZZ_FMI3_CHECKED_PLAIN(instance, ExitInitializationMode);
 }
 
 static void call_EnterStepMode(struct fuzz_session *session, struct fuzz_instance *instance) {
-    (void)session;
     if (FUZZ_FMI3_CHECKED_PLAIN(instance, EnterStepMode) == fmi2OK &&
         !(instance->variety & FUZZ_EVENT_MODE)) {
         fuzz_fail("fmi3EnterStepMode succeeds without event mode");
@@ -222,7 +220,6 @@ static void call_EnterStepMode(struct fuzz_session *session, struct fuzz_instanc
 #define NUMBER_CALL(name, expected)                                                                \
     static void call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {        \
         size_t count = 99;                                                                         \
-        (void)session;                                                                             \
         if (FUZZ_FMI3_CHECKED(instance, name, &count) == fmi2OK && count != (expected)) {          \
             fuzz_fail("fmi3" #name " returns %zu", count);                                         \
         }                                                                                          \

@@ -8,8 +8,6 @@
 /* ---- Life and logging ------------------------------------------------------------------------ */
 
 void fuzz_call_GetVersion(struct fuzz_session *session, struct fuzz_instance *instance) {
-    (void)session;
-    (void)instance;
     if (strcmp(FUZZ_CALL(fuzz_fmu.GetVersion()), "2.0") != 0) {
         fuzz_fail("fmi2GetVersion returns another version");
     }
@@ -42,7 +40,6 @@ void fuzz_call_SetDebugLogging(struct fuzz_session *session, struct fuzz_instanc
 
 #define PLAIN_CALL(name)                                                                           \
     void fuzz_call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {          \
-        (void)session;                                                                             \
         FUZZ_CHECKED_PLAIN(instance, name);                                                        \
     }
 PLAIN_CALL(EnterInitializationMode)
@@ -52,7 +49,6 @@ PLAIN_CALL(EnterEventMode)
 PLAIN_CALL(EnterContinuousTimeMode)
 
 void fuzz_call_Reset(struct fuzz_session *session, struct fuzz_instance *instance) {
-    (void)session;
     fuzz_reset(instance);
 }
 
@@ -60,7 +56,6 @@ void fuzz_call_Reset(struct fuzz_session *session, struct fuzz_instance *instanc
 
 void fuzz_call_NewDiscreteStates(struct fuzz_session *session, struct fuzz_instance *instance) {
     fmi2EventInfo info = {.nextEventTime = NAN};
-    (void)session;
     if (FUZZ_CHECKED(instance, NewDiscreteStates, &info) == fmi2OK &&
         (info.nextEventTimeDefined || info.newDiscreteStatesNeeded || info.terminateSimulation)) {
         fuzz_fail("fmi2NewDiscreteStates reports an event");

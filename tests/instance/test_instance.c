@@ -205,8 +205,6 @@ static void test_a_field_of_another_kind_is_refused(void) {
 static char texts[1000];
 
 static void collect(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
     (void)strncat(texts, text, sizeof texts - strlen(texts) - 1);
 }
 

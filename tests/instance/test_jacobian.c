@@ -183,10 +183,6 @@ static enum status late_jacobian(const void *values, double t, const double x[],
 
 static enum status no_jacobian(const void *values, double t, const double x[], const double u[],
                                double J[]) {
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
     memset(J, 0, sizeof(double[4]));
     return STATUS_OK;
 }

@@ -61,15 +61,12 @@ static double cubic(double time) {
 static unsigned asked;
 
 static enum status set_cubic(void *context, double time) {
-    (void)context;
     asked++;
     set_input(cubic(time));
     return STATUS_OK;
 }
 
 static enum status refuse(void *context, double time) {
-    (void)context;
-    (void)time;
     return STATUS_INVALID_ARGUMENT;
 }
 

@@ -228,15 +228,12 @@ void *realloc(void *memory, size_t size) {
 }
 
 void system_watch_allocations(void *library) {
-    (void)library;
     is_watched = true;
 }
 
 #else
 
-void system_watch_allocations(void *library) {
-    (void)library;
-}
+void system_watch_allocations(void *library) {}
 
 #endif
 

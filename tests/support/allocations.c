@@ -16,14 +16,10 @@ int __sanitizer_install_malloc_and_free_hooks(void (*allocated)(const volatile v
                                               void (*freed)(const volatile void *));
 
 static void count_one(const volatile void *memory, size_t size) {
-    (void)memory;
-    (void)size;
     count++;
 }
 
-static void ignore(const volatile void *memory) {
-    (void)memory;
-}
+static void ignore(const volatile void *memory) {}
 
 __attribute__((constructor)) static void install(void) {
     (void)__sanitizer_install_malloc_and_free_hooks(count_one, ignore);

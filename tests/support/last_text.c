@@ -5,8 +5,6 @@
 char last_text[512];
 
 static void keep(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
     strncpy(last_text, text, sizeof last_text - 1);
 }
 

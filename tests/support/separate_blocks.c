@@ -5,27 +5,17 @@
 #include <stdlib.h>
 
 bool workspace_create(struct workspace *workspace, size_t size) {
-    (void)size;
     *workspace = (struct workspace){0};
     return true;
 }
 
-void workspace_destroy(struct workspace *workspace) {
-    (void)workspace;
-}
+void workspace_destroy(struct workspace *workspace) {}
 
-void workspace_enter(struct workspace *workspace) {
-    (void)workspace;
-}
+void workspace_enter(struct workspace *workspace) {}
 
-void workspace_leave(struct workspace *workspace) {
-    (void)workspace;
-}
+void workspace_leave(struct workspace *workspace) {}
 
-void workspace_cut(struct workspace *workspace, size_t used) {
-    (void)workspace;
-    (void)used;
-}
+void workspace_cut(struct workspace *workspace, size_t used) {}
 
 void *workspace_malloc(size_t size) {
     return malloc(size);

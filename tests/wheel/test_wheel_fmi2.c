@@ -13,10 +13,6 @@ static char last_message[512];
 
 static void keep(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
                  fmi2String category, fmi2String message, ...) {
-    (void)environment;
-    (void)name;
-    (void)status;
-    (void)category;
     snprintf(last_message, sizeof last_message, "%s", message);
 }
 

@@ -13,9 +13,6 @@ static char last_message[512];
 
 static void keep(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                  fmi3String message) {
-    (void)environment;
-    (void)status;
-    (void)category;
     snprintf(last_message, sizeof last_message, "%s", message);
 }
 

@@ -194,8 +194,6 @@ static struct variable *row_of(unsigned reference) {
 static char texts[1000];
 
 static void collect(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
     (void)strncat(texts, text, sizeof texts - strlen(texts) - 1);
 }
 

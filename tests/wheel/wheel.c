@@ -9,18 +9,12 @@ enum indicator_index { TO_STOP, PUSH, INDICATORS };
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct wheel_values *values = values_pointer;
-    (void)t;
-    (void)x;
     dx[0] = values->is_caught ? 0.0 : u[0];
     return STATUS_OK;
 }
 
 static enum status jacobian(const void *values, double t, const double x[], const double u[],
                             double J[]) {
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
     J[0] = 0.0;
     return STATUS_OK;
 }
@@ -64,7 +58,6 @@ static void describe(const void *values_pointer, struct indicator indicators[]) 
 static enum status indicators(const void *values_pointer, double t, const double x[],
                               const double u[], double z[]) {
     const struct wheel_values *values = values_pointer;
-    (void)t;
     z[TO_STOP] = can_be_caught(values) ? values->stop - x[0] : 1.0;
     z[PUSH] = values->is_caught ? u[0] : 1.0;
     return STATUS_OK;
@@ -132,8 +125,6 @@ static void propagate_linearly(const struct wheel_values *values, struct wheel_v
 }
 
 static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    (void)t;
-    (void)dt;
     propagate_linearly(values, first);
     if (second != NULL) {
         propagate_linearly(values, second);
@@ -142,9 +133,6 @@ static enum status propagate(const void *values, double t, double dt, void *firs
 }
 
 static enum status check_parameters(const void *values, char *text, size_t size) {
-    (void)values;
-    (void)text;
-    (void)size;
     return STATUS_OK; // the limits of each are all that they need
 }
 
