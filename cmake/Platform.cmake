@@ -40,10 +40,10 @@ endif()
 set(CMAKE_C_VISIBILITY_PRESET hidden)
 
 # Fused multiply-adds would give other bits from one compiler to the next, and break the exact sums of
-# src/instance/clock.c.
+# src/instance/state/clock.c.
 set(language_options -ffp-contract=off)
-set(warning_options -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wmissing-prototypes
-  -Wno-unused-parameter -Werror) # callbacks have a fixed signature
+# Callbacks and functions of standards have parameters that not every implementation needs.
+set(warning_options -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wmissing-prototypes -Wno-unused-parameter -Werror)
 
 # Of sources that are not the project's own: they are taken as they are, and not all of them is used.
 set(foreign_options -w $<$<C_COMPILER_ID:GNU>:-fno-analyzer>)

@@ -79,8 +79,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean loggingOn) {
-    (void)fmuResourceLocation;
-    (void)visible;
     if (!may_instantiate(instanceName, fmuType, fmuGUID, functions)) {
         return NULL;
     }
@@ -153,39 +151,21 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                       fmi2Real value[]) {
-    return fmi2_status(access_get_real(c, CALL_fmi2GetReal, vr, nvr, value));
-}
-
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Integer value[]) {
-    return fmi2_status(access_get_integer(c, CALL_fmi2GetInteger, vr, nvr, value));
-}
-
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                       const fmi2Real value[]) {
-    return fmi2_status(access_set_real(c, CALL_fmi2SetReal, vr, nvr, value));
-}
-
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Integer value[]) {
-    return fmi2_status(access_set_integer(c, CALL_fmi2SetInteger, vr, nvr, value));
-}
-
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Boolean value[]) {
-    return fmi2_status(access_get_boolean(c, CALL_fmi2GetBoolean, vr, nvr, value));
-}
+#define ACCESS(Verb, verb, Type, type, element)                                                    \
+    fmi2Status fmi2##Verb##Type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,        \
+                                element value[]) {                                                 \
+        return fmi2_status(access_##verb##_##type(c, CALL_fmi2##Verb##Type, vr, nvr, value));      \
+    }
+ACCESS(Get, get, Real, real, fmi2Real)
+ACCESS(Set, set, Real, real, const fmi2Real)
+ACCESS(Get, get, Integer, integer, fmi2Integer)
+ACCESS(Set, set, Integer, integer, const fmi2Integer)
+ACCESS(Get, get, Boolean, boolean, fmi2Boolean)
+ACCESS(Set, set, Boolean, boolean, const fmi2Boolean)
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
     return fmi2_status(access_none(c, CALL_fmi2GetString, "String", vr, nvr, value));
-}
-
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Boolean value[]) {
-    return fmi2_status(access_set_boolean(c, CALL_fmi2SetBoolean, vr, nvr, value));
 }
 
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,

@@ -16,5 +16,5 @@
 #define CO_SIMULATION  KIND_CO_SIMULATION
 #define ANY_KIND       (MODEL_EXCHANGE | CO_SIMULATION)
 
-#define FMI2_CALL_RULE(name, kinds, states) [CALL_##name] = {#name, kinds, states},
-const struct call_rule fmi2_call_rules[FMI2_CALL_COUNT] = {FMI2_CALL_LIST(FMI2_CALL_RULE)};
+#define FMI2_CALL_RULE(name, kinds, states) [CALL_fmi2##name] = {"fmi2" #name, kinds, states},
+const struct call_rule fmi2_call_rules[FMI2_CALL_COUNT] = {FMI2_FUNCTION_LIST(FMI2_CALL_RULE)};

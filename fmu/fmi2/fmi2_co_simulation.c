@@ -22,7 +22,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
-    (void)noSetFMUStatePriorToCurrentPoint; // importers say true and roll back all the same
+    // importers say true and roll back all the same
     struct component *component = c;
     if (!component_enter(component, CALL_fmi2DoStep)) {
         return fmi2Error;
@@ -40,7 +40,17 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
     return component_enter(c, CALL_fmi2CancelStep) ? fmi2OK : fmi2Error;
 }
 
-static fmi2Status status_unknown(struct component *component, enum fmi2_call call) {
+/* ---- Status --------------------------------------------------------------------------------- */
+
+static bool may_ask(struct component *component, enum fmi2_call call, const void *value) {
+    return component_enter(component, call) &&
+           component_has_arrays(component, call, 1, value, value);
+}
+
+static fmi2Status no_status(struct component *component, enum fmi2_call call, const void *value) {
+    if (!may_ask(component, call, value)) {
+        return fmi2Error;
+    }
     component_log(component, COMPONENT_DISCARD, LOG_STATUS_DISCARD,
                   "%s: this status cannot be known, no step is ever pending",
                   fmi2_call_rules[call].name);
@@ -48,57 +58,36 @@ static fmi2Status status_unknown(struct component *component, enum fmi2_call cal
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
-    (void)s;
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetStatus) ||
-        !component_has_arrays(component, CALL_fmi2GetStatus, 1, value, value)) {
-        return fmi2Error;
-    }
-    return status_unknown(component, CALL_fmi2GetStatus);
+    return no_status(c, CALL_fmi2GetStatus, value);
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
     struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetRealStatus) ||
-        !component_has_arrays(component, CALL_fmi2GetRealStatus, 1, value, value)) {
-        return fmi2Error;
-    }
     if (s != fmi2LastSuccessfulTime) {
-        return status_unknown(component, CALL_fmi2GetRealStatus);
+        return no_status(component, CALL_fmi2GetRealStatus, value);
+    }
+    if (!may_ask(component, CALL_fmi2GetRealStatus, value)) {
+        return fmi2Error;
     }
     *value = instance_time(component->instance);
     return fmi2OK;
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
-    (void)s;
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetIntegerStatus) ||
-        !component_has_arrays(component, CALL_fmi2GetIntegerStatus, 1, value, value)) {
-        return fmi2Error;
-    }
-    return status_unknown(component, CALL_fmi2GetIntegerStatus);
+    return no_status(c, CALL_fmi2GetIntegerStatus, value);
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetBooleanStatus) ||
-        !component_has_arrays(component, CALL_fmi2GetBooleanStatus, 1, value, value)) {
-        return fmi2Error;
-    }
     if (s != fmi2Terminated) {
-        return status_unknown(component, CALL_fmi2GetBooleanStatus);
+        return no_status(c, CALL_fmi2GetBooleanStatus, value);
+    }
+    if (!may_ask(c, CALL_fmi2GetBooleanStatus, value)) {
+        return fmi2Error;
     }
     *value = fmi2False; // the FMU never ends a simulation by itself
     return fmi2OK;
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
-    (void)s;
-    struct component *component = c;
-    if (!component_enter(component, CALL_fmi2GetStringStatus) ||
-        !component_has_arrays(component, CALL_fmi2GetStringStatus, 1, value, value)) {
-        return fmi2Error;
-    }
-    return status_unknown(component, CALL_fmi2GetStringStatus);
+    return no_status(c, CALL_fmi2GetStringStatus, value);
 }

@@ -40,7 +40,6 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
                                        fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode,
                                        fmi2Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint;
     const enum fmi2_call call = CALL_fmi2CompletedIntegratorStep;
     struct component *component = c;
     if (!component_enter(component, call) ||

@@ -116,8 +116,6 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage) {
-    (void)resourcePath;
-    (void)visible;
     const struct receiver receiver = {logMessage, instanceEnvironment};
     struct fmi3_component *created =
         instantiate("fmi3InstantiateModelExchange", instanceName, instantiationToken,
@@ -163,8 +161,6 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
     size_t nRequiredIntermediateVariables, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
-    (void)resourcePath;
-    (void)visible;
     const struct receiver receiver = {logMessage, instanceEnvironment};
     struct fmi3_component *created = instantiate(
         "fmi3InstantiateCoSimulation", instanceName, instantiationToken,
@@ -188,14 +184,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
     fmi3LockPreemptionCallback lockPreemption, fmi3UnlockPreemptionCallback unlockPreemption) {
-    (void)instanceName;
-    (void)instantiationToken;
-    (void)resourcePath;
-    (void)visible;
-    (void)loggingOn;
-    (void)clockUpdate;
-    (void)lockPreemption;
-    (void)unlockPreemption;
     const struct receiver receiver = {logMessage, instanceEnvironment};
     return refuse_instance(&receiver,
                            "fmi3InstantiateScheduledExecution is refused: this is an FMU for Model "

@@ -87,7 +87,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                       fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
-    (void)noSetFMUStatePriorToCurrentPoint; // importers say true and roll back all the same
+    // importers say true and roll back all the same
     const enum fmi3_call call = CALL_fmi3DoStep;
     struct component *base = instance;
     if (!component_enter(base, call) ||

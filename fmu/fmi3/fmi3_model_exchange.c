@@ -15,7 +15,6 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode,
                                        fmi3Boolean *terminateSimulation) {
-    (void)noSetFMUStatePriorToCurrentPoint;
     const enum fmi3_call call = CALL_fmi3CompletedIntegratorStep;
     struct component *component = instance;
     if (!component_enter(component, call) ||

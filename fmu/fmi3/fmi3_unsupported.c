@@ -11,27 +11,17 @@ static const char no_dependencies[] =
 
 fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                         size_t nValueReferences, fmi3Clock values[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)values;
     return fmi3_unsupported(instance, CALL_fmi3GetClock, no_clocks);
 }
 
 fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                         size_t nValueReferences, const fmi3Clock values[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)values;
     return fmi3_unsupported(instance, CALL_fmi3SetClock, no_clocks);
 }
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                   size_t nValueReferences, fmi3Float64 intervals[],
                                   fmi3IntervalQualifier qualifiers[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)intervals;
-    (void)qualifiers;
     return fmi3_unsupported(instance, CALL_fmi3GetIntervalDecimal, no_clocks);
 }
 
@@ -39,37 +29,22 @@ fmi3Status fmi3GetIntervalFraction(fmi3Instance instance,
                                    const fmi3ValueReference valueReferences[],
                                    size_t nValueReferences, fmi3UInt64 counters[],
                                    fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)counters;
-    (void)resolutions;
-    (void)qualifiers;
     return fmi3_unsupported(instance, CALL_fmi3GetIntervalFraction, no_clocks);
 }
 
 fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                size_t nValueReferences, fmi3Float64 shifts[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)shifts;
     return fmi3_unsupported(instance, CALL_fmi3GetShiftDecimal, no_clocks);
 }
 
 fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                 size_t nValueReferences, fmi3UInt64 counters[],
                                 fmi3UInt64 resolutions[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)counters;
-    (void)resolutions;
     return fmi3_unsupported(instance, CALL_fmi3GetShiftFraction, no_clocks);
 }
 
 fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                   size_t nValueReferences, const fmi3Float64 intervals[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)intervals;
     return fmi3_unsupported(instance, CALL_fmi3SetIntervalDecimal, no_clocks);
 }
 
@@ -77,35 +52,22 @@ fmi3Status fmi3SetIntervalFraction(fmi3Instance instance,
                                    const fmi3ValueReference valueReferences[],
                                    size_t nValueReferences, const fmi3UInt64 counters[],
                                    const fmi3UInt64 resolutions[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)counters;
-    (void)resolutions;
     return fmi3_unsupported(instance, CALL_fmi3SetIntervalFraction, no_clocks);
 }
 
 fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                size_t nValueReferences, const fmi3Float64 shifts[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)shifts;
     return fmi3_unsupported(instance, CALL_fmi3SetShiftDecimal, no_clocks);
 }
 
 fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                 size_t nValueReferences, const fmi3UInt64 counters[],
                                 const fmi3UInt64 resolutions[]) {
-    (void)valueReferences;
-    (void)nValueReferences;
-    (void)counters;
-    (void)resolutions;
     return fmi3_unsupported(instance, CALL_fmi3SetShiftFraction, no_clocks);
 }
 
 fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
                                       fmi3Float64 activationTime) {
-    (void)clockReference;
-    (void)activationTime;
     return fmi3_unsupported(instance, CALL_fmi3ActivateModelPartition, no_clocks);
 }
 
@@ -127,8 +89,6 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance,
                                                fmi3ValueReference valueReference,
                                                size_t *nDependencies) {
-    (void)valueReference;
-    (void)nDependencies;
     return fmi3_unsupported(instance, CALL_fmi3GetNumberOfVariableDependencies, no_dependencies);
 }
 
@@ -137,11 +97,5 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
                                        fmi3ValueReference independents[],
                                        size_t elementIndicesOfIndependents[],
                                        fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
-    (void)dependent;
-    (void)elementIndicesOfDependent;
-    (void)independents;
-    (void)elementIndicesOfIndependents;
-    (void)dependencyKinds;
-    (void)nDependencies;
     return fmi3_unsupported(instance, CALL_fmi3GetVariableDependencies, no_dependencies);
 }

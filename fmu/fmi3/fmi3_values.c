@@ -55,65 +55,49 @@ static bool is_checked(fmi3Instance instance, enum fmi3_call call, bool setting,
            fmi3_may_access(instance, call, setting, references, count);
 }
 
-/* ---- Types that variables have --------------------------------------------------------------- */
+/* ---- Functions ------------------------------------------------------------------------------ */
 
-#define ACCESS(Verb, verb, Type, type, value_type, setting)                                        \
-    fmi3Status fmi3##Verb##Type(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
-                                size_t nValueReferences, value_type values[], size_t nValues) {    \
-        const enum fmi3_call call = CALL_fmi3##Verb##Type;                                         \
+/* Of one type; `access` reads or sets the values. */
+#define FUNCTION(name, element, setting, access)                                                   \
+    fmi3Status name(fmi3Instance instance, const fmi3ValueReference valueReferences[],             \
+                    size_t nValueReferences, element values[], size_t nValues) {                   \
+        const enum fmi3_call call = CALL_##name;                                                   \
         if (!is_checked(instance, call, setting, valueReferences, nValueReferences, nValues)) {    \
             return fmi3Error;                                                                      \
         }                                                                                          \
-        return fmi3_access_status(                                                                 \
-            instance,                                                                              \
-            access_##verb##_##type(instance, call, valueReferences, nValueReferences, values));    \
+        return fmi3_access_status(instance, access);                                               \
     }
 
-ACCESS(Get, get, Float64, real, fmi3Float64, false)
-ACCESS(Set, set, Float64, real, const fmi3Float64, true)
-ACCESS(Get, get, Int32, int32, fmi3Int32, false)
-ACCESS(Set, set, Int32, int32, const fmi3Int32, true)
-ACCESS(Get, get, Int64, enumeration, fmi3Int64, false)
-ACCESS(Set, set, Int64, enumeration, const fmi3Int64, true)
-ACCESS(Get, get, Boolean, bool, fmi3Boolean, false)
-ACCESS(Set, set, Boolean, bool, const fmi3Boolean, true)
+/* Types that variables have, and their names in variable_access.h. */
+#define OF_VARIABLES(Type, type)                                                                   \
+    FUNCTION(fmi3Get##Type, fmi3##Type, false,                                                     \
+             access_get_##type(instance, call, valueReferences, nValueReferences, values))         \
+    FUNCTION(fmi3Set##Type, const fmi3##Type, true,                                                \
+             access_set_##type(instance, call, valueReferences, nValueReferences, values))
+OF_VARIABLES(Float64, real)
+OF_VARIABLES(Int32, int32)
+OF_VARIABLES(Int64, enumeration)
+OF_VARIABLES(Boolean, bool)
 
-/* ---- Types that no variable has ---------------------------------------------------------------
- */
-
-#define ACCESS_NONE(Verb, Type, value_type, setting)                                               \
-    fmi3Status fmi3##Verb##Type(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
-                                size_t nValueReferences, value_type values[], size_t nValues) {    \
-        const enum fmi3_call call = CALL_fmi3##Verb##Type;                                         \
-        if (!is_checked(instance, call, setting, valueReferences, nValueReferences, nValues)) {    \
-            return fmi3Error;                                                                      \
-        }                                                                                          \
-        return fmi3_status(                                                                        \
-            access_none(instance, call, #Type, valueReferences, nValueReferences, values));        \
-    }
-
-ACCESS_NONE(Get, Float32, fmi3Float32, false)
-ACCESS_NONE(Set, Float32, const fmi3Float32, true)
-ACCESS_NONE(Get, Int8, fmi3Int8, false)
-ACCESS_NONE(Set, Int8, const fmi3Int8, true)
-ACCESS_NONE(Get, UInt8, fmi3UInt8, false)
-ACCESS_NONE(Set, UInt8, const fmi3UInt8, true)
-ACCESS_NONE(Get, Int16, fmi3Int16, false)
-ACCESS_NONE(Set, Int16, const fmi3Int16, true)
-ACCESS_NONE(Get, UInt16, fmi3UInt16, false)
-ACCESS_NONE(Set, UInt16, const fmi3UInt16, true)
-ACCESS_NONE(Get, UInt32, fmi3UInt32, false)
-ACCESS_NONE(Set, UInt32, const fmi3UInt32, true)
-ACCESS_NONE(Get, UInt64, fmi3UInt64, false)
-ACCESS_NONE(Set, UInt64, const fmi3UInt64, true)
-ACCESS_NONE(Get, String, fmi3String, false)
-ACCESS_NONE(Set, String, const fmi3String, true)
+/* Types that no variable has. */
+#define OF_NONE(Type)                                                                              \
+    FUNCTION(fmi3Get##Type, fmi3##Type, false,                                                     \
+             access_none(instance, call, #Type, valueReferences, nValueReferences, values))        \
+    FUNCTION(fmi3Set##Type, const fmi3##Type, true,                                                \
+             access_none(instance, call, #Type, valueReferences, nValueReferences, values))
+OF_NONE(Float32)
+OF_NONE(Int8)
+OF_NONE(UInt8)
+OF_NONE(Int16)
+OF_NONE(UInt16)
+OF_NONE(UInt32)
+OF_NONE(UInt64)
+OF_NONE(String)
 
 fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                          size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
                          size_t nValues) {
     const enum fmi3_call call = CALL_fmi3GetBinary;
-    (void)valueSizes;
     if (!is_checked(instance, call, false, valueReferences, nValueReferences, nValues)) {
         return fmi3Error;
     }
@@ -125,7 +109,6 @@ fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
                          size_t nValueReferences, const size_t valueSizes[],
                          const fmi3Binary values[], size_t nValues) {
     const enum fmi3_call call = CALL_fmi3SetBinary;
-    (void)valueSizes;
     if (!is_checked(instance, call, true, valueReferences, nValueReferences, nValues)) {
         return fmi3Error;
     }

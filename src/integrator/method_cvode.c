@@ -81,10 +81,6 @@ static enum status status_of_flag(const struct problem *problem, int flag) {
 static int evaluate_jacobian(sunrealtype t, N_Vector x, N_Vector dx, SUNMatrix jacobian,
                              void *user_data, N_Vector work1, N_Vector work2, N_Vector work3) {
     const struct sundials *base = user_data;
-    (void)dx;
-    (void)work1;
-    (void)work2;
-    (void)work3;
     return sundials_callback_flag(
         problem_jacobian(base->problem, t, small_vector_data(x), SUNDenseMatrix_Data(jacobian)));
 }
@@ -412,7 +408,7 @@ static void measure_work(struct cvode *cvode, struct method_work *work) {
 static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work) {
     struct cvode *cvode = memory;
-    (void)begin_x; // CVODE has it
+    // CVODE has it
     bool is_cut_short = false;
     if (cvode->base.problem->reached == 0.0 && t < shortest_first_advance) {
         *stopped_at = 0.0;

@@ -394,7 +394,6 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
 
 static double next_step(void *memory, const double x[]) {
     const struct erk *erk = memory;
-    (void)x;
     return erk->next_step;
 }
 

@@ -106,7 +106,6 @@ static enum status configure(void *memory) {
 
 static enum status restart(void *memory, const double x[]) {
     struct taylor *taylor = memory;
-    (void)x;
     taylor->passed = -INFINITY;
     taylor->is_searched = location_is_active(&taylor->problem->location);
     taylor->last_length = taylor->problem->first_step;
@@ -532,7 +531,6 @@ static bool interpolate(void *memory, double t, double x[]) {
 static double next_step(void *memory, const double x[]) {
     const struct taylor *taylor = memory;
     const struct problem *problem = taylor->problem;
-    (void)x;
     return location_is_active(&problem->location) ? problem->reached - taylor->begin : 0.0;
 }
 

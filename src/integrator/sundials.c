@@ -29,8 +29,6 @@ void sundials_text(int error_code, const char *module, const char *function, cha
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
-    (void)module;
-    (void)function;
     message_write(&problem->sink, sundials->status_of_flag(problem, error_code), "%s: %s",
                   sundials->method->name, explained(text));
 }
@@ -84,16 +82,12 @@ void sundials_get_state(const struct sundials *sundials, double x[]) {
 }
 
 static enum status rest(double t, const double x[], double dx[], void *state_count) {
-    (void)t;
-    (void)x;
     memset(dx, 0, *(const size_t *)state_count * sizeof(double));
     return STATUS_OK;
 }
 
 static enum status rest_jacobian(double t, const double x[], double J[], void *state_count) {
     const size_t n = *(const size_t *)state_count;
-    (void)t;
-    (void)x;
     memset(J, 0, n * n * sizeof(double));
     return STATUS_OK;
 }

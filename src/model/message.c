@@ -10,8 +10,8 @@ static bool is_in_word(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
 }
 
-/* The word nan in front of text, with the sign and the kind that some platforms give it; 0 if there
- * is none. */
+/* Length of the word nan in front of text, with the sign and the kind that some platforms add; 0 if
+ * it is not there. */
 static size_t nan_length(const char *text) {
     const size_t end = (size_t)(*text == '-') + strlen("nan");
     if (strncmp(text + (*text == '-'), "nan", strlen("nan")) != 0 || is_in_word(text[end])) {
@@ -19,26 +19,6 @@ static size_t nan_length(const char *text) {
     }
     const char *kind_end = text[end] == '(' ? strchr(text + end, ')') : NULL;
     return kind_end != NULL ? (size_t)(kind_end - text) + 1 : end;
-}
-
-/* printf writes NaN as nan, -nan, nan(ind) or -nan(ind), which depends on the platform: all become
- * nan. */
-static void write_nan_alike(char *text) {
-    char *to = text;
-    const char *from = text;
-    bool after_word = false;
-    while (*from != '\0') {
-        const size_t length = after_word ? 0 : nan_length(from);
-        if (length > 0) {
-            memcpy(to, "nan", strlen("nan"));
-            to += strlen("nan");
-            from += length;
-        } else {
-            *to++ = *from++;
-        }
-        after_word = is_in_word(to[-1]);
-    }
-    *to = '\0';
 }
 
 /* Length of the decimal fraction in front of text if it has more digits than 15; 0 if not. */
@@ -52,44 +32,55 @@ static size_t long_fraction_length(const char *text) {
     const bool is_long = length > zeros + 15;
     if (text[length] == 'e') {
         const size_t sign = text[length + 1] == '-' || text[length + 1] == '+';
-        length += 1 + sign + strspn(text + length + 1 + sign, "0123456789");
+        const size_t digits = strspn(text + length + 1 + sign, "0123456789");
+        length += digits > 0 ? 1 + sign + digits : 0;
     }
     return is_long ? length : 0;
 }
 
-/* %.17g writes 0.80000000000000004 for 0.8: numbers get the fewest digits that are read as the same
- * double. */
-static void shorten_numbers(char *text) {
+enum { SHORTER_SIZE = 32 };
+
+/* Writes the number in front of text with the fewest digits that are read as the same double. Its
+ * length in text; 0, if it cannot be shorter or there is none. */
+static size_t shorten_number(const char *text, char shorter[SHORTER_SIZE]) {
+    const size_t length = long_fraction_length(text);
+    const double number = length > 0 ? strtod(text, NULL) : 0.0;
+    for (int digits = 15; digits < 17 && length > 0; digits++) {
+        (void)snprintf(shorter, SHORTER_SIZE, "%.*g", digits, number);
+        if (strtod(shorter, NULL) == number) {
+            return strlen(shorter) <= length ? length : 0;
+        }
+    }
+    return 0;
+}
+
+/* printf writes NaN as nan, -nan, nan(ind) or -nan(ind), depending on the platform, and with %.17g
+ * 0.8 as 0.80000000000000004. */
+static void simplify_numbers(char *text) {
     char *to = text;
     const char *from = text;
-    bool after_word = false;
+    char last = ' '; // written
     while (*from != '\0') {
-        const size_t length = after_word ? 0 : long_fraction_length(from);
-        const double number = length > 0 ? strtod(from, NULL) : 0.0;
-        char shorter[32] = "";
-        for (int digits = 15; digits < 17 && length > 0; digits++) {
-            (void)snprintf(shorter, sizeof shorter, "%.*g", digits, number);
-            if (strtod(shorter, NULL) == number) {
-                break;
-            }
-            shorter[0] = '\0';
+        char shorter[SHORTER_SIZE] = "nan";
+        size_t length = is_in_word(last) ? 0 : nan_length(from);
+        if (length == 0 && !is_in_word(last) && last != '.') {
+            length = shorten_number(from, shorter);
         }
-        if (shorter[0] != '\0' && strlen(shorter) <= length) {
+        if (length > 0) {
             memcpy(to, shorter, strlen(shorter));
             to += strlen(shorter);
             from += length;
         } else {
             *to++ = *from++;
         }
-        after_word = is_in_word(to[-1]) || to[-1] == '.';
+        last = to[-1];
     }
     *to = '\0';
 }
 
 void message_format(char *text, size_t size, const char *format, va_list arguments) {
     (void)vsnprintf(text, size, format, arguments);
-    write_nan_alike(text);
-    shorten_numbers(text);
+    simplify_numbers(text);
 }
 
 void message_write(const struct message_sink *sink, enum status status, const char *format, ...) {

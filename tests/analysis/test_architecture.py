@@ -30,28 +30,41 @@ BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).par
 
 # ---- The architecture ----------------------------------------------------------------------------
 
-# folder, as a regular expression: folders whose public headers it includes
+# folder, as a regular expression: folders and libraries whose headers it includes
 MAY_INCLUDE = {
     r"src/model": (),
     r"src/integrator": ("src/model",),
-    r"src/instance": ("src/integrator", "src/model"),
-    r"fmu": ("src/instance", "src/model"),
-    r"fmu/fmi\d": ("fmu", "src/instance", "src/model"),
+    r"src/instance/state": ("src/integrator", "src/model"),
+    r"src/instance/events": ("src/instance/state",),
+    r"src/instance/values": ("src/instance/state", "src/instance/events"),
+    r"src/instance/history": ("src/instance/state", "src/instance/events"),
+    r"src/instance/snapshot": ("src/instance/state", "src/instance/history"),
+    r"src/instance/step": (
+        "src/instance/state", "src/instance/events", "src/instance/values", "src/instance/history",
+        "src/instance/snapshot",
+    ),
+    r"src/instance": (
+        "src/instance/state", "src/instance/events", "src/instance/history",
+        "src/instance/snapshot",
+    ),
+    r"fmu": ("src/model",),
+    r"fmu/component": ("src/instance", "src/model"),
+    r"fmu/fmi\d": ("fmu/component", "src/instance", "src/model"),
     r"models": ("src/model",),
     r"models/\w+": ("models", "src/model"),
-}
+}  # fmt: skip
 # the equations of another model
 MAY_INCLUDE_MODEL = {
     "models/rp_controller": "models/rp_manipulator",
     "models/rp_plant": "models/rp_manipulator",
 }
 
-# libraries that hide headers; those of other folders are all public
+# libraries, with the folders in them, that hide headers; those of other folders are all public
 PUBLIC_HEADERS = {
     "src/integrator": {"integrator.h", "ode.h"},
     "src/instance": {
         "continuous_states.h", "derivatives.h", "instance.h", "serialization.h", "snapshot.h",
-        "stepping.h", "values.h", "variables.h",
+        "stepping.h", "value_types.h", "values.h", "variables.h",
     },
 }  # fmt: skip
 
@@ -104,6 +117,11 @@ def is_library_of(name: str, folder: str) -> bool:
     )
 
 
+def library_of(folder: str) -> str:
+    found = (library for library in PUBLIC_HEADERS if f"{folder}/".startswith(f"{library}/"))
+    return next(found, folder)
+
+
 def is_allowed(header: Path, folder: str, root: Path) -> bool:
     """Whether files of this folder may include the header."""
     rules = [below for pattern, below in MAY_INCLUDE.items() if re.fullmatch(pattern, folder)]
@@ -111,7 +129,10 @@ def is_allowed(header: Path, folder: str, root: Path) -> bool:
     target = folder_of(header, root)
     if target == folder or target == MAY_INCLUDE_MODEL.get(folder):
         return True
-    return target in rules[0] and header.name in PUBLIC_HEADERS.get(target, {header.name})
+    library = library_of(target)
+    if library == library_of(folder):
+        return target in rules[0]
+    return library in rules[0] and header.name in PUBLIC_HEADERS.get(library, {header.name})
 
 
 def includes(path: Path) -> list[str]:
@@ -199,7 +220,8 @@ def project(tmp_path: Path) -> Path:
     """Headers and modules of every folder, with nothing in them."""
     for name in (
         "src/model/model.h", "src/integrator/ode.h", "src/integrator/method.h",
-        "src/instance/instance.h", "src/instance/internals.h", "fmu/component.h",
+        "src/instance/instance.h", "src/instance/state/internals.h",
+        "src/instance/step/stepping.h", "src/instance/step/step.h", "fmu/component/component.h",
         "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/taylor.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
         "fmu/generate.py", "cosim/unit.py", "models/rp_plant/references/make.py",
@@ -221,8 +243,11 @@ def write(project: Path, name: str, text: str) -> None:
         ("src/model/status.c", "math.h"),
         ("src/integrator/method_cvode.c", "cvode/cvode.h"),
         ("src/integrator/method_cvode.c", "method.h"),
-        ("src/instance/values.c", "ode.h"),
-        ("fmu/component.c", "instance.h"),
+        ("src/instance/state/settings.c", "ode.h"),
+        ("src/instance/values/values.c", "internals.h"),
+        ("src/instance/step/continuous_states.c", "step.h"),
+        ("fmu/fmi2/fmi2.c", "stepping.h"),
+        ("fmu/component/component.c", "instance.h"),
         ("fmu/fmi2/fmi2.c", "fmi2Functions.h"),
         ("fmu/fmi3/fmi3.c", "component.h"),
         ("models/rp_plant/rp_plant.c", "taylor.h"),
@@ -240,13 +265,17 @@ def test_what_may_be_included(project: Path, name: str, header: str) -> None:
         ("src/model/status.c", "ode.h"),
         ("src/integrator/workspace.c", "sched.h"),
         ("src/integrator/method_cvode.c", "instance.h"),
-        ("src/instance/values.c", "method.h"),
-        ("src/instance/values.c", "component.h"),
-        ("src/instance/values.c", "cvode/cvode.h"),
-        ("src/instance/values.c", "rp_manipulator.h"),
-        ("fmu/component.c", "internals.h"),
-        ("fmu/component.c", "fmi2_calls.h"),
-        ("fmu/component.h", "fmi2Functions.h"),
+        ("src/instance/state/settings.c", "method.h"),
+        ("src/instance/state/settings.c", "instance.h"),
+        ("src/instance/values/values.c", "stepping.h"),
+        ("src/instance/values/values.c", "method.h"),
+        ("fmu/fmi2/fmi2.c", "step.h"),
+        ("src/instance/values/values.c", "component.h"),
+        ("src/instance/values/values.c", "cvode/cvode.h"),
+        ("src/instance/values/values.c", "rp_manipulator.h"),
+        ("fmu/component/component.c", "internals.h"),
+        ("fmu/component/component.c", "fmi2_calls.h"),
+        ("fmu/component/component.h", "fmi2Functions.h"),
         ("fmu/fmi2/fmi2.c", "ode.h"),
         ("fmu/fmi2/fmi2.c", "fmi3_calls.h"),
         ("fmu/fmi2/fmi2.c", "fmi3Functions.h"),

@@ -11,9 +11,6 @@ static const fmi3ValueReference inputs_of[] = {RP_MANIPULATOR_tau1, RP_MANIPULAT
 
 static void log_text(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                      fmi3String text) {
-    (void)environment;
-    (void)status;
-    (void)category;
     fprintf(stderr, "bench: %s\n", text);
 }
 

@@ -14,10 +14,6 @@ static const fmi2ValueReference inputs_of[] = {RP_MANIPULATOR_tau1, RP_MANIPULAT
 
 static void log_text(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
                      fmi2String category, fmi2String text, ...) {
-    (void)environment;
-    (void)name;
-    (void)status;
-    (void)category;
     fprintf(stderr, "bench: %s\n", text);
 }
 

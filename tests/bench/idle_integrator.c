@@ -12,31 +12,23 @@ struct integrator {
 };
 
 const char *integrator_method_name(enum integrator_method method) {
-    (void)method;
     return "idle";
 }
 
 double integrator_tolerance_fraction(enum integrator_method method) {
-    (void)method;
     return 1.0;
 }
 
 int64_t integrator_longest_history(enum integrator_method method, bool has_events) {
-    (void)method;
-    (void)has_events;
     return 1;
 }
 
 bool integrator_is_possible(enum integrator_method method, const struct ode *ode) {
-    (void)method;
-    (void)ode;
     return true;
 }
 
 enum status integrator_create(const struct ode *ode, const struct message_sink *sink,
                               struct integrator **integrator) {
-    (void)ode;
-    (void)sink;
     *integrator = calloc(1, sizeof **integrator);
     return *integrator != NULL ? STATUS_OK : STATUS_OUT_OF_MEMORY;
 }
@@ -47,48 +39,32 @@ void integrator_destroy(struct integrator *integrator) {
 
 enum status integrator_configure(struct integrator *integrator,
                                  const struct integrator_settings *settings) {
-    (void)settings;
     integrator->statistics = (struct integrator_statistics){0};
     return STATUS_OK;
 }
 
 enum status integrator_restart(struct integrator *integrator, const double x[],
                                const struct integrator_start *start) {
-    (void)integrator;
-    (void)x;
-    (void)start;
     return STATUS_OK;
 }
 
 double integrator_next_step(const struct integrator *integrator) {
-    (void)integrator;
     return 0.0;
 }
 
 double integrator_passed_time(const struct integrator *integrator) {
-    (void)integrator;
     return INFINITY;
 }
 
 void integrator_set_observer(struct integrator *integrator, integrator_observer *observer,
-                             void *context) {
-    (void)integrator;
-    (void)observer;
-    (void)context;
-}
+                             void *context) {}
 
 bool integrator_interpolate(struct integrator *integrator, double t, double x[]) {
-    (void)integrator;
-    (void)t;
-    (void)x;
     return true;
 }
 
 enum status integrator_advance(struct integrator *integrator, double t, int64_t max_steps,
                                double *reached, double x[]) {
-    (void)integrator;
-    (void)max_steps;
-    (void)x;
     *reached = t;
     return STATUS_OK;
 }
@@ -104,15 +80,11 @@ void integrator_set_statistics(struct integrator *integrator,
 }
 
 const bool *integrator_event(const struct integrator *integrator) {
-    (void)integrator;
     return NULL;
 }
 
 enum status integrator_rest(struct integrator *integrator, const double x[],
                             const struct integrator_start *start, double t, double *reached) {
-    (void)integrator;
-    (void)x;
-    (void)start;
     *reached = t;
     return STATUS_OK;
 }

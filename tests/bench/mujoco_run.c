@@ -60,10 +60,6 @@ const char *mujoco_version(void) {
 
 double mujoco_run(const struct problem *problem, enum mujoco_integrator integrator, int substeps,
                   double states[][4]) {
-    (void)problem;
-    (void)integrator;
-    (void)substeps;
-    (void)states;
     require(false, "built without MuJoCo");
     return 0.0;
 }

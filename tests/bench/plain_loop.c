@@ -9,7 +9,6 @@
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 static int rhs(sunrealtype t, N_Vector x, N_Vector dx, void *u) {
-    (void)t;
     problem_rhs(N_VGetArrayPointer(x), u, N_VGetArrayPointer(dx));
     return 0;
 }

@@ -426,8 +426,8 @@ SAME(GetRealOutputDerivatives, GetOutputDerivatives,
 /* ---- Loading -------------------------------------------------------------------------------- */
 
 void *fmu_version_open(struct fmu_functions *functions) {
-#define ADAPTED(name) name,
-    *functions = (struct fmu_functions){FMU_FUNCTION_LIST(ADAPTED)};
+#define ADAPTED(name, kinds, states) name,
+    *functions = (struct fmu_functions){FMI2_FUNCTION_LIST(ADAPTED)};
 #undef ADAPTED
     return fmu3_library_open(FMU_LIBRARY, &fmi3);
 }

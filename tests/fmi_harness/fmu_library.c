@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define FMU_NAME(name) "fmi2" #name,
-const char *const fmu_function_names[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_NAME)};
+#define FMU_NAME(name, kinds, states) "fmi2" #name,
+const char *const fmu_function_names[FMU_FUNCTION_COUNT] = {FMI2_FUNCTION_LIST(FMU_NAME)};
 #undef FMU_NAME
 
 void *fmu_library_load(const char *path, const char *const names[], const size_t offsets[],
@@ -29,8 +29,8 @@ void *fmu_library_load(const char *path, const char *const names[], const size_t
 }
 
 void *fmu_library_open(const char *path, struct fmu_functions *functions) {
-#define FMU_OFFSET(name) offsetof(struct fmu_functions, name),
-    static const size_t offsets[FMU_FUNCTION_COUNT] = {FMU_FUNCTION_LIST(FMU_OFFSET)};
+#define FMU_OFFSET(name, kinds, states) offsetof(struct fmu_functions, name),
+    static const size_t offsets[FMU_FUNCTION_COUNT] = {FMI2_FUNCTION_LIST(FMU_OFFSET)};
 #undef FMU_OFFSET
     return fmu_library_load(path, fmu_function_names, offsets, FMU_FUNCTION_COUNT, functions);
 }

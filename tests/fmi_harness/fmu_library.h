@@ -3,6 +3,8 @@
 #ifndef FMU_LIBRARY_H
 #define FMU_LIBRARY_H
 
+#include "fmi2_functions.h"
+
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -10,62 +12,13 @@
 
 #include <fmi2FunctionTypes.h>
 
-/* Every function of fmi2Functions.h (section 2.1), without its prefix. */
-#define FMU_FUNCTION_LIST(X)                                                                       \
-    X(GetTypesPlatform)                                                                            \
-    X(GetVersion)                                                                                  \
-    X(SetDebugLogging)                                                                             \
-    X(Instantiate)                                                                                 \
-    X(FreeInstance)                                                                                \
-    X(SetupExperiment)                                                                             \
-    X(EnterInitializationMode)                                                                     \
-    X(ExitInitializationMode)                                                                      \
-    X(Terminate)                                                                                   \
-    X(Reset)                                                                                       \
-    X(GetReal)                                                                                     \
-    X(GetInteger)                                                                                  \
-    X(GetBoolean)                                                                                  \
-    X(GetString)                                                                                   \
-    X(SetReal)                                                                                     \
-    X(SetInteger)                                                                                  \
-    X(SetBoolean)                                                                                  \
-    X(SetString)                                                                                   \
-    X(GetFMUstate)                                                                                 \
-    X(SetFMUstate)                                                                                 \
-    X(FreeFMUstate)                                                                                \
-    X(SerializedFMUstateSize)                                                                      \
-    X(SerializeFMUstate)                                                                           \
-    X(DeSerializeFMUstate)                                                                         \
-    X(GetDirectionalDerivative)                                                                    \
-    /* Model Exchange */                                                                           \
-    X(EnterEventMode)                                                                              \
-    X(NewDiscreteStates)                                                                           \
-    X(EnterContinuousTimeMode)                                                                     \
-    X(CompletedIntegratorStep)                                                                     \
-    X(SetTime)                                                                                     \
-    X(SetContinuousStates)                                                                         \
-    X(GetDerivatives)                                                                              \
-    X(GetEventIndicators)                                                                          \
-    X(GetContinuousStates)                                                                         \
-    X(GetNominalsOfContinuousStates)                                                               \
-    /* Co-Simulation */                                                                            \
-    X(SetRealInputDerivatives)                                                                     \
-    X(GetRealOutputDerivatives)                                                                    \
-    X(DoStep)                                                                                      \
-    X(CancelStep)                                                                                  \
-    X(GetStatus)                                                                                   \
-    X(GetRealStatus)                                                                               \
-    X(GetIntegerStatus)                                                                            \
-    X(GetBooleanStatus)                                                                            \
-    X(GetStringStatus)
-
-#define FMU_CODE(name) FMU_##name,
-enum fmu_function { FMU_FUNCTION_LIST(FMU_CODE) FMU_FUNCTION_COUNT };
+#define FMU_CODE(name, kinds, states) FMU_##name,
+enum fmu_function { FMI2_FUNCTION_LIST(FMU_CODE) FMU_FUNCTION_COUNT };
 #undef FMU_CODE
 
-#define FMU_POINTER(name) fmi2##name##TYPE *name;
+#define FMU_POINTER(name, kinds, states) fmi2##name##TYPE *name;
 struct fmu_functions {
-    FMU_FUNCTION_LIST(FMU_POINTER)
+    FMI2_FUNCTION_LIST(FMU_POINTER)
 };
 #undef FMU_POINTER
 

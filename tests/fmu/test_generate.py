@@ -266,7 +266,8 @@ def compile_table(folder: Path, model: str = "rp_manipulator") -> None:
             "src/model",
             "src/integrator",
             "src/instance",
-            "fmu",
+            "src/instance/state",
+            "fmu/component",
             "models",
             f"models/{model}",
         )

@@ -147,7 +147,6 @@ enum { CLOCKS = 7 }; /* the most of fuzz_any_count */
         static fmi3UInt64 counters[CLOCKS];                                                        \
         static fmi3UInt64 resolutions[CLOCKS];                                                     \
         static fmi3IntervalQualifier qualifiers[CLOCKS];                                           \
-        (void)active, (void)times, (void)counters, (void)resolutions, (void)qualifiers;            \
         require_refusal(FUZZ_FMI3_CHECKED(instance, name, clocks, count, __VA_ARGS__),             \
                         "fmi3" #name);                                                             \
         free(clocks);                                                                              \

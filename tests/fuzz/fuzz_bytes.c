@@ -21,7 +21,8 @@ void fuzz_serialize(struct fuzz_instance *instance, struct fuzz_bytes *bytes) {
     require(FUZZ_CHECKED(instance, FreeFMUstate, &state), instance, "fmi2FreeFMUstate");
 }
 
-/* src/instance/serialization.h: magic, version, lengths, GUID, fields of 8 bytes, FNV-1a of it. */
+/* src/instance/snapshot/serialization.h: magic, version, lengths, GUID, fields of 8 bytes, FNV-1a
+ * of it. */
 enum { BEFORE_GUID = 20, FIELD = 8 };
 
 static void write_number(fmi2Byte to[FIELD], uint64_t number) {

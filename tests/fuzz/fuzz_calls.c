@@ -99,8 +99,8 @@ STATUS_CALL(GetStringStatus, fmi2String)
 /* ---- The target ------------------------------------------------------------------------------ */
 
 /* A function of the standard that is missing here does not compile. */
-#define CALL_OF(name) [FMU_##name] = fuzz_call_##name,
-static fuzz_operation *const calls[] = {FMU_FUNCTION_LIST(CALL_OF)};
+#define CALL_OF(name, kinds, states) [FMU_##name] = fuzz_call_##name,
+static fuzz_operation *const calls[] = {FMI2_FUNCTION_LIST(CALL_OF)};
 
 void fuzz_target_run(struct fuzz_input *input) {
     fuzz_session_run(input, calls, FUZZ_COUNT(calls));

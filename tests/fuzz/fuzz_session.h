@@ -39,8 +39,8 @@ void fuzz_session_end(struct fuzz_session *session);
  * of values in fuzz_access.c, of modes in fuzz_modes.c, of states in fuzz_session.c. Those of one
  * version only are in its target: fuzz_calls.c, fuzz_calls_fmi3.c. */
 typedef void fuzz_operation(struct fuzz_session *session, struct fuzz_instance *instance);
-#define FUZZ_OPERATION(name) fuzz_operation fuzz_call_##name;
-FMU_FUNCTION_LIST(FUZZ_OPERATION)
+#define FUZZ_OPERATION(name, kinds, states) fuzz_operation fuzz_call_##name;
+FMI2_FUNCTION_LIST(FUZZ_OPERATION)
 #undef FUZZ_OPERATION
 
 /* A run of a target: these calls, and sequences of calls that lead further. */

@@ -96,8 +96,8 @@ static const struct bytes *base_bytes(fmi2Type kind, unsigned base) {
 
 /* ---- Mutations ------------------------------------------------------------------------------- */
 
-/* src/instance/serialization.h: magic, version, length and length of the GUID, the GUID, fields of
- * 8 bytes, hash */
+/* src/instance/snapshot/serialization.h: magic, version, length and length of the GUID, the GUID,
+ * fields of 8 bytes, hash */
 static const size_t fields_begin = 20 + sizeof RP_MANIPULATOR_GUID - 1;
 enum { LENGTH_AT = 12, HASH_SIZE = 8, FIELD_SIZE = 8 };
 
@@ -145,7 +145,7 @@ static void mutate(struct fuzz_input *input, fmi2Type kind, struct bytes *bytes)
     }
 }
 
-/* FNV-1a, as in src/instance/serialization.h. */
+/* FNV-1a, as in src/instance/snapshot/serialization.h. */
 static void repair_hash(struct bytes *bytes) {
     uint64_t hash = 0xcbf29ce484222325u;
     for (size_t i = 0; i + HASH_SIZE < bytes->size; i++) {

@@ -19,25 +19,17 @@ void tearDown(void) {
 }
 
 static enum status rhs(double t, const double x[], double dx[], void *context) {
-    (void)t;
-    (void)x;
-    (void)context;
     dx[0] = rate;
     return STATUS_OK;
 }
 
 static enum status jacobian(double t, const double x[], double J[], void *context) {
-    (void)t;
-    (void)x;
-    (void)context;
     J[0] = 0.0;
     return STATUS_OK;
 }
 
 static enum status series(double t, double time_scale, int first, int last,
                           double row[][SERIES_LENGTH], void *context) {
-    (void)t;
-    (void)context;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
             row[0][k] = k == 1 ? time_scale * rate : 0.0;
@@ -47,8 +39,6 @@ static enum status series(double t, double time_scale, int first, int last,
 }
 
 static enum status indicators(double t, const double x[], double z[], void *context) {
-    (void)t;
-    (void)context;
     z[0] = x[0];
     return STATUS_OK;
 }

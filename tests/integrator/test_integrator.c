@@ -25,9 +25,6 @@ static enum status circle_rhs(double t, const double x[], double dx[], void *con
 }
 
 static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
-    (void)t;
-    (void)x;
-    (void)context;
     static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
     memcpy(J, columns, sizeof columns);
     return STATUS_OK;
@@ -46,17 +43,12 @@ static enum status circle_series(double t, double time_scale, int first, int las
 }
 
 static enum status always_failing(double t, const double x[], double dx[], void *context) {
-    (void)t;
-    (void)context;
     memcpy(dx, x, 2 * sizeof(double));
     return STATUS_OUT_OF_RANGE;
 }
 
 static enum status series_always_failing(double t, double time_scale, int first, int last,
                                          double row[][SERIES_LENGTH], void *context) {
-    (void)t;
-    (void)time_scale;
-    (void)context;
     for (int k = first; k <= last; k++) {
         row[0][k] = 0.0;
         row[1][k] = 0.0;

@@ -11,16 +11,12 @@
 static double failing_from;
 
 static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
-    (void)context;
     dx[0] = x[1];
     dx[1] = t >= failing_from ? NAN : -x[0];
     return STATUS_OK;
 }
 
 static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
-    (void)t;
-    (void)x;
-    (void)context;
     static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
     memcpy(J, columns, sizeof columns);
     return STATUS_OK;
@@ -28,7 +24,6 @@ static enum status circle_jacobian(double t, const double x[], double J[], void 
 
 static enum status circle_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
-    (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         row[0][k] = time_scale / k * row[1][k - 1];
         row[1][k] = t >= failing_from ? NAN : -time_scale / k * row[0][k - 1];
@@ -40,8 +35,6 @@ static struct integrator *integrator;
 static unsigned message_count;
 
 static void count_message(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
     message_count += text[0] != '\0';
 }
 

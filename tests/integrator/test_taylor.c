@@ -11,7 +11,6 @@
 static double rate;
 
 static enum status linear_rhs(double t, const double x[], double dx[], void *context) {
-    (void)context;
     dx[0] = x[1];
     dx[1] = rate * x[0] + t * t * t;
     return STATUS_OK;
@@ -22,7 +21,6 @@ static enum status linear_series(double t, double time_scale, int first, int las
     // (t + s time_scale)^3
     const double push[4] = {t * t * t, 3.0 * t * t * time_scale, 3.0 * t * time_scale * time_scale,
                             time_scale * time_scale * time_scale};
-    (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         row[0][k] = time_scale / k * row[1][k - 1];
         row[1][k] = time_scale / k * (rate * row[0][k - 1] + (k <= 4 ? push[k - 1] : 0.0));
@@ -32,8 +30,6 @@ static enum status linear_series(double t, double time_scale, int first, int las
 
 /* x1' = x1^2, x2' = 0 */
 static enum status square_rhs(double t, const double x[], double dx[], void *context) {
-    (void)t;
-    (void)context;
     dx[0] = x[0] * x[0];
     dx[1] = 0.0;
     return STATUS_OK;
@@ -41,8 +37,6 @@ static enum status square_rhs(double t, const double x[], double dx[], void *con
 
 static enum status square_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
-    (void)t;
-    (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         double sum = 0.0;
         for (int i = 0; i < k; i++) {

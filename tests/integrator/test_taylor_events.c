@@ -21,8 +21,6 @@ void tearDown(void) {
 }
 
 static enum status rhs(double t, const double x[], double dx[], void *context) {
-    (void)t;
-    (void)context;
     dx[0] = x[1];
     dx[1] = -x[0];
     return STATUS_OK;
@@ -30,8 +28,6 @@ static enum status rhs(double t, const double x[], double dx[], void *context) {
 
 /* What is left of the energy that x^2 may have. */
 static enum status indicators(double t, const double x[], double z[], void *context) {
-    (void)t;
-    (void)context;
     indicator_calls++;
     z[0] = 0.5 - x[0] * x[0];
     return STATUS_OK;
@@ -39,8 +35,6 @@ static enum status indicators(double t, const double x[], double z[], void *cont
 
 static enum status series(double t, double time_scale, int first, int last,
                           double row[][SERIES_LENGTH], void *context) {
-    (void)t;
-    (void)context;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
             row[X][k] = time_scale / k * row[V][k - 1];
@@ -55,8 +49,6 @@ static enum status series(double t, double time_scale, int first, int last,
 }
 
 static void short_reach(const double x[], double reach[], void *context) {
-    (void)x;
-    (void)context;
     reach[0] = INFINITY;
     reach[1] = 0.01;
 }

@@ -9,7 +9,6 @@ static int power;
 static struct integrator *integrator;
 
 static enum status rhs(double t, const double x[], double dx[], void *context) {
-    (void)context;
     dx[0] = power * pow(t, power - 1) * x[0] * x[0];
     return STATUS_OK;
 }
@@ -35,7 +34,6 @@ enum row { X, SQUARE, FACTOR, ROWS };
 
 static enum status series(double t, double time_scale, int first, int last,
                           double row[][SERIES_LENGTH], void *context) {
-    (void)context;
     for (int k = first; k <= last; k++) {
         if (k > 0) {
             row[X][k] = time_scale / k * product(row[FACTOR], row[SQUARE], k - 1);

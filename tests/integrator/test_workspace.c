@@ -211,7 +211,6 @@ static void test_without_memory_the_workspace_is_empty(void) {
 /* ---- As the integrator has it --------------------------------------------------------------- */
 
 static enum status decay(double t, const double x[], double dx[], void *count) {
-    (void)t;
     for (size_t i = 0; i < *(const size_t *)count; i++) {
         dx[i] = -x[i];
     }
@@ -220,8 +219,6 @@ static enum status decay(double t, const double x[], double dx[], void *count) {
 
 static enum status decay_jacobian(double t, const double x[], double J[], void *count) {
     const size_t n = *(const size_t *)count;
-    (void)t;
-    (void)x;
     memset(J, 0, n * n * sizeof(double));
     for (size_t i = 0; i < n; i++) {
         J[i * n + i] = -1.0;
@@ -231,7 +228,6 @@ static enum status decay_jacobian(double t, const double x[], double J[], void *
 
 static enum status decay_series(double t, double time_scale, int first, int last,
                                 double row[][SERIES_LENGTH], void *count) {
-    (void)t;
     for (size_t i = 0; i < *(const size_t *)count; i++) {
         for (int k = first > 0 ? first : 1; k <= last; k++) {
             row[i][k] = -time_scale / k * row[i][k - 1];

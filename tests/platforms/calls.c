@@ -388,7 +388,7 @@ static const struct {
     const char *name;
     call_function *call;
 } all[] = {
-#define COMMAND(name) {#name, call_##name},
+#define COMMAND(name, kinds, states) {#name, call_##name},
     FMI2_FUNCTION_LIST(COMMAND)
 #undef COMMAND
         {"bytes", call_bytes},

@@ -57,7 +57,7 @@ static void run_job(void *item) {
 }
 
 static bool find_functions(void *library, struct fmi2_functions *fmi) {
-#define FIND(name)                                                                                 \
+#define FIND(name, kinds, states)                                                                  \
     if (!system_find(library, "fmi2" #name, &fmi->name)) {                                         \
         fprintf(stderr, "the library has no fmi2%s\n", #name);                                     \
         return false;                                                                              \

@@ -127,6 +127,7 @@ def host_of(row: Platform) -> Path:
     headers = Path(fmpy.origin).parent / "c-code"
     # -O3 and -s as for the release: zig has the C library for these options
     command += ["-std=c17", "-O3", "-s", "-isystem", str(headers), "-o", str(host)]
+    command += ["-I", str(ROOT / "fmu" / "fmi2")]  # fmi2_functions.h
     command += [str(sources / name) for name in HOST_SOURCES]
     if row.system == "Linux":
         command += ["-rdynamic", "-pthread", "-ldl"]  # -rdynamic: its malloc for the FMU

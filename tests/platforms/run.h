@@ -3,7 +3,7 @@
 #ifndef RUN_H
 #define RUN_H
 
-#include "fmi2_functions.h"
+#include "fmi2_pointers.h"
 
 #include <stdint.h>
 #include <stdio.h>

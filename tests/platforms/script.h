@@ -19,7 +19,7 @@
 #ifndef SCRIPT_H
 #define SCRIPT_H
 
-#include "fmi2_functions.h"
+#include "fmi2_pointers.h"
 
 #include <stdio.h>
 

@@ -1,6 +1,7 @@
 /* Every evaluation of the model fails in turn, once or from then on, by its status or by values
  * that are not finite. A step then ends at a correct state and can be undone. */
 #include "captured_stderr.h"
+#include "instance.h"
 #include "last_text.h"
 #include "oscillator_by_hand.h"
 #include "snapshot.h"

@@ -90,7 +90,7 @@ def test_seeds_and_joints_have_different_noise(sensor: Fmu) -> None:
 
 
 def integers(values: list[int]) -> bytes:
-    """As src/instance/codec.h writes ints."""
+    """As src/instance/snapshot/codec.h writes ints."""
     return struct.pack(f"<{len(values)}q", *values)
 
 

@@ -1,6 +1,7 @@
 /* The reference motions: geometry, continuity, what is refused, and a model without states. */
 #include "continuous_states.h"
 #include "derivatives.h"
+#include "instance.h"
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_manipulator.h"

@@ -2,6 +2,7 @@
 #ifndef ONE_INSTANCE_H
 #define ONE_INSTANCE_H
 
+#include "instance.h"
 #include "internals.h"
 #include "last_text.h"
 #include "stepping.h"

@@ -68,9 +68,7 @@ struct work {
 };
 
 static void ignore(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                   fmi2String category, fmi2String message, ...) {
-    (void)environment, (void)name, (void)status, (void)category, (void)message;
-}
+                   fmi2String category, fmi2String message, ...) {}
 
 static void *find(void *library, const char *name) {
     void *function = dlsym(library, name);

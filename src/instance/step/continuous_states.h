@@ -2,7 +2,7 @@
 #ifndef INSTANCE_CONTINUOUS_STATES_H
 #define INSTANCE_CONTINUOUS_STATES_H
 
-#include "instance.h"
+#include "instance_types.h"
 
 /* While the time is continuous only continuous inputs may be set. */
 MUST_CHECK NONNULL enum status instance_enter_continuous_time(struct instance *instance);

@@ -1,6 +1,5 @@
 #include "continuous_states.h"
 
-#include "active_values.h"
 #include "event_point.h"
 #include "fields.h"
 #include "model_modes.h"

@@ -33,13 +33,11 @@ find_as(const struct instance *instance, unsigned reference,
 /* ---- Derivatives with respect to time ------------------------------------------------------- */
 
 static bool is_continuous_input(const struct instance *instance, const struct variable *variable) {
-    (void)instance;
     return variable->causality == CAUSALITY_INPUT &&
            variable->variability == VARIABILITY_CONTINUOUS;
 }
 
 static bool is_output(const struct instance *instance, const struct variable *variable) {
-    (void)instance;
     return variable->causality == CAUSALITY_OUTPUT && variable->owner == VARIABLE_OF_MODEL;
 }
 
@@ -174,7 +172,6 @@ enum status instance_get_output_derivatives(struct instance *instance, const uns
 /* ---- Derivatives with respect to other variables -------------------------------------------- */
 
 static bool is_unknown(const struct instance *instance, const struct variable *variable) {
-    (void)instance;
     return (variable->owner == VARIABLE_OF_MODEL ||
             variable->variability == VARIABILITY_DISCRETE) &&
            (variable->causality == CAUSALITY_OUTPUT || variable->causality == CAUSALITY_LOCAL);

@@ -19,6 +19,10 @@ NONNULL void instance_note_event(struct instance *instance, struct clock_time en
 MUST_CHECK NONNULL enum status instance_pass_due_event(struct instance *instance,
                                                        struct event_counts *in_step);
 
+/* Nothing has changed since the end of the last step, and no input moved over that step: the modes
+ * already follow from the values set now. */
+NONNULL bool instance_is_unchanged(const struct instance *instance);
+
 /* The end of a step after an event: that of the step which the event cut short, if the importer
  * means the same time. Its own differences of times have rounding errors. */
 NONNULL struct clock_time instance_resumed_end(const struct instance *instance,

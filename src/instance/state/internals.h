@@ -4,7 +4,7 @@
 #define INSTANCE_INTERNALS_H
 
 #include "clock.h"
-#include "instance.h"
+#include "instance_types.h"
 #include "polynomial.h"
 
 /* Bounds of what the integrator can run at: below, rounding stops its error test from converging;

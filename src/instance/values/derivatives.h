@@ -3,7 +3,7 @@
 #ifndef INSTANCE_DERIVATIVES_H
 #define INSTANCE_DERIVATIVES_H
 
-#include "instance.h"
+#include "instance_types.h"
 
 /* Derivatives of inputs with respect to time, of orders 1 to 3, at the beginning of the next step:
  * over it the inputs are Taylor polynomials. They apply to that step only. All or nothing. */

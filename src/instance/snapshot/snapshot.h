@@ -9,7 +9,7 @@
 #ifndef SNAPSHOT_H
 #define SNAPSHOT_H
 
-#include "instance.h"
+#include "instance_types.h"
 
 struct instance_snapshot;
 

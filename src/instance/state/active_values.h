@@ -37,12 +37,4 @@ static inline bool instance_values_are_active(const struct instance *instance) {
     return instance_inputs_are_active(instance) && instance_parameters_are_active(instance);
 }
 
-/* Nothing has changed since the end of the last step, and no input moved over that step: the modes
- * already follow from the values set now. */
-static inline bool instance_is_unchanged(const struct instance *instance) {
-    return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
-           !polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)) &&
-           instance_values_are_active(instance);
-}
-
 #endif

@@ -1,6 +1,7 @@
 #include "history.h"
 
 #include "active_values.h"
+#include "event_point.h"
 #include "model_modes.h"
 #include "right_hand_side.h"
 

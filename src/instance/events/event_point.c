@@ -51,6 +51,12 @@ enum status instance_pass_due_event(struct instance *instance, struct event_coun
     return status;
 }
 
+bool instance_is_unchanged(const struct instance *instance) {
+    return (instance->state.has_history || instance->state.event_point != NO_EVENT) &&
+           !polynomials_move(instance->memory.active_inputs, count_of(instance->model->inputs)) &&
+           instance_values_are_active(instance);
+}
+
 struct clock_time instance_resumed_end(const struct instance *instance, struct clock_time end) {
     const struct instance_state *state = &instance->state;
     const double difference = clock_difference(end, state->cut_end);

@@ -6,15 +6,10 @@
 
 #include <math.h>
 
-/* What an array is made of, and which variables it is for. */
-enum array {
-    ARRAY_OF_DOUBLES,
-    ARRAY_OF_INTS,
-    ARRAY_OF_INT32,
-    ARRAY_OF_ENUMERATIONS,
-    ARRAY_OF_BOOLEANS, /* ints */
-    ARRAY_OF_BOOLS,
-};
+/* What the elements of an array are, and which variables it is for. */
+#define ARRAY_OF(name, constant, element) ARRAY_OF_##constant,
+enum array { VALUE_TYPE_LIST(ARRAY_OF) };
+#undef ARRAY_OF
 
 _Static_assert(sizeof(bool) == 1, "a bool is read as a byte");
 
@@ -22,32 +17,37 @@ _Static_assert(sizeof(bool) == 1, "a bool is read as a byte");
  * bool is read as a byte: one that is neither 0 nor 1 is refused, not undefined. */
 ALWAYS_INLINE double element(enum array array, const void *values, size_t i) {
     switch (array) {
-    case ARRAY_OF_DOUBLES:
+    case ARRAY_OF_REAL:
         return ((const double *)values)[i];
-    case ARRAY_OF_ENUMERATIONS:
+    case ARRAY_OF_ENUMERATION:
         return (double)((const int64_t *)values)[i];
-    case ARRAY_OF_BOOLS:
+    case ARRAY_OF_BOOL:
         return ((const unsigned char *)values)[i];
     default:
         return ((const int *)values)[i];
     }
 }
 
-/* The type that a variable must have; with ARRAY_OF_INTS either of the two that are kept as int. */
+/* The type that a variable must have; for ARRAY_OF_INTEGER either of the two. */
 ALWAYS_INLINE enum variable_type type_for(const struct instance *instance, enum array array,
                                           unsigned reference) {
-    if (array == ARRAY_OF_DOUBLES) {
+    const struct variable *variable;
+    switch (array) {
+    case ARRAY_OF_REAL:
         return VARIABLE_FLOAT64;
-    }
-    if (array == ARRAY_OF_INTS) {
-        const struct variable *variable = variable_find(instance->description, reference);
+    case ARRAY_OF_INT32:
+        return VARIABLE_INT32;
+    case ARRAY_OF_ENUMERATION:
+        return VARIABLE_ENUMERATION;
+    case ARRAY_OF_INTEGER:
+        variable = variable_find(instance->description, reference);
         return variable != NULL && variable->type == VARIABLE_ENUMERATION ? VARIABLE_ENUMERATION
                                                                           : VARIABLE_INT32;
+    case ARRAY_OF_BOOLEAN:
+    case ARRAY_OF_BOOL:
+        break;
     }
-    if (array == ARRAY_OF_BOOLEANS || array == ARRAY_OF_BOOLS) {
-        return VARIABLE_BOOLEAN;
-    }
-    return array == ARRAY_OF_INT32 ? VARIABLE_INT32 : VARIABLE_ENUMERATION;
+    return VARIABLE_BOOLEAN;
 }
 
 static inline bool is_settable(const struct instance *instance, const struct variable *variable) {
@@ -103,35 +103,12 @@ ALWAYS_INLINE enum status set(struct instance *instance, enum array array,
     return STATUS_OK;
 }
 
-enum status instance_set_real(struct instance *instance, const unsigned references[], size_t count,
-                              const double values[]) {
-    return set(instance, ARRAY_OF_DOUBLES, references, count, values);
-}
-
-enum status instance_set_integer(struct instance *instance, const unsigned references[],
-                                 size_t count, const int values[]) {
-    return set(instance, ARRAY_OF_INTS, references, count, values);
-}
-
-enum status instance_set_int32(struct instance *instance, const unsigned references[], size_t count,
-                               const int values[]) {
-    return set(instance, ARRAY_OF_INT32, references, count, values);
-}
-
-enum status instance_set_enumeration(struct instance *instance, const unsigned references[],
-                                     size_t count, const int64_t values[]) {
-    return set(instance, ARRAY_OF_ENUMERATIONS, references, count, values);
-}
-
-enum status instance_set_boolean(struct instance *instance, const unsigned references[],
-                                 size_t count, const int values[]) {
-    return set(instance, ARRAY_OF_BOOLEANS, references, count, values);
-}
-
-enum status instance_set_bool(struct instance *instance, const unsigned references[], size_t count,
-                              const bool values[]) {
-    return set(instance, ARRAY_OF_BOOLS, references, count, values);
-}
+#define INSTANCE_SET(name, constant, element)                                                      \
+    enum status instance_set_##name(struct instance *instance, const unsigned references[],        \
+                                    size_t count, const element values[]) {                        \
+        return set(instance, ARRAY_OF_##constant, references, count, values);                      \
+    }
+VALUE_TYPE_LIST(INSTANCE_SET)
 
 enum status instance_get_real(struct instance *instance, const unsigned references[], size_t count,
                               double values[]) {
@@ -182,44 +159,14 @@ static int read_int(struct instance *instance, unsigned reference) {
     return *(const int *)instance_field(instance, variable);
 }
 
-static enum status get_ints(struct instance *instance, enum array array,
-                            const unsigned references[], size_t count, int values[]) {
-    const enum status status = prepare_ints(instance, array, references, count);
-    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        values[i] = read_int(instance, references[i]);
+/* To a bool, the conversion of an int that is not 0 gives true. */
+#define INSTANCE_GET(name, constant, element)                                                      \
+    enum status instance_get_##name(struct instance *instance, const unsigned references[],        \
+                                    size_t count, element values[]) {                              \
+        const enum status status = prepare_ints(instance, ARRAY_OF_##constant, references, count); \
+        for (size_t i = 0; status == STATUS_OK && i < count; i++) {                                \
+            values[i] = read_int(instance, references[i]);                                         \
+        }                                                                                          \
+        return status;                                                                             \
     }
-    return status;
-}
-
-enum status instance_get_integer(struct instance *instance, const unsigned references[],
-                                 size_t count, int values[]) {
-    return get_ints(instance, ARRAY_OF_INTS, references, count, values);
-}
-
-enum status instance_get_int32(struct instance *instance, const unsigned references[], size_t count,
-                               int values[]) {
-    return get_ints(instance, ARRAY_OF_INT32, references, count, values);
-}
-
-enum status instance_get_enumeration(struct instance *instance, const unsigned references[],
-                                     size_t count, int64_t values[]) {
-    const enum status status = prepare_ints(instance, ARRAY_OF_ENUMERATIONS, references, count);
-    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        values[i] = read_int(instance, references[i]);
-    }
-    return status;
-}
-
-enum status instance_get_boolean(struct instance *instance, const unsigned references[],
-                                 size_t count, int values[]) {
-    return get_ints(instance, ARRAY_OF_BOOLEANS, references, count, values);
-}
-
-enum status instance_get_bool(struct instance *instance, const unsigned references[], size_t count,
-                              bool values[]) {
-    const enum status status = prepare_ints(instance, ARRAY_OF_BOOLS, references, count);
-    for (size_t i = 0; status == STATUS_OK && i < count; i++) {
-        values[i] = read_int(instance, references[i]) != 0;
-    }
-    return status;
-}
+INTEGER_TYPE_LIST(INSTANCE_GET)
