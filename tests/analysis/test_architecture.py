@@ -24,12 +24,13 @@ MAY_INCLUDE = {
     r"fmu": ("src/instance", "src/model"),
     r"fmu/fmi\d": ("fmu", "src/instance", "src/model"),
     r"models": ("src/model",),
-    r"models/\w+": ("models", "src/model"),
+    r"models/\w+(/equations)?": ("models", "src/model"),
 }
 # the equations of another model
 MAY_INCLUDE_MODEL = {
     "models/rp_controller": "models/rp_manipulator",
     "models/rp_plant": "models/rp_manipulator",
+    "models/rp_plant/equations": "models/rp_manipulator",
 }
 
 # libraries that hide headers; those of other folders are all public
@@ -95,7 +96,7 @@ def is_allowed(header: Path, folder: str, root: Path) -> bool:
     rules = [below for pattern, below in MAY_INCLUDE.items() if re.fullmatch(pattern, folder)]
     assert len(rules) == 1, f"{folder} has no place in the architecture"
     target = folder_of(header, root)
-    if target == folder or target == MAY_INCLUDE_MODEL.get(folder):
+    if target in (folder, f"{folder}/equations", MAY_INCLUDE_MODEL.get(folder)):
         return True
     return target in rules[0] and header.name in PUBLIC_HEADERS.get(target, {header.name})
 
@@ -188,6 +189,7 @@ def project(tmp_path: Path) -> Path:
         "src/instance/instance.h", "src/instance/internals.h", "fmu/component.h",
         "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/taylor.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
+        "models/rp_plant/rp_plant_model.h", "models/rp_plant/equations/rp_plant.h",
         "fmu/generate.py", "cosim/unit.py", "models/rp_plant/references/make.py",
     ):  # fmt: skip
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -211,7 +213,9 @@ def write(project: Path, name: str, text: str) -> None:
         ("fmu/component.c", "instance.h"),
         ("fmu/fmi2/fmi2.c", "fmi2Functions.h"),
         ("fmu/fmi3/fmi3.c", "component.h"),
-        ("models/rp_plant/rp_plant.c", "taylor.h"),
+        ("models/rp_plant/equations/rp_plant.c", "taylor.h"),
+        ("models/rp_plant/equations/rp_plant.c", "rp_manipulator.h"),
+        ("models/rp_plant/rp_plant_model.c", "rp_plant.h"),
         ("models/rp_controller/rp_controller.c", "rp_manipulator.h"),
     ],
 )
@@ -237,6 +241,7 @@ def test_what_may_be_included(project: Path, name: str, header: str) -> None:
         ("fmu/fmi2/fmi2.c", "fmi3_calls.h"),
         ("fmu/fmi2/fmi2.c", "fmi3Functions.h"),
         ("models/rp_plant/rp_plant.c", "instance.h"),
+        ("models/rp_plant/equations/rp_plant.c", "rp_plant_model.h"),
         ("models/rp_trajectory/rp_trajectory.c", "rp_manipulator.h"),
         ("models/rp_plant/rp_plant.c", "nowhere.h"),
     ],
