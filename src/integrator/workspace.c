@@ -122,6 +122,4 @@ void *workspace_realloc(void *memory, size_t size) {
     return taken;
 }
 
-void workspace_free(void *memory) {
-    (void)memory;
-}
+void workspace_free(void *memory) {}
