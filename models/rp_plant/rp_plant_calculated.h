@@ -4,6 +4,7 @@
 
 #include "rp_plant_loads.h"
 #include "rp_plant_model.h"
+#include "rp_plant_modes.h"
 #include "rp_plant_rest.h"
 
 /* What friction and stop of a joint exert, as in struct rp_plant_hold. */
@@ -111,10 +112,12 @@ EQUATION void write_loads(struct rp_plant_values *const to[TARGETS],
     WRITE(to, loads.tau2[2], loads->tau2.z);
 }
 
-/* From the parameters, inputs and states, in the given modes. */
+/* From the parameters, inputs and states, in the modes that hold. */
 EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
-                        const struct rp_plant_modes *modes,
                         struct rp_plant_values *const to[TARGETS]) {
+    struct rp_plant_modes modes_in_effect;
+    rp_plant_modes_in_effect(from[0], from[0]->q, from[0]->dq, &from[0]->inputs, &modes_in_effect);
+    const struct rp_plant_modes *modes = &modes_in_effect;
     const struct rp_plant_parameters *const p[SOURCES] = PARTS(from, parameters);
     const real q[2] = {READ(from, q[0]), READ(from, q[1])};
     const real dq[2] = {READ(from, dq[0]), READ(from, dq[1])};

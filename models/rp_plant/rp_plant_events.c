@@ -333,7 +333,6 @@ static enum status indicators(const void *values_pointer, double t, const double
     const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
     struct rp_plant_inputs inputs;
-    (void)t;
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);

@@ -1,11 +1,11 @@
 #include "rp_plant_model.h"
 
 #include "arithmetic_double.h"
+#include "calculated.h"
 #include "rp_plant_calculated.h"
 #include "rp_plant_check.h"
 #include "rp_plant_events.h"
 #include "rp_plant_modes.h"
-#include "rp_plant_propagation.h"
 #include "rp_plant_series.h"
 
 #include <string.h>
@@ -27,7 +27,6 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
                                    const double u[], double dx[]) {
     const struct rp_plant_values *values = values_pointer;
     struct rp_plant_inputs inputs;
-    (void)t;
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
@@ -46,7 +45,6 @@ static enum status jacobian(const void *values_pointer, double t, const double x
                             const double u[], double J[]) {
     const struct rp_plant_values *values = values_pointer;
     struct rp_plant_inputs inputs;
-    (void)t;
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
@@ -66,27 +64,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_plant_values *values = values_pointer;
-    const struct rp_plant_values *from = values;
-    (void)t;
-    struct rp_plant_modes modes;
-    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
-    calculate(&from, &modes, &values);
-    return STATUS_OK;
-}
-
-static enum status propagate(const void *values_pointer, double t, double dt, void *first,
-                             void *second) {
-    const struct rp_plant_values *values = values_pointer;
-    // no field depends on the time itself
-    (void)t;
-    (void)dt;
-    struct rp_plant_modes modes;
-    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
-    rp_plant_propagate(values, &modes, first, second);
-    return STATUS_OK;
-}
+DEFINE_OUTPUTS(struct rp_plant_values)
 
 const struct model rp_plant_model = {
     .values_size = sizeof(struct rp_plant_values),
@@ -99,7 +77,7 @@ const struct model rp_plant_model = {
     .jacobian = jacobian,
     .series = &rp_plant_series,
     .outputs = outputs,
-    .propagate = propagate,
+    .propagate = rp_plant_propagate,
     .check_parameters = rp_plant_check_parameters,
     .events = &rp_plant_events,
 };

@@ -46,6 +46,10 @@ struct rp_plant_values {
     double indicators[RP_PLANT_INDICATORS]; /* rad/s, m/s; N.m, N; rad, m; 1; 1: unused */
 };
 
+/* propagate of struct model. Derivatives are those of the equations in the modes that hold at the
+ * point, on the side of a closed stop or of the limit of its friction where it lies. */
+enum status rp_plant_propagate(const void *values, double t, double dt, void *first, void *second);
+
 extern const struct model rp_plant_model;
 
 #endif

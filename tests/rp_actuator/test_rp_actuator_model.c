@@ -1,7 +1,6 @@
 /* The drives as the instance sees them: the derivatives of their fields along curves, the
  * integrator's view with the Jacobian, what is refused. */
 #include "rp_actuator_model.h"
-#include "rp_actuator_propagation.h"
 #include "rp_test_support.h"
 
 #include <float.h>
@@ -107,13 +106,13 @@ static void test_calculated_fields_are_written_and_not_read(void) {
     for (int n = 0; n < 20 * SIDES; n++) {
         next_point(n % SIDES);
         union point clean_first = first, clean_second = second, straight = first;
-        rp_actuator_propagate(&at.v, &clean_first.v, &clean_second.v);
+        rp_actuator_propagate(&at.v, 0.0, 0.0, &clean_first.v, &clean_second.v);
         union point *const poisoned[] = {&at, &first, &second, &straight};
         for (int i = 0; i < 4; i++) {
             memset(&poisoned[i]->all[CALCULATED], 0xff, (DOUBLES - CALCULATED) * sizeof(double));
         }
-        rp_actuator_propagate(&at.v, &first.v, &second.v);
-        rp_actuator_propagate(&at.v, &straight.v, NULL);
+        rp_actuator_propagate(&at.v, 0.0, 0.0, &first.v, &second.v);
+        rp_actuator_propagate(&at.v, 0.0, 0.0, &straight.v, NULL);
         TEST_ASSERT_EQUAL_MEMORY(&clean_first, &first, sizeof first);
         TEST_ASSERT_EQUAL_MEMORY(&clean_second, &second, sizeof second);
         TEST_ASSERT_EQUAL_MEMORY(&clean_first, &straight, sizeof first);

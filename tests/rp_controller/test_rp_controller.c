@@ -5,7 +5,6 @@
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_controller_model.h"
-#include "rp_controller_propagation.h"
 #include "rp_test_support.h"
 #include "stepping.h"
 #include "value_references.h"
@@ -159,14 +158,14 @@ static void test_calculated_fields_are_written_and_not_read(void) {
         random_values(&second);
         values.parameters.mode = 1 + n % 3;
         struct rp_controller_values clean_first = first, clean_second = second, alone = first;
-        rp_controller_propagate(&values, &clean_first, &clean_second);
+        rp_controller_propagate(&values, 0.0, 0.0, &clean_first, &clean_second);
 
         const struct rp_controller_values *poisoned[] = {&values, &first, &second, &alone};
         for (int k = 0; k < 4; k++) {
             memset((char *)poisoned[k] + known, 0xff, calculated); // NaN
         }
-        rp_controller_propagate(&values, &first, &second);
-        rp_controller_propagate(&values, &alone, NULL);
+        rp_controller_propagate(&values, 0.0, 0.0, &first, &second);
+        rp_controller_propagate(&values, 0.0, 0.0, &alone, NULL);
         TEST_ASSERT_EQUAL_MEMORY(&clean_first, &first, sizeof first);
         TEST_ASSERT_EQUAL_MEMORY(&clean_second, &second, sizeof second);
         TEST_ASSERT_EQUAL_MEMORY(&clean_first, &alone, sizeof alone);
