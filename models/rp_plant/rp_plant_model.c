@@ -3,7 +3,6 @@
 #include "arithmetic_double.h"
 #include "calculated.h"
 #include "rp_plant_calculated.h"
-#include "rp_plant_check.h"
 #include "rp_plant_events.h"
 #include "rp_plant_modes.h"
 #include "rp_plant_series.h"

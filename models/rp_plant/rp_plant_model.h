@@ -50,6 +50,9 @@ struct rp_plant_values {
  * point, on the side of a closed stop or of the limit of its friction where it lies. */
 enum status rp_plant_propagate(const void *values, double t, double dt, void *first, void *second);
 
+/* check_parameters of struct model (rp_plant_check.c). */
+enum status rp_plant_check_parameters(const void *values, char *text, size_t size);
+
 extern const struct model rp_plant_model;
 
 #endif
