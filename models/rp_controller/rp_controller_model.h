@@ -7,7 +7,7 @@
 #include "rp_controller.h"
 
 enum rp_controller_form {
-    RP_CONTROLLER_UNDECIDED = 0, /* initialization goes on: the law acts continuously */
+    RP_CONTROLLER_UNDECIDED = 0, /* until initialization ends: the law acts continuously */
     RP_CONTROLLER_CONTINUOUS = 1,
     RP_CONTROLLER_SAMPLED = 2,
 };

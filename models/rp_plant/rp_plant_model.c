@@ -38,7 +38,7 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
     return STATUS_OK;
 }
 
-/* Parts by the state of a held joint are left out: it does not move, and an elimination that
+/* Derivatives by the state of a stuck joint are left out: it does not move, and an elimination that
  * exchanges rows would mix the rounding of the other joint into it. */
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
@@ -52,12 +52,12 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     for (size_t j = 0; j < 2; j++) {
         double *by_q = J + 4 * j;
         double *by_dq = J + 4 * (2 + j);
-        const bool is_held = modes.joint[j] == RP_PLANT_STUCK;
+        const bool is_stuck = modes.joint[j] == RP_PLANT_STUCK;
         for (size_t i = 0; i < 2; i++) {
             by_q[i] = 0.0;
-            by_q[2 + i] = is_held ? 0.0 : ddq_by.q[i][j];
+            by_q[2 + i] = is_stuck ? 0.0 : ddq_by.q[i][j];
             by_dq[i] = i == j ? 1.0 : 0.0;
-            by_dq[2 + i] = is_held ? 0.0 : ddq_by.dq[i][j];
+            by_dq[2 + i] = is_stuck ? 0.0 : ddq_by.dq[i][j];
         }
     }
     return STATUS_OK;

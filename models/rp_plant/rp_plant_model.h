@@ -46,7 +46,7 @@ struct rp_plant_values {
     double indicators[RP_PLANT_INDICATORS]; /* rad/s, m/s; N.m, N; rad, m; 1; 1: unused */
 };
 
-/* propagate of struct model. Derivatives are those of the equations in the modes that hold at the
+/* propagate of struct model. Derivatives are those of the equations in the modes in effect at the
  * point, on the side of a closed stop or of the limit of its friction where it lies. */
 enum status rp_plant_propagate(const void *values, double t, double dt, void *first, void *second);
 

@@ -16,7 +16,7 @@
  *
  *   (N + m2 a^2 w)' = E1 - g c1 (m1 lc1 + m2 L) + m2 g a s1
  *
- * What holds a stuck joint is the rest of its row of the equations, as in plant_motion. */
+ * The reaction of a stuck joint is the rest of its row of the equations, as in plant_motion. */
 #include "rp_plant_series.h"
 
 #include "arithmetic_double.h"
@@ -252,11 +252,11 @@ static enum status extend(const struct series_origin *origin, int first, int las
         begin_rows(&m, row);
     }
     // indicators of an order take what follows from it
-    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
-    const int end = is_held ? last + 1 : last;
+    const bool sticks = is_stuck(&m, 0) || is_stuck(&m, 1);
+    const int end = sticks ? last + 1 : last;
     for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
         const struct next next = next_order(&m, n, row);
-        if (is_held && n >= first) {
+        if (sticks && n >= first) {
             write_indicators(&m, n, &next, row);
         }
         if (n < last) {

@@ -192,8 +192,8 @@ struct piece {
     int count; /* points sampled */
 };
 
-/* To 2 count - 1 points: those sampled before move apart. */
-static enum status refine(struct location *location, struct piece *piece) {
+/* Samples between the points of the piece: 2 count - 1 points. */
+static enum status sample_between(struct location *location, struct piece *piece) {
     const int count = 2 * piece->count - 1;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         for (int k = piece->count - 1; k > 0; k--) {
@@ -266,7 +266,7 @@ static enum status search_model_in(struct location *location, double begin, doub
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
             i++;
         } else if (piece.count < CHEBYSHEV_LENGTH) {
-            status = refine(location, &piece);
+            status = sample_between(location, &piece);
         } else {
             status = search_model_in(location, begin, 0.5 * length, i);
             if (status == STATUS_OK) {

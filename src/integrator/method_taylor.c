@@ -5,8 +5,8 @@
  * the coefficients. Where the largest order is not enough, a step is as long as this order allows.
  * At its end the polynomial must fit the equations.
  *
- * Where a restart goes on along the solution, its first step has the largest order and all the
- * length that this allows. The requested times in it are values of one polynomial. */
+ * Where a restart continues the same solution, its first step has the largest order and is as
+ * long as this allows. The requested times in it are values of one polynomial. */
 #include "method.h"
 #include "taylor_series.h"
 #include "workspace.h"
