@@ -103,7 +103,6 @@ static double odd(double s) {
 }
 
 static double constant(double s) {
-    (void)s;
     return -0.1;
 }
 

@@ -18,8 +18,6 @@ void tearDown(void) {
 /* A spring of stiffness 1e300. Where it begins decides how the norm of the derivatives overflows.
  */
 static enum status spring_rhs(double t, const double x[], double dx[], void *context) {
-    (void)t;
-    (void)context;
     dx[0] = x[1];
     dx[1] = -1e300 * x[0];
     return STATUS_OK;
@@ -27,9 +25,6 @@ static enum status spring_rhs(double t, const double x[], double dx[], void *con
 
 static enum status spring_jacobian(double t, const double x[], double J[], void *context) {
     static const double columns[4] = {0.0, -1e300, 1.0, 0.0};
-    (void)t;
-    (void)x;
-    (void)context;
     memcpy(J, columns, sizeof columns);
     return STATUS_OK;
 }

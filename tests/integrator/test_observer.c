@@ -2,6 +2,7 @@
  * an advance. */
 #include "each_method.h"
 #include "integrator.h"
+#include "last_text.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,16 +12,12 @@
 static double failing_from;
 
 static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
-    (void)context;
     dx[0] = x[1];
     dx[1] = t >= failing_from ? NAN : -x[0];
     return STATUS_OK;
 }
 
 static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
-    (void)t;
-    (void)x;
-    (void)context;
     static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
     memcpy(J, columns, sizeof columns);
     return STATUS_OK;
@@ -28,7 +25,6 @@ static enum status circle_jacobian(double t, const double x[], double J[], void 
 
 static enum status circle_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
-    (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         row[0][k] = time_scale / k * row[1][k - 1];
         row[1][k] = t >= failing_from ? NAN : -time_scale / k * row[0][k - 1];
@@ -40,8 +36,6 @@ static struct integrator *integrator;
 static unsigned message_count;
 
 static void count_message(void *context, enum status status, const char *text) {
-    (void)context;
-    (void)status;
     message_count += text[0] != '\0';
 }
 
@@ -62,9 +56,9 @@ static void begin(const struct integrator_start *start_of, double max_step) {
                                                  .max_step = max_step};
     failing_from = INFINITY;
     message_count = 0;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, start_of));
+    ASSERT_OK(integrator_create(&ode, &sink, &integrator));
+    ASSERT_OK(integrator_configure(integrator, &settings));
+    ASSERT_OK(integrator_restart(integrator, start, start_of));
 }
 
 /* All methods need many internal steps for an advance of some seconds. */
@@ -121,7 +115,7 @@ EACH_METHOD static void test_each_step_is_seen_once(void) {
     begin_watching(0);
     for (int i = 0; i < STOPS; i++) {
         const unsigned before = seen.count;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(stops[i], 100000, &reached, x));
+        ASSERT_OK(advance(stops[i], 100000, &reached, x));
         for (unsigned k = before; k < seen.count; k++) {
             TEST_ASSERT_TRUE(seen.times[k] < stops[i]);
         }
@@ -149,7 +143,7 @@ EACH_METHOD static void test_watching_changes_nothing(void) {
             begin_watching(0);
         }
         for (int i = 0; i < STOPS; i++) {
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(stops[i], 100000, &reached, x[watched][i]));
+            ASSERT_OK(advance(stops[i], 100000, &reached, x[watched][i]));
         }
         integrator_get_statistics(integrator, &statistics[watched]);
     }
@@ -163,7 +157,7 @@ EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
     double x[2];
     double reached;
     begin_watching(7);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 100000, &reached, x));
+    ASSERT_OK(advance(9.0, 100000, &reached, x));
     TEST_ASSERT_EQUAL_UINT(7, seen.count);
     TEST_ASSERT_TRUE(reached == seen.times[6]);
     TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
@@ -173,7 +167,7 @@ EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
     TEST_ASSERT_TRUE(statistics.steps == 7);
 
     integrator_set_observer(integrator, NULL, NULL);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 100000, &reached, x));
+    ASSERT_OK(advance(9.0, 100000, &reached, x));
     TEST_ASSERT_TRUE(reached == 9.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e4 * tolerance, cos(9.0), x[0]);
     TEST_ASSERT_EQUAL_UINT(7, seen.count);
@@ -205,7 +199,7 @@ EACH_METHOD static void test_an_advance_that_would_fail_is_ended_before(void) {
     begin_again();
     failing_from = 2.0;
     begin_watching(all);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 1000, &reached, x));
+    ASSERT_OK(advance(9.0, 1000, &reached, x));
     TEST_ASSERT_TRUE(reached == seen.times[all - 1]);
     TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
 }
@@ -238,7 +232,7 @@ EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) 
     begin(&on, 0.0);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 0.5, x));
     TEST_ASSERT_TRUE(x[0] == -7.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, x));
+    ASSERT_OK(advance(1.0, 100000, &reached, x));
     const double next = 1.0 + 1e-6;
     if (!(integrator_longest_history((enum integrator_method)method, false) > 0)) {
         TEST_ASSERT_FALSE(integrator_interpolate(integrator, next, x));
@@ -247,8 +241,8 @@ EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) 
     TEST_ASSERT_TRUE(integrator_interpolate(integrator, next, x));
     tearDown();
     begin(&on, 0.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, expected));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(next, 100000, &reached, expected));
+    ASSERT_OK(advance(1.0, 100000, &reached, expected));
+    ASSERT_OK(advance(next, 100000, &reached, expected));
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 100.0, x));
 }

@@ -1,5 +1,6 @@
 /* Steps by Taylor series: which orders they take, how long they are, and where they end. */
 #include "integrator.h"
+#include "last_text.h"
 
 #include <math.h>
 #include <string.h>
@@ -11,7 +12,6 @@
 static double rate;
 
 static enum status linear_rhs(double t, const double x[], double dx[], void *context) {
-    (void)context;
     dx[0] = x[1];
     dx[1] = rate * x[0] + t * t * t;
     return STATUS_OK;
@@ -22,7 +22,6 @@ static enum status linear_series(double t, double time_scale, int first, int las
     // (t + s time_scale)^3
     const double push[4] = {t * t * t, 3.0 * t * t * time_scale, 3.0 * t * time_scale * time_scale,
                             time_scale * time_scale * time_scale};
-    (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         row[0][k] = time_scale / k * row[1][k - 1];
         row[1][k] = time_scale / k * (rate * row[0][k - 1] + (k <= 4 ? push[k - 1] : 0.0));
@@ -32,8 +31,6 @@ static enum status linear_series(double t, double time_scale, int first, int las
 
 /* x1' = x1^2, x2' = 0 */
 static enum status square_rhs(double t, const double x[], double dx[], void *context) {
-    (void)t;
-    (void)context;
     dx[0] = x[0] * x[0];
     dx[1] = 0.0;
     return STATUS_OK;
@@ -41,8 +38,6 @@ static enum status square_rhs(double t, const double x[], double dx[], void *con
 
 static enum status square_series(double t, double time_scale, int first, int last,
                                  double row[][SERIES_LENGTH], void *context) {
-    (void)t;
-    (void)context;
     for (int k = first > 0 ? first : 1; k <= last; k++) {
         double sum = 0.0;
         for (int i = 0; i < k; i++) {
@@ -68,8 +63,8 @@ static void create_at(ode_rhs *rhs, ode_series *series, double max_step, double 
                                                  .absolute_tolerances = absolute,
                                                  .max_step = max_step};
     integrator_destroy(integrator);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
+    ASSERT_OK(integrator_configure(integrator, &settings));
 }
 
 static void create(ode_rhs *rhs, ode_series *series, double max_step) {
@@ -79,12 +74,12 @@ static void create(ode_rhs *rhs, ode_series *series, double max_step) {
 static void restart(double x1, double x2, double horizon, bool continues) {
     const struct integrator_start start = {.horizon = horizon, .continues = continues};
     const double x[2] = {x1, x2};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, &start));
+    ASSERT_OK(integrator_restart(integrator, x, &start));
 }
 
 static void advance(double t, double x[2]) {
     double reached;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, x));
+    ASSERT_OK(integrator_advance(integrator, t, 1000, &reached, x));
     TEST_ASSERT_TRUE(reached == t);
 }
 

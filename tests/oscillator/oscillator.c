@@ -8,7 +8,6 @@
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct oscillator_values *values = values_pointer;
-    (void)t;
     dx[0] = x[1];
     dx[1] = -values->omega * values->omega * x[0] + values->gain * u[0];
     return STATUS_OK;
@@ -17,9 +16,6 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct oscillator_values *values = values_pointer;
-    (void)t;
-    (void)x;
-    (void)u;
     J[0] = 0.0;
     J[1] = -values->omega * values->omega;
     J[2] = 1.0;
@@ -48,7 +44,6 @@ static const struct series series = {.row_count = ROWS, .extend = extend};
 
 static enum status outputs(void *values_pointer, double t) {
     struct oscillator_values *values = values_pointer;
-    (void)t;
     const double stretch = values->omega * values->x;
     values->a = -values->omega * stretch + values->gain * values->u;
     values->energy = 0.5 * (values->v * values->v + stretch * stretch);
@@ -63,8 +58,6 @@ static enum status propagate(const void *values_pointer, double t, double dt, vo
     struct oscillator_values *d = first_pointer;
     struct oscillator_values *dd = second_pointer;
     const double omega2 = p->omega * p->omega;
-    (void)t;
-    (void)dt;
     d->a = -omega2 * d->x + p->gain * d->u;
     d->energy = p->v * d->v + omega2 * p->x * d->x;
     if (dd != NULL) {

@@ -135,7 +135,7 @@ static void test_a_speed_that_grows_leads_along_the_line_inside_a_step(void) {
 /* ---- Limits --------------------------------------------------------------------------------- */
 
 /* Largest effort at a velocity: n k i_max up to the corner, then on the line that falls to 0 at the
- * no-load speed u_max / (n k), and goes on below it. */
+ * no-load speed u_max / (n k), and continues below it. */
 static double torque_speed_line(double dq) {
     return nk * fmax(fmin(i_max, (u_max - nk * dq) / R), -i_max);
 }

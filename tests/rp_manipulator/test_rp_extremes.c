@@ -2,6 +2,7 @@
  * right or refused, never wrong. */
 #include "each_method.h"
 #include "instance.h"
+#include "last_text.h"
 #include "model_description.h"
 #include "stepping.h"
 #include "value_references.h"
@@ -15,7 +16,7 @@ static struct instance *instance;
 
 void setUp(void) {
     const struct message_sink quiet = {0};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_create(&model_description, &quiet, &instance));
+    ASSERT_OK(instance_create(&model_description, &quiet, &instance));
 }
 
 void tearDown(void) {
@@ -23,22 +24,22 @@ void tearDown(void) {
 }
 
 static void set(unsigned reference, double value) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_set_real(instance, &reference, 1, &value));
+    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
 }
 
 static double get(unsigned reference) {
     double value = NAN;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_get_real(instance, &reference, 1, &value));
+    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
     return value;
 }
 
 static void initialize(void) {
     const struct instance_experiment experiment = {.start_time = 0.0};
     const unsigned reference = RP_MANIPULATOR_solver_method;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_set_integer(instance, &reference, 1, &method));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_setup_experiment(instance, &experiment));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_enter_initialization(instance));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_exit_initialization(instance));
+    ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
+    ASSERT_OK(instance_setup_experiment(instance, &experiment));
+    ASSERT_OK(instance_enter_initialization(instance));
+    ASSERT_OK(instance_exit_initialization(instance));
 }
 
 /* The horizontal plane without offset: only link 2 moves, at constant velocity or acceleration. */

@@ -2,6 +2,7 @@
  *
  * Bounds: textbook() with all terms added up by their absolute values gives each coefficient and
  * each error of one a majorant, which epsilons are counted of. */
+#include "last_text.h"
 #include "rp_series.h"
 
 #include "jet.h"
@@ -56,7 +57,7 @@ static void extend(int first, int last) {
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
     TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_series.row_count);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_series.extend(&origin, first, last, row));
+    ASSERT_OK(rp_series.extend(&origin, first, last, row));
 }
 
 /* The series of the sample's motion, all orders. */

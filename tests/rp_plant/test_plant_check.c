@@ -1,4 +1,5 @@
 /* What is refused when initialization ends, with the values in one line. */
+#include "model_test.h"
 #include "plant_test_support.h"
 #include "unity.h"
 
@@ -15,16 +16,11 @@ void setUp(void) {
 }
 
 static void assert_accepted(void) {
-    char text[256] = "";
-    TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, rp_plant_model.check_parameters(&v, text, sizeof text),
-                                  text);
+    model_test_accepted(&rp_plant_model, &v);
 }
 
 static void assert_refused(const char *expected) {
-    char text[256] = "";
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_plant_model.check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING(expected, text);
+    model_test_refused(&rp_plant_model, &v, expected);
 }
 
 static void test_start_values_are_accepted(void) {
@@ -134,8 +130,7 @@ static void test_restitution(void) {
     v.parameters.restitution[0] = -0.25;
     assert_refused("restitution1 = -0.25 is refused: it must be within 0 and 1");
     v.parameters.restitution[0] = NAN;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_plant_model.check_parameters(&v, (char[256]){""}, 256));
+    assert_refused("restitution1 = nan is refused: it must be within 0 and 1");
 }
 
 static void test_items_of_the_enumerations(void) {
