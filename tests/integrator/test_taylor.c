@@ -1,10 +1,5 @@
 /* Steps by Taylor series: which orders they take, how long they are, and where they end. */
-#include "integrator.h"
-#include "last_text.h"
-
-#include <math.h>
-#include <string.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 /* ---- Equations ------------------------------------------------------------------------------ */
 
@@ -57,14 +52,9 @@ static const double usual_tolerance = 1e-10;
 static void create_at(ode_rhs *rhs, ode_series *series, double max_step, double tolerance) {
     const struct ode ode = {.state_count = 2, .rhs = rhs, .series = series, .series_row_count = 2};
     const struct message_sink quiet = {0};
-    const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
-    const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
-                                                 .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = absolute,
-                                                 .max_step = max_step};
     integrator_destroy(integrator);
     ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
-    ASSERT_OK(integrator_configure(integrator, &settings));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, tolerance, max_step);
 }
 
 static void create(ode_rhs *rhs, ode_series *series, double max_step) {

@@ -1,10 +1,6 @@
 /* Steps by Taylor series with events: indicators that are rows of the series, and states that may
  * move only so far within a step. An oscillator x' = v, v' = -x from x = 0, v = 1. */
-#include "integrator.h"
-#include "last_text.h"
-
-#include <math.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 enum row { X, V, LEFT, ROWS };
 
@@ -55,15 +51,12 @@ static void short_reach(const double x[], double reach[], void *context) {
 }
 
 static void start(const struct ode *ode) {
-    const double absolute[2] = {1e-14, 1e-14};
-    const struct integrator_settings settings = {
-        .method = INTEGRATOR_TAYLOR, .relative_tolerance = 1e-12, .absolute_tolerances = absolute};
     static const struct indicator of_model = {.kind = INDICATOR_OF_MODEL};
     const struct integrator_start from = {.horizon = INFINITY, .indicators = &of_model};
     const struct message_sink quiet = {0};
     const double x[2] = {0.0, 1.0};
     ASSERT_OK(integrator_create(ode, &quiet, &integrator));
-    ASSERT_OK(integrator_configure(integrator, &settings));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, 1e-12, 0.0);
     ASSERT_OK(integrator_restart(integrator, x, &from));
 }
 

@@ -1,10 +1,6 @@
 /* Steps by Taylor series in which orders are missing: x' = p t^(p-1) x^2 from x = 1 at t = 0, with
  * the solution 1 / (1 - t^p), which has the powers 0, p, 2 p, 3 p ... of time and none between. */
-#include "integrator.h"
-#include "last_text.h"
-
-#include <math.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 static int power;
 static struct integrator *integrator;
@@ -81,9 +77,6 @@ static enum status series_of_three(double t, double time_scale, int first, int l
 }
 
 static void test_orders_that_nearly_vanish(void) {
-    const double absolute[3] = {1e-12, 1e-12, 1e-12};
-    const struct integrator_settings settings = {
-        .method = INTEGRATOR_TAYLOR, .relative_tolerance = 1e-10, .absolute_tolerances = absolute};
     const struct ode ode = {
         .state_count = 3, .rhs = rhs_of_three, .series = series_of_three, .series_row_count = 3};
     const struct message_sink quiet = {0};
@@ -91,7 +84,7 @@ static void test_orders_that_nearly_vanish(void) {
     power = 5;
     integrator_destroy(integrator);
     ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
-    ASSERT_OK(integrator_configure(integrator, &settings));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, 1e-10, 0.0);
     for (int k = 0; k < 15; k++) {
         const double small = 1e-15 * (double)(1 << 2 * k); // to 3e-7
         const double begin[3] = {1.0, small, 0.0};
@@ -106,11 +99,7 @@ static void test_orders_that_nearly_vanish(void) {
 
 /* Steps towards the pole at 1; a start error grows with x^2. */
 static void assert_solution(double tolerance, bool continues) {
-    const double absolute = 1e-2 * tolerance;
-    const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
-                                                 .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = &absolute};
-    ASSERT_OK(integrator_configure(integrator, &settings));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, tolerance, 0.0);
     for (int i = 1; i < 10; i++) {
         const double begin = 1.0;
         const double t = 0.1 * i;
