@@ -34,7 +34,7 @@ static inline real scaled(double factor, real x) {
     return factor * x;
 }
 
-static inline real over(real x, real y) {
+static inline real quotient(real x, real y) {
     return x / y;
 }
 
@@ -48,7 +48,6 @@ static inline real cosine(real x) {
 
 /* The value of x with the derivatives of y, for two that are the same but for rounding. */
 static inline real moving_as(real x, real y) {
-    (void)y;
     return x;
 }
 

@@ -63,7 +63,7 @@ static inline real times(real x, real y) {
 }
 
 /* From x = quotient y, differentiated. */
-static inline real over(real x, real y) {
+static inline real quotient(real x, real y) {
     const double value = x.value / y.value;
     const real rest = minus(x, scaled(value, y));
     return (real){value,

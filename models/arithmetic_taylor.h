@@ -34,7 +34,7 @@ static inline real scaled(double factor, real x) {
     return taylor_scaled(factor, x);
 }
 
-static inline real over(real x, real y) {
+static inline real quotient(real x, real y) {
     return taylor_quotient(x, y);
 }
 

@@ -43,10 +43,10 @@ EQUATION real drive_limited_current(const struct rp_actuator_parameters *const p
     const real voltage_max = READ(p, voltage_max[i]);
     const real current_max = READ(p, current_max[i]);
     const real back_emf = drive_back_emf(p, inputs, i);
-    const real lowest = over(minus(negative(voltage_max), back_emf), resistance);
-    const real highest = over(minus(voltage_max, back_emf), resistance);
+    const real lowest = quotient(minus(negative(voltage_max), back_emf), resistance);
+    const real highest = quotient(minus(voltage_max, back_emf), resistance);
 
-    const real commanded = over(READ(inputs, effort_cmd[i]), drive_constant(p, i));
+    const real commanded = quotient(READ(inputs, effort_cmd[i]), drive_constant(p, i));
     const real possible = drive_clipped(commanded, lowest, highest);
     // last, so that it holds where both limits cannot
     return drive_clipped(possible, negative(current_max), current_max);
@@ -54,7 +54,7 @@ EQUATION real drive_limited_current(const struct rp_actuator_parameters *const p
 
 EQUATION real drive_current_rate(const struct rp_actuator_parameters *const p[SOURCES],
                                  real limited, real current, int i) {
-    return over(minus(limited, current), READ(p, time_constant[i]));
+    return quotient(minus(limited, current), READ(p, time_constant[i]));
 }
 
 #endif

@@ -1,8 +1,8 @@
 #include "rp_actuator_model.h"
 
 #include "arithmetic_double.h"
+#include "calculated.h"
 #include "rp_actuator_calculated.h"
-#include "rp_actuator_propagation.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -17,7 +17,6 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
                                    const double u[], double dx[]) {
     const struct rp_actuator_parameters *p =
         &((const struct rp_actuator_values *)values_pointer)->parameters;
-    (void)t;
     struct rp_actuator_inputs inputs;
     memcpy(&inputs, u, sizeof inputs);
     rp_actuator_current_rates(p, &inputs, x, dx);
@@ -28,9 +27,6 @@ static enum status jacobian(const void *values_pointer, double t, const double x
                             const double u[], double J[]) {
     const struct rp_actuator_parameters *p =
         &((const struct rp_actuator_values *)values_pointer)->parameters;
-    (void)t;
-    (void)x;
-    (void)u;
     // the limits do not depend on the currents
     J[0] = -1.0 / p->time_constant[0];
     J[1] = 0.0;
@@ -39,21 +35,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_actuator_values *values = values_pointer;
-    const struct rp_actuator_values *from = values;
-    (void)t;
-    calculate(&from, &values);
-    return STATUS_OK;
-}
-
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    // no field depends on the time itself
-    (void)t;
-    (void)dt;
-    rp_actuator_propagate(values, first, second);
-    return STATUS_OK;
-}
+DEFINE_OUTPUTS(struct rp_actuator_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const double *ratio =
@@ -79,6 +61,6 @@ const struct model rp_actuator_model = {
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = propagate,
+    .propagate = rp_actuator_propagate,
     .check_parameters = check_parameters,
 };

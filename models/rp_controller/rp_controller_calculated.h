@@ -12,7 +12,7 @@ EQUATION void calculate(const struct rp_controller_values *const from[SOURCES],
     const struct rp_controller_inputs *const inputs[SOURCES] = PARTS(from, inputs);
     for (int i = 0; i < 2; i++) {
         WRITE(to, error[i], law_error(inputs, i));
-        WRITE(to, derror[i], law_derror(inputs, i));
+        WRITE(to, derror[i], law_error_rate(inputs, i));
     }
     if (from[0]->form == RP_CONTROLLER_SAMPLED) {
         const struct rp_controller_command *command = &from[0]->samples.command;

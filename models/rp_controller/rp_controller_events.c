@@ -132,7 +132,6 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
     const struct rp_controller_values *values = values_pointer;
     const struct rp_controller_samples *samples = &values->samples;
     const bool is_sampled = values->parameters.sample_time > 0.0;
-    (void)is_held; // sample_time is fixed
     if (values->form != (is_sampled ? RP_CONTROLLER_SAMPLED : RP_CONTROLLER_CONTINUOUS)) {
         return false;
     }

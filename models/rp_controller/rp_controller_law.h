@@ -11,7 +11,7 @@ EQUATION real law_error(const struct rp_controller_inputs *const inputs[SOURCES]
     return minus(READ(inputs, q_ref[i]), READ(inputs, q[i]));
 }
 
-EQUATION real law_derror(const struct rp_controller_inputs *const inputs[SOURCES], int i) {
+EQUATION real law_error_rate(const struct rp_controller_inputs *const inputs[SOURCES], int i) {
     return minus(READ(inputs, dq_ref[i]), READ(inputs, dq[i]));
 }
 
@@ -20,7 +20,7 @@ EQUATION real law_correction(const struct rp_controller_parameters *const p[SOUR
                              const struct rp_controller_inputs *const inputs[SOURCES],
                              const real w[2], int i) {
     const real proportional = times(READ(p, Kp[i]), law_error(inputs, i));
-    const real damping = times(READ(p, Kd[i]), law_derror(inputs, i));
+    const real damping = times(READ(p, Kd[i]), law_error_rate(inputs, i));
     return plus(plus(proportional, damping), w[i]);
 }
 
@@ -85,7 +85,7 @@ EQUATION real law_integral_rate(const struct rp_controller_parameters *const p[S
     }
     const real excess = minus(unlimited, law_limited(p, unlimited, i));
     const real followed = times(READ(p, inertia[i]), READ(p, tracking_time));
-    return minus(times(Ki, law_error(inputs, i)), over(excess, followed));
+    return minus(times(Ki, law_error(inputs, i)), quotient(excess, followed));
 }
 
 #endif

@@ -1,9 +1,9 @@
 #include "rp_controller_model.h"
 
 #include "arithmetic_double.h"
+#include "calculated.h"
 #include "rp_controller_calculated.h"
 #include "rp_controller_events.h"
-#include "rp_controller_propagation.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -17,7 +17,6 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
                                    const double u[], double dx[]) {
     const struct rp_controller_values *values = values_pointer;
     const struct rp_controller_parameters *p = &values->parameters;
-    (void)t;
     if (values->form == RP_CONTROLLER_SAMPLED) {
         dx[0] = dx[1] = 0.0;
         return STATUS_OK;
@@ -34,7 +33,6 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct rp_controller_values *values = values_pointer;
-    (void)t;
     double by_w[2][2] = {{0.0}};
     if (values->form != RP_CONTROLLER_SAMPLED) {
         struct rp_controller_inputs inputs;
@@ -49,21 +47,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_controller_values *values = values_pointer;
-    const struct rp_controller_values *from = values;
-    (void)t;
-    calculate(&from, &values);
-    return STATUS_OK;
-}
-
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    // no field depends on the time itself
-    (void)t;
-    (void)dt;
-    rp_controller_propagate(values, first, second);
-    return STATUS_OK;
-}
+DEFINE_OUTPUTS(struct rp_controller_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_controller_parameters *p =
@@ -102,7 +86,7 @@ const struct model rp_controller_model = {
     .right_hand_side = right_hand_side,
     .jacobian = jacobian,
     .outputs = outputs,
-    .propagate = propagate,
+    .propagate = rp_controller_propagate,
     .check_parameters = check_parameters,
     .events = &rp_controller_events,
 };

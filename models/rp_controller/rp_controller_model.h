@@ -7,7 +7,7 @@
 #include "rp_controller.h"
 
 enum rp_controller_form {
-    RP_CONTROLLER_UNDECIDED = 0, /* initialization goes on: the law acts continuously */
+    RP_CONTROLLER_UNDECIDED = 0, /* until initialization ends: the law acts continuously */
     RP_CONTROLLER_CONTINUOUS = 1,
     RP_CONTROLLER_SAMPLED = 2,
 };
@@ -45,6 +45,12 @@ struct rp_controller_values {
     double error[2];     /* rad, m */
     double derror[2];    /* rad/s, m/s */
 };
+
+/* propagate of struct model. An effort is taken as free strictly within its limits; at and beyond
+ * them it is the limit, which moves only with tau1_max and f2_max. Where it just meets its limit,
+ * derivatives are one-sided. */
+enum status rp_controller_propagate(const void *values, double t, double dt, void *first,
+                                    void *second);
 
 extern const struct model rp_controller_model;
 

@@ -1,8 +1,8 @@
 #include "rp_environment_model.h"
 
 #include "arithmetic_double.h"
+#include "calculated.h"
 #include "rp_environment_equations.h"
-#include "rp_environment_propagation.h"
 
 #include <stdbool.h>
 #include <stdio.h>
@@ -12,30 +12,10 @@ _Static_assert(sizeof(struct rp_environment_inputs) == sizeof(double[6]),
 
 static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
                                    double dx[]) {
-    // there is no state
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)dx;
-    return STATUS_OK;
+    return STATUS_OK; // there is no state
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_environment_values *values = values_pointer;
-    const struct rp_environment_values *from = values;
-    (void)t;
-    calculate(&from, &values);
-    return STATUS_OK;
-}
-
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    // no field depends on the time itself
-    (void)t;
-    (void)dt;
-    rp_environment_propagate(values, first, second);
-    return STATUS_OK;
-}
+DEFINE_OUTPUTS(struct rp_environment_values)
 
 /* A parameter with the range that it has to be in. */
 struct checked {
@@ -71,6 +51,6 @@ const struct model rp_environment_model = {
                sizeof(struct rp_environment_inputs)},
     .right_hand_side = right_hand_side,
     .outputs = outputs,
-    .propagate = propagate,
+    .propagate = rp_environment_propagate,
     .check_parameters = check_parameters,
 };

@@ -36,6 +36,11 @@ struct rp_environment_values {
     double force;       /* N, >= 0, along the outward normal */
 };
 
+/* propagate of struct model. Where the force sets in or ends, derivatives are those of the side
+ * without force, all 0. */
+enum status rp_environment_propagate(const void *values, double t, double dt, void *first,
+                                     void *second);
+
 extern const struct model rp_environment_model;
 
 #endif

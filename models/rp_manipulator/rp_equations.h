@@ -170,9 +170,9 @@ EQUATION void arm_forward_dynamics(const struct arm *arm, const real tau[2], rea
     const real efforts = plus(tau[0], times(arm->a, tau[1]));
     const real velocities = times(times(m2L, dq1), minus(times(arm->a, dq1), scaled(2.0, dq2)));
     const real weight = times(times(arm->g, arm->c1), plus(times(arm->m1, arm->lc1), m2L));
-    ddq[0] = over(minus(plus(efforts, velocities), weight), arm->J);
+    ddq[0] = quotient(minus(plus(efforts, velocities), weight), arm->J);
 
-    const real push = over(tau[1], arm->m2);
+    const real push = quotient(tau[1], arm->m2);
     const real centrifugal = times(times(arm->L, dq1), dq1);
     const real fall = times(arm->g, arm->s1);
     ddq[1] = plus(minus(plus(push, centrifugal), fall), times(arm->a, ddq[0]));

@@ -1,8 +1,8 @@
 #include "rp_model.h"
 
 #include "arithmetic_double.h"
+#include "calculated.h"
 #include "rp_calculated.h"
-#include "rp_propagation.h"
 #include "rp_series.h"
 
 #include <stdio.h>
@@ -10,7 +10,6 @@
 static enum status right_hand_side(const void *values_pointer, double t, const double x[],
                                    const double u[], double dx[]) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
-    (void)t;
     const struct arm arm = arm_in_state(&p, x, x + 2);
     dx[0] = x[2];
     dx[1] = x[3];
@@ -22,7 +21,6 @@ static enum status jacobian(const void *values_pointer, double t, const double x
                             const double u[], double J[]) {
     const struct rp_values *values = values_pointer;
     struct rp_dynamics_jacobians ddq_by;
-    (void)t;
     rp_dynamics_jacobians(&values->parameters, x, x + 2, u, &ddq_by);
     for (size_t j = 0; j < 2; j++) {
         double *by_q = J + 4 * j;
@@ -37,21 +35,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_values *values = values_pointer;
-    const struct rp_values *from = values;
-    (void)t;
-    calculate(&from, &values);
-    return STATUS_OK;
-}
-
-static enum status propagate(const void *values, double t, double dt, void *first, void *second) {
-    // no field depends on the time itself
-    (void)t;
-    (void)dt;
-    rp_propagate(values, first, second);
-    return STATUS_OK;
-}
+DEFINE_OUTPUTS(struct rp_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;
@@ -75,7 +59,7 @@ const struct model rp_model = {
     .jacobian = jacobian,
     .series = &rp_series,
     .outputs = outputs,
-    .propagate = propagate,
+    .propagate = rp_propagate,
     .check_parameters = check_parameters,
 };
 

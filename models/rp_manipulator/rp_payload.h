@@ -20,7 +20,7 @@ struct payload {
  * in dynamics and energies. offset (m): the center of mass of both, from that of link 2. */
 EQUATION void arm_attach(struct arm *arm, const struct payload *payload, real offset[2]) {
     const real mass = plus(arm->m2, payload->mass);
-    const real share = over(payload->mass, mass);
+    const real share = quotient(payload->mass, mass);
     const real distance2 = plus(times(payload->x, payload->x), times(payload->z, payload->z));
     offset[0] = times(share, payload->x);
     offset[1] = times(share, payload->z);

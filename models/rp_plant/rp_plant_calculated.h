@@ -4,6 +4,7 @@
 
 #include "rp_plant_loads.h"
 #include "rp_plant_model.h"
+#include "rp_plant_modes.h"
 #include "rp_plant_rest.h"
 
 /* What friction and stop of a joint exert, as in struct rp_plant_hold. */
@@ -21,9 +22,9 @@ EQUATION struct plant_hold plant_hold(const struct rp_plant_parameters *const p[
     }
     const real breakaway = plant_breakaway(p, i);
     const int closed = plant_closed_stop(p, i, q);
-    const struct rp_plant_hold held =
+    const struct rp_plant_hold hold =
         rp_plant_hold(value_of(reaction), value_of(breakaway), closed);
-    if (held.stop == 0.0) {
+    if (hold.stop == 0.0) {
         return (struct plant_hold){reaction, compliant};
     }
     const real friction = scaled(-closed, breakaway);
@@ -111,10 +112,12 @@ EQUATION void write_loads(struct rp_plant_values *const to[TARGETS],
     WRITE(to, loads.tau2[2], loads->tau2.z);
 }
 
-/* From the parameters, inputs and states, in the given modes. */
+/* From the parameters, inputs and states, in the modes in effect. */
 EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
-                        const struct rp_plant_modes *modes,
                         struct rp_plant_values *const to[TARGETS]) {
+    struct rp_plant_modes modes_in_effect;
+    rp_plant_modes_in_effect(from[0], from[0]->q, from[0]->dq, &from[0]->inputs, &modes_in_effect);
+    const struct rp_plant_modes *modes = &modes_in_effect;
     const struct rp_plant_parameters *const p[SOURCES] = PARTS(from, parameters);
     const real q[2] = {READ(from, q[0]), READ(from, q[1])};
     const real dq[2] = {READ(from, dq[0]), READ(from, dq[1])};
@@ -141,8 +144,8 @@ EQUATION void calculate(const struct rp_plant_values *const from[SOURCES],
         const struct plant_hold hold = plant_hold(p, modes, i, q[i], dq[i], reaction[i]);
         const real damped = times(READ(p, damping[i]), dq[i]);
         const real accelerated = times(READ(p, armature[i]), ddq[i]);
-        const real held = minus(hold.friction, hold.stop);
-        driven[i] = minus(minus(minus(tau[i], damped), held), accelerated);
+        const real resisted = minus(hold.friction, hold.stop);
+        driven[i] = minus(minus(minus(tau[i], damped), resisted), accelerated);
         power = plus(power, times(plus(hold.friction, damped), dq[i]));
         WRITE(to, friction[i], hold.friction);
         WRITE(to, stop_force[i], hold.stop);

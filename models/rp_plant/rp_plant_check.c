@@ -1,5 +1,4 @@
-#include "rp_plant_check.h"
-
+/* Which parameters and start values the plant refuses. */
 #include "rp_plant_model.h"
 
 #include <math.h>

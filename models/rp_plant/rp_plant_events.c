@@ -14,7 +14,7 @@
 
 enum { SLIP_FORWARD, SLIP_BACKWARD, LOWER, UPPER, PUSH }; /* the indicators of a joint */
 
-/* What has triggered, by the modes that held until now. */
+/* What has triggered, by the modes until now. */
 struct triggered {
     bool halted[2]; /* a sliding joint has come to rest */
     int leaves[2];  /* the direction in which a stuck joint breaks away, else 0 */
@@ -186,8 +186,8 @@ bool rp_plant_modes_exist(const struct rp_plant_modes *modes) {
            contact[1] >= -RP_PLANT_LET_GO && contact[1] <= RP_PLANT_LET_GO;
 }
 
-/* A joint slides only where there is friction, and is free only where there is none; one that is
- * held stands still, by friction or on a stop. Contacts follow from the state. */
+/* A joint with friction slides and one without is free, unless it sticks: then it is at rest, with
+ * friction or on a stop. Contacts follow from the state. */
 static bool fits(const struct rp_plant_values *values, int joint) {
     const struct rp_plant_parameters *p = &values->parameters;
     const bool has_friction = rp_plant_breakaway(p, joint) > 0.0;
@@ -248,9 +248,8 @@ static enum status update(void *values_pointer, const struct event *event) {
 static bool are_possible(const void *values_pointer) {
     const struct rp_plant_parameters *p =
         &((const struct rp_plant_values *)values_pointer)->parameters;
-    return rp_plant_can_be_held(p, 0) || rp_plant_can_be_held(p, 1) ||
-           rp_plant_has_contacts(p, 0) || rp_plant_has_contacts(p, 1) || p->payload_mass > 0.0 ||
-           p->payload_inertia > 0.0;
+    return rp_plant_can_stick(p, 0) || rp_plant_can_stick(p, 1) || rp_plant_has_contacts(p, 0) ||
+           rp_plant_has_contacts(p, 1) || p->payload_mass > 0.0 || p->payload_inertia > 0.0;
 }
 
 static bool is_at_rest(const void *values_pointer) {
@@ -333,7 +332,6 @@ static enum status indicators(const void *values_pointer, double t, const double
     const struct rp_plant_values *values = values_pointer;
     const struct rp_plant_parameters *p = &values->parameters;
     struct rp_plant_inputs inputs;
-    (void)t;
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);

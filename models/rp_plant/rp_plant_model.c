@@ -1,11 +1,10 @@
 #include "rp_plant_model.h"
 
 #include "arithmetic_double.h"
+#include "calculated.h"
 #include "rp_plant_calculated.h"
-#include "rp_plant_check.h"
 #include "rp_plant_events.h"
 #include "rp_plant_modes.h"
-#include "rp_plant_propagation.h"
 #include "rp_plant_series.h"
 
 #include <string.h>
@@ -27,7 +26,6 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
                                    const double u[], double dx[]) {
     const struct rp_plant_values *values = values_pointer;
     struct rp_plant_inputs inputs;
-    (void)t;
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
@@ -40,13 +38,12 @@ static enum status right_hand_side(const void *values_pointer, double t, const d
     return STATUS_OK;
 }
 
-/* Parts by the state of a held joint are left out: it does not move, and an elimination that
+/* Derivatives by the state of a stuck joint are left out: it does not move, and an elimination that
  * exchanges rows would mix the rounding of the other joint into it. */
 static enum status jacobian(const void *values_pointer, double t, const double x[],
                             const double u[], double J[]) {
     const struct rp_plant_values *values = values_pointer;
     struct rp_plant_inputs inputs;
-    (void)t;
     memcpy(&inputs, u, sizeof inputs);
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(values, x, x + 2, &inputs, &modes);
@@ -55,38 +52,18 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     for (size_t j = 0; j < 2; j++) {
         double *by_q = J + 4 * j;
         double *by_dq = J + 4 * (2 + j);
-        const bool is_held = modes.joint[j] == RP_PLANT_STUCK;
+        const bool is_stuck = modes.joint[j] == RP_PLANT_STUCK;
         for (size_t i = 0; i < 2; i++) {
             by_q[i] = 0.0;
-            by_q[2 + i] = is_held ? 0.0 : ddq_by.q[i][j];
+            by_q[2 + i] = is_stuck ? 0.0 : ddq_by.q[i][j];
             by_dq[i] = i == j ? 1.0 : 0.0;
-            by_dq[2 + i] = is_held ? 0.0 : ddq_by.dq[i][j];
+            by_dq[2 + i] = is_stuck ? 0.0 : ddq_by.dq[i][j];
         }
     }
     return STATUS_OK;
 }
 
-static enum status outputs(void *values_pointer, double t) {
-    struct rp_plant_values *values = values_pointer;
-    const struct rp_plant_values *from = values;
-    (void)t;
-    struct rp_plant_modes modes;
-    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
-    calculate(&from, &modes, &values);
-    return STATUS_OK;
-}
-
-static enum status propagate(const void *values_pointer, double t, double dt, void *first,
-                             void *second) {
-    const struct rp_plant_values *values = values_pointer;
-    // no field depends on the time itself
-    (void)t;
-    (void)dt;
-    struct rp_plant_modes modes;
-    rp_plant_modes_in_effect(values, values->q, values->dq, &values->inputs, &modes);
-    rp_plant_propagate(values, &modes, first, second);
-    return STATUS_OK;
-}
+DEFINE_OUTPUTS(struct rp_plant_values)
 
 const struct model rp_plant_model = {
     .values_size = sizeof(struct rp_plant_values),
@@ -99,7 +76,7 @@ const struct model rp_plant_model = {
     .jacobian = jacobian,
     .series = &rp_plant_series,
     .outputs = outputs,
-    .propagate = propagate,
+    .propagate = rp_plant_propagate,
     .check_parameters = rp_plant_check_parameters,
     .events = &rp_plant_events,
 };

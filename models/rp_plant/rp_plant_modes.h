@@ -13,8 +13,8 @@ struct rp_plant_decision {
     struct rp_plant_outcome outcome;
 };
 
-/* Whether anything can hold a joint: dry friction or rigid stops. */
-static inline bool rp_plant_can_be_held(const struct rp_plant_parameters *p, int joint) {
+/* Whether a joint can stick: by dry friction or on a rigid stop. */
+static inline bool rp_plant_can_stick(const struct rp_plant_parameters *p, int joint) {
     return p->coulomb_friction[joint] > 0.0 || p->breakaway_friction[joint] > 0.0 ||
            p->stops[joint] == RP_PLANT_STOPS_RIGID;
 }
@@ -43,7 +43,7 @@ void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], con
  * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
  * go to that side, and without friction, since that does not change at breakaway. A joint whose
  * indicator has triggered (leaves: 1 forward, -1 backward, otherwise 0) leaves unless the rate
- * points back; otherwise it would fire again. */
+ * points back; otherwise it would trigger again. */
 void rp_plant_break_away(struct rp_plant_values *values, const struct event *event,
                          const struct rp_plant_decision *decision, const int leaves[2]);
 
@@ -52,7 +52,7 @@ void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2
                           const double dq[2], const struct rp_plant_inputs *inputs,
                           struct rp_plant_modes *modes);
 
-/* Writes the modes that hold: those of the last event, or during initialization, when none has
+/* Writes the modes in effect: those of the last event, or during initialization, when none has
  * been, the first ones. Inline, as each evaluation asks for them; a modified copy that is returned
  * stalls the processor, which cannot load parts together that were stored apart. */
 static inline void rp_plant_modes_in_effect(const struct rp_plant_values *values, const double q[2],
@@ -68,7 +68,7 @@ static inline void rp_plant_modes_in_effect(const struct rp_plant_values *values
         if (!rp_plant_has_contacts(&values->parameters, i)) {
             modes->contact[i] = RP_PLANT_APART;
         }
-        if (!rp_plant_can_be_held(&values->parameters, i)) {
+        if (!rp_plant_can_stick(&values->parameters, i)) {
             modes->joint[i] = RP_PLANT_FREE;
         }
     }

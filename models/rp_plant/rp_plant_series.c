@@ -16,7 +16,7 @@
  *
  *   (N + m2 a^2 w)' = E1 - g c1 (m1 lc1 + m2 L) + m2 g a s1
  *
- * What holds a stuck joint is the rest of its row of the equations, as in plant_motion. */
+ * The reaction of a stuck joint is the rest of its row of the equations, as in plant_motion. */
 #include "rp_plant_series.h"
 
 #include "arithmetic_double.h"
@@ -24,57 +24,17 @@
 #include "platform.h"
 #include "rp_plant_equations.h"
 #include "rp_plant_modes.h"
+#include "rp_plant_series_efforts.h"
 #include "rp_series.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-/* Inputs: tau1, f2, and the wrench. */
-enum { FX = 2, FY, MZ };
-
-/* Those of the manipulator come first. Pairs: of joint 1 and of joint 2. */
-enum row {
-    Q1,
-    Q2,
-    W,
-    V,
-    L,
-    P,
-    S,
-    C,
-    X, // end effector, where there is a wrench
-    Y,
-    RATIO,                     // r = q' / vs of a sliding joint whose friction depends on it
-    RATE = RATIO + 2,          // k r_k
-    EXPONENTIAL = RATE + 2,    // e = exp(-r^2)
-    RATIO_E = EXPONENTIAL + 2, // r e
-    FORWARD = RATIO_E + 2,     // indicators of a stuck joint
-    BACKWARD = FORWARD + 2,
-    DEPTH = BACKWARD + 2, // penetration of a compliant stop
-    ROWS = DEPTH + 2
-};
 
 _Static_assert(X == (int)RP_SERIES_ROWS, "the rows of the manipulator come first");
 
 /* Where q' is so many times vs, friction is that of a fast joint: exp(-36) of the difference is
  * left. */
 static const double fast = 6.0;
-
-/* What all orders share. */
-struct motion {
-    const struct series_origin *origin;
-    const struct rp_plant_parameters *p;
-    struct rp_plant_modes modes;
-    bool has_wrench;
-    double direction[2];         /* of a joint that slides: 1 or -1; else 0 */
-    bool depends_on_velocity[2]; /* friction of the joint, where it slides */
-    double per_vs[2];
-    double m2, a, g, m1_lc1; /* m2, a: of link 2 with payload */
-    double L0;
-    double offset_z; /* m: of the payload */
-    double mu, a_mu_b2;
-    double per_m2, per_inertia; /* 1 over what stands before w_k */
-};
 
 /* ---- Constants ------------------------------------------------------------------------------ */
 
@@ -89,7 +49,7 @@ static bool has_wrench(const struct series_origin *origin) {
     return false;
 }
 
-static bool is_stuck(const struct motion *m, int joint) {
+static bool is_stuck(const struct series_motion *m, int joint) {
     return m->modes.joint[joint] == RP_PLANT_STUCK;
 }
 
@@ -97,13 +57,13 @@ static bool has_breakaway(const struct rp_plant_parameters *p, int joint) {
     return p->breakaway_friction[joint] > p->coulomb_friction[joint];
 }
 
-static bool has_payload(const struct motion *m) {
+static bool has_payload(const struct series_motion *m) {
     return m->modes.payload == RP_PLANT_ATTACHED &&
            (m->p->payload_mass > 0.0 || m->p->payload_inertia > 0.0);
 }
 
 /* The motion is that of the manipulator. */
-static bool is_plain(const struct motion *m) {
+static bool is_plain(const struct series_motion *m) {
     const struct rp_plant_parameters *p = m->p;
     return m->modes.joint[0] == RP_PLANT_FREE && m->modes.joint[1] == RP_PLANT_FREE &&
            m->modes.contact[0] == RP_PLANT_APART && m->modes.contact[1] == RP_PLANT_APART &&
@@ -112,7 +72,7 @@ static bool is_plain(const struct motion *m) {
 }
 
 /* The bodies at this q2. */
-static void set_bodies(struct motion *m, double q2) {
+static void set_bodies(struct series_motion *m, double q2) {
     const struct rp_plant_parameters *p = m->p;
     const struct rp_parameters *arm = &p->arm;
     struct plant plant = {
@@ -147,7 +107,7 @@ static void set_bodies(struct motion *m, double q2) {
 }
 
 static void begin_motion(const struct series_origin *origin, double row[][SERIES_LENGTH],
-                         struct motion *m) {
+                         struct series_motion *m) {
     const struct rp_plant_values *values = origin->values;
     const double q[2] = {row[Q1][0], row[Q2][0]};
     const double dq[2] = {row[W][0], row[V][0]};
@@ -166,96 +126,6 @@ static void begin_motion(const struct series_origin *origin, double row[][SERIES
             has_breakaway(m->p, i) && fabs(dq[i]) < (fast + 1.0) * m->p->stribeck_velocity[i];
         m->per_vs[i] = m->depends_on_velocity[i] ? 1.0 / m->p->stribeck_velocity[i] : 0.0;
     }
-}
-
-/* ---- Efforts -------------------------------------------------------------------------------- */
-
-/* Order k of the product of an input and a row. */
-static double with_input(const struct motion *m, int input, const double x[], int k) {
-    const double *u = m->origin->inputs[input];
-    double sum = 0.0;
-    for (int i = 0; i < SERIES_INPUT_LENGTH && i <= k; i++) {
-        sum += u[i] * x[k - i];
-    }
-    return sum;
-}
-
-/* Adds Q1 = x fy - y fx + mz and Q2 = c1 fx + s1 fy. */
-static void add_wrench(const struct motion *m, int k, double row[][SERIES_LENGTH],
-                       double effort[2]) {
-    const double a = m->p->arm.a;
-    const double L_c = jet_product(row[L], row[C], k) - m->offset_z * row[C][k];
-    const double L_s = jet_product(row[L], row[S], k) - m->offset_z * row[S][k];
-    row[X][k] = L_c - a * row[S][k];
-    row[Y][k] = L_s + a * row[C][k];
-    const double moment = with_input(m, FY, row[X], k) - with_input(m, FX, row[Y], k);
-    effort[0] += moment + jet_input(m->origin, MZ, k);
-    effort[1] += with_input(m, FX, row[C], k) + with_input(m, FY, row[S], k);
-}
-
-/* Order k of e = exp(-r^2), from e' = -2 r' (r e). */
-static double exponential(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
-    double *r = row[RATIO + i];
-    double *rate = row[RATE + i];
-    double *e = row[EXPONENTIAL + i];
-    double *r_e = row[RATIO_E + i];
-    r[k] = row[W + i][k] * m->per_vs[i];
-    rate[k] = k * r[k];
-    if (k == 0) {
-        e[0] = exp(-r[0] * r[0]);
-        r_e[0] = r[0] * e[0];
-        return e[0];
-    }
-    double rate_r_e = 0.0;
-    double product = 0.0;
-    for (int j = 1; j <= k; j++) {
-        rate_r_e += rate[j] * r_e[k - j];
-        product += r[j] * e[k - j];
-    }
-    e[k] = -2.0 / k * rate_r_e;
-    r_e[k] = product + r[0] * e[k];
-    return e[k];
-}
-
-/* As plant_sliding_friction. */
-ALWAYS_INLINE double sliding_friction(const struct motion *m, int i, int k,
-                                      double row[][SERIES_LENGTH]) {
-    const double coulomb = m->p->coulomb_friction[i];
-    if (!m->depends_on_velocity[i]) {
-        return k == 0 ? coulomb : 0.0;
-    }
-    const double e = exponential(m, i, k, row);
-    const double breakaway = m->p->breakaway_friction[i];
-    return k == 0 ? breakaway * e + coulomb * (1.0 - e) : (breakaway - coulomb) * e;
-}
-
-/* As plant_compliant_force:  s k (d + c (d d')) with d' = -s q', s: the side */
-static double compliant_force(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
-    const int contact = m->modes.contact[i];
-    if (abs(contact) != RP_PLANT_PUSHED) {
-        return 0.0;
-    }
-    const double *q = row[Q1 + i];
-    double *d = row[DEPTH + i];
-    d[k] = -contact * q[k];
-    if (k == 0) {
-        d[0] = contact > 0 ? m->p->lower[i] - q[0] : q[0] - m->p->upper[i];
-    }
-    const double damped = m->p->stop_damping[i] * jet_product(d, row[W + i], k);
-    return m->p->stop_stiffness[i] * (contact * d[k] - damped);
-}
-
-/* Order k of the effort of a joint, without the wrench. Inline, as most of it is left out for most
- * joints. */
-ALWAYS_INLINE double effort_of(const struct motion *m, int i, int k, double row[][SERIES_LENGTH]) {
-    double effort = jet_input(m->origin, i, k) - m->p->damping[i] * row[W + i][k];
-    if (m->direction[i] != 0.0) {
-        effort -= m->direction[i] * sliding_friction(m, i, k, row);
-    }
-    if (m->modes.contact[i] != RP_PLANT_APART) {
-        effort += compliant_force(m, i, k, row);
-    }
-    return effort;
 }
 
 /* ---- Motion --------------------------------------------------------------------------------- */
@@ -294,14 +164,15 @@ struct next {
     double P_w, weight; /* weight: g c1 (m1 lc1 + m2 L) */
 };
 
-static inline struct next next_order(const struct motion *m, int n, double row[][SERIES_LENGTH]) {
+static inline struct next next_order(const struct series_motion *m, int n,
+                                     double row[][SERIES_LENGTH]) {
     const double h = m->origin->time_scale / (n + 1);
     struct next next = {
         .L = h * row[V][n],
-        .effort = {effort_of(m, 0, n, row), effort_of(m, 1, n, row)},
+        .effort = {series_effort(m, 0, n, row), series_effort(m, 1, n, row)},
     };
     if (m->has_wrench) {
-        add_wrench(m, n, row, next.effort);
+        series_add_wrench(m, n, row, next.effort);
     }
     const struct products sum = products_of_order(row, next.L, n);
     const double L0 = row[L][0];
@@ -325,7 +196,7 @@ static inline struct next next_order(const struct motion *m, int n, double row[]
     return next;
 }
 
-static inline void write_order(const struct motion *m, int k, const struct next *next,
+static inline void write_order(const struct series_motion *m, int k, const struct next *next,
                                double row[][SERIES_LENGTH]) {
     row[Q1][k] = jet_integral(row[W], m->origin->time_scale, k);
     row[Q2][k] = next->L;
@@ -340,7 +211,7 @@ static inline void write_order(const struct motion *m, int k, const struct next 
 /* ---- Indicators ----------------------------------------------------------------------------- */
 
 /* As plant_stuck_indicators with both sides in use; those of other joints are not of the model. */
-static void write_indicators(const struct motion *m, int k, const struct next *next,
+static void write_indicators(const struct series_motion *m, int k, const struct next *next,
                              double row[][SERIES_LENGTH]) {
     const double rate = (k + 1) / m->origin->time_scale;
     const double a_m2 = m->a * m->m2;
@@ -361,7 +232,7 @@ static void write_indicators(const struct motion *m, int k, const struct next *n
 
 /* ---- Series --------------------------------------------------------------------------------- */
 
-static void begin_rows(const struct motion *m, double row[][SERIES_LENGTH]) {
+static void begin_rows(const struct series_motion *m, double row[][SERIES_LENGTH]) {
     row[L][0] = m->L0;
     row[P][0] = row[L][0] * row[W][0];
     row[S][0] = sin(row[Q1][0]);
@@ -370,7 +241,7 @@ static void begin_rows(const struct motion *m, double row[][SERIES_LENGTH]) {
 
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
-    struct motion m;
+    struct series_motion m;
     begin_motion(origin, row, &m);
     if (is_plain(&m)) {
         rp_series_extend(&m.p->arm, origin, first, last, row);
@@ -381,11 +252,11 @@ static enum status extend(const struct series_origin *origin, int first, int las
         begin_rows(&m, row);
     }
     // indicators of an order take what follows from it
-    const bool is_held = is_stuck(&m, 0) || is_stuck(&m, 1);
-    const int end = is_held ? last + 1 : last;
+    const bool sticks = is_stuck(&m, 0) || is_stuck(&m, 1);
+    const int end = sticks ? last + 1 : last;
     for (int n = first > 0 ? first - 1 : 0; n < end; n++) {
         const struct next next = next_order(&m, n, row);
-        if (is_held && n >= first) {
+        if (sticks && n >= first) {
             write_indicators(&m, n, &next, row);
         }
         if (n < last) {

@@ -10,13 +10,7 @@ _Static_assert(offsetof(struct rp_sensor_values, ticks) ==
 
 static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
                                    double dx[]) {
-    // there is no state
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)dx;
-    return STATUS_OK;
+    return STATUS_OK; // there is no state
 }
 
 /* ---- Ticks ---------------------------------------------------------------------------------- */
@@ -75,7 +69,6 @@ static enum status update(void *values_pointer, const struct event *event) {
  * there is none. */
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
     const struct rp_sensor_values *values = values_pointer;
-    (void)is_held; // parameters of the modes are fixed
     if (!(values->ticks >= 1.0 && values->ticks <= 0x1p53 &&
           values->ticks == floor(values->ticks))) {
         return false;
@@ -113,7 +106,6 @@ static void find_shown(const struct rp_sensor_values *values, int i, int *now, i
 static enum status outputs(void *values_pointer, double t) {
     struct rp_sensor_values *values = values_pointer;
     const struct rp_sensor_parameters *p = &values->parameters;
-    (void)t;
     for (int i = 0; i < 2; i++) {
         int now;
         int before;
@@ -133,8 +125,6 @@ static enum status propagate(const void *values_pointer, double t, double dt, vo
     struct rp_sensor_values *second = second_pointer;
     const double period = values->parameters.sample_time;
     const double dperiod = first->parameters.sample_time;
-    (void)t;
-    (void)dt;
     for (int i = 0; i < 2; i++) {
         int now;
         int before;

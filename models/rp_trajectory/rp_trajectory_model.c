@@ -7,13 +7,7 @@ static const struct rp_trajectory_parameters at_rest;
 
 static enum status right_hand_side(const void *values, double t, const double x[], const double u[],
                                    double dx[]) {
-    // there is no state
-    (void)values;
-    (void)t;
-    (void)x;
-    (void)u;
-    (void)dx;
-    return STATUS_OK;
+    return STATUS_OK; // there is no state
 }
 
 static enum status outputs(void *values_pointer, double t) {
@@ -129,7 +123,6 @@ static enum status update(void *values_pointer, const struct event *event) {
 
 static bool modes_are_possible(const void *values_pointer, bool is_held) {
     const struct rp_trajectory_values *values = values_pointer;
-    (void)is_held; // the parameters are fixed
     const bool is_grasped = values->parameters.grasp_time < values->parameters.release_time;
     return values->payload == RP_TRAJECTORY_RELEASED ||
            (is_grasped && (values->payload == RP_TRAJECTORY_TO_GRASP ||

@@ -8,7 +8,7 @@
 
 /* Where the time is between grasp_time and release_time. */
 enum rp_trajectory_payload {
-    RP_TRAJECTORY_UNDECIDED = 0, /* initialization goes on */
+    RP_TRAJECTORY_UNDECIDED = 0, /* until initialization ends */
     RP_TRAJECTORY_TO_GRASP = 1,
     RP_TRAJECTORY_ATTACHED = 2,
     RP_TRAJECTORY_RELEASED = 3, /* there is no grasp any more */

@@ -4,7 +4,7 @@
  * Time is counted from the last restart, so that its rounding does not grow with the time of the
  * simulation. CVODE steps past the requested times and interpolates; a restart drops what lies
  * beyond. The Runge-Kutta method ends its steps at the requested times and has no history. The
- * Taylor method does so too, unless a restart goes on along the same solution. One handle serves
+ * Taylor method does so too, unless a restart continues the same solution. One handle serves
  * one thread at a time; handles share nothing. */
 #ifndef INTEGRATOR_H
 #define INTEGRATOR_H
@@ -129,8 +129,9 @@ MUST_CHECK NONNULL bool integrator_interpolate(struct integrator *integrator, do
  * or the observer ended the advance.
  *
  * Deterministic: after a restart, results depend only on its arguments and the first t, which
- * bounds the first internal step, unless the restart has events and goes on. With a history, stops
- * at further times do not matter, as long as it is not longer than integrator_longest_history. */
+ * bounds the first internal step, unless the restart has events and continues. With a history,
+ * stops at further times do not matter, as long as it is not longer than
+ * integrator_longest_history. */
 MUST_CHECK NONNULL enum status integrator_advance(struct integrator *integrator, double t,
                                                   int64_t max_steps, double *reached, double x[]);
 

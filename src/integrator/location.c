@@ -1,6 +1,6 @@
 #include "location.h"
 
-#include "roots.h"
+#include "falls.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -109,83 +109,6 @@ enum status location_restart(struct location *location, const struct indicator *
     return status;
 }
 
-/* ---- Roots ---------------------------------------------------------------------------------- */
-
-/* The last fall to 0 up to this s; INFINITY: there is none. */
-static double last_fall(const struct roots_polynomial *p, double s) {
-    struct root roots[ROOTS_LENGTH];
-    const int count = roots_find(p, roots);
-    double last = INFINITY;
-    for (int i = 0; i < count && roots[i].s <= s; i++) {
-        last = roots[i].kind == ROOT_FALLS ? roots[i].s : last;
-    }
-    return last;
-}
-
-/* The first fall to 0 behind this s; INFINITY: there is none. */
-static double fall_behind(const struct roots_polynomial *p, double s) {
-    struct root roots[ROOTS_LENGTH];
-    const int count = roots_find(p, roots);
-    for (int i = 0; i < count; i++) {
-        if (roots[i].s > s && roots[i].kind == ROOT_FALLS) {
-            return roots[i].s;
-        }
-    }
-    return INFINITY;
-}
-
-/* The first s at which p, below the level before, is above it; INFINITY: it stays below. */
-static double first_rise(const struct roots_polynomial *p, double level) {
-    double c[ROOTS_LENGTH];
-    for (int k = 0; k <= p->degree; k++) {
-        c[k] = -p->c[k];
-    }
-    c[0] += level;
-    const struct roots_polynomial below = {.c = c, .degree = p->degree, .noise = -1.0};
-    return roots_first(&below);
-}
-
-/* The first s at which p is below the level; INFINITY: it stays above. */
-static double first_below(const struct roots_polynomial *p, double level) {
-    double c[ROOTS_LENGTH];
-    memcpy(c, p->c, ((size_t)p->degree + 1) * sizeof *c);
-    c[0] -= level;
-    const struct roots_polynomial above = {.c = c, .degree = p->degree, .noise = -1.0};
-    return roots_first(&above);
-}
-
-/* The first fall of an indicator that is 0 at a restart and is to rise. As small as the noise it
- * may have either sign; it has fallen where it is below the noise, and did so where it was 0 last.
- */
-static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
-    const double below = first_below(p, -noise);
-    const double above = first_rise(p, noise);
-    if (above < below) {
-        *is_armed = true;
-        return fall_behind(p, above);
-    }
-    return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
-}
-
-/* The first s at which indicator i, represented up to an error, falls to 0; INFINITY: it does not.
- * Where it is armed it has been above 0 before the step: where it rises from below 0, that is the
- * error of the polynomial. Where a restart finds it below its noise it has not fallen yet, as the
- * modes have just been found valid; otherwise an event could come again and again. */
-static double first_fall(struct location *location, size_t i, const struct roots_polynomial *p,
-                         double error) {
-    bool *is_armed = &location->is_armed[i];
-    if (!*is_armed) {
-        double noise = fmax(error, location->noise[i]);
-        if (p->c[0] <= -noise) {
-            noise = -2.0 * p->c[0];
-            location->noise[i] = noise;
-        }
-        return first_fall_from_zero(p, noise, is_armed);
-    }
-    const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
-    return rises ? fall_behind(p, 0.0) : roots_first(p);
-}
-
 /* ---- Indicators of states ------------------------------------------------------------------- */
 
 /* c(s) becomes c(s - 1). */
@@ -224,7 +147,7 @@ static double first_of_state(struct location *location, size_t i) {
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return first_fall(location, i, &p, 0.0);
+    return fall_first(&p, 0.0, &location->is_armed[i], &location->noise[i]);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -240,7 +163,7 @@ static double first_of_model(struct location *location, size_t i) {
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return first_fall(location, i, &p, representation * size);
+    return fall_first(&p, representation * size, &location->is_armed[i], &location->noise[i]);
 }
 
 /* Writes all indicators at s, of the whole step, to column k of samples. */
@@ -269,8 +192,8 @@ struct piece {
     int count; /* points sampled */
 };
 
-/* To 2 count - 1 points: those sampled before move apart. */
-static enum status refine(struct location *location, struct piece *piece) {
+/* Samples between the points of the piece: 2 count - 1 points. */
+static enum status sample_between(struct location *location, struct piece *piece) {
     const int count = 2 * piece->count - 1;
     for (size_t i = 0; i < location->ode->indicator_count; i++) {
         for (int k = piece->count - 1; k > 0; k--) {
@@ -321,7 +244,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
         return is_above;
     }
     const struct roots_polynomial p = {c, degree, -1.0};
-    const double s = first_fall(location, i, &p, noise);
+    const double s = fall_first(&p, noise, &location->is_armed[i], &location->noise[i]);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -343,7 +266,7 @@ static enum status search_model_in(struct location *location, double begin, doub
         if (!is_wanted || search_piece(location, &piece, i, is_last_try)) {
             i++;
         } else if (piece.count < CHEBYSHEV_LENGTH) {
-            status = refine(location, &piece);
+            status = sample_between(location, &piece);
         } else {
             status = search_model_in(location, begin, 0.5 * length, i);
             if (status == STATUS_OK) {
@@ -407,6 +330,27 @@ enum status location_search_at_rest(struct location *location, const double x[],
         step->row[i][0] = x[i];
     }
     return location_search(location);
+}
+
+void location_write_cubic(struct location *location, double begin, const double begin_x[],
+                          const double begin_dx[], double end, const double x[],
+                          const double dx[]) {
+    struct step_polynomial *step = &location->step;
+    const double h = end - begin;
+    step->begin = begin;
+    step->end = end;
+    step->is_from_end = false;
+    step->degree = 3;
+    step->row = location->rows;
+    for (size_t i = 0; i < location->ode->state_count; i++) {
+        const double change = x[i] - begin_x[i];
+        const double first = h * begin_dx[i];
+        const double last = h * dx[i];
+        step->row[i][0] = begin_x[i];
+        step->row[i][1] = first;
+        step->row[i][2] = 3.0 * change - 2.0 * first - last;
+        step->row[i][3] = first + last - 2.0 * change;
+    }
 }
 
 bool location_correction(struct location *location, double t, const double x[], const double dx[],

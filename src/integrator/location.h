@@ -67,6 +67,12 @@ MUST_CHECK NONNULL enum status location_search(struct location *location);
 MUST_CHECK NONNULL enum status location_search_at_rest(struct location *location, const double x[],
                                                        double t);
 
+/* Writes location->step: the cubic polynomial through the states and their derivatives at the begin
+ * and at the end of a step. */
+NONNULL void location_write_cubic(struct location *location, double begin, const double begin_x[],
+                                  const double begin_dx[], double end, const double x[],
+                                  const double dx[]);
+
 /* Newton's correction (s) of the event's time, from the state x and its derivative dx at the time
  * t: -z / z' of the first indicator that has triggered. False where it has none. */
 MUST_CHECK NONNULL bool location_correction(struct location *location, double t, const double x[],

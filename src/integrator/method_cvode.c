@@ -1,4 +1,5 @@
 /* The multistep methods of CVODE. */
+#include "first_step.h"
 #include "sundials.h"
 
 #include <cvode/cvode.h>
@@ -17,19 +18,10 @@
  * three times the error where steps are long. */
 static const double adams_iteration_error = 0.2;
 
-/* The first step after a restart is of order 1, over the step at which its error estimate would be
- * the tolerance. CVODE's own choice is 0.5 and takes two evaluations to find. The errors of first
- * steps all have the same sign and add up from restart to restart: measured over 2000 steps of 1
- * ms, the error of the trajectory at 0.1 is a third of that at 0.5, for as many internal steps. */
-static const double first_step_fraction = 0.1;
-
-/* After an event errors add up in another way: each bounce adds to the error of the height, and the
- * last bounces are as low as the tolerance. So the first steps are short, and do not grow to the
- * tolerance before the order does: bouncing then rests 1.7e-7 s early, as its cut-off says, and not
- * 2.8e-7 s, for 5 % more time. */
-static const double first_step_fraction_after_event = 0.003;
+/* Growth of the step after the first one: after an event it does not outgrow the order
+ * (first_step.h); else CVODE's own. */
 static const double growth_after_event = 10.0;
-static const double usual_growth = 1e4; // CVODE's own
+static const double usual_growth = 1e4;
 
 /* s: the square of a length underflows in shorter first steps, and their number then depends on who
  * watches them. */
@@ -45,36 +37,6 @@ struct cvode {
     enum status search_status;         /* of the last search for an event */
     struct method_work counted;        /* since the restart, up to the last advance */
 };
-
-static enum status status_of_flag(const struct problem *problem, int flag) {
-    const bool stuck = problem_is_stuck(problem);
-    switch (flag) {
-    case CV_SUCCESS:
-    case CV_TSTOP_RETURN:
-        return STATUS_OK;
-    case CV_FIRST_RHSFUNC_ERR:
-    case CV_REPTD_RHSFUNC_ERR:
-    case CV_UNREC_RHSFUNC_ERR:
-        return STATUS_NOT_FINITE;
-    case CV_TOO_MUCH_WORK:
-        return stuck ? STATUS_NOT_FINITE : STATUS_TOO_MANY_STEPS;
-    case CV_TOO_MUCH_ACC:
-    case CV_ERR_FAILURE:
-    case CV_CONV_FAILURE:
-    // of the Newton iteration
-    case CV_LSETUP_FAIL:
-    case CV_LSOLVE_FAIL:
-    // values so extreme that steps, weights or times underflow or overflow
-    case CV_BAD_T:
-    case CV_TOO_CLOSE:
-    case CV_ILL_INPUT:
-        return stuck ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
-    case CV_MEM_FAIL:
-        return STATUS_OUT_OF_MEMORY;
-    default:
-        return STATUS_INTERNAL;
-    }
-}
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
@@ -145,7 +107,7 @@ static enum status create(struct problem *problem, const struct method *method,
                           int multistep_method, bool (*create_iteration)(struct cvode *),
                           void **memory) {
     *memory = NULL;
-    struct cvode *cvode = sundials_create(sizeof *cvode, problem, method, status_of_flag);
+    struct cvode *cvode = sundials_create(sizeof *cvode, problem, method);
     if (cvode == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
@@ -180,57 +142,20 @@ static enum status configure(void *memory) {
     if (flag == CV_SUCCESS) {
         flag = CVodeSetMaxStep(cvode->solver, settings->max_step);
     }
-    return status_of_flag(base->problem, flag);
+    return sundials_status(base->problem, flag);
 }
 
 /* ---- Integration ---------------------------------------------------------------------------- */
-
-/* Length of a first step from x, of order 1, whose error is about h^2 x'' / 2, as a fraction of the
- * one at which that would be the tolerance; 0: unknown. */
-static double step_of_curvature(const struct problem *problem, double fraction, const double x[],
-                                const double ddx[]) {
-    const double relative = problem->settings.relative_tolerance;
-    const double *absolute = problem->settings.absolute_tolerances;
-    double sum = 0.0;
-    for (size_t i = 0; i < problem->ode.state_count; i++) {
-        const double weighted = ddx[i] / (relative * fabs(x[i]) + absolute[i]);
-        sum += weighted * weighted;
-    }
-    const double norm = sqrt(sum / (double)problem->ode.state_count);
-    const double step = fraction * sqrt(2.0 / norm);
-    return isfinite(step) ? step : 0.0;
-}
 
 /* After an event the first internal step does not depend on where the next requested time is. */
 static bool does_not_depend_on_points(const struct problem *problem) {
     return problem->continues && location_is_active(&problem->location);
 }
 
-/* s: over this time x'' is taken. */
-static const double curvature_time = 1e-6;
-
 /* The length of a first step after an event, from its state, which is CVODE's; 0: unknown. */
 static double step_after_event(struct cvode *cvode) {
-    struct problem *problem = cvode->base.problem;
-    const size_t n = problem->ode.state_count;
-    const double *x = small_vector_data(cvode->base.x);
-    const double ahead = fmin(curvature_time, problem->horizon);
-    double *dx = problem->location.x;
-    double *ddx = small_vector_data(cvode->base.work);
-    if (problem_rhs(problem, 0.0, x, dx) != STATUS_OK) {
-        return 0.0;
-    }
-    double *moved = problem->location.dx;
-    for (size_t i = 0; i < n; i++) {
-        moved[i] = x[i] + ahead * dx[i];
-    }
-    if (problem_rhs(problem, ahead, moved, ddx) != STATUS_OK) {
-        return 0.0;
-    }
-    for (size_t i = 0; i < n; i++) {
-        ddx[i] = (ddx[i] - dx[i]) / ahead;
-    }
-    return step_of_curvature(problem, first_step_fraction_after_event, x, ddx);
+    return first_step_after_event(cvode->base.problem, small_vector_data(cvode->base.x),
+                                  small_vector_data(cvode->base.work));
 }
 
 static enum status restart(void *memory, const double x[]) {
@@ -247,7 +172,7 @@ static enum status restart(void *memory, const double x[]) {
     if (flag == CV_SUCCESS) {
         flag = CVodeReInit(cvode->solver, 0.0, cvode->base.x);
     }
-    return status_of_flag(problem, flag);
+    return sundials_status(problem, flag);
 }
 
 /* CVODE interpolates by combining the columns of its Nordsieck array, up to 13, which stay as they
@@ -281,7 +206,7 @@ static enum status search(struct cvode *cvode, double begin, double end) {
     const int flag = CVodeGetDky(cvode->solver, end, 0, cvode->base.work);
     small_vector_note_terms(cvode->base.work, NULL);
     if (flag != CV_SUCCESS) {
-        return status_of_flag(problem, flag);
+        return sundials_status(problem, flag);
     }
     step->begin = begin;
     step->end = end;
@@ -408,18 +333,17 @@ static void measure_work(struct cvode *cvode, struct method_work *work) {
 static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
                            double *stopped_at, double x[], struct method_work *work) {
     struct cvode *cvode = memory;
-    // CVODE has it
     bool is_cut_short = false;
     if (cvode->base.problem->reached == 0.0 && t < shortest_first_advance) {
         *stopped_at = 0.0;
         sundials_get_state(&cvode->base, x);
-        return status_of_flag(cvode->base.problem, CV_TOO_CLOSE);
+        return sundials_status(cvode->base.problem, CV_TOO_CLOSE);
     }
     const int flag = integrate(cvode, t, max_steps, stopped_at, x, &is_cut_short);
     measure_work(cvode, work);
     work->is_cut_short = is_cut_short;
     return cvode->search_status != STATUS_OK ? cvode->search_status
-                                             : status_of_flag(cvode->base.problem, flag);
+                                             : sundials_status(cvode->base.problem, flag);
 }
 
 static double next_step(void *memory, const double x[]) {
@@ -430,7 +354,7 @@ static double next_step(void *memory, const double x[]) {
         CVodeGetDky(cvode->solver, problem->reached, 2, cvode->base.work) != CV_SUCCESS) {
         return 0.0;
     }
-    return step_of_curvature(problem, first_step_fraction, x, small_vector_data(cvode->base.work));
+    return first_step_after_restart(problem, x, small_vector_data(cvode->base.work));
 }
 
 /* Measured over the scenarios: at 1/500 of the requested tolerance the error after 5000 restarts is

@@ -40,61 +40,19 @@ struct erk {
     enum status search_status;
 };
 
-static enum status status_of_flag(const struct problem *problem, int flag) {
-    const bool stuck = problem_is_stuck(problem);
-    switch (flag) {
-    case ARK_SUCCESS:
-    case ARK_TSTOP_RETURN:
-        return STATUS_OK;
-    case ARK_RHSFUNC_FAIL:
-    case ARK_FIRST_RHSFUNC_ERR:
-    case ARK_REPTD_RHSFUNC_ERR:
-    case ARK_UNREC_RHSFUNC_ERR:
-        return STATUS_NOT_FINITE;
-    case ARK_TOO_MUCH_WORK:
-        return stuck ? STATUS_NOT_FINITE : STATUS_TOO_MANY_STEPS;
-    case ARK_TOO_MUCH_ACC:
-    case ARK_ERR_FAILURE:
-    case ARK_CONV_FAILURE:
-    // values so extreme that steps, weights or times underflow or overflow
-    case ARK_BAD_T:
-    case ARK_TOO_CLOSE:
-    case ARK_ILL_INPUT:
-        return stuck ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
-    case ARK_MEM_FAIL:
-        return STATUS_OUT_OF_MEMORY;
-    default:
-        return STATUS_INTERNAL;
-    }
-}
-
 /* ---- Observation ---------------------------------------------------------------------------- */
 
-/* Searches the step that has ended at t with the state x: the cubic polynomial through the states
- * and the right-hand sides at its ends. Goes on to the next one. */
+/* Searches the step that has ended at t with the state x. Where it has no event, the next one
+ * begins there. */
 static enum status search(struct erk *erk, double t, const double x[]) {
     struct problem *problem = erk->base.problem;
-    struct step_polynomial *step = &problem->location.step;
     const size_t n = problem->ode.state_count;
     enum status status = problem_rhs(problem, t, x, erk->dx);
     if (status != STATUS_OK) {
         return status;
     }
-    const double h = t - erk->step_begin;
-    step->begin = erk->step_begin;
-    step->end = t;
-    step->is_from_end = false;
-    step->degree = 3;
-    step->row = problem->location.rows;
-    for (size_t i = 0; i < n; i++) {
-        const double change = x[i] - erk->step_x[i];
-        const double first = h * erk->step_dx[i];
-        const double last = h * erk->dx[i];
-        step->row[i][0] = erk->step_x[i];
-        step->row[i][1] = first;
-        step->row[i][2] = 3.0 * change - 2.0 * first - last;
-        step->row[i][3] = first + last - 2.0 * change;
-    }
+    location_write_cubic(&problem->location, erk->step_begin, erk->step_x, erk->step_dx, t, x,
+                         erk->dx);
     status = location_search(&problem->location);
     if (problem->location.time == INFINITY) {
         erk->step_begin = t;
@@ -182,7 +140,7 @@ static bool create_solver(struct erk *erk) {
 
 static enum status create(struct problem *problem, void **memory) {
     *memory = NULL;
-    struct erk *erk = sundials_create(sizeof *erk, problem, &integrator_erk, status_of_flag);
+    struct erk *erk = sundials_create(sizeof *erk, problem, &integrator_erk);
     if (erk == NULL) {
         return STATUS_OUT_OF_MEMORY;
     }
@@ -211,7 +169,7 @@ static enum status configure(void *memory) {
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetMaxStep(erk->solver, settings->max_step);
     }
-    return status_of_flag(base->problem, flag);
+    return sundials_status(base->problem, flag);
 }
 
 /* ---- Integration ---------------------------------------------------------------------------- */
@@ -382,14 +340,14 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         work->internal = problem->reached;
         sundials_set_state(&erk->base, begin_x);
         sundials_get_state(&erk->base, x);
-        return status_of_flag(problem, ARK_TOO_CLOSE);
+        return sundials_status(problem, ARK_TOO_CLOSE);
     }
     const int flag = integrate(erk, t, max_steps, begin_x, stopped_at, x, work);
     if (flag < 0 || ERKStepGetCurrentStep(erk->solver, &erk->next_step) < 0 ||
         !isfinite(erk->next_step)) {
         erk->next_step = 0.0;
     }
-    return erk->search_status != STATUS_OK ? erk->search_status : status_of_flag(problem, flag);
+    return erk->search_status != STATUS_OK ? erk->search_status : sundials_status(problem, flag);
 }
 
 static double next_step(void *memory, const double x[]) {

@@ -2,6 +2,8 @@
 
 #include "workspace.h"
 
+#include <arkode/arkode.h>
+#include <cvode/cvode.h>
 #include <math.h>
 #include <string.h>
 
@@ -11,6 +13,55 @@
 size_t sundials_memory_size(const struct ode *ode) {
     const size_t state_count = ode->state_count;
     return 5376 + sizeof(double) * (25 * state_count + 2 * state_count * state_count);
+}
+
+#define SAME_NUMBER(flag) _Static_assert((int)CV_##flag == (int)ARK_##flag, "the same number")
+SAME_NUMBER(SUCCESS);
+SAME_NUMBER(TSTOP_RETURN);
+SAME_NUMBER(RHSFUNC_FAIL);
+SAME_NUMBER(FIRST_RHSFUNC_ERR);
+SAME_NUMBER(REPTD_RHSFUNC_ERR);
+SAME_NUMBER(UNREC_RHSFUNC_ERR);
+SAME_NUMBER(TOO_MUCH_WORK);
+SAME_NUMBER(TOO_MUCH_ACC);
+SAME_NUMBER(ERR_FAILURE);
+SAME_NUMBER(CONV_FAILURE);
+SAME_NUMBER(LSETUP_FAIL);
+SAME_NUMBER(LSOLVE_FAIL);
+SAME_NUMBER(BAD_T);
+SAME_NUMBER(TOO_CLOSE);
+SAME_NUMBER(ILL_INPUT);
+SAME_NUMBER(MEM_FAIL);
+
+enum status sundials_status(const struct problem *problem, int flag) {
+    const bool stuck = problem_is_stuck(problem);
+    switch (flag) {
+    case CV_SUCCESS:
+    case CV_TSTOP_RETURN:
+        return STATUS_OK;
+    case CV_RHSFUNC_FAIL:
+    case CV_FIRST_RHSFUNC_ERR:
+    case CV_REPTD_RHSFUNC_ERR:
+    case CV_UNREC_RHSFUNC_ERR:
+        return STATUS_NOT_FINITE;
+    case CV_TOO_MUCH_WORK:
+        return stuck ? STATUS_NOT_FINITE : STATUS_TOO_MANY_STEPS;
+    case CV_TOO_MUCH_ACC:
+    case CV_ERR_FAILURE:
+    case CV_CONV_FAILURE:
+    // of the Newton iteration
+    case CV_LSETUP_FAIL:
+    case CV_LSOLVE_FAIL:
+    // values so extreme that steps, weights or times underflow or overflow
+    case CV_BAD_T:
+    case CV_TOO_CLOSE:
+    case CV_ILL_INPUT:
+        return stuck ? STATUS_NOT_FINITE : STATUS_NO_CONVERGENCE;
+    case CV_MEM_FAIL:
+        return STATUS_OUT_OF_MEMORY;
+    default:
+        return STATUS_INTERNAL;
+    }
 }
 
 /* SUNDIALS says how long the step is at which it fails: 0, or not a number, where the norm of the
@@ -29,12 +80,11 @@ void sundials_text(int error_code, const char *module, const char *function, cha
                    void *sundials_pointer) {
     const struct sundials *sundials = sundials_pointer;
     const struct problem *problem = sundials->problem;
-    message_write(&problem->sink, sundials->status_of_flag(problem, error_code), "%s: %s",
+    message_write(&problem->sink, sundials_status(problem, error_code), "%s: %s",
                   sundials->method->name, explained(text));
 }
 
-void *sundials_create(size_t size, struct problem *problem, const struct method *method,
-                      enum status (*status_of_flag)(const struct problem *, int)) {
+void *sundials_create(size_t size, struct problem *problem, const struct method *method) {
     const sunindextype n = (sunindextype)problem->ode.state_count;
     struct sundials *created = workspace_calloc(1, size);
     if (created == NULL) {
@@ -42,7 +92,6 @@ void *sundials_create(size_t size, struct problem *problem, const struct method 
     }
     created->problem = problem;
     created->method = method;
-    created->status_of_flag = status_of_flag;
     if (SUNContext_Create(NULL, &created->context) == 0 &&
         (created->x = small_vector_create(n, created->context)) != NULL &&
         (created->absolute_tolerances = small_vector_create(n, created->context)) != NULL &&

@@ -12,7 +12,6 @@
 struct sundials {
     struct problem *problem;
     const struct method *method;
-    enum status (*status_of_flag)(const struct problem *problem, int flag);
     SUNContext context;
     N_Vector x;
     N_Vector absolute_tolerances;
@@ -24,12 +23,14 @@ size_t sundials_memory_size(const struct ode *ode);
 
 /* Allocates memory of size bytes that begins with a struct sundials, with the context and the
  * vectors in it. NULL where memory is short. */
-MUST_CHECK NONNULL void *
-sundials_create(size_t size, struct problem *problem, const struct method *method,
-                enum status (*status_of_flag)(const struct problem *, int));
+MUST_CHECK NONNULL void *sundials_create(size_t size, struct problem *problem,
+                                         const struct method *method);
 
 /* Frees the memory itself too; the solver must be freed before. Half-built is allowed. */
 NONNULL void sundials_destroy(void *memory);
+
+/* The status of a flag that CVODE or ARKODE has returned: they use the same numbers. */
+MUST_CHECK NONNULL enum status sundials_status(const struct problem *problem, int flag);
 
 /* Receives the texts of a solver; user data: struct sundials. */
 void sundials_text(int error_code, const char *module, const char *function, char *text,

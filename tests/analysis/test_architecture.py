@@ -51,12 +51,13 @@ MAY_INCLUDE = {
     r"fmu/component": ("src/instance", "src/model"),
     r"fmu/fmi\d": ("fmu/component", "src/instance", "src/model"),
     r"models": ("src/model",),
-    r"models/\w+": ("models", "src/model"),
+    r"models/\w+(/equations)?": ("models", "src/model"),
 }  # fmt: skip
 # the equations of another model
 MAY_INCLUDE_MODEL = {
     "models/rp_controller": "models/rp_manipulator",
     "models/rp_plant": "models/rp_manipulator",
+    "models/rp_plant/equations": "models/rp_manipulator",
 }
 
 # libraries, with the folders in them, that hide headers; those of other folders are all public
@@ -127,7 +128,7 @@ def is_allowed(header: Path, folder: str, root: Path) -> bool:
     rules = [below for pattern, below in MAY_INCLUDE.items() if re.fullmatch(pattern, folder)]
     assert len(rules) == 1, f"{folder} has no place in the architecture"
     target = folder_of(header, root)
-    if target == folder or target == MAY_INCLUDE_MODEL.get(folder):
+    if target in (folder, f"{folder}/equations", MAY_INCLUDE_MODEL.get(folder)):
         return True
     library = library_of(target)
     if library == library_of(folder):
@@ -224,6 +225,7 @@ def project(tmp_path: Path) -> Path:
         "src/instance/step/stepping.h", "src/instance/step/step.h", "fmu/component/component.h",
         "fmu/fmi2/fmi2_calls.h", "fmu/fmi3/fmi3_calls.h", "models/taylor.h",
         "models/rp_manipulator/rp_manipulator.h", "models/rp_trajectory/motion.h",
+        "models/rp_plant/rp_plant_model.h", "models/rp_plant/equations/rp_plant.h",
         "fmu/generate.py", "cosim/unit.py", "models/rp_plant/references/make.py",
     ):  # fmt: skip
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -250,7 +252,9 @@ def write(project: Path, name: str, text: str) -> None:
         ("fmu/component/component.c", "instance.h"),
         ("fmu/fmi2/fmi2.c", "fmi2Functions.h"),
         ("fmu/fmi3/fmi3.c", "component.h"),
-        ("models/rp_plant/rp_plant.c", "taylor.h"),
+        ("models/rp_plant/equations/rp_plant.c", "taylor.h"),
+        ("models/rp_plant/equations/rp_plant.c", "rp_manipulator.h"),
+        ("models/rp_plant/rp_plant_model.c", "rp_plant.h"),
         ("models/rp_controller/rp_controller.c", "rp_manipulator.h"),
     ],
 )
@@ -280,6 +284,7 @@ def test_what_may_be_included(project: Path, name: str, header: str) -> None:
         ("fmu/fmi2/fmi2.c", "fmi3_calls.h"),
         ("fmu/fmi2/fmi2.c", "fmi3Functions.h"),
         ("models/rp_plant/rp_plant.c", "instance.h"),
+        ("models/rp_plant/equations/rp_plant.c", "rp_plant_model.h"),
         ("models/rp_trajectory/rp_trajectory.c", "rp_manipulator.h"),
         ("models/rp_plant/rp_plant.c", "nowhere.h"),
     ],

@@ -1,10 +1,5 @@
 /* A first step that cannot be found. */
-#include "integrator.h"
-#include "last_text.h"
-
-#include <math.h>
-#include <string.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 static struct integrator *integrator;
 
@@ -30,17 +25,13 @@ static enum status spring_jacobian(double t, const double x[], double J[], void 
 }
 
 static void test_derivatives_that_are_too_large_are_named(void) {
-    static const double absolute[2] = {1e-10, 1e-10};
     static const double start[2] = {1.0, 0.0};
     const struct ode ode = {.state_count = 2, .rhs = spring_rhs, .jacobian = spring_jacobian};
-    const struct integrator_settings settings = {.method = INTEGRATOR_CVODE_ADAMS,
-                                                 .relative_tolerance = 1e-8,
-                                                 .absolute_tolerances = absolute};
     const struct integrator_start from = {.horizon = INFINITY};
     double x[2];
     double reached;
     ASSERT_OK(integrator_create(&ode, &last_text_sink, &integrator));
-    ASSERT_OK(integrator_configure(integrator, &settings));
+    configure_integrator(integrator, INTEGRATOR_CVODE_ADAMS, 1e-8, 0.0);
     ASSERT_OK(integrator_restart(integrator, start, &from));
     TEST_ASSERT_EQUAL_INT(STATUS_NO_CONVERGENCE,
                           integrator_advance(integrator, 1.0, 1000, &reached, x));

@@ -1,46 +1,8 @@
-#include "integrator.h"
-
 #include "allocations.h"
 #include "each_method.h"
+#include "integrator_test.h"
 
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
-#include <unity.h>
-
-/* x' = v, v' = -x, until failing_from, from where on the right-hand side gives NaN. */
-struct circle {
-    double latest; /* s: latest time requested */
-    double failing_from;
-    long evaluations;
-};
-
-static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
-    struct circle *of = context;
-    of->latest = fmax(of->latest, t);
-    of->evaluations++;
-    dx[0] = x[1];
-    dx[1] = t >= of->failing_from ? NAN : -x[0];
-    return STATUS_OK;
-}
-
-static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
-    static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
-    memcpy(J, columns, sizeof columns);
-    return STATUS_OK;
-}
-
-static enum status circle_series(double t, double time_scale, int first, int last,
-                                 double row[][SERIES_LENGTH], void *context) {
-    struct circle *of = context;
-    of->latest = fmax(of->latest, t);
-    of->evaluations += first == 0 ? 1 : 0;
-    for (int k = first > 0 ? first : 1; k <= last; k++) {
-        row[0][k] = time_scale / k * row[1][k - 1];
-        row[1][k] = t >= of->failing_from ? NAN : -time_scale / k * row[0][k - 1];
-    }
-    return STATUS_OK;
-}
 
 static enum status always_failing(double t, const double x[], double dx[], void *context) {
     memcpy(dx, x, 2 * sizeof(double));
@@ -79,16 +41,11 @@ static void create(ode_rhs *rhs, ode_series *series) {
                             .series_row_count = 2,
                             .context = &circle};
     const struct message_sink sink = {.write = count_message, .context = &circle};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
+    ASSERT_OK(integrator_create(&ode, &sink, &integrator));
 }
 
 static void configure_with(double tolerance, double max_step) {
-    const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
-    const struct integrator_settings settings = {.method = (enum integrator_method)method,
-                                                 .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = absolute,
-                                                 .max_step = max_step};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    configure_integrator(integrator, method, tolerance, max_step);
 }
 
 static void configure(double tolerance) {
@@ -96,14 +53,13 @@ static void configure(double tolerance) {
 }
 
 static void restart(double horizon) {
-    TEST_ASSERT_EQUAL_INT(
-        STATUS_OK,
+    ASSERT_OK(
         integrator_restart(integrator, start, &(struct integrator_start){.horizon = horizon}));
 }
 
 static void advance(double t, double x[2]) {
     double reached;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, step_limit, &reached, x));
+    ASSERT_OK(integrator_advance(integrator, t, step_limit, &reached, x));
     TEST_ASSERT_EQUAL_DOUBLE(t, reached);
 }
 
@@ -172,13 +128,13 @@ EACH_CVODE_METHOD static void test_many_points_lie_where_each_lies_alone(void) {
     // otherwise the first step depends on the first point
     const struct integrator_start first = {.horizon = INFINITY, .first_step = 1e-6};
     double many[POINTS][2];
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, &first));
+    ASSERT_OK(integrator_restart(integrator, start, &first));
     for (int i = 0; i < POINTS; i++) {
         advance(0.01 * (i + 1), many[i]);
     }
     for (int i = 0; i < POINTS; i++) {
         double alone[2];
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, &first));
+        ASSERT_OK(integrator_restart(integrator, start, &first));
         advance(0.01 * (i + 1), alone);
         TEST_ASSERT_EQUAL_MEMORY(alone, many[i], sizeof alone);
     }
@@ -227,7 +183,7 @@ EACH_CVODE_METHOD static void test_a_run_can_be_repeated_with_two_stops(void) {
     TEST_ASSERT_EQUAL_MEMORY(x, repeated, sizeof x);
     integrator_set_statistics(integrator, &first);
 
-    // and go on alike
+    // and continue alike
     for (int i = 61; i <= 70; i++) {
         advance(fmin(0.1 * i, 7.0), repeated);
     }
@@ -353,7 +309,7 @@ EACH_METHOD static void test_no_step_is_longer_than_the_limit(void) {
     for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
         const double limit = settings.max_step = limits[i];
         const double length = limit > 0.0 ? 100.0 * limit : 1.0;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+        ASSERT_OK(integrator_configure(integrator, &settings));
         restart(INFINITY);
         advance(length, x);
         integrator_get_statistics(integrator, &statistics);
@@ -416,10 +372,9 @@ EACH_METHOD static void test_another_method_may_take_over(void) {
          other++) {
         const struct integrator_settings settings = {
             .method = other, .relative_tolerance = 1e-10, .absolute_tolerances = absolute};
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              integrator_restart(integrator, not_finite,
-                                                 &(struct integrator_start){.horizon = INFINITY}));
+        ASSERT_OK(integrator_configure(integrator, &settings));
+        ASSERT_OK(integrator_restart(integrator, not_finite,
+                                     &(struct integrator_start){.horizon = INFINITY}));
     }
     configure(1e-10);
     restart(INFINITY);
@@ -437,7 +392,7 @@ EACH_METHOD static void test_a_new_handle_takes_any_limit_and_tolerance(void) {
         settings.max_step = limits[i];
         integrator_destroy(integrator);
         create(circle_rhs, circle_series);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+        ASSERT_OK(integrator_configure(integrator, &settings));
     }
 }
 

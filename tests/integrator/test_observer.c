@@ -1,36 +1,9 @@
 /* Who watches the internal steps of an integrator sees each of them once, changes none, and may end
  * an advance. */
 #include "each_method.h"
-#include "integrator.h"
+#include "integrator_test.h"
 
-#include <math.h>
-#include <string.h>
-#include <unity.h>
-
-/* x' = v, v' = -x; from failing_from (s) on the right-hand side gives NaN. */
-static double failing_from;
-
-static enum status circle_rhs(double t, const double x[], double dx[], void *context) {
-    dx[0] = x[1];
-    dx[1] = t >= failing_from ? NAN : -x[0];
-    return STATUS_OK;
-}
-
-static enum status circle_jacobian(double t, const double x[], double J[], void *context) {
-    static const double columns[4] = {0.0, -1.0, 1.0, 0.0};
-    memcpy(J, columns, sizeof columns);
-    return STATUS_OK;
-}
-
-static enum status circle_series(double t, double time_scale, int first, int last,
-                                 double row[][SERIES_LENGTH], void *context) {
-    for (int k = first > 0 ? first : 1; k <= last; k++) {
-        row[0][k] = time_scale / k * row[1][k - 1];
-        row[1][k] = t >= failing_from ? NAN : -time_scale / k * row[0][k - 1];
-    }
-    return STATUS_OK;
-}
-
+static struct circle circle;
 static struct integrator *integrator;
 static unsigned message_count;
 
@@ -42,22 +15,18 @@ static const double tolerance = 1e-9;
 static const double start[2] = {1.0, 0.0};
 
 static void begin(const struct integrator_start *start_of, double max_step) {
-    static const double absolute[2] = {1e-11, 1e-11};
     const struct ode ode = {.state_count = 2,
                             .rhs = circle_rhs,
                             .jacobian = circle_jacobian,
                             .series = circle_series,
-                            .series_row_count = 2};
+                            .series_row_count = 2,
+                            .context = &circle};
     const struct message_sink sink = {.write = count_message};
-    const struct integrator_settings settings = {.method = (enum integrator_method)method,
-                                                 .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = absolute,
-                                                 .max_step = max_step};
-    failing_from = INFINITY;
+    circle = (struct circle){.failing_from = INFINITY};
     message_count = 0;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &sink, &integrator));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, start, start_of));
+    ASSERT_OK(integrator_create(&ode, &sink, &integrator));
+    configure_integrator(integrator, method, tolerance, max_step);
+    ASSERT_OK(integrator_restart(integrator, start, start_of));
 }
 
 /* All methods need many internal steps for an advance of some seconds. */
@@ -114,7 +83,7 @@ EACH_METHOD static void test_each_step_is_seen_once(void) {
     begin_watching(0);
     for (int i = 0; i < STOPS; i++) {
         const unsigned before = seen.count;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(stops[i], 100000, &reached, x));
+        ASSERT_OK(advance(stops[i], 100000, &reached, x));
         for (unsigned k = before; k < seen.count; k++) {
             TEST_ASSERT_TRUE(seen.times[k] < stops[i]);
         }
@@ -142,7 +111,7 @@ EACH_METHOD static void test_watching_changes_nothing(void) {
             begin_watching(0);
         }
         for (int i = 0; i < STOPS; i++) {
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(stops[i], 100000, &reached, x[watched][i]));
+            ASSERT_OK(advance(stops[i], 100000, &reached, x[watched][i]));
         }
         integrator_get_statistics(integrator, &statistics[watched]);
     }
@@ -156,7 +125,7 @@ EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
     double x[2];
     double reached;
     begin_watching(7);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 100000, &reached, x));
+    ASSERT_OK(advance(9.0, 100000, &reached, x));
     TEST_ASSERT_EQUAL_UINT(7, seen.count);
     TEST_ASSERT_TRUE(reached == seen.times[6]);
     TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
@@ -166,7 +135,7 @@ EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
     TEST_ASSERT_TRUE(statistics.steps == 7);
 
     integrator_set_observer(integrator, NULL, NULL);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 100000, &reached, x));
+    ASSERT_OK(advance(9.0, 100000, &reached, x));
     TEST_ASSERT_TRUE(reached == 9.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e4 * tolerance, cos(9.0), x[0]);
     TEST_ASSERT_EQUAL_UINT(7, seen.count);
@@ -176,7 +145,7 @@ EACH_METHOD static void test_an_advance_ends_where_the_watcher_says(void) {
 EACH_METHOD static void test_times_rise_where_the_right_hand_side_fails(void) {
     double x[2];
     double reached;
-    failing_from = 2.0;
+    circle.failing_from = 2.0;
     begin_watching(0);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, advance(9.0, 1000, &reached, x));
     TEST_ASSERT_TRUE(reached <= 2.0);
@@ -191,14 +160,14 @@ EACH_METHOD static void test_times_rise_where_the_right_hand_side_fails(void) {
 EACH_METHOD static void test_an_advance_that_would_fail_is_ended_before(void) {
     double x[2];
     double reached;
-    failing_from = 2.0;
+    circle.failing_from = 2.0;
     begin_watching(0);
     TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, advance(9.0, 1000, &reached, x));
     const unsigned all = seen.count;
     begin_again();
-    failing_from = 2.0;
+    circle.failing_from = 2.0;
     begin_watching(all);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(9.0, 1000, &reached, x));
+    ASSERT_OK(advance(9.0, 1000, &reached, x));
     TEST_ASSERT_TRUE(reached == seen.times[all - 1]);
     TEST_ASSERT_DOUBLE_WITHIN(1e3 * tolerance, cos(reached), x[0]);
 }
@@ -231,7 +200,7 @@ EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) 
     begin(&on, 0.0);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 0.5, x));
     TEST_ASSERT_TRUE(x[0] == -7.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, x));
+    ASSERT_OK(advance(1.0, 100000, &reached, x));
     const double next = 1.0 + 1e-6;
     if (!(integrator_longest_history((enum integrator_method)method, false) > 0)) {
         TEST_ASSERT_FALSE(integrator_interpolate(integrator, next, x));
@@ -240,8 +209,8 @@ EACH_METHOD static void test_only_a_point_that_was_passed_is_interpolated(void) 
     TEST_ASSERT_TRUE(integrator_interpolate(integrator, next, x));
     tearDown();
     begin(&on, 0.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(1.0, 100000, &reached, expected));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, advance(next, 100000, &reached, expected));
+    ASSERT_OK(advance(1.0, 100000, &reached, expected));
+    ASSERT_OK(advance(next, 100000, &reached, expected));
     TEST_ASSERT_EQUAL_MEMORY(expected, x, sizeof x);
     TEST_ASSERT_FALSE(integrator_interpolate(integrator, 100.0, x));
 }

@@ -76,15 +76,6 @@ static void assert_same(double rounding) {
     fill();
 }
 
-/* Runs a test at every length, also at those with special loops. */
-static void at_every_length(void (*test)(void)) {
-    for (sunindextype n = 1; n <= LONGEST; n++) {
-        create(n);
-        test();
-        destroy();
-    }
-}
-
 void setUp(void) {
     TEST_ASSERT_EQUAL_INT(0, SUNContext_Create(NULL, &context));
 }
@@ -92,6 +83,16 @@ void setUp(void) {
 void tearDown(void) {
     SUNContext_Free(&context);
 }
+
+/* The operation on the small vectors and on the serial ones, and what they give. */
+#define COMPARE(rounding, operation)                                                               \
+    do {                                                                                           \
+        N_Vector(*of)[COUNT] = small;                                                              \
+        operation;                                                                                 \
+        of = serial;                                                                               \
+        operation;                                                                                 \
+        assert_same(rounding);                                                                     \
+    } while (0)
 
 /* The result apart from the operands (2), or in place of one (0, 1). */
 #define EACH_RESULT(z) for (int z = 0; z < 3; z++)
@@ -101,9 +102,8 @@ static void check_linear_sum(void) {
     EACH_RESULT(z) {
         for (int i = 0; i < 5; i++) {
             for (int j = 0; j < 5; j++) {
-                N_VLinearSum(factors[i], small[0][0], factors[j], small[1][0], small[z][0]);
-                N_VLinearSum(factors[i], serial[0][0], factors[j], serial[1][0], serial[z][0]);
-                assert_same(256.0 * 8.0 * DBL_EPSILON);
+                COMPARE(256.0 * 8.0 * DBL_EPSILON,
+                        N_VLinearSum(factors[i], of[0][0], factors[j], of[1][0], of[z][0]));
             }
         }
     }
@@ -111,29 +111,15 @@ static void check_linear_sum(void) {
 
 static void check_elementwise(void) {
     EACH_RESULT(z) {
-        N_VProd(small[0][0], small[1][0], small[z][0]);
-        N_VProd(serial[0][0], serial[1][0], serial[z][0]);
-        assert_same(0.0);
-        N_VDiv(small[0][0], small[1][0], small[z][0]);
-        N_VDiv(serial[0][0], serial[1][0], serial[z][0]);
-        assert_same(0.0);
-        N_VAbs(small[0][0], small[z][0]);
-        N_VAbs(serial[0][0], serial[z][0]);
-        assert_same(0.0);
-        N_VInv(small[0][0], small[z][0]);
-        N_VInv(serial[0][0], serial[z][0]);
-        assert_same(0.0);
-        N_VAddConst(small[0][0], 1.7, small[z][0]);
-        N_VAddConst(serial[0][0], 1.7, serial[z][0]);
-        assert_same(0.0);
-        N_VConst(-3.1, small[z][0]);
-        N_VConst(-3.1, serial[z][0]);
-        assert_same(0.0);
+        COMPARE(0.0, N_VProd(of[0][0], of[1][0], of[z][0]));
+        COMPARE(0.0, N_VDiv(of[0][0], of[1][0], of[z][0]));
+        COMPARE(0.0, N_VAbs(of[0][0], of[z][0]));
+        COMPARE(0.0, N_VInv(of[0][0], of[z][0]));
+        COMPARE(0.0, N_VAddConst(of[0][0], 1.7, of[z][0]));
+        COMPARE(0.0, N_VConst(-3.1, of[z][0]));
         for (int half = -2; half < 5; half++) {
             const double factor = 0.5 * half;
-            N_VScale(factor, small[0][0], small[z][0]);
-            N_VScale(factor, serial[0][0], serial[z][0]);
-            assert_same(0.0);
+            COMPARE(0.0, N_VScale(factor, of[0][0], of[z][0]));
         }
     }
 }
@@ -152,9 +138,9 @@ static void check_linear_combination(void) {
     static sunrealtype factors[COUNT] = {0.5, -2.0, 3.25, 1.0, -0.125};
     for (int count = 1; count <= COUNT; count++) {
         for (int z = 0; z < 2; z++) { // in place of the first operand, and apart
-            TEST_ASSERT_EQUAL_INT(0, N_VLinearCombination(count, factors, small[0], small[z][0]));
-            TEST_ASSERT_EQUAL_INT(0, N_VLinearCombination(count, factors, serial[0], serial[z][0]));
-            assert_same(256.0 * 16.0 * DBL_EPSILON);
+            COMPARE(
+                256.0 * 16.0 * DBL_EPSILON,
+                TEST_ASSERT_EQUAL_INT(0, N_VLinearCombination(count, factors, of[0], of[z][0])));
         }
     }
 }
@@ -163,17 +149,11 @@ static void check_arrays(void) {
     static sunrealtype factors[COUNT] = {0.5, -2.0, 3.25, 1.0, -0.125};
     for (int count = 1; count <= COUNT; count++) {
         for (int z = 1; z < 3; z++) {
-            N_VScaleAddMulti(count, factors, small[0][0], small[1], small[z]);
-            N_VScaleAddMulti(count, factors, serial[0][0], serial[1], serial[z]);
-            assert_same(0.0);
+            COMPARE(0.0, N_VScaleAddMulti(count, factors, of[0][0], of[1], of[z]));
         }
         EACH_RESULT(z) {
-            N_VScaleVectorArray(count, factors, small[0], small[z]);
-            N_VScaleVectorArray(count, factors, serial[0], serial[z]);
-            assert_same(0.0);
-            N_VLinearSumVectorArray(count, 1.5, small[0], -0.25, small[1], small[z]);
-            N_VLinearSumVectorArray(count, 1.5, serial[0], -0.25, serial[1], serial[z]);
-            assert_same(0.0);
+            COMPARE(0.0, N_VScaleVectorArray(count, factors, of[0], of[z]));
+            COMPARE(0.0, N_VLinearSumVectorArray(count, 1.5, of[0], -0.25, of[1], of[z]));
         }
     }
 }
@@ -198,42 +178,6 @@ static void check_polynomial(void) {
     assert_same(COUNT * 256.0 * DBL_EPSILON);
 }
 
-static void check_space(void) {
-    sunindextype reals = -1;
-    sunindextype integers = -1;
-    N_VSpace(small[0][0], &reals, &integers);
-    TEST_ASSERT_EQUAL_INT(length, reals);
-    TEST_ASSERT_EQUAL_INT(1, integers);
-}
-
-static void test_space(void) {
-    at_every_length(check_space);
-}
-
-static void test_linear_sum(void) {
-    at_every_length(check_linear_sum);
-}
-
-static void test_elementwise_operations(void) {
-    at_every_length(check_elementwise);
-}
-
-static void test_reductions(void) {
-    at_every_length(check_reductions);
-}
-
-static void test_linear_combination(void) {
-    at_every_length(check_linear_combination);
-}
-
-static void test_operations_on_arrays_of_vectors(void) {
-    at_every_length(check_arrays);
-}
-
-static void test_polynomial_of_noted_terms(void) {
-    at_every_length(check_polynomial);
-}
-
 static void test_more_terms_than_there_is_room_for_are_not_noted(void) {
     sunrealtype factors[SMALL_VECTOR_MOST_TERMS + 1] = {1.0};
     N_Vector same[SMALL_VECTOR_MOST_TERMS + 1];
@@ -256,12 +200,23 @@ static void check_length(void) {
     TEST_ASSERT_EQUAL_INT(length, N_VGetLength(small[0][0]));
     N_VSpace(small[0][0], &reals, &integers);
     TEST_ASSERT_EQUAL_INT(length, reals);
+    TEST_ASSERT_EQUAL_INT(1, integers);
     TEST_ASSERT_EQUAL_INT(SUNDIALS_NVEC_CUSTOM, N_VGetVectorID(small[0][0]));
     TEST_ASSERT_EQUAL_PTR(N_VGetArrayPointer(small[0][0]), small_vector_data(small[0][0]));
 }
 
-static void test_length(void) {
-    at_every_length(check_length);
+static void test_operations_at_every_length(void) {
+    static void (*const checks[])(void) = {
+        check_length,     check_linear_sum,         check_elementwise,
+        check_reductions, check_linear_combination, check_arrays,
+        check_polynomial};
+    for (size_t i = 0; i < sizeof checks / sizeof checks[0]; i++) {
+        for (sunindextype n = 1; n <= LONGEST; n++) {
+            create(n);
+            checks[i]();
+            destroy();
+        }
+    }
 }
 
 /* A NaN must not vanish in a norm: the integrator recognizes a failed step by it. */

@@ -1,9 +1,5 @@
 /* Steps by Taylor series: which orders they take, how long they are, and where they end. */
-#include "integrator.h"
-
-#include <math.h>
-#include <string.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 /* ---- Equations ------------------------------------------------------------------------------ */
 
@@ -56,14 +52,9 @@ static const double usual_tolerance = 1e-10;
 static void create_at(ode_rhs *rhs, ode_series *series, double max_step, double tolerance) {
     const struct ode ode = {.state_count = 2, .rhs = rhs, .series = series, .series_row_count = 2};
     const struct message_sink quiet = {0};
-    const double absolute[2] = {1e-2 * tolerance, 1e-2 * tolerance};
-    const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
-                                                 .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = absolute,
-                                                 .max_step = max_step};
     integrator_destroy(integrator);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, tolerance, max_step);
 }
 
 static void create(ode_rhs *rhs, ode_series *series, double max_step) {
@@ -73,12 +64,12 @@ static void create(ode_rhs *rhs, ode_series *series, double max_step) {
 static void restart(double x1, double x2, double horizon, bool continues) {
     const struct integrator_start start = {.horizon = horizon, .continues = continues};
     const double x[2] = {x1, x2};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, &start));
+    ASSERT_OK(integrator_restart(integrator, x, &start));
 }
 
 static void advance(double t, double x[2]) {
     double reached;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, x));
+    ASSERT_OK(integrator_advance(integrator, t, 1000, &reached, x));
     TEST_ASSERT_TRUE(reached == t);
 }
 

@@ -1,9 +1,6 @@
 /* Steps by Taylor series with events: indicators that are rows of the series, and states that may
  * move only so far within a step. An oscillator x' = v, v' = -x from x = 0, v = 1. */
-#include "integrator.h"
-
-#include <math.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 enum row { X, V, LEFT, ROWS };
 
@@ -54,16 +51,13 @@ static void short_reach(const double x[], double reach[], void *context) {
 }
 
 static void start(const struct ode *ode) {
-    const double absolute[2] = {1e-14, 1e-14};
-    const struct integrator_settings settings = {
-        .method = INTEGRATOR_TAYLOR, .relative_tolerance = 1e-12, .absolute_tolerances = absolute};
     static const struct indicator of_model = {.kind = INDICATOR_OF_MODEL};
     const struct integrator_start from = {.horizon = INFINITY, .indicators = &of_model};
     const struct message_sink quiet = {0};
     const double x[2] = {0.0, 1.0};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(ode, &quiet, &integrator));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, x, &from));
+    ASSERT_OK(integrator_create(ode, &quiet, &integrator));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, 1e-12, 0.0);
+    ASSERT_OK(integrator_restart(integrator, x, &from));
 }
 
 static struct ode oscillator(void) {
@@ -81,7 +75,7 @@ static struct ode oscillator(void) {
 static double go_to(double t) {
     double reached;
     double x[2];
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, x));
+    ASSERT_OK(integrator_advance(integrator, t, 1000, &reached, x));
     TEST_ASSERT_DOUBLE_WITHIN(1e-11, sin(reached), x[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-11, cos(reached), x[1]);
     return reached;

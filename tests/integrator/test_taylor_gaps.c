@@ -1,9 +1,6 @@
 /* Steps by Taylor series in which orders are missing: x' = p t^(p-1) x^2 from x = 1 at t = 0, with
  * the solution 1 / (1 - t^p), which has the powers 0, p, 2 p, 3 p ... of time and none between. */
-#include "integrator.h"
-
-#include <math.h>
-#include <unity.h>
+#include "integrator_test.h"
 
 static int power;
 static struct integrator *integrator;
@@ -48,7 +45,7 @@ void setUp(void) {
     const struct ode ode = {
         .state_count = 1, .rhs = rhs, .series = series, .series_row_count = ROWS};
     const struct message_sink quiet = {0};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
+    ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
 }
 
 void tearDown(void) {
@@ -80,24 +77,21 @@ static enum status series_of_three(double t, double time_scale, int first, int l
 }
 
 static void test_orders_that_nearly_vanish(void) {
-    const double absolute[3] = {1e-12, 1e-12, 1e-12};
-    const struct integrator_settings settings = {
-        .method = INTEGRATOR_TAYLOR, .relative_tolerance = 1e-10, .absolute_tolerances = absolute};
     const struct ode ode = {
         .state_count = 3, .rhs = rhs_of_three, .series = series_of_three, .series_row_count = 3};
     const struct message_sink quiet = {0};
     const struct integrator_start start = {.horizon = INFINITY};
     power = 5;
     integrator_destroy(integrator);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, 1e-10, 0.0);
     for (int k = 0; k < 15; k++) {
         const double small = 1e-15 * (double)(1 << 2 * k); // to 3e-7
         const double begin[3] = {1.0, small, 0.0};
         double reached;
         double x[3];
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, begin, &start));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, 0.5, 1000, &reached, x));
+        ASSERT_OK(integrator_restart(integrator, begin, &start));
+        ASSERT_OK(integrator_advance(integrator, 0.5, 1000, &reached, x));
         TEST_ASSERT_DOUBLE_WITHIN(4e-10, 1.0 / (1.0 - 0.03125), x[0]);
         TEST_ASSERT_DOUBLE_WITHIN(4e-10 * small + 4e-12, small * exp(0.5), x[1]);
     }
@@ -105,19 +99,15 @@ static void test_orders_that_nearly_vanish(void) {
 
 /* Steps towards the pole at 1; a start error grows with x^2. */
 static void assert_solution(double tolerance, bool continues) {
-    const double absolute = 1e-2 * tolerance;
-    const struct integrator_settings settings = {.method = INTEGRATOR_TAYLOR,
-                                                 .relative_tolerance = tolerance,
-                                                 .absolute_tolerances = &absolute};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
+    configure_integrator(integrator, INTEGRATOR_TAYLOR, tolerance, 0.0);
     for (int i = 1; i < 10; i++) {
         const double begin = 1.0;
         const double t = 0.1 * i;
         const double exact = 1.0 / (1.0 - pow(t, power));
         const struct integrator_start start = {.horizon = INFINITY, .continues = continues};
         double reached, x;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_restart(integrator, &begin, &start));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_advance(integrator, t, 1000, &reached, &x));
+        ASSERT_OK(integrator_restart(integrator, &begin, &start));
+        ASSERT_OK(integrator_advance(integrator, t, 1000, &reached, &x));
         TEST_ASSERT_DOUBLE_WITHIN(4.0 * tolerance * exact * exact, exact, x);
     }
 }

@@ -1,3 +1,4 @@
+#include "last_text.h"
 #include "workspace.h"
 
 #include "allocator.h"
@@ -262,16 +263,14 @@ static void test_the_workspace_of_an_integrator_is_enough(void) {
         for (size_t i = 0; i < n; i++) {
             x[i] = 1.0;
         }
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_create(&ode, &quiet, &integrator));
+        ASSERT_OK(integrator_create(&ode, &quiet, &integrator));
         for (size_t i = 0; i < sizeof methods / sizeof methods[0]; i++) {
             const struct integrator_settings settings = {methods[i], 1e-8, tolerances, 0.0};
             double reached = 0.0;
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, integrator_configure(integrator, &settings));
-            TEST_ASSERT_EQUAL_INT(
-                STATUS_OK,
+            ASSERT_OK(integrator_configure(integrator, &settings));
+            ASSERT_OK(
                 integrator_restart(integrator, x, &(struct integrator_start){.horizon = 10.0}));
-            TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                                  integrator_advance(integrator, 1.0, 1000, &reached, x));
+            ASSERT_OK(integrator_advance(integrator, 1.0, 1000, &reached, x));
         }
         TEST_ASSERT_EQUAL_INT(before + 2, allocator_calls()); // the handle and its workspace
         integrator_destroy(integrator);
@@ -290,7 +289,7 @@ static size_t bytes_taken(const struct method *method, const struct ode *ode) {
     void *memory = NULL;
     TEST_ASSERT_TRUE(workspace_create(&whole, method->memory_size(ode)));
     workspace_enter(&whole);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, method->create(&problem, &memory));
+    ASSERT_OK(method->create(&problem, &memory));
     workspace_leave(&whole);
     method->destroy(memory);
     const size_t used = whole.used;

@@ -1,39 +1,18 @@
 /* The drives by closed forms, through the instance and the integrator: step response, limits,
  * torque-speed line, energy. */
 #include "derivatives.h"
-#include "instance.h"
-#include "last_text.h"
-#include "model_description.h"
 #include "rp_actuator_model.h"
 #include "rp_test_support.h"
-#include "stepping.h"
+#include "run_instance.h"
 #include "value_references.h"
-#include "values.h"
 
 #include <float.h>
-#include <math.h>
-#include <unity.h>
 
-static struct instance *instance;
 static struct rp_test_random random_source;
 
 void setUp(void) {
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    create_instance();
     random_source.state = 16;
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
-}
-
-static double get(unsigned reference) {
-    double value = NAN;
-    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
-    return value;
-}
-
-static void set(unsigned reference, double value) {
-    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
 }
 
 /* Drive of joint 1. k and n are powers of two, so that commands of whole currents are exact. */
@@ -48,14 +27,7 @@ static void start_at(double current) {
     set(RP_ACTUATOR_voltage_max1, u_max);
     set(RP_ACTUATOR_time_constant1, T);
     set(RP_ACTUATOR_current1, current);
-    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
-}
-
-static void step_to(double t) {
-    ASSERT_OK(instance_do_step(instance, instance_time(instance), t - instance_time(instance)));
+    initialize(1e-11);
 }
 
 /* The current a time t after `current`, while the limited current rests. */
@@ -68,8 +40,7 @@ static double first_order(double current, double limited, double t) {
 static void test_steps_of_the_command_are_answered_in_first_order(void) {
     for (int method = 1; method <= 3; method++) {
         instance_reset(instance);
-        const unsigned reference = RP_ACTUATOR_solver_method;
-        ASSERT_OK(instance_set_integer(instance, &reference, 1, &method));
+        set_integer(RP_ACTUATOR_solver_method, method);
         set(RP_ACTUATOR_tau1_cmd, nk * 5.0);
         start_at(-3.0);
         for (int i = 1; i <= 60; i++) {
@@ -135,7 +106,7 @@ static void test_a_speed_that_grows_leads_along_the_line_inside_a_step(void) {
 /* ---- Limits --------------------------------------------------------------------------------- */
 
 /* Largest effort at a velocity: n k i_max up to the corner, then on the line that falls to 0 at the
- * no-load speed u_max / (n k), and goes on below it. */
+ * no-load speed u_max / (n k), and continues below it. */
 static double torque_speed_line(double dq) {
     return nk * fmax(fmin(i_max, (u_max - nk * dq) / R), -i_max);
 }

@@ -1,11 +1,13 @@
 /* The drives as the instance sees them: the derivatives of their fields along curves, the
  * integrator's view with the Jacobian, what is refused. */
+#include "last_text.h"
+#include "model_test.h"
 #include "rp_actuator_model.h"
-#include "rp_actuator_propagation.h"
 #include "rp_test_support.h"
 
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include <unity.h>
 
@@ -25,11 +27,9 @@ enum { FREE, CURRENT_HIGH, CURRENT_LOW, VOLTAGE_HIGH, VOLTAGE_LOW, BOTH, SIDES }
 
 static union point at, first, second;
 static struct rp_test_random random_source;
-static char text[512];
 
 void setUp(void) {
     random_source.state = 61;
-    text[0] = '\0';
 }
 
 /* Far from the other sides, at which the result has a kink. */
@@ -57,7 +57,7 @@ static double field_at(const void *field, double t) {
     for (int i = 0; i < CALCULATED; i++) {
         moved.all[i] += t * first.all[i] + 0.5 * t * t * second.all[i];
     }
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_actuator_model.outputs(&moved.v, t));
+    ASSERT_OK(rp_actuator_model.outputs(&moved.v, t));
     return moved.all[*(const int *)field];
 }
 
@@ -68,7 +68,7 @@ static void test_points_lie_where_their_side_says(void) {
         next_point(n % SIDES);
         struct rp_actuator_values *v = &at.v;
         const struct rp_actuator_parameters *p = &v->parameters;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_actuator_model.outputs(v, 0.0));
+        ASSERT_OK(rp_actuator_model.outputs(v, 0.0));
         for (int i = 0; i < 2; i++) {
             const double constant = p->gear_ratio[i] * p->torque_constant[i];
             const double voltage = p->resistance[i] * v->limited[i] + constant * v->inputs.dq[i];
@@ -91,8 +91,7 @@ static void test_derivatives_along_curves_are_those_of_the_fields(void) {
     const double h = 1.0 / 256;
     for (int n = 0; n < 20 * SIDES; n++) {
         next_point(n % SIDES);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_actuator_model.propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
+        ASSERT_OK(rp_actuator_model.propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
         for (int field = CALCULATED; field < DOUBLES; field++) {
             const double scale = 1.0 + fabs(field_at(&field, 0.0));
             ASSERT_CLOSE(rp_test_derivative(field_at, &field, 0.0, h), first.all[field],
@@ -106,17 +105,8 @@ static void test_derivatives_along_curves_are_those_of_the_fields(void) {
 static void test_calculated_fields_are_written_and_not_read(void) {
     for (int n = 0; n < 20 * SIDES; n++) {
         next_point(n % SIDES);
-        union point clean_first = first, clean_second = second, straight = first;
-        rp_actuator_propagate(&at.v, &clean_first.v, &clean_second.v);
-        union point *const poisoned[] = {&at, &first, &second, &straight};
-        for (int i = 0; i < 4; i++) {
-            memset(&poisoned[i]->all[CALCULATED], 0xff, (DOUBLES - CALCULATED) * sizeof(double));
-        }
-        rp_actuator_propagate(&at.v, &first.v, &second.v);
-        rp_actuator_propagate(&at.v, &straight.v, NULL);
-        TEST_ASSERT_EQUAL_MEMORY(&clean_first, &first, sizeof first);
-        TEST_ASSERT_EQUAL_MEMORY(&clean_second, &second, sizeof second);
-        TEST_ASSERT_EQUAL_MEMORY(&clean_first, &straight, sizeof first);
+        model_test_calculated_fields(&rp_actuator_model, &at, &first, &second,
+                                     CALCULATED * sizeof(double));
     }
 }
 
@@ -129,10 +119,9 @@ static void test_what_is_integrated_are_the_rates_that_are_output(void) {
         memset(&parameters, 0xff, sizeof parameters);
         parameters.v.parameters = at.v.parameters;
         double dx[2];
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_actuator_model.right_hand_side(&parameters.v, 0.0, at.v.current,
-                                                                at.v.inputs.effort_cmd, dx));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_actuator_model.outputs(&at.v, 0.0));
+        ASSERT_OK(rp_actuator_model.right_hand_side(&parameters.v, 0.0, at.v.current,
+                                                    at.v.inputs.effort_cmd, dx));
+        ASSERT_OK(rp_actuator_model.outputs(&at.v, 0.0));
         TEST_ASSERT_EQUAL_MEMORY(at.v.dcurrent, dx, sizeof dx);
     }
 }
@@ -142,13 +131,12 @@ static void test_jacobian_is_what_propagation_gives(void) {
         next_point(n % SIDES);
         double J[2][2];
         memset(J, 0xff, sizeof J);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_actuator_model.jacobian(&at.v, 0.0, at.v.current,
-                                                                    at.v.inputs.effort_cmd, J[0]));
+        ASSERT_OK(
+            rp_actuator_model.jacobian(&at.v, 0.0, at.v.current, at.v.inputs.effort_cmd, J[0]));
         for (int j = 0; j < 2; j++) {
             memset(&first, 0, sizeof first);
             first.v.current[j] = 1.0;
-            TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                                  rp_actuator_model.propagate(&at.v, 0.0, 0.0, &first.v, NULL));
+            ASSERT_OK(rp_actuator_model.propagate(&at.v, 0.0, 0.0, &first.v, NULL));
             TEST_ASSERT_TRUE(J[j][0] == first.v.dcurrent[0] && J[j][1] == first.v.dcurrent[1]);
         }
     }
@@ -184,17 +172,18 @@ static void test_gears_without_a_ratio_are_refused(void) {
     double *ratio = at.v.parameters.gear_ratio;
     ratio[0] = -1e-9;
     ratio[1] = 1e-9;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_actuator_model.check_parameters(&at.v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("", text);
-    const double wrong[] = {0.0, 9e-10, -9e-10, NAN};
+    model_test_accepted(&rp_actuator_model, &at);
+    const struct {
+        double ratio;
+        const char *text;
+    } wrong[] = {{0.0, "0"}, {9e-10, "9e-10"}, {-5e-10, "-5e-10"}, {NAN, "nan"}};
     for (int i = 0; i < 8; i++) {
+        char expected[128];
         ratio[0] = ratio[1] = 1.0;
-        ratio[i / 4] = wrong[i % 4];
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                              rp_actuator_model.check_parameters(&at.v, text, sizeof text));
+        ratio[i / 4] = wrong[i % 4].ratio;
+        (void)snprintf(expected, sizeof expected,
+                       "gear_ratio%d = %s is refused: its magnitude must be 1e-09 or more",
+                       i / 4 + 1, wrong[i % 4].text);
+        model_test_refused(&rp_actuator_model, &at, expected);
     }
-    ratio[1] = -0.5e-9;
-    (void)rp_actuator_model.check_parameters(&at.v, text, sizeof text);
-    TEST_ASSERT_EQUAL_STRING("gear_ratio2 = -5e-10 is refused: its magnitude must be 1e-09 or more",
-                             text);
 }

@@ -1,31 +1,20 @@
 /* The controller: its law with the arm that it drives, and its integral part through the instance
  * and the integrator. test_controller.py compares values and derivatives with sympy. */
 #include "derivatives.h"
-#include "instance.h"
-#include "last_text.h"
-#include "model_description.h"
+#include "model_test.h"
 #include "rp_controller_model.h"
-#include "rp_controller_propagation.h"
 #include "rp_test_support.h"
-#include "stepping.h"
+#include "run_instance.h"
 #include "value_references.h"
-#include "values.h"
 
 #include <float.h>
-#include <math.h>
 #include <string.h>
-#include <unity.h>
 
-static struct instance *instance;
 static struct rp_test_random random_source;
 
 void setUp(void) {
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
+    create_instance();
     random_source.state = 4;
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
 }
 
 /* ---- The law and the arm -------------------------------------------------------------------- */
@@ -150,49 +139,25 @@ static void test_efforts_stay_within_their_limits(void) {
 }
 
 static void test_calculated_fields_are_written_and_not_read(void) {
-    const size_t known = offsetof(struct rp_controller_values, dintegral);
-    const size_t calculated = sizeof(struct rp_controller_values) - known;
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         struct rp_controller_values values, first, second;
         random_values(&values);
         random_values(&first);
         random_values(&second);
         values.parameters.mode = 1 + n % 3;
-        struct rp_controller_values clean_first = first, clean_second = second, alone = first;
-        rp_controller_propagate(&values, &clean_first, &clean_second);
-
-        const struct rp_controller_values *poisoned[] = {&values, &first, &second, &alone};
-        for (int k = 0; k < 4; k++) {
-            memset((char *)poisoned[k] + known, 0xff, calculated); // NaN
-        }
-        rp_controller_propagate(&values, &first, &second);
-        rp_controller_propagate(&values, &alone, NULL);
-        TEST_ASSERT_EQUAL_MEMORY(&clean_first, &first, sizeof first);
-        TEST_ASSERT_EQUAL_MEMORY(&clean_second, &second, sizeof second);
-        TEST_ASSERT_EQUAL_MEMORY(&clean_first, &alone, sizeof alone);
+        model_test_calculated_fields(&rp_controller_model, &values, &first, &second,
+                                     offsetof(struct rp_controller_values, dintegral));
     }
 }
 
 /* ---- The integral part ---------------------------------------------------------------------- */
-
-static double get(unsigned reference) {
-    double value = NAN;
-    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
-    return value;
-}
-
-static void set(unsigned reference, double value) {
-    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
-}
 
 /* PD of joint 1, by itself: u = M (Kp e + Kd de + w). */
 static const double M = 0.75, Kp = 50.0, Kd = 8.0, Ki = 240.0, Tt = 0.125, limit = 30.0;
 static const double e = 0.25, de = -0.5;
 
 static void start(double gain, double tracking_time, double w) {
-    const unsigned mode = RP_CONTROLLER_mode;
-    const int pd = RP_CONTROLLER_PD;
-    ASSERT_OK(instance_set_integer(instance, &mode, 1, &pd));
+    set_integer(RP_CONTROLLER_mode, RP_CONTROLLER_PD);
     set(RP_CONTROLLER_inertia1, M);
     set(RP_CONTROLLER_Kp1, Kp);
     set(RP_CONTROLLER_Kd1, Kd);
@@ -202,14 +167,7 @@ static void start(double gain, double tracking_time, double w) {
     set(RP_CONTROLLER_integral1, w);
     set(RP_CONTROLLER_q1_ref, e);
     set(RP_CONTROLLER_dq1, -de);
-    const struct instance_experiment experiment = {.tolerance_defined = true, .tolerance = 1e-11};
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
-}
-
-static void step_to(double t) {
-    ASSERT_OK(instance_do_step(instance, instance_time(instance), t - instance_time(instance)));
+    initialize(1e-11);
 }
 
 /* Below the limit w' = Ki e: a ramp. At w = edge the effort meets the limit; from there on

@@ -1,5 +1,7 @@
 /* The controller as the instance sees it: the derivatives of its fields along curves, its
  * integrator's view with the Jacobian, what is refused. */
+#include "last_text.h"
+#include "model_test.h"
 #include "rp_controller_model.h"
 #include "rp_test_support.h"
 
@@ -25,11 +27,9 @@ union point {
 
 static union point at, first, second;
 static struct rp_test_random random_source;
-static char text[512];
 
 void setUp(void) {
     random_source.state = 7;
-    text[0] = '\0';
 }
 /* Integral gain only at joint 2; limits that are far or exceeded everywhere. */
 static void next_point(int mode, bool is_limited) {
@@ -64,7 +64,7 @@ static void calculate(double t, union point *moved) {
             moved->all[i] += t * first.all[i] + 0.5 * t * t * second.all[i];
         }
     }
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.outputs(&moved->v, t));
+    ASSERT_OK(rp_controller_model.outputs(&moved->v, t));
 }
 
 static double field_at(const void *field, double t) {
@@ -77,8 +77,7 @@ static void test_derivatives_along_curves_are_those_of_the_fields(void) {
     const double h = 1.0 / 256;
     for (int n = 0; n < 60; n++) {
         next_point(RP_CONTROLLER_PD + n % 3, n % 2 == 1);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_controller_model.propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
+        ASSERT_OK(rp_controller_model.propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
         for (int field = CALCULATED; field < DOUBLES; field++) {
             const double scale = 1e3 + fabs(field_at(&field, 0.0));
             ASSERT_CLOSE(rp_test_derivative(field_at, &field, 0.0, h), first.all[field],
@@ -97,10 +96,9 @@ static void test_what_is_integrated_are_the_rates_that_are_output(void) {
         double dx[2];
         memcpy(u, &inputs, sizeof inputs);
         memset(&at.v.inputs, 0, sizeof at.v.inputs); // they are arguments
-        TEST_ASSERT_EQUAL_INT(
-            STATUS_OK, rp_controller_model.right_hand_side(&at.v, 0.0, at.v.integral, u, dx));
+        ASSERT_OK(rp_controller_model.right_hand_side(&at.v, 0.0, at.v.integral, u, dx));
         at.v.inputs = inputs;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.outputs(&at.v, 0.0));
+        ASSERT_OK(rp_controller_model.outputs(&at.v, 0.0));
         TEST_ASSERT_EQUAL_MEMORY(at.v.dintegral, dx, sizeof dx);
         TEST_ASSERT_TRUE(dx[0] == 0.0 && dx[1] != 0.0);
     }
@@ -132,14 +130,13 @@ static void jacobian(double J[2][2]) {
     parameters.payload_attached = at.v.payload_attached;
     parameters.form = RP_CONTROLLER_CONTINUOUS;
     memset(J, 0xff, sizeof(double[2][2]));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_controller_model.jacobian(&parameters, 3.0, at.v.integral,
-                                                                  at.v.inputs.q_ref, J[0]));
+    ASSERT_OK(
+        rp_controller_model.jacobian(&parameters, 3.0, at.v.integral, at.v.inputs.q_ref, J[0]));
 }
 
 static double rate_at(const double w[2], int i) {
     double dx[2];
-    TEST_ASSERT_EQUAL_INT(
-        STATUS_OK, rp_controller_model.right_hand_side(&at.v, 3.0, w, at.v.inputs.q_ref, dx));
+    ASSERT_OK(rp_controller_model.right_hand_side(&at.v, 3.0, w, at.v.inputs.q_ref, dx));
     return dx[i];
 }
 
@@ -209,8 +206,7 @@ static void test_jacobian_is_what_propagation_gives(void) {
         for (int j = 0; j < 2; j++) {
             memset(&first, 0, sizeof first);
             first.v.integral[j] = 1.0;
-            TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                                  rp_controller_model.propagate(&at.v, 3.0, 0.0, &first.v, NULL));
+            ASSERT_OK(rp_controller_model.propagate(&at.v, 3.0, 0.0, &first.v, NULL));
             TEST_ASSERT_TRUE(J[j][0] == first.v.dintegral[0] && J[j][1] == first.v.dintegral[1]);
         }
     }
@@ -219,9 +215,7 @@ static void test_jacobian_is_what_propagation_gives(void) {
 /* ---- What is refused ------------------------------------------------------------------------ */
 
 static void assert_refused(const char *expected) {
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING(expected, text);
+    model_test_refused(&rp_controller_model, &at, expected);
 }
 
 static void test_times_that_do_not_fit_are_refused(void) {
@@ -235,21 +229,15 @@ static void test_times_that_do_not_fit_are_refused(void) {
     assert_refused("sample_time = 9.99e-07 s is refused: it must be 0, for a continuous law, or at "
                    "least 1e-06 s");
     p->sample_time = p->delay = 1e-6;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
+    model_test_accepted(&rp_controller_model, &at);
 }
 
 static void test_an_arm_without_inertia_is_refused(void) {
     next_point(RP_CONTROLLER_PD, false);
     struct rp_parameters *arm = &at.v.parameters.arm;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("", text);
+    model_test_accepted(&rp_controller_model, &at);
     arm->m1 = 2.0;
     arm->lc1 = arm->I1z = arm->I2z = 0.0;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_controller_model.check_parameters(&at.v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("the inertia m1 lc1^2 + I1z + I2z = 0 is refused: it must be above 0 "
-                             "(m1 = 2, lc1 = 0, I1z = 0, I2z = 0)",
-                             text);
+    assert_refused("the inertia m1 lc1^2 + I1z + I2z = 0 is refused: it must be above 0 "
+                   "(m1 = 2, lc1 = 0, I1z = 0, I2z = 0)");
 }

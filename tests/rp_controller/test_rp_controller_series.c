@@ -1,7 +1,7 @@
 /* The law of computed torque by jets (jet.h), along inputs that are cubic in time: against the
  * derivatives that the model has, and in all orders against Cauchy's integrals of the law. */
 #include "jet.h"
-#include "rp_controller_propagation.h"
+#include "rp_controller_model.h"
 #include "rp_test_support.h"
 
 #include <complex.h>
@@ -217,7 +217,7 @@ static void test_derivatives_are_those_of_the_model(void) {
         read_curve(1, &first);
         read_curve(2, &second);
         rp_controller_unlimited(&p, false, &values.inputs, values.integral, unlimited);
-        rp_controller_propagate(&values, &first, &second);
+        rp_controller_propagate(&values, 0.0, 0.0, &first, &second);
         for (int i = 0; i < 2; i++) {
             const double bound = 8.0 * DBL_EPSILON * scale[i];
             ASSERT_CLOSE(unlimited[i], efforts[i][0], bound);

@@ -1,5 +1,7 @@
 /* The wall: its force against formulas written out here, power, no adhesion, symmetry under turns,
  * derivatives, refusals. */
+#include "last_text.h"
+#include "model_test.h"
 #include "rp_environment_model.h"
 #include "rp_test_support.h"
 
@@ -11,11 +13,9 @@
 static const struct model *const model = &rp_environment_model;
 static struct rp_environment_values v;
 static struct rp_test_random random_source;
-static char text[512];
 
 void setUp(void) {
     random_source.state = 11;
-    text[0] = '\0';
     v = (struct rp_environment_values){
         .parameters = {.stiffness = 2000.0, .damping = 30.0, .position = -0.25, .tip_z = 0.125},
     };
@@ -25,7 +25,7 @@ static double uniform(double low, double high) {
 }
 
 static void outputs(void) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, model->outputs(&v, 0.0));
+    ASSERT_OK(model->outputs(&v, 0.0));
 }
 
 /* A random wall, and a tip at the depth given, which moves at random. */
@@ -235,7 +235,7 @@ static double field_at(const void *field, double t) {
     for (int i = 0; i < CALCULATED; i++) {
         moved.all[i] += t * first.all[i] + 0.5 * t * t * second.all[i];
     }
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, model->outputs(&moved.v, t));
+    ASSERT_OK(model->outputs(&moved.v, t));
     return moved.all[*(const int *)field];
 }
 
@@ -258,7 +258,7 @@ static void test_derivatives_along_curves_are_those_of_the_fields(void) {
         // pressed; on the way out, where the wall does not pull; outside
         const double depth = n % 3 == 2 ? -0.5 : 0.5;
         next_curve(depth, n % 3 == 1 ? 4096.0 : 0.0);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, model->propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
+        ASSERT_OK(model->propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
         for (int field = CALCULATED; field < DOUBLES; field++) {
             const double scale = 1e4;
             ASSERT_CLOSE(rp_test_derivative(field_at, &field, 0.0, h), first.all[field],
@@ -275,41 +275,41 @@ static void test_first_derivatives_do_not_need_the_second(void) {
     for (int n = 0; n < 20; n++) {
         next_curve(0.5, 0.0);
         union point only = first;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, model->propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, model->propagate(&at.v, 0.0, 1.0, &only.v, NULL));
+        ASSERT_OK(model->propagate(&at.v, 0.0, 1.0, &first.v, &second.v));
+        ASSERT_OK(model->propagate(&at.v, 0.0, 1.0, &only.v, NULL));
         TEST_ASSERT_EQUAL_MEMORY(&first, &only, sizeof only);
     }
 }
 
 static void test_there_is_no_state(void) {
     TEST_ASSERT_EQUAL_UINT64(0, model->states.size);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, model->right_hand_side(&v, 0.0, NULL, NULL, NULL));
+    ASSERT_OK(model->right_hand_side(&v, 0.0, NULL, NULL, NULL));
 }
 
 /* ---- What is refused ------------------------------------------------------------------------ */
 
-static void assert_refused(double *parameter, double value, const char *expected) {
-    const double before = *parameter;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, model->check_parameters(&v, text, sizeof text));
-    *parameter = value;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          model->check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING(expected, text);
-    *parameter = before;
-}
-
 static void test_values_out_of_range_are_refused_with_the_value(void) {
     struct rp_environment_parameters *p = &v.parameters;
-    assert_refused(&p->stiffness, -1.5,
-                   "stiffness = -1.5 is refused: it must be finite and not below 0");
-    assert_refused(&p->stiffness, INFINITY,
-                   "stiffness = inf is refused: it must be finite and not below 0");
-    assert_refused(&p->damping, -0.25,
-                   "damping = -0.25 is refused: it must be finite and not below 0");
-    assert_refused(&p->position, INFINITY, "position = inf is refused: it must be finite");
-    assert_refused(&p->angle, -INFINITY, "angle = -inf is refused: it must be finite");
-    assert_refused(&p->tip_x, INFINITY, "tip_x = inf is refused: it must be finite");
-    assert_refused(&p->tip_z, INFINITY, "tip_z = inf is refused: it must be finite");
+    const struct {
+        double *parameter;
+        double value;
+        const char *text;
+    } cases[] = {
+        {&p->stiffness, -1.5, "stiffness = -1.5 is refused: it must be finite and not below 0"},
+        {&p->stiffness, INFINITY, "stiffness = inf is refused: it must be finite and not below 0"},
+        {&p->damping, -0.25, "damping = -0.25 is refused: it must be finite and not below 0"},
+        {&p->position, INFINITY, "position = inf is refused: it must be finite"},
+        {&p->angle, -INFINITY, "angle = -inf is refused: it must be finite"},
+        {&p->tip_x, INFINITY, "tip_x = inf is refused: it must be finite"},
+        {&p->tip_z, INFINITY, "tip_z = inf is refused: it must be finite"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const double before = *cases[i].parameter;
+        model_test_accepted(model, &v);
+        *cases[i].parameter = cases[i].value;
+        model_test_refused(model, &v, cases[i].text);
+        *cases[i].parameter = before;
+    }
     p->stiffness = p->damping = 0.0;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, model->check_parameters(&v, text, sizeof text));
+    model_test_accepted(model, &v);
 }

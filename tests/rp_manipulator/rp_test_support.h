@@ -45,7 +45,7 @@ void rp_test_default_parameters(struct rp_parameters *p);
 double rp_test_inertia(const struct rp_parameters *p, double q2);
 
 /* Bounds of the terms of (14) and (15) for any q1, with |q2| <= q2_bound and so on. The second is
- * what they make of the accelerations through |D^-1|, without their inertial terms. */
+ * that of the accelerations which follow through |D^-1|, without their inertial terms. */
 void rp_test_force_scale(const struct rp_parameters *p, const struct rp_test_state *state,
                          double scale[2]);
 void rp_test_acceleration_scale(const struct rp_parameters *p, const double q[2],

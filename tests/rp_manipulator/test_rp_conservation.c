@@ -1,41 +1,10 @@
 /* What the motion of the arm conserves, through the instance and the integrator. */
-#include "instance.h"
-#include "last_text.h"
-#include "model_description.h"
 #include "rp_model.h"
-#include "stepping.h"
+#include "run_instance.h"
 #include "value_references.h"
-#include "values.h"
-
-#include <math.h>
-#include <unity.h>
-
-static struct instance *instance;
 
 void setUp(void) {
-    ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
-}
-
-void tearDown(void) {
-    instance_destroy(instance);
-}
-
-static double get(unsigned reference) {
-    double value = NAN;
-    ASSERT_OK(instance_get_real(instance, &reference, 1, &value));
-    return value;
-}
-
-static void set(unsigned reference, double value) {
-    ASSERT_OK(instance_set_real(instance, &reference, 1, &value));
-}
-
-static void initialize(double tolerance) {
-    const struct instance_experiment experiment = {.tolerance_defined = true,
-                                                   .tolerance = tolerance};
-    ASSERT_OK(instance_setup_experiment(instance, &experiment));
-    ASSERT_OK(instance_enter_initialization(instance));
-    ASSERT_OK(instance_exit_initialization(instance));
+    create_instance();
 }
 
 static double momentum(void) {

@@ -1,44 +1,18 @@
 /* Values so extreme that the integrator's own arithmetic underflows or overflows: a step is then
  * right or refused, never wrong. */
 #include "each_method.h"
-#include "instance.h"
-#include "model_description.h"
-#include "stepping.h"
+#include "run_instance.h"
 #include "value_references.h"
-#include "values.h"
 
 #include <float.h>
-#include <math.h>
-#include <unity.h>
-
-static struct instance *instance;
-
 void setUp(void) {
     const struct message_sink quiet = {0};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_create(&model_description, &quiet, &instance));
+    ASSERT_OK(instance_create(&model_description, &quiet, &instance));
 }
 
-void tearDown(void) {
-    instance_destroy(instance);
-}
-
-static void set(unsigned reference, double value) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_set_real(instance, &reference, 1, &value));
-}
-
-static double get(unsigned reference) {
-    double value = NAN;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_get_real(instance, &reference, 1, &value));
-    return value;
-}
-
-static void initialize(void) {
-    const struct instance_experiment experiment = {.start_time = 0.0};
-    const unsigned reference = RP_MANIPULATOR_solver_method;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_set_integer(instance, &reference, 1, &method));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_setup_experiment(instance, &experiment));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_enter_initialization(instance));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, instance_exit_initialization(instance));
+static void begin(void) {
+    set_integer(RP_MANIPULATOR_solver_method, method);
+    initialize(0.0);
 }
 
 /* The horizontal plane without offset: only link 2 moves, at constant velocity or acceleration. */
@@ -48,7 +22,7 @@ static void start_sliding(double dq2, double f2) {
     set(RP_MANIPULATOR_a, 0.0);
     set(RP_MANIPULATOR_dq2, dq2);
     set(RP_MANIPULATOR_f2, f2);
-    initialize();
+    begin();
 }
 
 EACH_METHOD static void test_a_huge_speed_is_integrated_or_refused(void) {
@@ -102,7 +76,7 @@ EACH_METHOD static void test_tiny_steps_are_done_or_refused(void) {
 EACH_METHOD static void test_the_state_is_that_of_the_time_reached(void) {
     set(RP_MANIPULATOR_l1, 1e212);
     set(RP_MANIPULATOR_g, -9e-20);
-    initialize();
+    begin();
     const enum status status = instance_do_step(instance, 0.0, 4e209);
     // the arm is so long that it does not move: only the Runge-Kutta method finds that; the Taylor
     // method gets as far as its limit of steps lets it

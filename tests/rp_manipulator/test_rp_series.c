@@ -2,11 +2,11 @@
  *
  * Bounds: textbook() with all terms added up by their absolute values gives each coefficient and
  * each error of one a majorant, which epsilons are counted of. */
+#include "last_text.h"
 #include "rp_series.h"
 
 #include "jet.h"
 #include "rp_model.h"
-#include "rp_propagation.h"
 #include "rp_test_support.h"
 #include "unity.h"
 
@@ -57,7 +57,7 @@ static void extend(int first, int last) {
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
     TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, rp_series.row_count);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_series.extend(&origin, first, last, row));
+    ASSERT_OK(rp_series.extend(&origin, first, last, row));
 }
 
 /* The series of the sample's motion, all orders. */
@@ -183,10 +183,10 @@ static void test_derivatives_are_those_of_the_forward_dynamics(void) {
             first.tau[i] = inputs[i][1] / time_scale;
             second.tau[i] = 2.0 * inputs[i][2] / (time_scale * time_scale);
         }
-        rp_propagate(&at, &first, NULL);
+        rp_propagate(&at, 0.0, 0.0, &first, NULL);
         assert_derivative(first.ddq, 2, 32.0);
         memcpy(second.dq, first.ddq, sizeof second.dq);
-        rp_propagate(&at, &first, &second);
+        rp_propagate(&at, 0.0, 0.0, &first, &second);
         assert_derivative(second.ddq, 3, 64.0);
     }
 }

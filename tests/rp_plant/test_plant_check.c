@@ -1,4 +1,5 @@
 /* What is refused when initialization ends, with the values in one line. */
+#include "model_test.h"
 #include "plant_test_support.h"
 #include "unity.h"
 
@@ -15,16 +16,11 @@ void setUp(void) {
 }
 
 static void assert_accepted(void) {
-    char text[256] = "";
-    TEST_ASSERT_EQUAL_INT_MESSAGE(STATUS_OK, rp_plant_model.check_parameters(&v, text, sizeof text),
-                                  text);
+    model_test_accepted(&rp_plant_model, &v);
 }
 
 static void assert_refused(const char *expected) {
-    char text[256] = "";
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_plant_model.check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING(expected, text);
+    model_test_refused(&rp_plant_model, &v, expected);
 }
 
 static void test_start_values_are_accepted(void) {
@@ -126,16 +122,31 @@ static void test_compliant_stops(void) {
     assert_refused("stop_damping2 = -0.5 is refused: it must be finite and not below 0");
 }
 
-static void test_restitution(void) {
-    v.parameters.restitution[0] = 1.0;
-    assert_accepted();
-    v.parameters.restitution[0] = 1.25;
-    assert_refused("restitution1 = 1.25 is refused: it must be within 0 and 1");
-    v.parameters.restitution[0] = -0.25;
-    assert_refused("restitution1 = -0.25 is refused: it must be within 0 and 1");
-    v.parameters.restitution[0] = NAN;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_plant_model.check_parameters(&v, (char[256]){""}, 256));
+static void test_ranges(void) {
+    struct rp_plant_parameters *p = &v.parameters;
+    const struct {
+        double *value;
+        double refused;
+        const char *text;
+    } cases[] = {
+        {&p->restitution[0], 1.25, "restitution1 = 1.25 is refused: it must be within 0 and 1"},
+        {&p->restitution[0], -0.25, "restitution1 = -0.25 is refused: it must be within 0 and 1"},
+        {&p->restitution[1], NAN, "restitution2 = nan is refused: it must be within 0 and 1"},
+        {&p->payload_x, NAN,
+         "payload_x = nan and payload_z = 0.5 are refused: they must be finite"},
+        {&p->payload_z, INFINITY,
+         "payload_x = -0.5 and payload_z = inf are refused: they must be finite"},
+    };
+    p->restitution[0] = 1.0;
+    p->payload_x = -0.5;
+    p->payload_z = 0.5;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const double before = *cases[i].value;
+        assert_accepted();
+        *cases[i].value = cases[i].refused;
+        assert_refused(cases[i].text);
+        *cases[i].value = before;
+    }
 }
 
 static void test_items_of_the_enumerations(void) {
@@ -146,15 +157,6 @@ static void test_items_of_the_enumerations(void) {
     v.parameters.stops[0] = RP_PLANT_STOPS_NONE;
     v.parameters.grasp = 0;
     assert_refused("grasp = 0 is refused: it must be 1 or 2");
-}
-
-static void test_offset_of_the_payload(void) {
-    v.parameters.payload_x = NAN;
-    v.parameters.payload_z = 0.5;
-    assert_refused("payload_x = nan and payload_z = 0.5 are refused: they must be finite");
-    v.parameters.payload_x = -0.5;
-    v.parameters.payload_z = INFINITY;
-    assert_refused("payload_x = -0.5 and payload_z = inf are refused: they must be finite");
 }
 
 static void test_start_outside_the_stops(void) {

@@ -1,4 +1,4 @@
-/* Contacts with compliant stops: where they begin and end, their force, what an update makes of
+/* Contacts with compliant stops: where they begin and end, their force, how an update changes
  * them. */
 #include "plant_test_support.h"
 #include "unity.h"

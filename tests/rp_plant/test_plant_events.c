@@ -1,5 +1,6 @@
-/* What an update makes of modes, states and sums. Impacts, grasps and decisions at rest have files
- * of their own for their laws. */
+/* How an update changes modes, states and sums. The laws of impacts, grasps and decisions at rest
+ * have other files. */
+#include "last_text.h"
 #include "plant_test_support.h"
 #include "unity.h"
 
@@ -44,10 +45,10 @@ static void indicators_now(double z[RP_PLANT_INDICATORS]) {
     double u[PLANT_INPUTS];
     const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
     memcpy(u, &v.inputs, sizeof u);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, events->indicators(&v, 3.0, x, u, z));
+    ASSERT_OK(events->indicators(&v, 3.0, x, u, z));
 }
 
-static void fire(int indicator, const double *du) {
+static void trigger(int indicator, const double *du) {
     bool triggered[RP_PLANT_INDICATORS] = {false};
     triggered[indicator] = true;
     plant_test_update_with(&v, triggered, du);
@@ -136,7 +137,7 @@ static void test_description_gives_the_indicators(void) {
     }
 }
 
-/* While initialization goes on, values can be read that the first update does not change. */
+/* Until initialization ends, values can be read that the first update does not change. */
 static void test_before_the_first_event_modes_follow_from_the_state(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         next_sample();
@@ -182,12 +183,12 @@ static void test_at_breakaway_the_rate_decides(void) {
         const struct rp_plant_values held = v;
         const int indicator = side > 0 ? FORWARD2 : BACKWARD2;
         v.inputs.tau[1] = side * nextafter(tau2, 0.0); // the root, to rounding
-        fire(indicator, on);
+        trigger(indicator, on);
         assert_modes(RP_PLANT_STUCK, side);
         v = held;
-        fire(indicator, back);
+        trigger(indicator, back);
         assert_modes(RP_PLANT_STUCK, RP_PLANT_STUCK);
-        fire(indicator, NULL);
+        trigger(indicator, NULL);
         assert_modes(RP_PLANT_STUCK, side);
 
         // an input that jumps to the limit: nothing has triggered
@@ -246,7 +247,7 @@ static void test_two_joints_at_their_limits(void) {
 }
 
 /* A slide that moves loads the held joint 1 through the offset. */
-static void test_what_fires_counts_only_where_forces_have_not_jumped(void) {
+static void test_what_triggers_counts_only_where_forces_have_not_jumped(void) {
     v.parameters.arm.a = 0.5;
     v.modes.joint[1] = RP_PLANT_FORWARD;
     v.inputs.tau[0] = 3.0 - 1e-3;
@@ -258,7 +259,7 @@ static void test_what_fires_counts_only_where_forces_have_not_jumped(void) {
 }
 
 /* The load that would have drawn the slide down is let go at the same time. */
-static void test_what_fires_does_not_count_where_the_payload_is_released(void) {
+static void test_what_triggers_does_not_count_where_the_payload_is_released(void) {
     v.parameters.arm.g = 2.0;
     v.parameters.payload_mass = 0.5; // with link 2 it weighs 3, which is the limit
     v.q[0] = RP_TEST_PI / 2.0;

@@ -1,4 +1,5 @@
 /* The smooth part: friction law, mass matrix, balance of power, joint loads, derivatives. */
+#include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_plant_modes.h"
 #include "unity.h"
@@ -55,7 +56,7 @@ static void test_friction_falls_from_breakaway_to_coulomb(void) {
     }
 }
 
-/* An internal step goes on past the velocity 0, where an event ends the mode: friction is smooth
+/* An internal step continues past the velocity 0, where an event ends the mode: friction is smooth
  * there, but does not fall to what it was before, which the step would take for no change. */
 static void test_friction_of_a_mode_that_is_over_stays_high(void) {
     struct rp_plant_parameters *p = &v.parameters;
@@ -141,7 +142,7 @@ static void along_the_motion(struct rp_plant_values *first) {
     memset(first, 0, sizeof *first);
     memcpy(first->q, v.dq, sizeof v.dq);
     memcpy(first->dq, v.ddq, sizeof v.ddq);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, first, NULL));
+    ASSERT_OK(rp_plant_model.propagate(&v, 3.0, 0.0, first, NULL));
 }
 
 /* (K + P)' = power of the drives and the wrench - what friction takes; stuck joints and closed
@@ -214,7 +215,7 @@ static double rate_at(const void *context, double value) {
     double dx[PLANT_STATES];
     memcpy(u, &v.inputs, sizeof u);
     x[rate->state] = value;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.right_hand_side(&v, 3.0, x, u, dx));
+    ASSERT_OK(rp_plant_model.right_hand_side(&v, 3.0, x, u, dx));
     return dx[rate->row];
 }
 
@@ -235,7 +236,7 @@ static void test_jacobian_is_that_of_the_right_hand_side(void) {
         double u[PLANT_INPUTS];
         const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
         memcpy(u, &v.inputs, sizeof u);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
+        ASSERT_OK(rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
         for (int j = 0; j < PLANT_STATES; j++) {
             for (int i = 0; i < PLANT_STATES; i++) {
                 const struct rate rate = {i, j};
@@ -258,11 +259,11 @@ static void test_jacobian_is_what_propagation_gives(void) {
         double u[PLANT_INPUTS];
         const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
         memcpy(u, &v.inputs, sizeof u);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
+        ASSERT_OK(rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
         for (int j = 0; j < PLANT_STATES; j++) {
             struct rp_plant_values first = {.q = {0.0}};
             (j < 2 ? first.q : first.dq)[j % 2] = 1.0;
-            TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
+            ASSERT_OK(rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
             for (int i = 0; i < 2; i++) {
                 ASSERT_SAME(first.dq[i], J[j][i]);
                 ASSERT_SAME(state_rests(j) ? 0.0 : first.ddq[i], J[j][2 + i]);
@@ -288,7 +289,7 @@ static void test_rates_of_the_reactions(void) {
             du.wrench[i] = rp_test_uniform(&random_source, -5.0, 5.0);
         }
         first.inputs = du;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
+        ASSERT_OK(rp_plant_model.propagate(&v, 3.0, 0.0, &first, NULL));
         struct rp_plant_modes modes;
         rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs, &modes);
         rp_plant_reaction_rates(&v.parameters, &modes, v.q, v.dq, &v.inputs, &du, rates);

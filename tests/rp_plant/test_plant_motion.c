@@ -1,6 +1,7 @@
 /* The model run by a simple method, Runge-Kutta steps of 1/2 ms with events found
  * by bisection: closed forms of friction and stops, and the balance of energy over random motions.
  * The core that runs models has its own tests; here any method serves. */
+#include "last_text.h"
 #include "plant_test_support.h"
 #include "unity.h"
 
@@ -76,13 +77,13 @@ static void runge_kutta(const double start[ALL], double h, double end[ALL]) {
     }
 }
 
-static bool fires(double t, const double y[ALL], bool triggered[RP_PLANT_INDICATORS]) {
+static bool triggers(double t, const double y[ALL], bool triggered[RP_PLANT_INDICATORS]) {
     double z[RP_PLANT_INDICATORS];
     double u[PLANT_INPUTS];
     const struct rp_plant_inputs inputs = inputs_at(t);
     bool any = false;
     memcpy(u, &inputs, sizeof u);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, events->indicators(&v, t, y, u, z));
+    ASSERT_OK(events->indicators(&v, t, y, u, z));
     for (int k = 0; k < RP_PLANT_INDICATORS; k++) {
         triggered[k] = z[k] < -RESOLVED;
         any = any || triggered[k];
@@ -103,7 +104,7 @@ static bool advance(double h) {
     double end[ALL];
     bool triggered[RP_PLANT_INDICATORS];
     runge_kutta(start, h, end);
-    const bool event = fires(now + h, end, triggered);
+    const bool event = triggers(now + h, end, triggered);
     if (event) {
         double before = 0.0;
         while (h - before > 1e-16) {
@@ -112,10 +113,10 @@ static bool advance(double h) {
             if (middle == before || middle == h) {
                 break;
             }
-            *(fires(now + middle, end, triggered) ? &h : &before) = middle;
+            *(triggers(now + middle, end, triggered) ? &h : &before) = middle;
         }
         runge_kutta(start, h, end);
-        (void)fires(now + h, end, triggered);
+        (void)triggers(now + h, end, triggered);
         event_count++;
     }
     now += h;

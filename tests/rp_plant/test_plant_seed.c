@@ -1,4 +1,5 @@
 /* With every feature off the plant is the manipulator, bit for bit up to the sign of zero. */
+#include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_model.h"
 #include "unity.h"
@@ -64,7 +65,7 @@ static void test_outputs_are_those_of_the_manipulator(void) {
     for (int n = 0; n < 10 * RP_TEST_SAMPLES; n++) {
         next_sample();
         plant_test_outputs(&plant);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_model.outputs(&arm, 3.0));
+        ASSERT_OK(rp_model.outputs(&arm, 3.0));
         assert_same_fields(&arm, &plant);
         for (int i = 0; i < 2; i++) {
             ASSERT_SAME(0.0, plant.friction[i]);
@@ -81,13 +82,13 @@ static void test_right_hand_side_and_jacobian_are_those_of_the_manipulator(void)
         next_sample();
         const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
         const double u[PLANT_INPUTS] = {plant.inputs.tau[0], plant.inputs.tau[1]};
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_model.right_hand_side(&arm, 3.0, x, u, expected));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.right_hand_side(&plant, 3.0, x, u, actual));
+        ASSERT_OK(rp_model.right_hand_side(&arm, 3.0, x, u, expected));
+        ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, u, actual));
         for (int i = 0; i < PLANT_STATES; i++) {
             ASSERT_SAME(expected[i], actual[i]);
         }
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_model.jacobian(&arm, 3.0, x, u, expected));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.jacobian(&plant, 3.0, x, u, actual));
+        ASSERT_OK(rp_model.jacobian(&arm, 3.0, x, u, expected));
+        ASSERT_OK(rp_plant_model.jacobian(&plant, 3.0, x, u, actual));
         ASSERT_SAME_ARRAY(expected, actual);
     }
 }
@@ -120,10 +121,8 @@ static void test_derivatives_are_those_of_the_manipulator(void) {
         next_sample();
         next_direction(&arm_first, &first);
         next_direction(&arm_second, &second);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_model.propagate(&arm, 3.0, 0.0, &arm_first, &arm_second));
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_plant_model.propagate(&plant, 3.0, 0.0, &first, &second));
+        ASSERT_OK(rp_model.propagate(&arm, 3.0, 0.0, &arm_first, &arm_second));
+        ASSERT_OK(rp_plant_model.propagate(&plant, 3.0, 0.0, &first, &second));
         assert_same_fields(&arm_first, &first);
         assert_same_fields(&arm_second, &second);
     }

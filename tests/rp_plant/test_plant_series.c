@@ -1,5 +1,6 @@
 /* The series of the plant against its right-hand side, its indicators, and the manipulator's
  * series. In test_plant_series.py its coefficients are those of the Lagrangian. */
+#include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_model.h"
 #include "rp_plant_series.h"
@@ -60,7 +61,7 @@ static void extend(const struct series *series, const void *values, int first, i
         .inputs = (const double(*)[SERIES_INPUT_LENGTH])inputs,
     };
     TEST_ASSERT_LESS_OR_EQUAL_size_t(MAX_ROWS, series->row_count);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, series->extend(&origin, first, last, all));
+    ASSERT_OK(series->extend(&origin, first, last, all));
 }
 
 static void test_any_number_of_orders_at_once_gives_the_same_bits(void) {
@@ -122,9 +123,8 @@ static void test_each_feature_counts(void) {
         clear(rows);
         extend(&rp_plant_series, &plant, 0, 1, rows);
         const double x[PLANT_STATES] = {plant.q[0], plant.q[1], plant.dq[0], plant.dq[1]};
-        TEST_ASSERT_EQUAL_INT(
-            STATUS_OK, rp_plant_model.right_hand_side(&plant, 3.0, x, (const double *)&plant.inputs,
-                                                      expected));
+        ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, (const double *)&plant.inputs,
+                                                 expected));
         for (int k = 0; k < PLANT_STATES; k++) {
             ASSERT_CLOSE(expected[k], rows[k][1] / time_scale, 1e-12 * (1.0 + fabs(expected[k])));
         }
@@ -221,8 +221,8 @@ static void assert_model_at(double s) {
     for (int i = 0; i < PLANT_INPUTS; i++) {
         u[i] = inputs[i][0] + s * (inputs[i][1] + s * (inputs[i][2] + s * inputs[i][3]));
     }
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_plant_model.events->indicators(&plant, 3.0, x, u, z));
+    ASSERT_OK(rp_plant_model.right_hand_side(&plant, 3.0, x, u, dx));
+    ASSERT_OK(rp_plant_model.events->indicators(&plant, 3.0, x, u, z));
     rp_plant_model.events->describe(&plant, kinds);
     for (int i = 0; i < PLANT_STATES; i++) {
         const struct sum sum = sum_of(rows[i], s);

@@ -232,7 +232,7 @@ static void test_a_joint_that_hardly_leaves_its_stop_stays(void) {
 }
 
 /* Both joints on stops: the impact of joint 1 drives the slide, which was leaving, back into its
- * stop. It goes on until both leave, and takes energy each time. */
+ * stop. This repeats until both leave, and takes energy each time. */
 static void test_impacts_in_turn_end_with_both_joints_leaving(void) {
     struct rp_test_random random = {67};
     int in_turn = 0;

@@ -1,4 +1,6 @@
 /* The sensor as the instance runs it: ticks, latency, what is shown, which modes are refused. */
+#include "last_text.h"
+#include "model_test.h"
 #include "rp_sensor_model.h"
 
 #include <math.h>
@@ -21,15 +23,15 @@ static enum status update(double t, bool is_timed) {
 }
 
 static void start(double t) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, update(t, false));
+    ASSERT_OK(update(t, false));
 }
 
 static void tick(void) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, update(events->next_time(&v), true));
+    ASSERT_OK(update(events->next_time(&v), true));
 }
 
 static void assert_shown(int counts1, int counts2) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.outputs(&v, 0.0));
+    ASSERT_OK(rp_sensor_model.outputs(&v, 0.0));
     TEST_ASSERT_EQUAL_INT(counts1, v.counts[0]);
     TEST_ASSERT_EQUAL_INT(counts2, v.counts[1]);
     TEST_ASSERT_EQUAL_DOUBLE(counts1 * 0.25, v.q_measured[0]);
@@ -71,7 +73,7 @@ static void test_what_is_no_tick_changes_nothing(void) {
     tick();
     const struct rp_sensor_values before = v;
     v.q[0] = 2.0;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, update(0.0015, false));
+    ASSERT_OK(update(0.0015, false));
     TEST_ASSERT_EQUAL_MEMORY(before.samples, v.samples, sizeof v.samples);
     TEST_ASSERT_EQUAL_DOUBLE(before.ticks, v.ticks);
     TEST_ASSERT_EQUAL_DOUBLE(before.start, v.start);
@@ -103,7 +105,7 @@ static void test_outputs_during_initialization(void) {
     v.parameters.latency = 5;
     for (int n = 0; n < 100; n++) {
         v.q[0] = n;
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.outputs(&v, 0.0));
+        ASSERT_OK(rp_sensor_model.outputs(&v, 0.0));
         const int expected = v.counts[0];
         const struct rp_sensor_values before = v;
         start(0.0);
@@ -157,17 +159,13 @@ static void test_sample_times_that_the_start_swallows_are_refused(void) {
 }
 
 static void test_resolutions_that_give_no_finite_velocity_are_refused(void) {
-    char text[200] = "";
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.check_parameters(&v, text, sizeof text));
+    model_test_accepted(&rp_sensor_model, &v);
     v.parameters.resolution[1] = 1e295;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("", text);
+    model_test_accepted(&rp_sensor_model, &v);
     v.parameters.resolution[1] = 1e296;
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_sensor_model.check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("resolution2 = 1e+296 is refused: with sample_time = 0.001 s the "
-                             "velocity of 2^32 counts in one sample time is not finite",
-                             text);
+    model_test_refused(&rp_sensor_model, &v,
+                       "resolution2 = 1e+296 is refused: with sample_time = 0.001 s the velocity "
+                       "of 2^32 counts in one sample time is not finite");
 }
 
 /* ---- Derivatives ---------------------------------------------------------------------------- */
@@ -176,7 +174,7 @@ static void test_derivatives_by_inputs_are_zero(void) {
     struct rp_sensor_values first = {.q = {1.0, 2.0}, .q_measured = {3.0, 4.0}};
     struct rp_sensor_values second = {.dq_measured = {3.0, 4.0}};
     start(0.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.propagate(&v, 0.0, 1.0, &first, &second));
+    ASSERT_OK(rp_sensor_model.propagate(&v, 0.0, 1.0, &first, &second));
     for (int i = 0; i < 2; i++) {
         TEST_ASSERT_TRUE(first.q_measured[i] == 0.0 && first.dq_measured[i] == 0.0);
         TEST_ASSERT_TRUE(second.q_measured[i] == 0.0 && second.dq_measured[i] == 0.0);
@@ -185,7 +183,7 @@ static void test_derivatives_by_inputs_are_zero(void) {
 
 static void test_first_derivatives_without_second_ones(void) {
     struct rp_sensor_values first = {.q_measured = {3.0, 4.0}, .dq_measured = {5.0, 6.0}};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.propagate(&v, 0.0, 1.0, &first, NULL));
+    ASSERT_OK(rp_sensor_model.propagate(&v, 0.0, 1.0, &first, NULL));
     for (int i = 0; i < 2; i++) {
         TEST_ASSERT_TRUE(first.q_measured[i] == 0.0 && first.dq_measured[i] == 0.0);
     }
@@ -210,7 +208,7 @@ static void test_derivatives_along_resolution_and_sample_time(void) {
         struct rp_sensor_values at = v;
         at.parameters.resolution[0] += s * resolution[FIRST] + s * s / 2.0 * resolution[SECOND];
         at.parameters.sample_time += s * period[FIRST] + s * s / 2.0 * period[SECOND];
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.outputs(&at, 0.0));
+        ASSERT_OK(rp_sensor_model.outputs(&at, 0.0));
         q[k + 1] = at.q_measured[0];
         dq[k + 1] = at.dq_measured[0];
     }
@@ -218,8 +216,8 @@ static void test_derivatives_along_resolution_and_sample_time(void) {
         .parameters = {.sample_time = period[FIRST], .resolution = {resolution[FIRST]}}};
     struct rp_sensor_values second = {
         .parameters = {.sample_time = period[SECOND], .resolution = {resolution[SECOND]}}};
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.outputs(&v, 0.0));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.propagate(&v, 0.0, 0.0, &first, &second));
+    ASSERT_OK(rp_sensor_model.outputs(&v, 0.0));
+    ASSERT_OK(rp_sensor_model.propagate(&v, 0.0, 0.0, &first, &second));
     TEST_ASSERT_TRUE(fabs(q[1]) > 0.5 && fabs(dq[1]) > 5.0);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, (q[2] - q[0]) / (2.0 * ds), first.q_measured[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-5, (dq[2] - dq[0]) / (2.0 * ds), first.dq_measured[0]);
@@ -230,7 +228,7 @@ static void test_derivatives_along_resolution_and_sample_time(void) {
 
 static void test_there_is_no_continuous_state(void) {
     TEST_ASSERT_EQUAL_UINT64(0, rp_sensor_model.states.size);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_sensor_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
+    ASSERT_OK(rp_sensor_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
 }
 
 /* ---- Modes of saved states ------------------------------------------------------------------ */

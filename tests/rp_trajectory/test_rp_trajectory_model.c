@@ -1,4 +1,6 @@
 /* The reference motions as the instance sees them: fields, their derivatives, what is refused. */
+#include "last_text.h"
+#include "model_test.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
 
@@ -9,12 +11,10 @@
 static const double pi = 3.14159265358979323846;
 
 static struct rp_trajectory_values v;
-static char text[512];
 
 void setUp(void) {
     v = (struct rp_trajectory_values){.parameters = rp_trajectory_example};
     v.parameters.start_angle = 0.25;
-    text[0] = '\0';
 }
 /* Calculated fields in the order of the structure. */
 enum { DQ = 2, DDQ = 4, VELOCITY = 8, FIELDS = 10 };
@@ -24,7 +24,7 @@ static const double *fields_of(const struct rp_trajectory_values *values) {
 }
 
 static void fields_at(double t, double fields[FIELDS]) {
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.outputs(&v, t));
+    ASSERT_OK(rp_trajectory_model.outputs(&v, t));
     memcpy(fields, fields_of(&v), FIELDS * sizeof(double));
 }
 
@@ -42,8 +42,7 @@ static void test_rates_along_time_are_the_fields(void) {
         fields_at(1.1, fields);
         memset(&first, 0, sizeof first);
         memset(&second, 0, sizeof second);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                              rp_trajectory_model.propagate(&v, 1.1, 1.0, &first, &second));
+        ASSERT_OK(rp_trajectory_model.propagate(&v, 1.1, 1.0, &first, &second));
         for (int i = 0; i < 2; i++) {
             TEST_ASSERT_DOUBLE_WITHIN(1e-12, fields[DQ + i], first.q[i]);
             TEST_ASSERT_DOUBLE_WITHIN(1e-12, fields[DDQ + i], first.dq[i]);
@@ -79,8 +78,7 @@ static void test_rates_along_parameters_are_those_of_the_fields(void) {
             const double value = parameters[i];
             memset(&first, 0, sizeof first);
             direction[i] = 1.0;
-            TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                                  rp_trajectory_model.propagate(&v, 1.1, 0.0, &first, NULL));
+            ASSERT_OK(rp_trajectory_model.propagate(&v, 1.1, 0.0, &first, NULL));
             parameters[i] = value - step;
             fields_at(1.1, before);
             parameters[i] = value + step;
@@ -97,8 +95,7 @@ static void test_rates_along_parameters_are_those_of_the_fields(void) {
 
 static void test_there_is_no_state(void) {
     TEST_ASSERT_EQUAL_UINT64(0, rp_trajectory_model.states.size);
-    TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                          rp_trajectory_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
+    ASSERT_OK(rp_trajectory_model.right_hand_side(&v, 0.0, NULL, NULL, NULL));
 }
 
 /* ---- The payload ---------------------------------------------------------------------------- */
@@ -109,25 +106,24 @@ static void test_the_payload_is_attached_from_grasp_to_release(void) {
     v.parameters.release_time = 2.5;
     const double times[] = {-1.0, 1.2499, 1.25, 2.4999, 2.5, 1e9};
     for (int i = 0; i < 6; i++) {
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.outputs(&v, times[i]));
+        ASSERT_OK(rp_trajectory_model.outputs(&v, times[i]));
         TEST_ASSERT_EQUAL_INT(i == 2 || i == 3, v.payload_attached);
     }
     v.parameters.release_time = 1.25;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.outputs(&v, 1.25));
+    ASSERT_OK(rp_trajectory_model.outputs(&v, 1.25));
     TEST_ASSERT_EQUAL_INT(0, v.payload_attached);
 }
 
 static void begin_at(double t) {
     const struct event end_of_initialization = {.t = t};
     v.payload = RP_TRAJECTORY_UNDECIDED;
-    TEST_ASSERT_EQUAL_INT(STATUS_OK,
-                          rp_trajectory_model.events->update(&v, &end_of_initialization));
+    ASSERT_OK(rp_trajectory_model.events->update(&v, &end_of_initialization));
 }
 
 static void assert_next(double expected_time, int expected_payload) {
     TEST_ASSERT_TRUE(rp_trajectory_model.events->next_time(&v) == expected_time);
     TEST_ASSERT_TRUE(rp_trajectory_model.events->modes_are_possible(&v, true));
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.outputs(&v, 0.0));
+    ASSERT_OK(rp_trajectory_model.outputs(&v, 0.0));
     TEST_ASSERT_EQUAL_INT(expected_payload, v.payload_attached);
 }
 
@@ -139,10 +135,10 @@ static void test_grasp_and_release_are_time_events(void) {
     const double times[] = {1.25, 2.5, INFINITY};
     for (int i = 0; i < 3; i++) {
         assert_next(times[i], i == 1);
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.events->update(&v, &no_event));
+        ASSERT_OK(rp_trajectory_model.events->update(&v, &no_event));
         assert_next(times[i], i == 1);
         const struct event comes = {.t = times[i], .is_timed = true};
-        TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.events->update(&v, &comes));
+        ASSERT_OK(rp_trajectory_model.events->update(&v, &comes));
     }
     begin_at(1.25);
     assert_next(2.5, 1);
@@ -163,15 +159,11 @@ static void test_without_a_grasp_there_is_no_event(void) {
 /* ---- What is refused ------------------------------------------------------------------------ */
 
 static void assert_refused(const char *expected) {
-    TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                          rp_trajectory_model.check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING(expected, text);
+    model_test_refused(&rp_trajectory_model, &v, expected);
 }
 
 static void assert_accepted(void) {
-    text[0] = '\0';
-    TEST_ASSERT_EQUAL_INT(STATUS_OK, rp_trajectory_model.check_parameters(&v, text, sizeof text));
-    TEST_ASSERT_EQUAL_STRING("", text);
+    model_test_accepted(&rp_trajectory_model, &v);
 }
 
 static void test_start_values_are_accepted(void) {
@@ -256,9 +248,9 @@ static void test_the_nearest_point_of_an_arc_may_be_an_end(void) {
         v.parameters.frequency = 0.5 * direction;
         v.parameters.start_angle = direction < 0 ? 0.5 * pi : 0.0;
         v.parameters.a = 0.5;
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_PARAMETERS,
-                              rp_trajectory_model.check_parameters(&v, text, sizeof text));
-        TEST_ASSERT_NOT_NULL(strstr(text, "(0.25, 0.25) m is refused: there it is 0.353553 m"));
+        assert_refused(
+            "the path to (0.25, 0.25) m is refused: there it is 0.353553 m from the axis of joint "
+            "1, and it must stay beyond the smallest reachable distance |a| = 0.5 m");
     }
 }
 

@@ -56,7 +56,7 @@ static bool is_at_rest_on_limit(const struct rp_plant_parameters *p, int joint, 
     return is_compliant(p, joint) && dq == 0.0 && (q == p->lower[joint] || q == p->upper[joint]);
 }
 
-/* A joint that breaks away has no acceleration yet; one that is held has none at all. */
+/* A joint that breaks away has no acceleration yet; a stuck one has none at all. */
 static int first_direction(int mode, double ddq) {
     const bool slides = mode == RP_PLANT_FORWARD || mode == RP_PLANT_BACKWARD;
     return slides ? mode : sign_of(ddq);

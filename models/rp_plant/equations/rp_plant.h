@@ -29,7 +29,7 @@ enum rp_plant_grasp {
 
 enum rp_plant_joint_mode {
     RP_PLANT_BACKWARD = -1, /* slides, friction drives it forward */
-    RP_PLANT_STUCK = 0,     /* held by friction or at a closed stop */
+    RP_PLANT_STUCK = 0,     /* at rest, by friction or on a closed stop */
     RP_PLANT_FORWARD = 1,   /* slides, friction drives it backward */
     RP_PLANT_FREE = 2,      /* moves without friction */
 };
@@ -43,7 +43,7 @@ enum rp_plant_contact {
 };
 
 enum rp_plant_payload_mode {
-    RP_PLANT_UNDECIDED = 0, /* initialization goes on: no mode has been decided */
+    RP_PLANT_UNDECIDED = 0, /* until initialization ends: no mode has been decided */
     RP_PLANT_ATTACHED = 1,
     RP_PLANT_RELEASED = 2,
 };
@@ -112,7 +112,7 @@ void rp_plant_inertia(const struct rp_plant_parameters *p, bool attached, double
 double rp_plant_kinetic_energy(const struct rp_plant_parameters *p, bool attached,
                                const double q[2], const double dq[2]);
 
-/* b: all generalized forces but those that hold joints at rest. A joint that slides has its
+/* b: all generalized forces but the reactions of stuck joints. A joint that slides has its
  * friction in it, a stuck one has none:
  *
  *   b = tau + Q - damping q' - friction + compliant stop - C q' - g */

@@ -103,7 +103,7 @@ EQUATION real plant_turned_back(real w) {
     if (!(value_of(w8) < most)) {
         return constant(1.0);
     }
-    return over(w8, plus(constant(1.0), w8));
+    return quotient(w8, plus(constant(1.0), w8));
 }
 
 /* F(v) = Fc + (Fb - Fc) e with e = exp(-(v / vs)^2), summed up so that F(0) is Fb to the bit; v in
@@ -116,7 +116,7 @@ EQUATION real plant_sliding_friction(const struct rp_plant_parameters *const p[S
     if (!(value_of(breakaway) > 0.0 && value_of(velocity) > 0.0)) {
         return coulomb;
     }
-    const real w = over(v, velocity);
+    const real w = quotient(v, velocity);
     real e = plant_exponential(negative(times(w, w)));
     if (value_of(w) < 0.0) {
         e = plus(e, plant_turned_back(w));
@@ -159,8 +159,8 @@ EQUATION real plant_push(const struct rp_plant_parameters *const p[SOURCES], int
     return contact > 0 ? minus(constant(1.0), y) : plus(constant(1.0), y);
 }
 
-/* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it goes on past d = 0, up to
- * the event that ends the contact. */
+/* Hunt and Crossley: k d (1 + c d'), on the joint. In a given contact it continues past d = 0, up
+ * to the event that ends the contact. */
 EQUATION real plant_compliant_force(const struct rp_plant_parameters *const p[SOURCES], int contact,
                                     int i, real q, real dq) {
     if (abs(contact) != RP_PLANT_PUSHED) {
@@ -232,25 +232,25 @@ EQUATION void plant_forward_dynamics(const struct plant *plant, const real effor
     const real dq2 = arm->dq[1];
     const real m2L = times(arm->m2, arm->L);
     const real moved2 = plus(arm->m2, plant->armature2);
-    const real mu = over(arm->m2, moved2);
+    const real mu = quotient(arm->m2, moved2);
     const real a_mu = times(arm->a, mu);
 
     const real driven = plus(efforts[0], times(a_mu, efforts[1]));
     const real velocities = times(times(m2L, dq1), minus(times(a_mu, dq1), scaled(2.0, dq2)));
     const real weight = times(times(arm->g, arm->c1), plus(times(arm->m1, arm->lc1), m2L));
     const real weight2 = times(times(arm->m2, arm->g), times(arm->a, arm->s1));
-    const real held = times(over(plant->armature2, moved2), weight2);
-    const real torque = plus(minus(plus(driven, velocities), weight), held);
-    ddq[0] = over(torque, plus(arm->J, times(times(arm->a, a_mu), plant->armature2)));
+    const real borne = times(quotient(plant->armature2, moved2), weight2);
+    const real torque = plus(minus(plus(driven, velocities), weight), borne);
+    ddq[0] = quotient(torque, plus(arm->J, times(times(arm->a, a_mu), plant->armature2)));
 
-    const real push = over(efforts[1], arm->m2);
+    const real push = quotient(efforts[1], arm->m2);
     const real centrifugal = times(times(arm->L, dq1), dq1);
     const real fall = times(arm->g, arm->s1);
     const real free = plus(minus(plus(push, centrifugal), fall), times(arm->a, ddq[0]));
     ddq[1] = times(mu, free);
 }
 
-/* Accelerations, and what it takes to hold the stuck joints: with q_i'' = 0 row i of
+/* Accelerations, and the reactions of stuck joints: with q_i'' = 0 row i of
  * D q'' = forces is left out, and reaction_i = forces_i - D_ij q_j''. */
 EQUATION void plant_motion(const struct plant *plant, const int mode[2], const real efforts[2],
                            real ddq[2], real reaction[2]) {
@@ -270,7 +270,7 @@ EQUATION void plant_motion(const struct plant *plant, const int mode[2], const r
     plant_forces(plant, efforts, forces);
     for (int i = 0; i < 2; i++) {
         if (!stuck[i]) {
-            ddq[i] = over(forces[i], D[i][i]);
+            ddq[i] = quotient(forces[i], D[i][i]);
         }
     }
     for (int i = 0; i < 2; i++) {

@@ -1,0 +1,76 @@
+#include "falls.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The last fall to 0 up to this s; INFINITY: there is none. */
+static double last_fall(const struct roots_polynomial *p, double s) {
+    struct root roots[ROOTS_LENGTH];
+    const int count = roots_find(p, roots);
+    double last = INFINITY;
+    for (int i = 0; i < count && roots[i].s <= s; i++) {
+        last = roots[i].kind == ROOT_FALLS ? roots[i].s : last;
+    }
+    return last;
+}
+
+/* The first fall to 0 behind this s; INFINITY: there is none. */
+static double fall_behind(const struct roots_polynomial *p, double s) {
+    struct root roots[ROOTS_LENGTH];
+    const int count = roots_find(p, roots);
+    for (int i = 0; i < count; i++) {
+        if (roots[i].s > s && roots[i].kind == ROOT_FALLS) {
+            return roots[i].s;
+        }
+    }
+    return INFINITY;
+}
+
+/* The first s at which p, below the level before, is above it; INFINITY: it stays below. */
+static double first_rise(const struct roots_polynomial *p, double level) {
+    double c[ROOTS_LENGTH];
+    for (int k = 0; k <= p->degree; k++) {
+        c[k] = -p->c[k];
+    }
+    c[0] += level;
+    const struct roots_polynomial below = {.c = c, .degree = p->degree, .noise = -1.0};
+    return roots_first(&below);
+}
+
+/* The first s at which p is below the level; INFINITY: it stays above. */
+static double first_below(const struct roots_polynomial *p, double level) {
+    double c[ROOTS_LENGTH];
+    memcpy(c, p->c, ((size_t)p->degree + 1) * sizeof *c);
+    c[0] -= level;
+    const struct roots_polynomial above = {.c = c, .degree = p->degree, .noise = -1.0};
+    return roots_first(&above);
+}
+
+/* The first fall of an indicator that is 0 at a restart and is to rise. As small as the noise it
+ * may have either sign; it has fallen where it is below the noise, and did so where it was 0 last.
+ */
+static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
+    const double below = first_below(p, -noise);
+    const double above = first_rise(p, noise);
+    if (above < below) {
+        *is_armed = true;
+        return fall_behind(p, above);
+    }
+    return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
+}
+
+/* Where a restart finds the indicator below its noise it has not fallen yet, as the modes have just
+ * been found valid; otherwise an event could come again and again. */
+double fall_first(const struct roots_polynomial *p, double error, bool *is_armed, double *noise) {
+    if (!*is_armed) {
+        double within = fmax(error, *noise);
+        if (p->c[0] <= -within) {
+            within = -2.0 * p->c[0];
+            *noise = within;
+        }
+        return first_fall_from_zero(p, within, is_armed);
+    }
+    // from below 0 it can only rise by the error of the polynomial
+    const bool rises = p->degree > 0 && p->c[0] <= 0.0 && p->c[1] > 0.0;
+    return rises ? fall_behind(p, 0.0) : roots_first(p);
+}

@@ -1,0 +1,133 @@
+#include "taylor_series.h"
+
+#include "workspace.h"
+
+#include <math.h>
+#include <string.h>
+
+/* The last coefficient of an input enters the states' two orders before. */
+enum { LEAST_ORDER = SERIES_INPUT_LENGTH + 1 };
+
+/* Of the length that the last terms allow (Jorba and Zou, section 3.2.1). */
+static const double safety = 0.9;
+
+/* ---- Life ----------------------------------------------------------------------------------- */
+
+size_t taylor_series_memory_size(const struct ode *ode) {
+    const size_t padding = 2 * _Alignof(max_align_t);
+    return padding + ode->state_count * sizeof(double) +
+           ode->series_row_count * sizeof(double[SERIES_LENGTH]);
+}
+
+bool taylor_series_create(struct problem *problem, struct taylor_series *series) {
+    *series = (struct taylor_series){.problem = problem};
+    series->weight = workspace_calloc(problem->ode.state_count, sizeof *series->weight);
+    series->row = workspace_calloc(problem->ode.series_row_count, sizeof *series->row);
+    return series->weight != NULL && series->row != NULL;
+}
+
+void taylor_series_destroy(struct taylor_series *series) {
+    workspace_free(series->row);
+    workspace_free(series->weight);
+}
+
+/* Steps cost least near 1 - ln(tolerance) / 2 where all orders cost the same (Jorba and Zou,
+ * section 3.2). The first ones, with their sine and cosine, cost as much as several others. */
+void taylor_series_configure(struct taylor_series *series) {
+    const double e = 2.718281828459045;
+    int order = 8; // at a tolerance of 1
+    for (double left = series->problem->settings.relative_tolerance;
+         left < 1.0 && order < SERIES_LENGTH - 1; left *= e * e) {
+        order++;
+    }
+    series->largest_order = order + 1 - order % 2;
+    series->expected_order = LEAST_ORDER;
+}
+
+/* ---- Orders --------------------------------------------------------------------------------- */
+
+/* Begins the series, with the orders from 0 to last. */
+static enum status begin(struct taylor_series *series, double t, double time_scale,
+                         const double x[], int last) {
+    const struct integrator_settings *settings = &series->problem->settings;
+    for (size_t i = 0; i < series->problem->ode.state_count; i++) {
+        series->row[i][0] = x[i];
+        series->weight[i] =
+            1.0 / (settings->relative_tolerance * fabs(x[i]) + settings->absolute_tolerances[i]);
+    }
+    series->begin = t;
+    series->time_scale = time_scale;
+    series->order = last;
+    return problem_series(series->problem, t, time_scale, 0, last, series->row);
+}
+
+enum status taylor_series_add_orders(struct taylor_series *series, int last) {
+    const int first = series->order + 1;
+    series->order = last;
+    return problem_series(series->problem, series->begin, series->time_scale, first, last,
+                          series->row);
+}
+
+/* Sum of the terms of an order, one time scale ahead, in tolerances of the states. */
+static double size_of_terms(const struct taylor_series *series, int order) {
+    double size = 0.0;
+    for (size_t i = 0; i < series->problem->ode.state_count; i++) {
+        size += fabs(series->row[i][order]) * series->weight[i];
+    }
+    return size;
+}
+
+/* Near log2 x, for x >= 0. */
+static int exponent_of(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (int)(bits >> 52) - 1023;
+}
+
+/* The step at whose end the terms of the orders last - 1 and last, which have these sizes one time
+ * scale ahead, are within the tolerance; bound at most, NaN where a size is not finite. */
+static double step_of_last_terms(const double size[2], int last, double bound) {
+    if (!isfinite(size[0] + size[1])) {
+        return NAN;
+    }
+    // where log2 of the size over the order is larger
+    const bool is_last = exponent_of(size[1]) * (last - 1) > exponent_of(size[0]) * last;
+    const int limiting = is_last ? last : last - 1;
+    const double step = safety * pow(size[is_last ? 1 : 0], -1.0 / limiting);
+    return step < bound ? step : bound;
+}
+
+/* Adds orders until the series has converged, or has its largest order. Odd ones: with steps of
+ * even order the errors of a swing cancel, and cease to cancel at a smaller tolerance where some
+ * steps have one order more. */
+static enum status find_order(struct taylor_series *series) {
+    for (int order = LEAST_ORDER;; order += 2) {
+        if (order > series->order) {
+            const enum status status = taylor_series_add_orders(series, order);
+            if (status != STATUS_OK) {
+                return status;
+            }
+        }
+        // the terms are within the tolerance and become smaller
+        const double size[2] = {size_of_terms(series, order - 1), size_of_terms(series, order)};
+        const bool is_enough = size[0] <= 1.0 && size[1] <= size[0];
+        if (is_enough || order == series->largest_order) {
+            series->order = order;
+            series->step = is_enough ? 1.0 : step_of_last_terms(size, order, 1.0);
+            return STATUS_OK;
+        }
+    }
+}
+
+enum status taylor_series_expand(struct taylor_series *series, double t, double time_scale,
+                                 const double x[], double longest) {
+    const bool is_long = longest > 0.0;
+    const int last = is_long ? series->largest_order : series->expected_order;
+    const enum status status = begin(series, t, time_scale, x, last);
+    if (status != STATUS_OK || !is_long) {
+        return status != STATUS_OK ? status : find_order(series);
+    }
+    const double size[2] = {size_of_terms(series, last - 1), size_of_terms(series, last)};
+    series->step = step_of_last_terms(size, last, longest);
+    return STATUS_OK;
+}

@@ -1,0 +1,94 @@
+/* The Taylor series of the solution about the begin of a step: its orders, the step for which they
+ * suffice, and its values (Jorba and Zou, A software package for the numerical integration of ODEs
+ * by means of high-order Taylor methods, Experimental Mathematics 14, 2005).
+ *
+ * Steps are in time scales here: the series is one in s = (t - begin) / time_scale. */
+#ifndef TAYLOR_SERIES_H
+#define TAYLOR_SERIES_H
+
+#include "problem.h"
+
+struct taylor_series {
+    struct problem *problem;
+    int largest_order;
+    int order;
+    int expected_order;           /* which a step that lands is expanded to at first; its result
+                                     does not depend on it */
+    double begin;                 /* s since the restart */
+    double time_scale;            /* s */
+    double step;                  /* for which the series is good; NaN: a term is not finite */
+    double (*row)[SERIES_LENGTH]; /* the coefficients */
+    double *weight;               /* of each state: 1 over its tolerance */
+};
+
+/* Bytes that create allocates at most. */
+NONNULL size_t taylor_series_memory_size(const struct ode *ode);
+
+/* False where memory is short. Destroy it in either case. */
+MUST_CHECK NONNULL bool taylor_series_create(struct problem *problem, struct taylor_series *series);
+NONNULL void taylor_series_destroy(struct taylor_series *series);
+
+/* The largest order, from problem->settings. */
+NONNULL void taylor_series_configure(struct taylor_series *series);
+
+/* Expands the solution about the state x at the time t, and writes `step`. longest > 0: the step is
+ * as long as the largest order allows, and as this at most. 0: orders are added until the terms one
+ * time scale ahead are within the tolerance; the step is 1, or less where the largest order is not
+ * enough. */
+MUST_CHECK NONNULL enum status taylor_series_expand(struct taylor_series *series, double t,
+                                                    double time_scale, const double x[],
+                                                    double longest);
+
+/* Goes on with the series, to the order last. */
+MUST_CHECK NONNULL enum status taylor_series_add_orders(struct taylor_series *series, int last);
+
+/* As taylor_series_evaluate. n: the number of states. */
+ALWAYS_INLINE void taylor_series_evaluate_of(const struct taylor_series *series, double s, size_t n,
+                                             double x[], double dx[]) {
+    for (size_t i = 0; i < n; i++) {
+        x[i] = series->row[i][series->order];
+        if (dx != NULL) {
+            dx[i] = 0.0;
+        }
+    }
+    for (int k = series->order - 1; k >= 0; k--) {
+        for (size_t i = 0; i < n; i++) {
+            if (dx != NULL) {
+                dx[i] = dx[i] * s + x[i];
+            }
+            x[i] = x[i] * s + series->row[i][k];
+        }
+    }
+}
+
+/* Writes the state at s to x and, unless NULL, its derivative by s to dx.
+ *
+ * Where the number of states is a constant, and s = 1 is one, values stay in registers and the
+ * products are left out: a quarter of a step of two joints. */
+static inline void taylor_series_evaluate(const struct taylor_series *series, double s, double x[],
+                                          double dx[]) {
+    double four_x[4];
+    double four_dx[4];
+    const size_t n = series->problem->ode.state_count;
+    if (n != 4) {
+        taylor_series_evaluate_of(series, s, n, x, dx);
+        return;
+    }
+    if (dx == NULL) {
+        taylor_series_evaluate_of(series, s, 4, four_x, NULL);
+    } else if (s == 1.0) {
+        taylor_series_evaluate_of(series, 1.0, 4, four_x, four_dx);
+    } else {
+        taylor_series_evaluate_of(series, s, 4, four_x, four_dx);
+    }
+    for (int i = 0; i < 4; i++) {
+        x[i] = four_x[i];
+    }
+    if (dx != NULL) {
+        for (int i = 0; i < 4; i++) {
+            dx[i] = four_dx[i];
+        }
+    }
+}
+
+#endif
