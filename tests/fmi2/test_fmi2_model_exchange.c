@@ -126,8 +126,7 @@ static void test_start_values_are_the_first_states(void) {
     double x[FMU_STATES] = {0};
     const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
     fmu_set(c, RP_MANIPULATOR_q2, 0.25);
-    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 3.0, fmi2False, 0));
-    ASSERT_OK(fmu.EnterInitializationMode(c));
+    fmu_enter_initialization(c, 3.0);
     fmu_set(c, RP_MANIPULATOR_dq1, -1.5);
     ASSERT_OK(fmu.GetContinuousStates(c, x, FMU_STATES));
     TEST_ASSERT_EQUAL_DOUBLE(0.25, x[1]);

@@ -71,6 +71,9 @@ void fmu_free(fmi2Component component);
 /* Frees what is open and fails the test if a message was malformed. */
 void fmu_tear_down(const struct fmu_log *log);
 
+/* SetupExperiment, from start on (s), and EnterInitializationMode. */
+void fmu_enter_initialization(fmi2Component component, double start);
+
 /* SetupExperiment to ExitInitializationMode; tolerance 0: not defined. No stop time. */
 void fmu_initialize(fmi2Component component, double start, double tolerance);
 

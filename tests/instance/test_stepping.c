@@ -323,12 +323,12 @@ static double error_with_jumps(double tolerance, double jump, int every) {
 
 /* No size of jump is so small that going on costs accuracy, or so large that a restart does. */
 EACH_METHOD static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
-    static const double tolerances[] = {1e-4, 1e-6, 1e-8, 1e-10};
+    static const double tolerances[] = {1e-5, 1e-9};
     static const int intervals[] = {1, 25};
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 4; i++) {
         const double tolerance = tolerances[i / 2];
         const double smallest = error_with_jumps(tolerance, 1e-12, intervals[i % 2]);
-        for (int exponent = -12; exponent <= 3; exponent++) {
+        for (int exponent = -12; exponent <= 3; exponent += 2) {
             const double error = error_with_jumps(tolerance, pow(10.0, exponent), intervals[i % 2]);
             TEST_ASSERT_TRUE(error <= 3.0 * tolerance);
             TEST_ASSERT_TRUE(error <= 2.0 * smallest);
