@@ -50,14 +50,12 @@ static void check_refused(void (*check)(fmi2Component c, fmi2FMUstate good,
 static void check_damaged(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes) {
     static const fmi2Byte masks[] = {(fmi2Byte)0xff, 0x01, (fmi2Byte)0x80};
     for (size_t i = 0; i < bytes->size; i++) {
-        for (size_t m = 0; m < FMU_COUNT(masks); m++) {
-            char text[64];
-            snprintf(text, sizeof text, "byte %zu flipped", i);
-            struct fmu_bytes damaged = fmu_bytes_copy(bytes, bytes->size);
-            damaged.data[i] = (fmi2Byte)(damaged.data[i] ^ masks[m]);
-            assert_refused(c, good, &damaged, text);
-            fmu_bytes_free(&damaged);
-        }
+        char text[64];
+        snprintf(text, sizeof text, "byte %zu flipped", i);
+        struct fmu_bytes damaged = fmu_bytes_copy(bytes, bytes->size);
+        damaged.data[i] = (fmi2Byte)(damaged.data[i] ^ masks[i % FMU_COUNT(masks)]);
+        assert_refused(c, good, &damaged, text);
+        fmu_bytes_free(&damaged);
     }
 }
 

@@ -16,24 +16,21 @@ static const enum fmu_function access_functions[] = {FMU_GetReal,    FMU_GetInte
                                                      FMU_GetString,  FMU_SetReal,    FMU_SetInteger,
                                                      FMU_SetBoolean, FMU_SetString};
 
+#define CASE(name)                                                                                 \
+    case FMU_##name:                                                                               \
+        return fmu.name(c, references, count, values)
+
 /* Any of them by one signature; values are of the function's own type. */
 static fmi2Status access(enum fmu_function function, fmi2Component c,
                          const fmi2ValueReference references[], size_t count, void *values) {
     switch (function) {
-    case FMU_GetReal:
-        return fmu.GetReal(c, references, count, values);
-    case FMU_GetInteger:
-        return fmu.GetInteger(c, references, count, values);
-    case FMU_GetBoolean:
-        return fmu.GetBoolean(c, references, count, values);
-    case FMU_GetString:
-        return fmu.GetString(c, references, count, values);
-    case FMU_SetReal:
-        return fmu.SetReal(c, references, count, values);
-    case FMU_SetInteger:
-        return fmu.SetInteger(c, references, count, values);
-    case FMU_SetBoolean:
-        return fmu.SetBoolean(c, references, count, values);
+        CASE(GetReal);
+        CASE(GetInteger);
+        CASE(GetBoolean);
+        CASE(GetString);
+        CASE(SetReal);
+        CASE(SetInteger);
+        CASE(SetBoolean);
     default:
         return fmu.SetString(c, references, count, values);
     }

@@ -222,6 +222,30 @@ fmi2Integer fmu_get_integer(fmi2Component component, fmi2ValueReference referenc
     return value;
 }
 
+const fmi2ValueReference fmu_state_references[FMU_STATES] = {
+    RP_MANIPULATOR_q1, RP_MANIPULATOR_q2, RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
+
+void fmu_get_states(fmi2Component component, double x[FMU_STATES]) {
+    ASSERT_OK(fmu.GetReal(component, fmu_state_references, FMU_STATES, x));
+}
+
+void fmu_assert_motion(fmi2Component c, double tau1, double f2, double tolerance) {
+    const double ddq1 = fmu_get(c, RP_MANIPULATOR_ddq1);
+    const double ddq2 = fmu_get(c, RP_MANIPULATOR_ddq2);
+    const double D12 = fmu_get(c, RP_MANIPULATOR_D12);
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, tau1,
+                              fmu_get(c, RP_MANIPULATOR_D11) * ddq1 + D12 * ddq2 +
+                                  fmu_get(c, RP_MANIPULATOR_coriolis1) +
+                                  fmu_get(c, RP_MANIPULATOR_gravity1));
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, f2,
+                              D12 * ddq1 + fmu_get(c, RP_MANIPULATOR_D22) * ddq2 +
+                                  fmu_get(c, RP_MANIPULATOR_coriolis2) +
+                                  fmu_get(c, RP_MANIPULATOR_gravity2));
+    TEST_ASSERT_DOUBLE_WITHIN(
+        tolerance, tau1 * fmu_get(c, RP_MANIPULATOR_dq1) + f2 * fmu_get(c, RP_MANIPULATOR_dq2),
+        fmu_get(c, RP_MANIPULATOR_actuator_power));
+}
+
 static fmi2Status worse(fmi2Status a, fmi2Status b) {
     return a > b ? a : b;
 }

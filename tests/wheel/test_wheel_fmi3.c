@@ -326,32 +326,6 @@ static void test_a_byte_that_is_no_boolean_is_discarded(void) {
     assert_message("an array has 2 values: 1 are expected");
 }
 
-/* Discrete variables are not those of intermediate updates. */
-static void test_no_intermediate_update_of_booleans(void) {
-    const fmi3ValueReference required = WHEEL_is_counting;
-    TEST_ASSERT_NULL(fmu3.InstantiateCoSimulation("wheel", WHEEL_TOKEN_FMI3, NULL, false, false,
-                                                  false, false, &required, 1, NULL, keep, NULL));
-    assert_message("21");
-}
-
-static void test_only_reals_have_derivatives(void) {
-    const fmi3ValueReference counting = WHEEL_is_counting;
-    const fmi3ValueReference rate = WHEEL_rate;
-    const fmi3ValueReference caught = WHEEL_is_caught;
-    const double seed = 1.0;
-    double result = 7.0;
-    in_initialization();
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetDirectionalDerivative(wheel, &rate, 1, &counting, 1,
-                                                                   &seed, 1, &result, 1));
-    assert_message("is_counting (value reference 21) is refused: it is of type boolean");
-    release();
-    in_initialization();
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetAdjointDerivative(wheel, &caught, 1, &counting, 1,
-                                                               &seed, 1, &result, 1));
-    assert_message("is_caught (value reference 40) is refused: it is of type boolean");
-    TEST_ASSERT_EQUAL_DOUBLE(7.0, result);
-}
-
 static void test_the_number_of_indicators(void) {
     size_t count = 0;
     wheel =
