@@ -266,7 +266,7 @@ void fuzz_target_run(struct fuzz_input *input) {
         is_exchange ? fuzz_model_exchange(&subject) : run_co_simulation(&subject);
     }
     if (subject.saved != NULL) {
-        fuzz_model_forget(&subject, &subject.saved);
+        fuzz_forget(subject.instance, &subject.saved);
     }
     if (selector >= 192) {
         fuzz_assert_as_new(subject.instance, selector);
