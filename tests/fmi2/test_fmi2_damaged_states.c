@@ -51,14 +51,12 @@ static void check_refused(void (*check)(fmi2Component c, fmi2FMUstate good,
 static void check_damaged(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes) {
     static const fmi2Byte masks[] = {(fmi2Byte)0xff, 0x01, (fmi2Byte)0x80};
     for (size_t i = 0; i < bytes->size; i++) {
-        for (size_t m = 0; m < FMU_COUNT(masks); m++) {
-            char text[64];
-            snprintf(text, sizeof text, "byte %zu flipped", i);
-            struct fmu_bytes damaged = fmu_bytes_copy(bytes, bytes->size);
-            damaged.data[i] = (fmi2Byte)(damaged.data[i] ^ masks[m]);
-            assert_refused(c, good, &damaged, text);
-            fmu_bytes_free(&damaged);
-        }
+        char text[64];
+        snprintf(text, sizeof text, "byte %zu flipped", i);
+        struct fmu_bytes damaged = fmu_bytes_copy(bytes, bytes->size);
+        damaged.data[i] = (fmi2Byte)(damaged.data[i] ^ masks[i % FMU_COUNT(masks)]);
+        assert_refused(c, good, &damaged, text);
+        fmu_bytes_free(&damaged);
     }
 }
 
@@ -179,7 +177,8 @@ static void use_restored(fmi2Component c) {
     }
 }
 
-static void try_forged(const struct fmu_bytes *forged, const char *message) {
+/* Whether the state was accepted. */
+static bool try_forged(const struct fmu_bytes *forged, bool checks_reset, const char *message) {
     fmi2FMUstate made = NULL;
     const fmi2Component c = fmu_instantiate(&messages, false);
     const fmi2Status status = fmu.DeSerializeFMUstate(c, forged->data, forged->size, &made);
@@ -188,8 +187,11 @@ static void try_forged(const struct fmu_bytes *forged, const char *message) {
         TEST_ASSERT_EQUAL_INT_MESSAGE(fmi2OK, fmu.SetFMUstate(c, made), message);
         use_restored(c);
     }
-    fmu_assert_reset_is_fresh(c, message);
+    if (status == fmi2OK && checks_reset) { // after a refusal: check_refused
+        fmu_assert_reset_is_fresh(c, message);
+    }
     fmu_free(c);
+    return status == fmi2OK;
 }
 
 /* Replaces each field in turn by values of all kinds. */
@@ -212,6 +214,7 @@ static void forge(fmi2Component c) {
     struct fmu_bytes bytes = fmu_save_bytes(c);
     const size_t fields_at = GUID_AT + strlen(RP_MANIPULATOR_GUID);
     for (size_t at = fields_at; at + CHECKSUM_SIZE < bytes.size; at += 8) {
+        bool is_reset = false; // once after this field
         for (size_t i = 0; i < FMU_COUNT(fields); i++) {
             char text[64];
             snprintf(text, sizeof text, "field at %zu, value %zu", at, i);
@@ -220,7 +223,7 @@ static void forge(fmi2Component c) {
                 forged.data[at + k] = (fmi2Byte)(fields[i] >> (8 * k));
             }
             set_checksum(&forged);
-            try_forged(&forged, text);
+            is_reset |= try_forged(&forged, !is_reset, text);
             fmu_bytes_free(&forged);
         }
     }

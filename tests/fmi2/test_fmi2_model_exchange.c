@@ -8,9 +8,6 @@
 #include <string.h>
 #include <unity.h>
 
-static const fmi2ValueReference states[FMU_STATES] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
-                                                      RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
-
 static fmi2Component in_event_mode(void) {
     const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
     fmu_initialize(c, 0.0, 0.0);
@@ -62,7 +59,7 @@ static void test_states_are_the_variables(void) {
     const fmi2Component c = fmu_me_initialized(&messages, 0.0);
     fmu_set(c, RP_MANIPULATOR_tau1, 3.0);
     ASSERT_OK(fmu.SetContinuousStates(c, x, FMU_STATES));
-    ASSERT_OK(fmu.GetReal(c, states, FMU_STATES, got));
+    fmu_get_states(c, got);
     TEST_ASSERT_EQUAL_MEMORY(x, got, sizeof x);
     ASSERT_OK(fmu.GetContinuousStates(c, got, FMU_STATES));
     TEST_ASSERT_EQUAL_MEMORY(x, got, sizeof x);
@@ -93,7 +90,7 @@ static void test_setting_reals_is_setting_states(void) {
         for (size_t i = 0; i < FMU_STATES; i++) {
             if (chosen >> i & 1u) {
                 x[i] = 0.1 * (double)(chosen + i);
-                references[count] = states[i];
+                references[count] = fmu_state_references[i];
                 some[count] = x[i];
                 count++;
             }
@@ -126,8 +123,7 @@ static void test_start_values_are_the_first_states(void) {
     double x[FMU_STATES] = {0};
     const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
     fmu_set(c, RP_MANIPULATOR_q2, 0.25);
-    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 3.0, fmi2False, 0));
-    ASSERT_OK(fmu.EnterInitializationMode(c));
+    fmu_enter_initialization(c, 3.0);
     fmu_set(c, RP_MANIPULATOR_dq1, -1.5);
     ASSERT_OK(fmu.GetContinuousStates(c, x, FMU_STATES));
     TEST_ASSERT_EQUAL_DOUBLE(0.25, x[1]);
@@ -186,17 +182,17 @@ static const enum fmu_function array_functions[] = {
     FMU_GetNominalsOfContinuousStates, FMU_GetEventIndicators,
 };
 
+#define CASE(name)                                                                                 \
+    case FMU_##name:                                                                               \
+        return fmu.name(c, x, count)
+
 static fmi2Status call_with_array(enum fmu_function function, fmi2Component c, double *x,
                                   size_t count) {
     switch (function) {
-    case FMU_SetContinuousStates:
-        return fmu.SetContinuousStates(c, x, count);
-    case FMU_GetContinuousStates:
-        return fmu.GetContinuousStates(c, x, count);
-    case FMU_GetDerivatives:
-        return fmu.GetDerivatives(c, x, count);
-    case FMU_GetNominalsOfContinuousStates:
-        return fmu.GetNominalsOfContinuousStates(c, x, count);
+        CASE(SetContinuousStates);
+        CASE(GetContinuousStates);
+        CASE(GetDerivatives);
+        CASE(GetNominalsOfContinuousStates);
     default:
         return fmu.GetEventIndicators(c, x, count);
     }

@@ -5,32 +5,6 @@
 #include <math.h>
 #include <unity.h>
 
-static const fmi2ValueReference state_references[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2,
-                                                      RP_MANIPULATOR_dq1, RP_MANIPULATOR_dq2};
-
-static void get_states(fmi2Component c, double x[4]) {
-    ASSERT_OK(fmu.GetReal(c, state_references, 4, x));
-}
-
-/* D ddq + C dq + g = (tau1, f2), from what the FMU reports. */
-static void assert_equations_of_motion_hold(fmi2Component c, double tau1, double f2) {
-    const double ddq1 = fmu_get(c, RP_MANIPULATOR_ddq1);
-    const double ddq2 = fmu_get(c, RP_MANIPULATOR_ddq2);
-    const double D12 = fmu_get(c, RP_MANIPULATOR_D12);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (10.0 + fabs(tau1)), tau1,
-                              fmu_get(c, RP_MANIPULATOR_D11) * ddq1 + D12 * ddq2 +
-                                  fmu_get(c, RP_MANIPULATOR_coriolis1) +
-                                  fmu_get(c, RP_MANIPULATOR_gravity1));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (10.0 + fabs(f2)), f2,
-                              D12 * ddq1 + fmu_get(c, RP_MANIPULATOR_D22) * ddq2 +
-                                  fmu_get(c, RP_MANIPULATOR_coriolis2) +
-                                  fmu_get(c, RP_MANIPULATOR_gravity2));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-13 * (10.0 + fabs(tau1) + fabs(f2)),
-                              tau1 * fmu_get(c, RP_MANIPULATOR_dq1) +
-                                  f2 * fmu_get(c, RP_MANIPULATOR_dq2),
-                              fmu_get(c, RP_MANIPULATOR_actuator_power));
-}
-
 static void test_get_after_set_answers_for_the_new_inputs(void) {
     static const double inputs[][2] = {{0.0, 0.0}, {3.0, -4.0}, {-50.0, 70.0}};
     const fmi2Component c = fmu_instantiate(&messages, false);
@@ -38,13 +12,14 @@ static void test_get_after_set_answers_for_the_new_inputs(void) {
     fmu_initialize(c, 0.0, 0.0);
     ASSERT_OK(fmu.DoStep(c, 0.0, 0.1, fmi2True));
     double before[4];
-    get_states(c, before);
+    fmu_get_states(c, before);
     for (size_t i = 0; i < FMU_COUNT(inputs); i++) {
         double after[4];
         fmu_set(c, RP_MANIPULATOR_tau1, inputs[i][0]);
         fmu_set(c, RP_MANIPULATOR_f2, inputs[i][1]);
-        assert_equations_of_motion_hold(c, inputs[i][0], inputs[i][1]);
-        get_states(c, after);
+        fmu_assert_motion(c, inputs[i][0], inputs[i][1],
+                          1e-12 * (10.0 + fabs(inputs[i][0]) + fabs(inputs[i][1])));
+        fmu_get_states(c, after);
         TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof before);
     }
 }
@@ -62,7 +37,7 @@ static void test_only_the_inputs_at_the_step_count(void) {
             fmu_set(c, RP_MANIPULATOR_tau1, 2.0);
             ASSERT_OK(fmu.DoStep(c, step / 8.0, 0.125, fmi2True));
         }
-        get_states(c, x[with_detour]);
+        fmu_get_states(c, x[with_detour]);
     }
     TEST_ASSERT_EQUAL_MEMORY(x[0], x[1], sizeof x[0]);
 }
@@ -79,24 +54,24 @@ static void test_tunable_parameters_keep_the_states(void) {
     }
     double before[4];
     double after[4];
-    get_states(c, before);
+    fmu_get_states(c, before);
     const double energy = fmu_get(c, RP_MANIPULATOR_total_energy);
     ASSERT_OK(fmu.SetReal(c, references, 3, values));
-    get_states(c, after);
+    fmu_get_states(c, after);
     TEST_ASSERT_EQUAL_MEMORY(before, after, sizeof before);
     TEST_ASSERT_TRUE(energy != fmu_get(c, RP_MANIPULATOR_total_energy));
-    assert_equations_of_motion_hold(c, 0.0, 0.0);
+    fmu_assert_motion(c, 0.0, 0.0, 1e-11);
 
     // goes on like an instance that starts here with these parameters
     const fmi2Component other = fmu_instantiate(&messages, false);
     ASSERT_OK(fmu.SetReal(other, references, 3, values));
-    ASSERT_OK(fmu.SetReal(other, state_references, 4, before));
+    ASSERT_OK(fmu.SetReal(other, fmu_state_references, 4, before));
     fmu_initialize(other, 0.5, 0.0);
     double expected[4];
     ASSERT_OK(fmu.DoStep(c, 0.5, 0.5, fmi2True));
     ASSERT_OK(fmu.DoStep(other, 0.5, 0.5, fmi2True));
-    get_states(c, after);
-    get_states(other, expected);
+    fmu_get_states(c, after);
+    fmu_get_states(other, expected);
     for (int i = 0; i < 4; i++) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected[i], after[i]);
     }
@@ -152,7 +127,7 @@ static void test_a_step_into_overflow_is_discarded(void) {
         double x[4];
         ASSERT_OK(fmu.GetRealStatus(c, fmi2LastSuccessfulTime, &reached));
         TEST_ASSERT_TRUE(reached >= 1.0 && reached < 1.1);
-        get_states(c, x);
+        fmu_get_states(c, x);
         for (int j = 0; j < 4; j++) {
             TEST_ASSERT_TRUE(isfinite(x[j]));
         }

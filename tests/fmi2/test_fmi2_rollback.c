@@ -1,12 +1,10 @@
 /* Rollback to a saved state is exact to the bit and leaves no trace, wherever and however often it
  * happens. FMI 2.0, section 2.1.8. */
-#define _POSIX_C_SOURCE 200809L
 #include "each_method.h"
 #include "fmu_sequences.h"
 #include "fmu_snapshots.h"
 
 #include <stdio.h>
-#include <time.h>
 #include <unity.h>
 
 static struct fmu_sequence sequence;
@@ -293,50 +291,4 @@ EACH_METHOD static void test_rollback_is_exact_over_steps_of_many_internal_steps
         }
     }
     assert_long(c);
-}
-
-/* ---- What it costs -------------------------------------------------------------------------- */
-
-static double seconds(void) {
-    struct timespec now;
-    clock_gettime(CLOCK_MONOTONIC, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-/* Figures, no assertion: times depend on the machine. */
-EACH_METHOD static void test_what_a_snapshot_costs_where_inputs_change_at_every_step(void) {
-    enum { STEPS = 5000 };
-    const double h = 1e-3;
-    double in_save = 0.0;
-    double in_restore = 0.0;
-    double in_first = 0.0;
-    double in_repeat = 0.0;
-    const fmi2Component c = fmu_initialized_with(method, &messages, 0.0);
-    for (int i = 0; i < STEPS; i++) {
-        fmi2FMUstate state = NULL;
-        fmu_set(c, RP_MANIPULATOR_tau1, i % 7 - 3.0);
-        const double start = seconds();
-        (void)fmu.GetFMUstate(c, &state);
-        const double saved = seconds();
-        (void)fmu.DoStep(c, i * h, h, fmi2True);
-        const double stepped = seconds();
-        (void)fmu.SetFMUstate(c, state);
-        const double restored = seconds();
-        (void)fmu.DoStep(c, i * h, h, fmi2True);
-        const double repeated = seconds();
-        (void)fmu.FreeFMUstate(c, &state);
-        const double freed = seconds();
-        in_save += (saved - start) + (freed - repeated);
-        in_first += stepped - saved;
-        in_restore += restored - stepped;
-        in_repeat += repeated - restored;
-    }
-    char text[256];
-    snprintf(text, sizeof text,
-             "method %d: GetFMUstate and FreeFMUstate %.0f ns, SetFMUstate %.0f ns, step after it "
-             "%.0f ns, the "
-             "same step without %.0f ns",
-             method, 1e9 * in_save / STEPS, 1e9 * in_restore / STEPS, 1e9 * in_repeat / STEPS,
-             1e9 * in_first / STEPS);
-    TEST_MESSAGE(text);
 }

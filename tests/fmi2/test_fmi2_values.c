@@ -16,24 +16,21 @@ static const enum fmu_function access_functions[] = {FMU_GetReal,    FMU_GetInte
                                                      FMU_GetString,  FMU_SetReal,    FMU_SetInteger,
                                                      FMU_SetBoolean, FMU_SetString};
 
+#define CASE(name)                                                                                 \
+    case FMU_##name:                                                                               \
+        return fmu.name(c, references, count, values)
+
 /* Any of them by one signature; values are of the function's own type. */
 static fmi2Status access(enum fmu_function function, fmi2Component c,
                          const fmi2ValueReference references[], size_t count, void *values) {
     switch (function) {
-    case FMU_GetReal:
-        return fmu.GetReal(c, references, count, values);
-    case FMU_GetInteger:
-        return fmu.GetInteger(c, references, count, values);
-    case FMU_GetBoolean:
-        return fmu.GetBoolean(c, references, count, values);
-    case FMU_GetString:
-        return fmu.GetString(c, references, count, values);
-    case FMU_SetReal:
-        return fmu.SetReal(c, references, count, values);
-    case FMU_SetInteger:
-        return fmu.SetInteger(c, references, count, values);
-    case FMU_SetBoolean:
-        return fmu.SetBoolean(c, references, count, values);
+        CASE(GetReal);
+        CASE(GetInteger);
+        CASE(GetBoolean);
+        CASE(GetString);
+        CASE(SetReal);
+        CASE(SetInteger);
+        CASE(SetBoolean);
     default:
         return fmu.SetString(c, references, count, values);
     }
@@ -79,8 +76,7 @@ static void test_type_mismatches_are_named(void) {
     for (size_t i = 0; i < FMU_COUNT(cases); i++) {
         double value = untouched;
         const fmi2Component c = fmu_instantiate(&messages, false);
-        ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-        ASSERT_OK(fmu.EnterInitializationMode(c));
+        fmu_enter_initialization(c, 0);
         fmu_log_clear(&messages);
         ASSERT_ERROR(access(cases[i].function, c, &cases[i].reference, 1, &value));
         TEST_ASSERT_EQUAL_DOUBLE(untouched, value);
@@ -206,8 +202,7 @@ static void test_values_out_of_range_are_discarded(void) {
         const struct refused_value *refused = &refused_values[i];
         const fmi2Component c = fmu_instantiate(&messages, false);
         ASSERT_DISCARD(fmu_try_set(c, refused->reference, refused->value));
-        ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-        ASSERT_OK(fmu.EnterInitializationMode(c));
+        fmu_enter_initialization(c, 0);
         const double old = fmu_get(c, refused->reference);
         assert_discarded(c, refused, old);
         ASSERT_OK(fmu.ExitInitializationMode(c));
@@ -265,8 +260,7 @@ static void assert_massless_is_told(fmi2Component c) {
 static void test_no_inertia_at_the_end_of_initialization(void) {
     const fmi2Component c = fmu_instantiate(&messages, false);
     make_massless(c);
-    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-    ASSERT_OK(fmu.EnterInitializationMode(c));
+    fmu_enter_initialization(c, 0);
     ASSERT_ERROR(fmu.ExitInitializationMode(c));
     assert_massless_is_told(c);
 }
@@ -342,8 +336,7 @@ static void test_start_values_and_inputs_are_accepted_before_steps(void) {
     for (size_t i = 0; i < FMU_COUNT(references); i++) {
         fmu_set(c, references[i], 0.25 + 0.125 * (double)i);
     }
-    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-    ASSERT_OK(fmu.EnterInitializationMode(c));
+    fmu_enter_initialization(c, 0);
     for (size_t i = 0; i < FMU_COUNT(references); i++) {
         TEST_ASSERT_TRUE(0.25 + 0.125 * (double)i == fmu_get(c, references[i]));
         fmu_set(c, references[i], 0.5);
@@ -355,8 +348,7 @@ static void test_start_values_and_inputs_are_accepted_before_steps(void) {
 
 static void test_every_variable_is_readable_in_initialization_mode(void) {
     const fmi2Component c = fmu_instantiate(&messages, false);
-    ASSERT_OK(fmu.SetupExperiment(c, fmi2False, 0, 0, fmi2False, 0));
-    ASSERT_OK(fmu.EnterInitializationMode(c));
+    fmu_enter_initialization(c, 0);
     for (size_t i = 0; i < fmu_variable_count; i++) {
         double real = NAN;
         fmi2Integer integer = -1;

@@ -71,6 +71,9 @@ void fmu_free(fmi2Component component);
 /* Frees what is open and fails the test if a message was malformed. */
 void fmu_tear_down(const struct fmu_log *log);
 
+/* SetupExperiment, from start on (s), and EnterInitializationMode. */
+void fmu_enter_initialization(fmi2Component component, double start);
+
 /* SetupExperiment to ExitInitializationMode; tolerance 0: not defined. No stop time. */
 void fmu_initialize(fmi2Component component, double start, double tolerance);
 
@@ -87,6 +90,14 @@ fmi2Status fmu_try_set(fmi2Component component, fmi2ValueReference reference, do
 /* One Integer or Enumeration, likewise. */
 void fmu_set_integer(fmi2Component component, fmi2ValueReference reference, fmi2Integer value);
 fmi2Integer fmu_get_integer(fmi2Component component, fmi2ValueReference reference);
+
+/* The states. */
+enum { FMU_STATES = 4 };
+extern const fmi2ValueReference fmu_state_references[FMU_STATES]; /* q1, q2, dq1, dq2 */
+void fmu_get_states(fmi2Component component, double x[FMU_STATES]);
+
+/* Fails the test unless D ddq + C dq + g = (tau1, f2), and the power is theirs, by what is read. */
+void fmu_assert_motion(fmi2Component component, double tau1, double f2, double tolerance);
 
 /* Values of solver_method. */
 enum { FMU_CVODE_ADAMS = 1, FMU_CVODE_BDF = 2, FMU_ERK = 3, FMU_TAYLOR = 4, FMU_METHODS };

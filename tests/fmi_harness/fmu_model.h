@@ -27,6 +27,10 @@ static inline bool fmu_is_enumeration(unsigned reference) {
 #define FMU_NAME(name)   RP_SENSOR_##name
 #define FMU_ENUMERATIONS -1u // none
 #define FMU_INPUTS       RP_SENSOR_q1, RP_SENSOR_q2
+#elif defined FMU_IS_WHEEL
+#define FMU_NAME(name)   WHEEL_##name
+#define FMU_ENUMERATIONS WHEEL_solver_method
+#define FMU_INPUTS       WHEEL_speed, -1u
 #else
 #define FMU_NAME(name)   RP_MANIPULATOR_##name
 #define FMU_ENUMERATIONS RP_MANIPULATOR_solver_method

@@ -4,8 +4,6 @@
 
 #include "fmu_harness.h"
 
-enum { FMU_STATES = 4 }; /* q1, q2, dq1, dq2 */
-
 /* SetupExperiment to EnterContinuousTimeMode, with the event iteration between them; no tolerance
  * and no stop time. */
 fmi2Status fmu_me_enter_continuous_time(fmi2Component component, double start);

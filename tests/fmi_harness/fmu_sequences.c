@@ -149,7 +149,7 @@ fmi2Component fmu_lasting(fmi2Integer method, struct fmu_log *log) {
     const fmi2Component component = fmu_instantiate(log, false);
     fmu_set_integer(component, RP_MANIPULATOR_solver_method, method);
     for (size_t i = 0; i < FMU_COUNT(lasting); i++) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_apply(component, &lasting[i]));
+        ASSERT_OK(fmu_apply(component, &lasting[i]));
     }
     fmu_initialize(component, 0.0, 0.0);
     return component;
@@ -257,7 +257,7 @@ static fmi2Status apply(fmi2Component component, const struct fmu_sequence *sequ
     memset(values, 0, sizeof *values);
     const fmi2Status status = fmu_apply(component, &sequence->operations[at]);
     if (at >= sequence->readable_from) {
-        TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(component, values));
+        ASSERT_OK(fmu_get_all(component, values));
     }
     return status;
 }

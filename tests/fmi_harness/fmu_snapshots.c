@@ -6,34 +6,33 @@
 
 fmi2FMUstate fmu_save(fmi2Component component) {
     fmi2FMUstate state = NULL;
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.GetFMUstate(component, &state));
+    ASSERT_OK(fmu.GetFMUstate(component, &state));
     TEST_ASSERT_NOT_NULL(state);
     return state;
 }
 
 void fmu_restore(fmi2Component component, fmi2FMUstate state) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetFMUstate(component, state));
+    ASSERT_OK(fmu.SetFMUstate(component, state));
 }
 
 void fmu_forget(fmi2Component component, fmi2FMUstate *state) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.FreeFMUstate(component, state));
+    ASSERT_OK(fmu.FreeFMUstate(component, state));
     TEST_ASSERT_NULL(*state);
 }
 
 struct fmu_bytes fmu_serialize(fmi2Component component, fmi2FMUstate state) {
     struct fmu_bytes bytes = {0};
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SerializedFMUstateSize(component, state, &bytes.size));
+    ASSERT_OK(fmu.SerializedFMUstateSize(component, state, &bytes.size));
     TEST_ASSERT_GREATER_THAN_UINT(0, bytes.size);
     bytes.data = malloc(bytes.size); // not cleared: every byte is to be written
     TEST_ASSERT_NOT_NULL(bytes.data);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SerializeFMUstate(component, state, bytes.data, bytes.size));
+    ASSERT_OK(fmu.SerializeFMUstate(component, state, bytes.data, bytes.size));
     return bytes;
 }
 
 fmi2FMUstate fmu_deserialize(fmi2Component component, const struct fmu_bytes *bytes) {
     fmi2FMUstate state = NULL;
-    TEST_ASSERT_EQUAL_INT(fmi2OK,
-                          fmu.DeSerializeFMUstate(component, bytes->data, bytes->size, &state));
+    ASSERT_OK(fmu.DeSerializeFMUstate(component, bytes->data, bytes->size, &state));
     TEST_ASSERT_NOT_NULL(state);
     return state;
 }
@@ -85,14 +84,14 @@ fmi2Component fmu_used(fmi2Integer method, struct fmu_log *log) {
     fmu_set(c, RP_MANIPULATOR_m1, 1.5);
     fmu_initialize(c, 0.5, 1e-7);
     fmu_set(c, RP_MANIPULATOR_tau1, -2.0);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.5, 0.0625, fmi2True));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(c, 0.5625, 0.0625, fmi2True));
+    ASSERT_OK(fmu.DoStep(c, 0.5, 0.0625, fmi2True));
+    ASSERT_OK(fmu.DoStep(c, 0.5625, 0.0625, fmi2True));
     fmu_set(c, RP_MANIPULATOR_g, 5.0);
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.SetRealInputDerivatives(c, &f2, 1, &order, &slope));
+    ASSERT_OK(fmu.SetRealInputDerivatives(c, &f2, 1, &order, &slope));
     return c;
 }
 
 void fmu_used_step(fmi2Component component, struct fmu_values *values) {
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu.DoStep(component, fmu_used_until, 0.25, fmi2True));
-    TEST_ASSERT_EQUAL_INT(fmi2OK, fmu_get_all(component, values));
+    ASSERT_OK(fmu.DoStep(component, fmu_used_until, 0.25, fmi2True));
+    ASSERT_OK(fmu_get_all(component, values));
 }

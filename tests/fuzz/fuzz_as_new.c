@@ -1,36 +1,14 @@
 /* After an error: a reset instance against a new one. */
-#include "fuzz_instance.h"
+#include "fuzz_bytes.h"
 
-#include <string.h>
-
-enum { RUN_STEPS = 6, BYTES_CAPACITY = 4096 };
+enum { RUN_STEPS = 6 };
 
 /* A short simulation, and the serialized state before it. */
 struct run {
     bool is_known;
-    size_t byte_count;
-    fmi2Byte bytes[BYTES_CAPACITY];
+    struct fuzz_bytes bytes;
     struct fuzz_values after[RUN_STEPS];
 };
-
-static void require(fmi2Status status, const char *what) {
-    if (status != fmi2OK) {
-        fuzz_fail("%s in a run of a new or reset instance has the status %d", what, (int)status);
-    }
-}
-
-static void serialize(struct fuzz_instance *instance, struct run *run) {
-    fmi2FMUstate state = NULL;
-    require(FUZZ_CHECKED(instance, GetFMUstate, &state), "fmi2GetFMUstate");
-    require(FUZZ_CHECKED(instance, SerializedFMUstateSize, state, &run->byte_count),
-            "fmi2SerializedFMUstateSize");
-    if (run->byte_count > BYTES_CAPACITY) {
-        fuzz_fail("%zu bytes of a state are more than BYTES_CAPACITY", run->byte_count);
-    }
-    require(FUZZ_CHECKED(instance, SerializeFMUstate, state, run->bytes, run->byte_count),
-            "fmi2SerializeFMUstate");
-    require(FUZZ_CHECKED(instance, FreeFMUstate, &state), "fmi2FreeFMUstate");
-}
 
 /* Inputs of step i that any model takes, and their derivatives. */
 static void move_inputs(struct fuzz_instance *instance, int i) {
@@ -47,11 +25,13 @@ static void move_inputs(struct fuzz_instance *instance, int i) {
         }
     }
     if (i != 1 && i != 2) {
-        require(FUZZ_CHECKED(instance, SetReal, references, count, values), "fmi2SetReal");
+        fuzz_require(FUZZ_CHECKED(instance, SetReal, references, count, values), instance,
+                     "fmi2SetReal");
     }
     if (i == 4) {
-        require(FUZZ_CHECKED(instance, SetRealInputDerivatives, references, count, orders, values),
-                "fmi2SetRealInputDerivatives");
+        fuzz_require(
+            FUZZ_CHECKED(instance, SetRealInputDerivatives, references, count, orders, values),
+            instance, "fmi2SetRealInputDerivatives");
     }
 }
 
@@ -59,7 +39,7 @@ static void run_co_simulation(struct fuzz_instance *instance, struct run *run) {
     static const double lengths[RUN_STEPS] = {1.0 / 64, 1.0 / 64, 0.25, 1e-3, 1e-3, 0.5};
     for (int i = 0; i < RUN_STEPS; i++) {
         move_inputs(instance, i);
-        require(fuzz_step(instance, lengths[i]), "fmi2DoStep");
+        fuzz_require(fuzz_step(instance, lengths[i]), instance, "fmi2DoStep");
         fuzz_read(instance, &run->after[i]);
     }
 }
@@ -68,16 +48,20 @@ static void run_model_exchange(struct fuzz_instance *instance, struct run *run) 
     double x[FUZZ_STATE_CAPACITY];
     double dx[FUZZ_STATE_CAPACITY];
     const size_t count = fuzz_state_count();
-    require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode), "fmi2EnterContinuousTimeMode");
-    require(FUZZ_CHECKED(instance, GetContinuousStates, x, count), "fmi2GetContinuousStates");
+    fuzz_require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode), instance,
+                 "fmi2EnterContinuousTimeMode");
+    fuzz_require(FUZZ_CHECKED(instance, GetContinuousStates, x, count), instance,
+                 "fmi2GetContinuousStates");
     for (int i = 0; i < RUN_STEPS; i++) {
-        require(FUZZ_CHECKED(instance, GetDerivatives, dx, count), "fmi2GetDerivatives");
+        fuzz_require(FUZZ_CHECKED(instance, GetDerivatives, dx, count), instance,
+                     "fmi2GetDerivatives");
         for (size_t k = 0; k < count; k++) {
             x[k] += 0.01 * dx[k];
         }
         instance->time += 0.01;
-        require(FUZZ_CHECKED(instance, SetTime, instance->time), "fmi2SetTime");
-        require(FUZZ_CHECKED(instance, SetContinuousStates, x, count), "fmi2SetContinuousStates");
+        fuzz_require(FUZZ_CHECKED(instance, SetTime, instance->time), instance, "fmi2SetTime");
+        fuzz_require(FUZZ_CHECKED(instance, SetContinuousStates, x, count), instance,
+                     "fmi2SetContinuousStates");
         fuzz_read(instance, &run->after[i]);
     }
 }
@@ -90,23 +74,23 @@ static void set_starts(struct fuzz_instance *instance, unsigned variant) {
         const struct variable *variable = &model_description.variables[i];
         const fmi2Real value = i % 2 == 0 ? -0.75 : 0.25;
         if (variable->variability == VARIABILITY_CONTINUOUS && variable->initial == INITIAL_EXACT) {
-            require(FUZZ_CHECKED(instance, SetReal, &variable->reference, 1, &value),
-                    "fmi2SetReal");
+            fuzz_require(FUZZ_CHECKED(instance, SetReal, &variable->reference, 1, &value), instance,
+                         "fmi2SetReal");
         }
     }
     if (method != NULL) {
-        require(FUZZ_CHECKED(instance, SetInteger, &method->reference, 1, &method_value),
-                "fmi2SetInteger");
+        fuzz_require(FUZZ_CHECKED(instance, SetInteger, &method->reference, 1, &method_value),
+                     instance, "fmi2SetInteger");
     }
 }
 
 /* From an instance that was just made or reset. */
 static void make_run(struct fuzz_instance *instance, unsigned variant, struct run *run) {
-    serialize(instance, run);
+    fuzz_serialize(instance, &run->bytes);
     set_starts(instance, variant);
-    require(fuzz_initialize(instance, variant < FUZZ_METHODS ? 0.0 : 1e-6,
-                            variant < FUZZ_METHODS ? 0.0 : 1000.0),
-            "the initialization");
+    fuzz_require(fuzz_initialize(instance, variant < FUZZ_METHODS ? 0.0 : 1e-6,
+                                 variant < FUZZ_METHODS ? 0.0 : 1000.0),
+                 instance, "the initialization");
     if (instance->kind == fmi2CoSimulation) {
         run_co_simulation(instance, run);
     } else {
@@ -132,8 +116,7 @@ void fuzz_assert_as_new(struct fuzz_instance *instance, unsigned variant) {
     const struct run *expected = run_of_fresh(instance->kind, instance->variety, variant);
     fuzz_reset_plain(instance);
     make_run(instance, variant, &run);
-    if (run.byte_count != expected->byte_count ||
-        memcmp(run.bytes, expected->bytes, run.byte_count) != 0) {
+    if (!fuzz_are_same_bytes(&run.bytes, &expected->bytes)) {
         fuzz_fail("the serialized state after fmi2Reset is not that of a new instance");
     }
     for (int i = 0; i < RUN_STEPS; i++) {

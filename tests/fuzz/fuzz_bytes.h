@@ -1,4 +1,4 @@
-/* Serialized states, and forged ones. */
+/* Saved states as bytes, and forged ones. */
 #ifndef FUZZ_BYTES_H
 #define FUZZ_BYTES_H
 
@@ -6,13 +6,39 @@
 
 struct fuzz_bytes {
     size_t size;
-    fmi2Byte data[4096];
+    fmi2Byte data[8192]; /* twice as many as any state has */
 };
 
-/* The instance as it is now. */
+/* A state of the instance, or the instance as it is now. */
+void fuzz_serialize_state(struct fuzz_instance *instance, fmi2FMUstate state,
+                          struct fuzz_bytes *bytes);
 void fuzz_serialize(struct fuzz_instance *instance, struct fuzz_bytes *bytes);
+
+bool fuzz_are_same_bytes(const struct fuzz_bytes *one, const struct fuzz_bytes *other);
+
+/* src/instance/serialization.h: magic, version, length and length of the GUID, the GUID, fields of
+ * 8 bytes, FNV-1a of all that. */
+enum { FUZZ_LENGTH_AT = 12, FUZZ_FIELD = 8 };
+size_t fuzz_fields_begin(void);
+void fuzz_write_number(fmi2Byte *to, uint64_t number, size_t size);
+void fuzz_write_field(struct fuzz_bytes *bytes, size_t field,
+                      uint64_t bits); /* modulo their number */
+void fuzz_repair_checksum(struct fuzz_bytes *bytes);
 
 /* Changes one to three fields, and repairs the checksum. */
 void fuzz_forge(struct fuzz_input *input, struct fuzz_bytes *bytes);
+
+/* How a target steps. */
+struct fuzz_stepping {
+    double (*any_length)(struct fuzz_input *input);
+    fmi2Status (*step)(struct fuzz_instance *instance, double length, unsigned choices);
+    bool has_choices;
+    fmi2Integer most; /* internal steps and events that a forged state may ask for */
+};
+
+/* Another instance of this variety takes the state of the instance from its bytes: a step has the
+ * same bits. Or forged bytes do no harm: a step can be tried, and what it gives is finite. */
+void fuzz_move_state(struct fuzz_input *input, struct fuzz_instance *instance,
+                     const struct fuzz_stepping *stepping);
 
 #endif

@@ -3,7 +3,7 @@
 #define FUZZ_FMI3_H
 
 #include "fmu_fmi3.h"
-#include "fuzz_session.h"
+#include "fuzz_instance.h"
 
 #include <fmi3Functions.h>
 
@@ -15,8 +15,5 @@
 #define FUZZ_FMI3_CHECKED_PLAIN(instance, name)                                                    \
     fuzz_check_call(instance, "fmi3" #name, false,                                                 \
                     (fmi2Status)FUZZ_CALL(fmi3##name(fmu_fmi3_instance((instance)->component))))
-
-/* The operations of fuzz_access_fmi3.c; those of FMU3_FUNCTION_LIST that are missing are NULL. */
-extern fuzz_operation *const fuzz_access_fmi3[FMU3_FUNCTION_COUNT];
 
 #endif

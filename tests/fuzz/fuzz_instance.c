@@ -150,6 +150,28 @@ fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, boo
     return status;
 }
 
+void fuzz_require(fmi2Status status, const struct fuzz_instance *instance, const char *what) {
+    if (status != fmi2OK) {
+        fuzz_fail("%s has the status %d: %s", what, (int)status, instance->text);
+    }
+}
+
+fmi2FMUstate fuzz_save(struct fuzz_instance *instance) {
+    fmi2FMUstate state = NULL;
+    fuzz_require(FUZZ_CHECKED(instance, GetFMUstate, &state), instance, "fmi2GetFMUstate");
+    return state;
+}
+
+void fuzz_restore(struct fuzz_instance *instance, fmi2FMUstate state, double time) {
+    fuzz_require(FUZZ_CHECKED(instance, SetFMUstate, state), instance, "fmi2SetFMUstate");
+    instance->in_error = false;
+    instance->time = time;
+}
+
+void fuzz_forget(struct fuzz_instance *instance, fmi2FMUstate *state) {
+    fuzz_require(FUZZ_CHECKED(instance, FreeFMUstate, state), instance, "fmi2FreeFMUstate");
+}
+
 void fuzz_limit_steps(struct fuzz_instance *instance, fmi2Integer limit) {
     const struct variable *variable = fuzz_find("max_internal_steps");
     if (variable != NULL &&

@@ -60,6 +60,14 @@ fmi2Status fuzz_check_call(struct fuzz_instance *instance, const char *name, boo
 #define FUZZ_CHECKED_PLAIN(instance, name)                                                         \
     fuzz_check(instance, FMU_##name, FUZZ_CALL(fuzz_fmu.name((instance)->component)))
 
+/* Fails unless the status is fmi2OK. */
+void fuzz_require(fmi2Status status, const struct fuzz_instance *instance, const char *what);
+
+/* A state of the instance, which goes back to it, also after an error; it is of this time (s). */
+fmi2FMUstate fuzz_save(struct fuzz_instance *instance);
+void fuzz_restore(struct fuzz_instance *instance, fmi2FMUstate state, double time);
+void fuzz_forget(struct fuzz_instance *instance, fmi2FMUstate *state);
+
 /* fmi2Reset, and max_internal_steps as above. */
 void fuzz_reset(struct fuzz_instance *instance);
 

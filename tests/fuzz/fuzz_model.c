@@ -6,50 +6,24 @@
 #include "fuzz_bytes.h"
 
 #include <math.h>
-#include <string.h>
 
 const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 
 enum { MAX_SETTINGS = 12, MAX_OPERATIONS = 16, MAX_INTERNAL_STEPS = 100 };
 
-void fuzz_model_require(const struct subject *subject, fmi2Status status, const char *what) {
-    if (status != fmi2OK) {
-        fuzz_fail("%s has the status %d: %s", what, (int)status, subject->instance->text);
-    }
-}
-
 /* ---- States ---------------------------------------------------------------------------------- */
-
-fmi2FMUstate fuzz_model_save(const struct subject *subject) {
-    fmi2FMUstate state = NULL;
-    fuzz_model_require(subject, FUZZ_CHECKED(subject->instance, GetFMUstate, &state),
-                       "fmi2GetFMUstate");
-    return state;
-}
-
-void fuzz_model_restore(const struct subject *subject, fmi2FMUstate state, double time) {
-    fuzz_model_require(subject, FUZZ_CHECKED(subject->instance, SetFMUstate, state),
-                       "fmi2SetFMUstate");
-    subject->instance->in_error = false;
-    subject->instance->time = time;
-}
-
-void fuzz_model_forget(const struct subject *subject, fmi2FMUstate *state) {
-    fuzz_model_require(subject, FUZZ_CHECKED(subject->instance, FreeFMUstate, state),
-                       "fmi2FreeFMUstate");
-}
 
 static void keep_or_go_back(struct subject *subject) {
     if (subject->saved != NULL && fuzz_below(subject->input, 2) == 0) {
-        fuzz_model_restore(subject, subject->saved, subject->saved_time);
+        fuzz_restore(subject->instance, subject->saved, subject->saved_time);
         subject->is_usual = subject->saved_usual;
         subject->is_inconsistent = subject->saved_inconsistent;
         return;
     }
     if (subject->saved != NULL) {
-        fuzz_model_forget(subject, &subject->saved);
+        fuzz_forget(subject->instance, &subject->saved);
     }
-    subject->saved = fuzz_model_save(subject);
+    subject->saved = fuzz_save(subject->instance);
     subject->saved_time = subject->instance->time;
     subject->saved_usual = subject->is_usual;
     subject->saved_inconsistent = subject->is_inconsistent;
@@ -182,7 +156,7 @@ static void check_error(const struct subject *subject, const struct step *step) 
 static void repeat(struct subject *subject, const struct step *step, fmi2FMUstate state,
                    const struct fuzz_values *after) {
     struct fuzz_values again;
-    fuzz_model_restore(subject, state, step->begin);
+    fuzz_restore(subject->instance, state, step->begin);
     if (fuzz_model_step(subject->instance, step->length, step->choices) != step->status) {
         fuzz_fail("a repeated step has another status than %d", (int)step->status);
     }
@@ -196,7 +170,7 @@ static void do_step(struct subject *subject) {
     struct fuzz_values after;
     struct step step = {.begin = instance->time, .length = any_length(subject->input)};
     step.choices = fuzz_byte(subject->input);
-    fmi2FMUstate state = fuzz_model_save(subject);
+    fmi2FMUstate state = fuzz_save(subject->instance);
     fuzz_read(instance, &before);
     step.status = fuzz_model_step(instance, step.length, step.choices);
     check_error(subject, &step);
@@ -214,7 +188,7 @@ static void do_step(struct subject *subject) {
         repeat(subject, &step, state, &after);
     }
     if (step.status != fmi2OK) {
-        fuzz_model_restore(subject, state, step.begin);
+        fuzz_restore(subject->instance, state, step.begin);
         fuzz_read(instance, &after);
         fuzz_assert_same(&before, &after, "after a rollback");
     }
@@ -223,86 +197,17 @@ static void do_step(struct subject *subject) {
             !fuzz_model_failed_inside()) {
             fuzz_fail("a shorter step after a rollback fails: %s", instance->text);
         }
-        fuzz_model_restore(subject, state, step.begin);
+        fuzz_restore(subject->instance, state, step.begin);
     }
-    fuzz_model_forget(subject, &state);
+    fuzz_forget(subject->instance, &state);
 }
 
-/* ---- Serialized states ----------------------------------------------------------------------- */
-
-/* Whether a forged state asks for more work in a step than the settings of this target. */
-static bool is_quick(struct fuzz_instance *instance) {
-    static const char *const limits[] = {"max_internal_steps", "max_events"};
-    for (size_t i = 0; i < FUZZ_COUNT(limits); i++) {
-        const struct variable *limit = fuzz_find(limits[i]);
-        fmi2Integer value = 0;
-        if (limit != NULL &&
-            (FUZZ_CHECKED(instance, GetInteger, &limit->reference, 1, &value) != fmi2OK ||
-             value > 4 * MAX_INTERNAL_STEPS)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* A forged state that was taken does no harm: a step can be tried, and what it gives is finite. */
-static void use_forged(struct subject *subject, struct fuzz_instance *other, fmi2FMUstate state) {
-    const fmi2ValueReference time = 0;
-    const double length = any_length(subject->input);
-    struct fuzz_values values;
-    if (FUZZ_CHECKED(other, SetFMUstate, state) != fmi2OK) {
-        fuzz_fail("fmi2SetFMUstate of an accepted state fails: %s", other->text);
-    }
-    if (is_quick(other) && FUZZ_CHECKED(other, GetReal, &time, 1, &other->time) == fmi2OK &&
-        fuzz_step(other, length) != fmi2Error) {
-        fuzz_read(other, &values);
-    }
-}
-
-/* The same state in another instance, from its bytes: the same step has the same bits. */
-static void use_same(struct subject *subject, struct fuzz_instance *other, fmi2FMUstate state) {
-    struct fuzz_values here;
-    struct fuzz_values there;
-    const double length = any_length(subject->input);
-    const unsigned choices = fuzz_byte(subject->input);
-    const double begin = subject->instance->time;
-    fmi2FMUstate before = fuzz_model_save(subject);
-    if (FUZZ_CHECKED(other, SetFMUstate, state) != fmi2OK) {
-        fuzz_fail("fmi2SetFMUstate in another instance fails: %s", other->text);
-    }
-    other->time = begin;
-    const fmi2Status status = fuzz_model_step(subject->instance, length, choices);
-    if (fuzz_model_step(other, length, choices) != status) {
-        fuzz_fail("a step in another instance has another status than %d", (int)status);
-    }
-    fuzz_read(subject->instance, &here);
-    fuzz_read(other, &there);
-    fuzz_assert_same(&here, &there, "a step in another instance");
-    fuzz_model_restore(subject, before, begin);
-    fuzz_model_forget(subject, &before);
-}
-
-static void move_state(struct subject *subject) {
-    static struct fuzz_bytes bytes;
-    const struct fuzz_instance *here = subject->instance;
-    const bool is_forged = fuzz_below(subject->input, 2) == 0;
-    struct fuzz_instance *other =
-        fuzz_instance_create_variety(here->kind, is_forged ? 0 : here->variety, true, false);
-    fmi2FMUstate state = NULL;
-    fuzz_serialize(subject->instance, &bytes);
-    if (is_forged) {
-        fuzz_forge(subject->input, &bytes);
-    }
-    const fmi2Status status =
-        FUZZ_CHECKED(other, DeSerializeFMUstate, bytes.data, bytes.size, &state);
-    if (!is_forged && status != fmi2OK) {
-        fuzz_fail("a serialized state is refused: %s", other->text);
-    }
-    if (status == fmi2OK) {
-        is_forged ? use_forged(subject, other, state) : use_same(subject, other, state);
-    }
-    fuzz_instance_free(other);
-}
+static const struct fuzz_stepping stepping = {
+    .any_length = any_length,
+    .step = fuzz_model_step,
+    .has_choices = true,
+    .most = 4 * MAX_INTERNAL_STEPS,
+};
 
 /* ---- Co-Simulation --------------------------------------------------------------------------- */
 
@@ -317,7 +222,7 @@ static void run_co_simulation(struct subject *subject) {
             fuzz_model_move_inputs(subject);
             break;
         case 3:
-            move_state(subject);
+            fuzz_move_state(subject->input, subject->instance, &stepping);
             break;
         case 4:
         case 5:
@@ -361,7 +266,7 @@ void fuzz_target_run(struct fuzz_input *input) {
         is_exchange ? fuzz_model_exchange(&subject) : run_co_simulation(&subject);
     }
     if (subject.saved != NULL) {
-        fuzz_model_forget(&subject, &subject.saved);
+        fuzz_forget(subject.instance, &subject.saved);
     }
     if (selector >= 192) {
         fuzz_assert_as_new(subject.instance, selector);

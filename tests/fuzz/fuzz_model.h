@@ -17,17 +17,6 @@ struct subject {
     bool saved_inconsistent;
 };
 
-/* Fails unless the status is fmi2OK. */
-void fuzz_model_require(const struct subject *subject, fmi2Status status, const char *what);
-
-/* ---- States (fuzz_model.c) ------------------------------------------------------------------- */
-
-fmi2FMUstate fuzz_model_save(const struct subject *subject);
-
-/* Back to a state of this time, after an error, too. */
-void fuzz_model_restore(const struct subject *subject, fmi2FMUstate state, double time);
-void fuzz_model_forget(const struct subject *subject, fmi2FMUstate *state);
-
 /* ---- Values (fuzz_model_values.c) ------------------------------------------------------------ */
 
 /* Sets a variable that can be set in this phase, mostly to a value that it may have. */

@@ -1,44 +1,12 @@
+#include "fuzz_exchange.h"
 #include "fuzz_model.h"
 
 #include <math.h>
-#include <string.h>
 
-enum { MAX_STEPS = 40, INDICATOR_CAPACITY = 16, MOST_UPDATES = 100 };
-
-/* What an importer keeps of a run. */
-struct exchange {
-    struct subject *subject;
-    double x[FUZZ_STATE_CAPACITY];
-    double z[INDICATOR_CAPACITY];
-    double next_time; /* s: of the next time event; INFINITY: there is none */
-};
-
-static size_t indicator_count(void) {
-    if (model_description.indicator_count > INDICATOR_CAPACITY) {
-        fuzz_fail("more indicators than INDICATOR_CAPACITY");
-    }
-    return model_description.indicator_count;
-}
-
-/* States and indicators; false: they cannot be computed. */
-static bool read(struct exchange *run, double x[], double z[]) {
-    struct fuzz_instance *instance = run->subject->instance;
-    const size_t states = fuzz_state_count();
-    const size_t indicators = indicator_count();
-    fuzz_poison(x, states);
-    fuzz_poison(z, indicators);
-    fmi2Status status = FUZZ_CHECKED(instance, GetContinuousStates, x, states);
-    fuzz_assert_written(status, x, states, "fmi2GetContinuousStates");
-    if (status == fmi2OK) {
-        status = FUZZ_CHECKED(instance, GetEventIndicators, z, indicators);
-        fuzz_assert_written(status, z, indicators, "fmi2GetEventIndicators");
-    }
-    return status == fmi2OK;
-}
+enum { MAX_STEPS = 40, MOST_UPDATES = 100 };
 
 /* From event mode to continuous-time mode; false: no modes follow. */
-static bool update_discrete_states(struct exchange *run) {
-    struct subject *subject = run->subject;
+static bool update_discrete_states(struct subject *subject, struct fuzz_exchange *run) {
     struct fuzz_instance *instance = subject->instance;
     fmi2EventInfo info = {.newDiscreteStatesNeeded = fmi2True};
     for (int i = 0; info.newDiscreteStatesNeeded; i++) {
@@ -69,95 +37,33 @@ static bool update_discrete_states(struct exchange *run) {
     }
     subject->is_inconsistent = false;
     subject->phase = PHASE_CONTINUOUS_TIME;
-    return read(run, run->x, run->z);
+    return fuzz_exchange_read(run);
 }
 
 /* Inputs and parameters change in event mode. */
-static bool handle_event(struct exchange *run) {
-    struct subject *subject = run->subject;
-    fuzz_model_require(subject, FUZZ_CHECKED_PLAIN(subject->instance, EnterEventMode),
-                       "fmi2EnterEventMode");
+static bool handle_event(struct subject *subject, struct fuzz_exchange *run) {
+    fuzz_require(FUZZ_CHECKED_PLAIN(subject->instance, EnterEventMode), subject->instance,
+                 "fmi2EnterEventMode");
     subject->phase = PHASE_STEPPING;
     const unsigned count = fuzz_below(subject->input, 4);
     for (unsigned i = 0; i < count; i++) {
         fuzz_model_set_any(subject);
     }
-    return update_discrete_states(run);
-}
-
-enum outcome { GOES_ON, MEETS_EVENT, IS_OVER };
-
-/* Forward Euler to the next time event at most. */
-static enum outcome step(struct exchange *run, double length) {
-    struct fuzz_instance *instance = run->subject->instance;
-    const size_t count = fuzz_state_count();
-    fmi2Boolean enter_event_mode = fmi2True;
-    fmi2Boolean terminate = fmi2True;
-    double dx[FUZZ_STATE_CAPACITY];
-    double z[INDICATOR_CAPACITY];
-    const double end = fmin(instance->time + length, run->next_time);
-    fuzz_poison(dx, count);
-    const fmi2Status status = FUZZ_CHECKED(instance, GetDerivatives, dx, count);
-    fuzz_assert_written(status, dx, count, "fmi2GetDerivatives");
-    if (status != fmi2OK) {
-        return IS_OVER;
-    }
-    for (size_t i = 0; i < count; i++) {
-        run->x[i] += (end - instance->time) * dx[i];
-        if (!(fabs(run->x[i]) < 1e6)) {
-            return IS_OVER; // Euler's method has become unstable
-        }
-    }
-    instance->time = end;
-    if (FUZZ_CHECKED(instance, SetTime, end) != fmi2OK ||
-        FUZZ_CHECKED(instance, SetContinuousStates, run->x, count) != fmi2OK ||
-        FUZZ_CHECKED(instance, CompletedIntegratorStep, fmi2True, &enter_event_mode, &terminate) !=
-            fmi2OK) {
-        fuzz_fail("a step of Model Exchange to %.17g s fails: %s", end, instance->text);
-    }
-    if (enter_event_mode || terminate) {
-        fuzz_fail("fmi2CompletedIntegratorStep asks for %d %d", enter_event_mode, terminate);
-    }
-    if (!read(run, run->x, z)) {
-        return IS_OVER;
-    }
-    bool crosses = end == run->next_time;
-    for (size_t i = 0; i < indicator_count(); i++) {
-        crosses |= (z[i] > 0.0) != (run->z[i] > 0.0);
-    }
-    memcpy(run->z, z, sizeof z);
-    return crosses ? MEETS_EVENT : GOES_ON;
-}
-
-/* From a saved state the same step has the same bits. */
-static void repeat(struct exchange *run, double length) {
-    struct exchange first = *run;
-    struct exchange second = *run;
-    struct fuzz_values values[2];
-    const double begin = run->subject->instance->time;
-    fmi2FMUstate state = fuzz_model_save(run->subject);
-    (void)step(&first, length);
-    fuzz_read(run->subject->instance, &values[0]);
-    fuzz_model_restore(run->subject, state, begin);
-    (void)step(&second, length);
-    fuzz_read(run->subject->instance, &values[1]);
-    fuzz_assert_same(&values[0], &values[1], "a repeated step of Model Exchange");
-    fuzz_model_restore(run->subject, state, begin);
-    fuzz_model_forget(run->subject, &state);
+    return update_discrete_states(subject, run);
 }
 
 void fuzz_model_exchange(struct subject *subject) {
-    struct exchange run = {.subject = subject};
+    struct fuzz_exchange run = {.instance = subject->instance};
     const double length = fuzz_magnitude(subject->input, 1e-5, 0.05);
     if (!isfinite(subject->instance->time + MAX_STEPS * length) ||
         subject->instance->time + length == subject->instance->time ||
-        !update_discrete_states(&run)) {
+        !update_discrete_states(subject, &run)) {
         return;
     }
     for (int i = 0; i < MAX_STEPS && subject->input->left > 0; i++) {
         const unsigned selector = fuzz_below(subject->input, 16);
         if (selector == 0) {
-            repeat(&run, length);
+            fuzz_exchange_repeat(&run, length);
         } else if (selector == 1) {
             fuzz_model_set_any(subject);
         } else if (selector == 2) {
@@ -166,9 +72,9 @@ void fuzz_model_exchange(struct subject *subject) {
         if (subject->instance->in_error) {
             return;
         }
-        const enum outcome outcome = step(&run, length);
-        if (outcome == IS_OVER ||
-            ((outcome == MEETS_EVENT || selector == 3) && !handle_event(&run))) {
+        const enum fuzz_outcome outcome = fuzz_exchange_step(&run, length);
+        if (outcome == FUZZ_IS_OVER ||
+            ((outcome == FUZZ_MEETS_EVENT || selector == 3) && !handle_event(subject, &run))) {
             return;
         }
     }

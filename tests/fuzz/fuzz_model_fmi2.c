@@ -16,15 +16,15 @@ void fuzz_model_move_inputs(struct subject *subject) {
     const size_t i = fuzz_below(subject->input, (unsigned)count);
     const fmi2Integer order = 1 + (fmi2Integer)fuzz_below(subject->input, MOST_ORDERS);
     const fmi2Real value = fuzz_likely_real(subject->input);
-    fmi2FMUstate state = fuzz_model_save(subject);
+    fmi2FMUstate state = fuzz_save(subject->instance);
     const fmi2Status status =
         FUZZ_CHECKED(subject->instance, SetRealInputDerivatives, &references[i], 1, &order, &value);
     if (status == fmi2OK) {
         subject->is_usual &= value >= -1e3 && value <= 1e3;
     } else {
-        fuzz_model_restore(subject, state, subject->instance->time);
+        fuzz_restore(subject->instance, state, subject->instance->time);
     }
-    fuzz_model_forget(subject, &state);
+    fuzz_forget(subject->instance, &state);
 }
 
 bool fuzz_model_failed_inside(void) {

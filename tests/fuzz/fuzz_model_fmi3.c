@@ -1,19 +1,9 @@
 /* Steps of FMI 3.0: intermediate updates move the inputs and may end the step, and events are left
  * to event mode. */
-#include "fmu_fmi3.h"
+#include "fuzz_fmi3.h"
 #include "fuzz_model.h"
 
-#include <fmi3Functions.h>
 #include <math.h>
-
-/* Calls of FMI 3.0 without a counterpart in FMI 2.0. */
-#define CHECKED(instance, name, ...)                                                               \
-    fuzz_check_call(                                                                               \
-        instance, "fmi3" #name, false,                                                             \
-        (fmi2Status)FUZZ_CALL(fmi3##name(fmu_fmi3_instance((instance)->component), __VA_ARGS__)))
-#define CHECKED_PLAIN(instance, name)                                                              \
-    fuzz_check_call(instance, "fmi3" #name, false,                                                 \
-                    (fmi2Status)FUZZ_CALL(fmi3##name(fmu_fmi3_instance((instance)->component))))
 
 /* What intermediate updates do in steps. */
 static struct {
@@ -111,11 +101,11 @@ static void handle_event(struct fuzz_instance *instance) {
     bool states = true;
     bool has_next = true;
     double next = NAN;
-    if (CHECKED_PLAIN(instance, EnterEventMode) != fmi2OK) {
+    if (FUZZ_FMI3_CHECKED_PLAIN(instance, EnterEventMode) != fmi2OK) {
         fuzz_fail("fmi3EnterEventMode fails: %s", instance->text);
     }
-    const fmi2Status status = CHECKED(instance, UpdateDiscreteStates, &more, &terminate, &nominals,
-                                      &states, &has_next, &next);
+    const fmi2Status status = FUZZ_FMI3_CHECKED(instance, UpdateDiscreteStates, &more, &terminate,
+                                                &nominals, &states, &has_next, &next);
     if (status == fmi2Error) {
         fuzz_fail("an event at %.17g s fails: %s", instance->time, instance->text);
     }
@@ -124,7 +114,7 @@ static void handle_event(struct fuzz_instance *instance) {
                   "the next one at %g s",
                   instance->time, terminate, nominals, next);
     }
-    if (CHECKED_PLAIN(instance, EnterStepMode) != fmi2OK) {
+    if (FUZZ_FMI3_CHECKED_PLAIN(instance, EnterStepMode) != fmi2OK) {
         fuzz_fail("fmi3EnterStepMode fails: %s", instance->text);
     }
 }
@@ -140,8 +130,8 @@ fmi2Status fuzz_model_step(struct fuzz_instance *instance, double length, unsign
     updates.middle = choices & 1 ? instance->time + 0.5 * length : INFINITY;
     updates.was_asked = updates.has_failed = false;
     fuzz_poison(&reached, 1);
-    const fmi2Status status = CHECKED(instance, DoStep, instance->time, length, true, &event,
-                                      &terminate, &early, &reached);
+    const fmi2Status status = FUZZ_FMI3_CHECKED(instance, DoStep, instance->time, length, true,
+                                                &event, &terminate, &early, &reached);
     fuzz_assert_written(status, &reached, 1, "fmi3DoStep");
     if (updates.has_failed && status != fmi2Error) {
         fuzz_fail("a step has the status %d after an error inside it", (int)status);

@@ -130,7 +130,7 @@ static void set_refused(const struct subject *subject, const struct variable *va
     static struct fuzz_bytes bytes[2];
     struct fuzz_values before;
     struct fuzz_values after;
-    fmi2FMUstate state = fuzz_model_save(subject);
+    fmi2FMUstate state = fuzz_save(subject->instance);
     fuzz_serialize(instance, &bytes[0]);
     read_allowed(subject, &before);
     const fmi2Status status = set(instance, variable, value);
@@ -140,13 +140,12 @@ static void set_refused(const struct subject *subject, const struct variable *va
     }
     read_allowed(subject, &after);
     fuzz_assert_same(&before, &after, "after a value that was refused");
-    fuzz_model_restore(subject, state, instance->time);
+    fuzz_restore(subject->instance, state, instance->time);
     fuzz_serialize(instance, &bytes[1]);
-    if (bytes[0].size != bytes[1].size ||
-        memcmp(bytes[0].data, bytes[1].data, bytes[0].size) != 0) {
+    if (!fuzz_are_same_bytes(&bytes[0], &bytes[1])) {
         fuzz_fail("%s = %.17g was refused, and a rollback leaves a trace", variable->name, value);
     }
-    fuzz_model_forget(subject, &state);
+    fuzz_forget(subject->instance, &state);
 }
 
 void fuzz_model_set_any(struct subject *subject) {
@@ -157,7 +156,7 @@ void fuzz_model_set_any(struct subject *subject) {
         set_refused(subject, variable, value);
         return;
     }
-    fuzz_model_require(subject, set(subject->instance, variable, value), variable->name);
+    fuzz_require(set(subject->instance, variable, value), subject->instance, variable->name);
     subject->is_usual &= is_usual;
     subject->is_inconsistent |= variable->causality == CAUSALITY_PARAMETER;
 }
@@ -181,8 +180,8 @@ void fuzz_model_set_inputs(struct subject *subject) {
     for (size_t i = 0; i < count; i++) {
         values[i] = usual_real(subject->input, variable_of(&model_description, references[i]));
     }
-    fuzz_model_require(subject, FUZZ_CHECKED(subject->instance, SetReal, references, count, values),
-                       "fmi2SetReal of all inputs");
+    fuzz_require(FUZZ_CHECKED(subject->instance, SetReal, references, count, values),
+                 subject->instance, "fmi2SetReal of all inputs");
 }
 
 /* ---- Reading --------------------------------------------------------------------------------- */

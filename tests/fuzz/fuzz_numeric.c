@@ -111,26 +111,20 @@ struct trace {
     struct fuzz_values values[MAX_STEPS];
 };
 
-static void require(fmi2Status status, const struct fuzz_instance *instance, const char *what) {
-    if (status != fmi2OK) {
-        fuzz_fail("%s has the status %d: %s", what, (int)status, instance->text);
-    }
-}
-
 static void begin(struct fuzz_instance *instance, const struct simulation *simulation) {
     const fmi2ValueReference method = RP_MANIPULATOR_solver_method;
     const fmi2ValueReference max_step = RP_MANIPULATOR_max_step;
     fuzz_limit_steps(instance, MAX_INTERNAL_STEPS);
-    require(FUZZ_CHECKED(instance, SetReal, parameter_references, 8, simulation->parameters),
-            instance, "setting valid parameters");
-    require(FUZZ_CHECKED(instance, SetReal, state_references, 4, simulation->states), instance,
-            "setting states");
-    require(FUZZ_CHECKED(instance, SetInteger, &method, 1, &simulation->method), instance,
-            "setting the method");
-    require(FUZZ_CHECKED(instance, SetReal, &max_step, 1, &simulation->max_step), instance,
-            "setting the longest step");
-    require(fuzz_initialize(instance, simulation->tolerance, simulation->start), instance,
-            "the initialization");
+    fuzz_require(FUZZ_CHECKED(instance, SetReal, parameter_references, 8, simulation->parameters),
+                 instance, "setting valid parameters");
+    fuzz_require(FUZZ_CHECKED(instance, SetReal, state_references, 4, simulation->states), instance,
+                 "setting states");
+    fuzz_require(FUZZ_CHECKED(instance, SetInteger, &method, 1, &simulation->method), instance,
+                 "setting the method");
+    fuzz_require(FUZZ_CHECKED(instance, SetReal, &max_step, 1, &simulation->max_step), instance,
+                 "setting the longest step");
+    fuzz_require(fuzz_initialize(instance, simulation->tolerance, simulation->start), instance,
+                 "the initialization");
 }
 
 /* Where a step was discarded the instance is at the last successful time, within the step; from the
@@ -139,8 +133,8 @@ static void check_discard(struct fuzz_instance *instance, fmi2FMUstate before,
                           const struct segment *segment) {
     double reached;
     struct fuzz_values values;
-    require(FUZZ_CHECKED(instance, GetRealStatus, fmi2LastSuccessfulTime, &reached), instance,
-            "fmi2LastSuccessfulTime after a discarded step");
+    fuzz_require(FUZZ_CHECKED(instance, GetRealStatus, fmi2LastSuccessfulTime, &reached), instance,
+                 "fmi2LastSuccessfulTime after a discarded step");
     if (!(reached >= instance->time && reached <= instance->time + segment->length)) {
         fuzz_fail("a step from %.17g of %.17g s is discarded with the last successful time %.17g",
                   instance->time, segment->length, reached);
@@ -150,7 +144,7 @@ static void check_discard(struct fuzz_instance *instance, fmi2FMUstate before,
         fuzz_fail("after a discarded step the time is %.17g, the last successful one %.17g",
                   fuzz_value(&values, RP_MANIPULATOR_time), reached);
     }
-    require(FUZZ_CHECKED(instance, SetFMUstate, before), instance, "a rollback");
+    fuzz_require(FUZZ_CHECKED(instance, SetFMUstate, before), instance, "a rollback");
     if (fuzz_step(instance, segment->length / 1024.0) == fmi2Error) {
         fuzz_fail("a shorter step after a rollback fails: %s", instance->text);
     }
@@ -159,18 +153,18 @@ static void check_discard(struct fuzz_instance *instance, fmi2FMUstate before,
 /* Sets what changes in front of a step. */
 static void prepare(struct fuzz_instance *instance, const struct segment *segment) {
     if (segment->sets_parameter) {
-        require(FUZZ_CHECKED(instance, SetReal, &parameter_references[segment->parameter], 1,
-                             &segment->parameter_value),
-                instance, "changing a parameter");
+        fuzz_require(FUZZ_CHECKED(instance, SetReal, &parameter_references[segment->parameter], 1,
+                                  &segment->parameter_value),
+                     instance, "changing a parameter");
     }
     if (segment->sets_inputs) {
-        require(FUZZ_CHECKED(instance, SetReal, input_references, 2, segment->efforts), instance,
-                "setting inputs");
+        fuzz_require(FUZZ_CHECKED(instance, SetReal, input_references, 2, segment->efforts),
+                     instance, "setting inputs");
     }
     if (segment->sets_derivative) {
-        require(FUZZ_CHECKED(instance, SetRealInputDerivatives, input_references, 1,
-                             &segment->order, &segment->derivative),
-                instance, "setting the derivative of an input");
+        fuzz_require(FUZZ_CHECKED(instance, SetRealInputDerivatives, input_references, 1,
+                                  &segment->order, &segment->derivative),
+                     instance, "setting the derivative of an input");
     }
 }
 
@@ -187,7 +181,7 @@ static bool run(struct fuzz_instance *instance, const struct simulation *simulat
         struct fuzz_values values;
         prepare(instance, segment);
         fuzz_read(instance, &values);
-        require(FUZZ_CHECKED(instance, GetFMUstate, &before), instance, "fmi2GetFMUstate");
+        fuzz_require(FUZZ_CHECKED(instance, GetFMUstate, &before), instance, "fmi2GetFMUstate");
         const fmi2Status status = fuzz_step(instance, segment->length);
         trace->statuses[trace->count] = status;
         fuzz_read(instance, after);
@@ -209,7 +203,7 @@ static bool run(struct fuzz_instance *instance, const struct simulation *simulat
         }
     }
     if (before != NULL) {
-        require(FUZZ_CHECKED(instance, FreeFMUstate, &before), instance, "fmi2FreeFMUstate");
+        fuzz_require(FUZZ_CHECKED(instance, FreeFMUstate, &before), instance, "fmi2FreeFMUstate");
     }
     return is_done;
 }

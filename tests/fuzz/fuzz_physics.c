@@ -128,12 +128,6 @@ static void see(struct balance *balance, double tolerance, const struct fuzz_val
     balance->rounding = fmax(balance->rounding, rounding);
 }
 
-static void require(fmi2Status status, const struct fuzz_instance *instance) {
-    if (status != fmi2OK) {
-        fuzz_fail("a rollback fails: %s", instance->text);
-    }
-}
-
 /* Checks the step in parts: the values at its ends may not be enough. */
 static void see_parts(struct balance *balance, struct fuzz_instance *instance, fmi2FMUstate saved,
                       double tolerance, double length) {
@@ -142,10 +136,8 @@ static void see_parts(struct balance *balance, struct fuzz_instance *instance, f
     double moved = 0.0;
     struct fuzz_values from;
     struct fuzz_values to;
-    fmi2FMUstate now = NULL;
-    require(FUZZ_CHECKED(instance, GetFMUstate, &now), instance);
-    require(FUZZ_CHECKED(instance, SetFMUstate, saved), instance);
-    instance->time -= length;
+    fmi2FMUstate now = fuzz_save(instance);
+    fuzz_restore(instance, saved, end - length);
     fuzz_read(instance, &from);
     for (int i = 0; i < PARTS && fuzz_step(instance, length / PARTS) == fmi2OK; i++) {
         fuzz_read(instance, &to);
@@ -154,10 +146,8 @@ static void see_parts(struct balance *balance, struct fuzz_instance *instance, f
         from = to;
     }
     balance->moved = fmax(balance->moved, moved);
-    require(FUZZ_CHECKED(instance, SetFMUstate, now), instance);
-    require(FUZZ_CHECKED(instance, FreeFMUstate, &now), instance);
-    instance->time = end;
-    instance->in_error = false;
+    fuzz_restore(instance, now, end);
+    fuzz_forget(instance, &now);
 }
 
 static double bound_of(const struct balance *balance, double tolerance, double internal_steps) {

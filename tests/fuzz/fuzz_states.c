@@ -1,6 +1,6 @@
 /* Deserialization of mutated states, and what an instance does that goes on from one that was
  * taken. README.md says how an input is decoded. */
-#include "fuzz_instance.h"
+#include "fuzz_bytes.h"
 #include "value_references.h"
 
 #include <math.h>
@@ -9,21 +9,10 @@
 
 const char *const fuzz_target_name = FUZZ_TARGET_NAME;
 
-enum { BASES = 12, BYTES_CAPACITY = 2048, MAX_MUTATIONS = 12, MAX_OPERATIONS = 10 };
+enum { BASES = 12, MAX_MUTATIONS = 12, MAX_OPERATIONS = 10 };
 
 /* An instance steps from a restored state only if its max_internal_steps is at most this. */
 enum { MAX_INTERNAL_STEPS = 3000 };
-
-struct bytes {
-    size_t size;
-    unsigned char data[BYTES_CAPACITY];
-};
-
-static void require(fmi2Status status, const char *what) {
-    if (status != fmi2OK) {
-        fuzz_fail("%s has the status %d", what, (int)status);
-    }
-}
 
 /* ---- States to mutate ------------------------------------------------------------------------ */
 
@@ -31,16 +20,16 @@ static void step_with_efforts(struct fuzz_instance *instance, unsigned base) {
     const fmi2ValueReference inputs[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
     const double efforts[] = {1.0, 9.0};
     const fmi2Integer orders[] = {1, 3};
-    require(FUZZ_CHECKED(instance, SetReal, inputs, 2, efforts), "fmi2SetReal");
+    fuzz_require(FUZZ_CHECKED(instance, SetReal, inputs, 2, efforts), instance, "fmi2SetReal");
     for (int i = 0; i < 5; i++) {
-        require(fuzz_step(instance, 0.0625 * (1 + i % 2)), "fmi2DoStep");
+        fuzz_require(fuzz_step(instance, 0.0625 * (1 + i % 2)), instance, "fmi2DoStep");
     }
     if (base >= 6) {
-        require(FUZZ_CHECKED(instance, SetRealInputDerivatives, inputs, 2, orders, efforts),
-                "fmi2SetRealInputDerivatives");
+        fuzz_require(FUZZ_CHECKED(instance, SetRealInputDerivatives, inputs, 2, orders, efforts),
+                     instance, "fmi2SetRealInputDerivatives");
     }
     if (base >= 9) {
-        require(fuzz_step(instance, 0.25), "fmi2DoStep");
+        fuzz_require(fuzz_step(instance, 0.25), instance, "fmi2DoStep");
     }
 }
 
@@ -49,46 +38,35 @@ static void step_with_efforts(struct fuzz_instance *instance, unsigned base) {
 static void bring_to_base(struct fuzz_instance *instance, unsigned base) {
     const fmi2ValueReference method_reference = RP_MANIPULATOR_solver_method;
     const fmi2Integer method = 1 + (fmi2Integer)(base % FUZZ_METHODS);
-    require(FUZZ_CHECKED(instance, SetInteger, &method_reference, 1, &method), "fmi2SetInteger");
+    fuzz_require(FUZZ_CHECKED(instance, SetInteger, &method_reference, 1, &method), instance,
+                 "fmi2SetInteger");
     if (base == 0) {
         return;
     }
-    require(fuzz_initialize(instance, base % 2 == 0 ? 0.0 : 1e-4, base < 8 ? 0.0 : 100.0),
-            "the initialization");
+    fuzz_require(fuzz_initialize(instance, base % 2 == 0 ? 0.0 : 1e-4, base < 8 ? 0.0 : 100.0),
+                 instance, "the initialization");
     if (instance->kind == fmi2CoSimulation) {
         step_with_efforts(instance, base);
     } else if (base % 2 == 0) {
-        require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode),
-                "fmi2EnterContinuousTimeMode");
+        fuzz_require(FUZZ_CHECKED_PLAIN(instance, EnterContinuousTimeMode), instance,
+                     "fmi2EnterContinuousTimeMode");
     }
     if (base == 1) {
-        require(FUZZ_CHECKED_PLAIN(instance, Terminate), "fmi2Terminate");
+        fuzz_require(FUZZ_CHECKED_PLAIN(instance, Terminate), instance, "fmi2Terminate");
     }
     if (base == 2) {
         (void)FUZZ_CHECKED_PLAIN(instance, ExitInitializationMode); // is refused
     }
 }
 
-static void serialize(struct fuzz_instance *instance, fmi2FMUstate state, struct bytes *bytes) {
-    require(FUZZ_CHECKED(instance, SerializedFMUstateSize, state, &bytes->size),
-            "fmi2SerializedFMUstateSize");
-    if (bytes->size > BYTES_CAPACITY / 2) {
-        fuzz_fail("%zu bytes of a state are too many for BYTES_CAPACITY", bytes->size);
-    }
-    require(FUZZ_CHECKED(instance, SerializeFMUstate, state, (fmi2Byte *)bytes->data, bytes->size),
-            "fmi2SerializeFMUstate");
-}
-
-static const struct bytes *base_bytes(fmi2Type kind, unsigned base) {
-    static struct bytes known[2][BASES];
-    struct bytes *bytes = &known[kind == fmi2CoSimulation][base];
+static const struct fuzz_bytes *base_bytes(fmi2Type kind, unsigned base) {
+    static struct fuzz_bytes known[2][BASES];
+    struct fuzz_bytes *bytes = &known[kind == fmi2CoSimulation][base];
     if (bytes->size == 0) {
         struct fuzz_instance *instance = fuzz_instance_create(kind, false, false);
-        fmi2FMUstate state = NULL;
         fuzz_limit_steps(instance, FUZZ_MAX_INTERNAL_STEPS);
         bring_to_base(instance, base);
-        require(FUZZ_CHECKED(instance, GetFMUstate, &state), "fmi2GetFMUstate");
-        serialize(instance, state, bytes);
+        fuzz_serialize(instance, bytes);
         fuzz_instance_free(instance);
     }
     return bytes;
@@ -96,71 +74,47 @@ static const struct bytes *base_bytes(fmi2Type kind, unsigned base) {
 
 /* ---- Mutations ------------------------------------------------------------------------------- */
 
-/* src/instance/snapshot/serialization.h: magic, version, length and length of the GUID, the GUID,
- * fields of 8 bytes, hash */
-static const size_t fields_begin = 20 + sizeof RP_MANIPULATOR_GUID - 1;
-enum { LENGTH_AT = 12, HASH_SIZE = 8, FIELD_SIZE = 8 };
-
-static void write_number(unsigned char *to, uint64_t number, size_t size) {
-    for (size_t i = 0; i < size; i++) {
-        to[i] = (unsigned char)(number >> (8 * i));
-    }
-}
-
-static void write_field(struct bytes *bytes, unsigned field, uint64_t bits) {
-    const size_t count = (bytes->size - fields_begin - HASH_SIZE) / FIELD_SIZE;
-    write_number(bytes->data + fields_begin + FIELD_SIZE * (field % count), bits, FIELD_SIZE);
-}
-
-static void mutate(struct fuzz_input *input, fmi2Type kind, struct bytes *bytes) {
+static void mutate(struct fuzz_input *input, fmi2Type kind, struct fuzz_bytes *bytes) {
     const unsigned at = fuzz_byte(input);
-    const size_t field = fields_begin + (size_t)at * FIELD_SIZE;
+    const size_t field = fuzz_fields_begin() + (size_t)at * FUZZ_FIELD;
     double value;
     uint64_t bits;
-    const struct bytes *other;
+    fmi2Byte *byte;
+    const struct fuzz_bytes *other;
     switch (fuzz_below(input, 8)) {
     case 0: // one byte anywhere
-        bytes->data[(at + (size_t)256 * fuzz_byte(input)) % bytes->size] ^=
-            (unsigned char)(1 + fuzz_below(input, 255));
+        byte = &bytes->data[(at + (size_t)256 * fuzz_byte(input)) % bytes->size];
+        *byte = (fmi2Byte)(*byte ^ (int)(1 + fuzz_below(input, 255)));
         break;
     case 1: // a field of another state
         other = base_bytes(kind, fuzz_below(input, BASES));
-        if (field + FIELD_SIZE <= other->size && other->size == bytes->size) {
-            memcpy(bytes->data + field, other->data + field, FIELD_SIZE);
+        if (field + FUZZ_FIELD <= other->size && other->size == bytes->size) {
+            memcpy(bytes->data + field, other->data + field, FUZZ_FIELD);
         }
         break;
     case 2:
     case 3:
-        write_field(bytes, at, (uint64_t)(int64_t)fuzz_integer(input));
+        fuzz_write_field(bytes, at, (uint64_t)(int64_t)fuzz_integer(input));
         break;
     case 4: // a small integer, or one at the end of the range
         bits = fuzz_byte(input);
-        write_field(bytes, at, bits < 240 ? bits : INT64_MAX - (bits - 240));
+        fuzz_write_field(bytes, at, bits < 240 ? bits : INT64_MAX - (bits - 240));
         break;
     default:
         value = fuzz_real(input);
         memcpy(&bits, &value, sizeof bits);
-        write_field(bytes, at, bits);
+        fuzz_write_field(bytes, at, bits);
         break;
     }
 }
 
-/* FNV-1a, as in src/instance/snapshot/serialization.h. */
-static void repair_hash(struct bytes *bytes) {
-    uint64_t hash = 0xcbf29ce484222325u;
-    for (size_t i = 0; i + HASH_SIZE < bytes->size; i++) {
-        hash = (hash ^ bytes->data[i]) * 0x100000001b3u;
-    }
-    write_number(bytes->data + bytes->size - HASH_SIZE, hash, HASH_SIZE);
-}
-
 /* Cut off or lengthened, with the length that is stated repaired or not. */
-static void change_size(struct fuzz_input *input, struct bytes *bytes) {
+static void change_size(struct fuzz_input *input, struct fuzz_bytes *bytes) {
     const unsigned change = fuzz_byte(input) + 256u * fuzz_below(input, 4);
     const bool states_it = fuzz_below(input, 2) == 0;
     bytes->size = change < bytes->size ? bytes->size - change : bytes->size + change % 64;
-    if (states_it && bytes->size >= LENGTH_AT + 4) {
-        write_number(bytes->data + LENGTH_AT, bytes->size, 4);
+    if (states_it && bytes->size >= FUZZ_LENGTH_AT + 4) {
+        fuzz_write_number(bytes->data + FUZZ_LENGTH_AT, bytes->size, 4);
     }
 }
 
@@ -209,7 +163,8 @@ static void repeat_step(struct fuzz_instance *instance, fmi2FMUstate state, doub
     fmi2Status statuses[2];
     memset(values, 0, sizeof values);
     for (int i = 0; i < 2; i++) {
-        require(FUZZ_CHECKED(instance, SetFMUstate, state), "fmi2SetFMUstate of an accepted state");
+        fuzz_require(FUZZ_CHECKED(instance, SetFMUstate, state), instance,
+                     "fmi2SetFMUstate of an accepted state");
         instance->in_error = false; // or not: the state may hold it
         if (FUZZ_CHECKED(instance, GetReal, &(fmi2ValueReference){RP_MANIPULATOR_time}, 1,
                          &instance->time) != fmi2OK) {
@@ -271,10 +226,10 @@ static void go_on(struct fuzz_input *input, struct fuzz_instance *instance, fmi2
 
 /* A state that was taken is served like any other, and comes out as the bytes that went in. */
 static void use(struct fuzz_input *input, struct fuzz_instance *instance, fmi2FMUstate state,
-                const struct bytes *bytes) {
-    static struct bytes again;
-    serialize(instance, state, &again);
-    if (again.size != bytes->size || memcmp(again.data, bytes->data, bytes->size) != 0) {
+                const struct fuzz_bytes *bytes) {
+    static struct fuzz_bytes again;
+    fuzz_serialize_state(instance, state, &again);
+    if (!fuzz_are_same_bytes(&again, bytes)) {
         fuzz_fail("an accepted state is serialized to other bytes");
     }
     if (FUZZ_CHECKED(instance, SetFMUstate, state) != fmi2OK) {
@@ -286,11 +241,11 @@ static void use(struct fuzz_input *input, struct fuzz_instance *instance, fmi2FM
 /* ---- The target ------------------------------------------------------------------------------ */
 
 void fuzz_target_run(struct fuzz_input *input) {
-    static struct bytes bytes;
+    static struct fuzz_bytes bytes;
     const unsigned selector = fuzz_byte(input);
     const fmi2Type kind = selector & 0x80 ? fmi2ModelExchange : fmi2CoSimulation;
     const fmi2Type reader = (selector & 0x70) == 0x70 ? fmi2ModelExchange : kind;
-    const struct bytes *base = base_bytes(kind, (selector & 15) % BASES);
+    const struct fuzz_bytes *base = base_bytes(kind, (selector & 15) % BASES);
     const unsigned variant = fuzz_byte(input);
     const unsigned mutations = fuzz_below(input, MAX_MUTATIONS);
     const bool repairs = fuzz_below(input, 8) != 0;
@@ -302,8 +257,8 @@ void fuzz_target_run(struct fuzz_input *input) {
     if (resizes) {
         change_size(input, &bytes);
     }
-    if (repairs && bytes.size > HASH_SIZE) {
-        repair_hash(&bytes);
+    if (repairs && bytes.size > FUZZ_FIELD) {
+        fuzz_repair_checksum(&bytes);
     }
 
     struct fuzz_instance *instance = fuzz_instance_create(reader, true, (variant & 0x80) != 0);
@@ -313,8 +268,7 @@ void fuzz_target_run(struct fuzz_input *input) {
     const fmi2Status status =
         FUZZ_CHECKED(instance, DeSerializeFMUstate, exact, bytes.size, &state);
     free(exact);
-    const bool is_changed =
-        bytes.size != base->size || memcmp(bytes.data, base->data, base->size) != 0;
+    const bool is_changed = !fuzz_are_same_bytes(&bytes, base);
     if ((status == fmi2OK) != (state != NULL)) {
         fuzz_fail("fmi2DeSerializeFMUstate has the status %d and leaves %s", (int)status,
                   state != NULL ? "a state" : "none");

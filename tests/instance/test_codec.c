@@ -76,30 +76,6 @@ static void test_the_layout_is_little_endian(void) {
     TEST_ASSERT_EQUAL_MEMORY(minus_a_tenth, bytes + 20 + strlen(guid), 8);
 }
 
-static void test_any_changed_byte_is_noticed(void) {
-    unsigned char bytes[128];
-    struct fields fields = {0};
-    const size_t size = written(bytes);
-    for (size_t i = 0; i < size; i++) {
-        for (unsigned change = 1; change < 256; change <<= 1) {
-            bytes[i] ^= (unsigned char)change;
-            TEST_ASSERT_NOT_NULL(read(bytes, size, size, &fields));
-            bytes[i] ^= (unsigned char)change;
-        }
-    }
-    TEST_ASSERT_NULL(read(bytes, size, size, &fields));
-}
-
-static void test_any_other_length_is_noticed(void) {
-    unsigned char bytes[128] = {0};
-    struct fields fields = {0};
-    const size_t size = written(bytes);
-    for (size_t i = 0; i < sizeof bytes; i++) {
-        TEST_ASSERT_TRUE((read(bytes, i, size, &fields) == NULL) == (i == size));
-    }
-    TEST_ASSERT_NOT_NULL(read(bytes, size, size + 8, &fields));
-}
-
 static void test_values_that_a_type_does_not_have_fail(void) {
     unsigned char bytes[8] = {2};
     struct codec codec = codec_reading(bytes, sizeof bytes);

@@ -31,32 +31,6 @@ static void test_a_small_mismatch_of_the_time_is_integrated(void) {
     TEST_ASSERT_EQUAL_DOUBLE(1.5 + 1e-10, instance_time(instance));
 }
 
-static void test_times_that_do_not_fit_are_refused(void) {
-    const struct {
-        double t, h;
-        const char *expected;
-    } cases[] = {
-        {0.0, 0.0, "a step of 0 s"},
-        {0.0, -0.1, "a step of -0.1 s"},
-        {0.0, NAN, "nan s from t = 0"},
-        {0.0, INFINITY, "inf s"},
-        {NAN, 0.1, "from t = nan"},
-        {0.01, 0.1, "a step from t = 0.01 is refused: the instance is at t = 0"},
-        {-0.01, 0.1, "the instance is at t = 0"},
-        {1e9, 1e-9, "does not change the time"},
-        {0.0, 2.5, "the stop time is 2"},
-    };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        instance_reset(instance);
-        initialize_of(instance, 0.0, 2.0);
-        TEST_ASSERT_EQUAL_INT(STATUS_INVALID_TIME,
-                              instance_do_step(instance, cases[i].t, cases[i].h));
-        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_text, cases[i].expected), last_text);
-        TEST_ASSERT_EQUAL_DOUBLE(0.0, instance_time(instance));
-        ASSERT_OK(instance_do_step(instance, 0.0, 0.1));
-    }
-}
-
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 /* As if variables.toml named a calculated field for the input: it compiles and would do nothing. */

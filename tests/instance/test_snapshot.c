@@ -46,39 +46,6 @@ static void step(struct instance *stepped, double h) {
     ASSERT_OK(instance_do_step(stepped, instance_time(stepped), h));
 }
 
-/* Inputs that change at every step, so that each restart relies on the step before. */
-EACH_METHOD static void test_a_run_of_restarts_goes_on_bit_for_bit(void) {
-    struct instance *other = started();
-    struct instance_snapshot *snapshot = NULL;
-    struct instance_snapshot *copy = NULL;
-    unsigned char bytes[4096];
-    const size_t size = instance_serialized_size(instance);
-    TEST_ASSERT_TRUE(size <= sizeof bytes);
-    for (int i = 0; i < 60; i++) {
-        const double u = sin(0.3 * i);
-        const double h = i % 7 == 0 ? 0.3 : 0.001;
-        ASSERT_OK(instance_save(instance, 0, &snapshot));
-        ASSERT_OK(instance_serialize(instance, snapshot, bytes, size));
-        set(OSCILLATOR_U, 3.0);
-        step(instance, 0.1);
-        if (i % 2 == 0) {
-            ASSERT_OK(instance_restore(instance, snapshot));
-            ASSERT_OK(instance_save(instance, 0, &snapshot)); // of a state that was only restored
-            ASSERT_OK(instance_restore(instance, snapshot));
-        } else {
-            ASSERT_OK(instance_deserialize(instance, bytes, size, &copy));
-            ASSERT_OK(instance_restore(instance, copy));
-            ASSERT_OK(instance_forget(instance, &copy));
-        }
-        set(OSCILLATOR_U, u);
-        set_of(other, OSCILLATOR_U, u);
-        step(instance, h);
-        step(other, h);
-        assert_equal(other, instance);
-    }
-    instance_destroy(other);
-}
-
 /* A snapshot from before initialization carries another method. */
 EACH_METHOD static void test_a_state_of_another_method_can_be_restored(void) {
     struct instance *other = started();
@@ -102,26 +69,6 @@ EACH_METHOD static void test_a_state_of_another_method_can_be_restored(void) {
         step(other, 0.1);
         assert_equal(instance, other);
     }
-    instance_destroy(other);
-}
-
-/* Long enough for restarts without any change; wherever it is restored, they come at the same step.
- */
-EACH_METHOD static void test_restarts_without_a_change_are_part_of_the_state(void) {
-    struct instance *other = started();
-    struct instance_snapshot *snapshot = NULL;
-    for (int i = 0; i < 400; i++) {
-        if (i % 17 == 0) {
-            ASSERT_OK(instance_save(instance, 0, &snapshot));
-            step(instance, 1.7);
-            ASSERT_OK(instance_restore(instance, snapshot));
-        }
-        step(instance, 1.0);
-        step(other, 1.0);
-        assert_equal(other, instance);
-    }
-    const int64_t longest = integrator_longest_history((enum integrator_method)method, false);
-    TEST_ASSERT_TRUE(read(instance).integers[0] > 3 * longest);
     instance_destroy(other);
 }
 
@@ -156,21 +103,6 @@ EACH_METHOD static void test_bytes_carry_a_state_to_another_instance(void) {
     free(bytes);
     free(again);
     instance_destroy(other);
-}
-
-EACH_METHOD static void test_input_derivatives_are_part_of_the_state(void) {
-    struct instance_snapshot *snapshot = NULL;
-    const unsigned input = OSCILLATOR_U;
-    const int order = 2;
-    const double value = 4.0;
-    ASSERT_OK(instance_set_input_derivatives(instance, &input, 1, &order, &value));
-    ASSERT_OK(instance_save(instance, 0, &snapshot));
-    step(instance, 0.5);
-    const struct readings expected = read(instance);
-    ASSERT_OK(instance_restore(instance, snapshot));
-    step(instance, 0.5);
-    const struct readings repeated = read(instance);
-    TEST_ASSERT_EQUAL_MEMORY(&expected, &repeated, sizeof expected);
 }
 
 EACH_METHOD static void test_a_snapshot_can_be_forgotten_in_any_order(void) {

@@ -30,10 +30,6 @@ static enum status set_cubic(void *context, double time) {
     return STATUS_OK;
 }
 
-static enum status refuse(void *context, double time) {
-    return STATUS_INVALID_ARGUMENT;
-}
-
 /* x'' = -omega^2 x + u with u a cubic and x(0) = 1, x'(0) = 0: a particular cubic and the free
  * motion. */
 static double solution(double time) {
@@ -60,12 +56,6 @@ EACH_METHOD static void test_a_cubic_input_is_exact(void) {
     const double held = get(OSCILLATOR_U);
     ASSERT_OK(instance_do_step(instance, 2.0, 0.25));
     TEST_ASSERT_TRUE(held == get(OSCILLATOR_U));
-}
-
-EACH_METHOD static void test_a_refusal_ends_the_step(void) {
-    const struct step_options options = {.ask_inputs = refuse};
-    ASSERT_REFUSED(instance_do_step_with(instance, 1.0, 0.5, &options));
-    TEST_ASSERT_TRUE(instance_time(instance) == 1.0);
 }
 
 /* ---- Reports -------------------------------------------------------------------------------- */
@@ -106,29 +96,6 @@ EACH_METHOD static void test_internal_steps_and_the_end_are_reported(void) {
     TEST_ASSERT_GREATER_THAN_UINT(10, reports.count);
     TEST_ASSERT_TRUE(reports.last == 4.0);
     TEST_ASSERT_TRUE(reports.largest_error < 1e-6);
-}
-
-EACH_METHOD static void test_a_report_may_bring_the_end_forward(void) {
-    begin_noting(2.0, STATUS_OK);
-    ASSERT_OK(instance_do_step_with(instance, 1.0, 3.0, &noting));
-    TEST_ASSERT_TRUE(instance_time(instance) == 2.0);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, cos(2.0), get(OSCILLATOR_X));
-    ASSERT_OK(instance_do_step(instance, 2.0, 2.0));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-6, cos(6.0), get(OSCILLATOR_X));
-}
-
-EACH_METHOD static void test_a_report_may_end_the_step_at_once(void) {
-    begin_noting(0.5, STATUS_OK); // before the step
-    ASSERT_OK(instance_do_step_with(instance, 1.0, 3.0, &noting));
-    TEST_ASSERT_EQUAL_UINT(3, reports.count);
-    TEST_ASSERT_TRUE(instance_time(instance) == reports.last);
-    ASSERT_OK(instance_do_step(instance, reports.last, 0.5));
-}
-
-EACH_METHOD static void test_a_report_may_fail_the_step(void) {
-    begin_noting(INFINITY, STATUS_INVALID_ARGUMENT);
-    ASSERT_REFUSED(instance_do_step_with(instance, 1.0, 3.0, &noting));
-    TEST_ASSERT_EQUAL_UINT(3, reports.count);
 }
 
 /* Asked for the end of internal steps, a step may take as many of them as without. */

@@ -1,6 +1,5 @@
 /* From one communication point to the next, with each method, against the solution in closed form.
  */
-#include "allocations.h"
 #include "derivatives.h"
 #include "each_method.h"
 #include "one_instance.h"
@@ -60,15 +59,6 @@ static void get_states(struct instance *from, double states[2]) {
     states[1] = get_of(from, OSCILLATOR_V);
 }
 
-/* An experiment whose input changes at every third step. */
-static void run(struct instance *stepped, int steps, double states[2]) {
-    for (int i = 0; i < steps; i++) {
-        set_of(stepped, OSCILLATOR_U, sin((i / 3) * 0.1));
-        ASSERT_OK(instance_do_step(stepped, i * 0.01, 0.01));
-    }
-    get_states(stepped, states);
-}
-
 /* ---- Solutions ----------------------------------------------------------------------------------
  */
 
@@ -98,36 +88,6 @@ EACH_METHOD static void test_a_tunable_parameter_acts_from_the_next_step_on(void
     TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
 }
 
-EACH_METHOD static void test_a_step_that_ends_early_tells_how_far_it_got(void) {
-    double exact[2] = {1.0, 0.0};
-    set_int(OSCILLATOR_MAX_STEPS, 20);
-    initialize_at(5.0);
-    TEST_ASSERT_EQUAL_INT(STATUS_TOO_MANY_STEPS, instance_do_step(instance, 5.0, 100.0));
-    const double t = instance_time(instance);
-    TEST_ASSERT_TRUE(t > 5.0 && t < 105.0);
-    TEST_ASSERT_EQUAL_DOUBLE(t, get(OSCILLATOR_TIME));
-    oscillator_solution(2.0, 0.0, t - 5.0, exact, exact);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, exact[0], get(OSCILLATOR_X));
-    TEST_ASSERT_EQUAL_INT(20, get_int(OSCILLATOR_STEPS));
-}
-
-EACH_METHOD static void test_setting_the_same_values_again_changes_nothing(void) {
-    struct instance *untouched = watched();
-    initialize_at(0.0);
-    initialize_of(untouched, 0.0, INFINITY);
-    for (int i = 0; i < 100; i++) {
-        set(OSCILLATOR_U, 5.0); // set and taken back before the step
-        set(OSCILLATOR_U, 0.0);
-        set(OSCILLATOR_OMEGA, 2.0);
-        (void)get(OSCILLATOR_ENERGY);
-        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
-        ASSERT_OK(instance_do_step(untouched, 0.01 * i, 0.01));
-        TEST_ASSERT_EQUAL_DOUBLE(get_of(untouched, OSCILLATOR_X), get(OSCILLATOR_X));
-        TEST_ASSERT_EQUAL_DOUBLE(get_of(untouched, OSCILLATOR_V), get(OSCILLATOR_V));
-    }
-    instance_destroy(untouched);
-}
-
 EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
     initialize_at(0.0);
     for (int i = 0; i < 50; i++) {
@@ -143,44 +103,12 @@ EACH_METHOD static void test_the_sign_of_zero_is_no_change(void) {
     TEST_ASSERT_EQUAL_INT(get_int(OSCILLATOR_STEPS), alternating);
 }
 
-EACH_CVODE_METHOD static void test_a_restart_happens_only_where_something_changed(void) {
-    double states[2];
-    initialize_at(0.0);
-    for (int i = 0; i < 100; i++) {
-        ASSERT_OK(instance_do_step(instance, 0.01 * i, 0.01));
-    }
-    const int held = get_int(OSCILLATOR_STEPS);
-
-    begin_anew();
-    initialize_at(0.0);
-    run(instance, 100, states);
-    TEST_ASSERT_TRUE(get_int(OSCILLATOR_STEPS) > 3 * held);
-    TEST_ASSERT_TRUE(get_int(OSCILLATOR_EVALUATIONS) > get_int(OSCILLATOR_STEPS));
-}
-
-EACH_METHOD static void test_steps_allocate_nothing(void) {
-    double states[2];
-    initialize_at(0.0);
-    const long before = allocation_count();
-    run(instance, 100, states);
-    TEST_ASSERT_EQUAL_INT(before, allocation_count());
-}
-
 /* ---- Beyond communication points ------------------------------------------------------------ */
 
 static void step_held(int steps, double h) {
     for (int i = 0; i < steps; i++) {
         ASSERT_OK(instance_do_step(instance, i * h, h));
     }
-}
-
-EACH_CVODE_METHOD static void test_internal_steps_pass_points_where_nothing_changes(void) {
-    const double h = 1.0 / 1024.0;
-    initialize_at(0.0);
-    step_held(1024, h);
-    TEST_ASSERT_TRUE(latest > 1.0 + h);
-    TEST_ASSERT_LESS_THAN_INT(512, get_int(OSCILLATOR_STEPS));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-7, cos(2.0), get(OSCILLATOR_X));
 }
 
 EACH_METHOD static void test_no_internal_step_passes_the_stop_time(void) {
@@ -323,12 +251,12 @@ static double error_with_jumps(double tolerance, double jump, int every) {
 
 /* No size of jump is so small that going on costs accuracy, or so large that a restart does. */
 EACH_METHOD static void test_jumps_of_all_sizes_keep_the_accuracy(void) {
-    static const double tolerances[] = {1e-4, 1e-6, 1e-8, 1e-10};
+    static const double tolerances[] = {1e-5, 1e-9};
     static const int intervals[] = {1, 25};
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 4; i++) {
         const double tolerance = tolerances[i / 2];
         const double smallest = error_with_jumps(tolerance, 1e-12, intervals[i % 2]);
-        for (int exponent = -12; exponent <= 3; exponent++) {
+        for (int exponent = -12; exponent <= 3; exponent += 2) {
             const double error = error_with_jumps(tolerance, pow(10.0, exponent), intervals[i % 2]);
             TEST_ASSERT_TRUE(error <= 3.0 * tolerance);
             TEST_ASSERT_TRUE(error <= 2.0 * smallest);

@@ -68,74 +68,35 @@ CALL_WITH_INSTANCE(CancelStep)
 
 /* ---- Values ---------------------------------------------------------------------------------- */
 
-static void call_GetReal(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const size_t count = run_read_references(run, run->references);
-    run_write_status(run, run->fmi->GetReal(c, run->references, count, run->results));
-    run_write_reals(run, run->results, count);
-}
-
-static void call_GetInteger(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const size_t count = run_read_references(run, run->references);
-    run_write_status(run, run->fmi->GetInteger(c, run->references, count, run->integers));
-    run_write_integers(run, run->integers, count);
-}
-
-static void call_GetBoolean(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const size_t count = run_read_references(run, run->references);
-    run_write_status(run, run->fmi->GetBoolean(c, run->references, count, run->integers));
-    run_write_integers(run, run->integers, count);
-}
-
-static void call_GetString(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const size_t count = run_read_references(run, run->references);
-    run_write_status(run, run->fmi->GetString(c, run->references, count, run->strings));
-}
+/* Value references. */
+#define GET_CALL(name, to, WRITE)                                                                  \
+    static void call_##name(struct run *run) {                                                     \
+        const fmi2Component c = run_read_instance(run);                                            \
+        const size_t count = run_read_references(run, run->references);                            \
+        run_write_status(run, run->fmi->name(c, run->references, count, run->to));                 \
+        WRITE(run, run->to, count);                                                                \
+    }
+#define WRITE_NOTHING(run, to, count)
+GET_CALL(GetReal, results, run_write_reals)
+GET_CALL(GetInteger, integers, run_write_integers)
+GET_CALL(GetBoolean, integers, run_write_integers)
+GET_CALL(GetString, strings, WRITE_NOTHING)
 
 /* Value references, each with a value. */
-static void call_SetReal(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    size_t count = 0;
-    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
-        run->references[count] = (fmi2ValueReference)run_read_integer(run);
-        run->reals[count] = run_read_real(run);
+#define SET_CALL(name, values, read)                                                               \
+    static void call_##name(struct run *run) {                                                     \
+        const fmi2Component c = run_read_instance(run);                                            \
+        size_t count = 0;                                                                          \
+        for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {                          \
+            run->references[count] = (fmi2ValueReference)run_read_integer(run);                    \
+            run->values[count] = read(run);                                                        \
+        }                                                                                          \
+        run_write_status(run, run->fmi->name(c, run->references, count, run->values));             \
     }
-    run_write_status(run, run->fmi->SetReal(c, run->references, count, run->reals));
-}
-
-static size_t read_integers(struct run *run) {
-    size_t count = 0;
-    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
-        run->references[count] = (fmi2ValueReference)run_read_integer(run);
-        run->integers[count] = run_read_integer(run);
-    }
-    return count;
-}
-
-static void call_SetInteger(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const size_t count = read_integers(run);
-    run_write_status(run, run->fmi->SetInteger(c, run->references, count, run->integers));
-}
-
-static void call_SetBoolean(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const size_t count = read_integers(run);
-    run_write_status(run, run->fmi->SetBoolean(c, run->references, count, run->integers));
-}
-
-static void call_SetString(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    size_t count = 0;
-    for (; run_words_left(run) > 0 && count < MOST_VALUES; count++) {
-        run->references[count] = (fmi2ValueReference)run_read_integer(run);
-        run->strings[count] = run_read_text(run);
-    }
-    run_write_status(run, run->fmi->SetString(c, run->references, count, run->strings));
-}
+SET_CALL(SetReal, reals, run_read_real)
+SET_CALL(SetInteger, integers, run_read_integer)
+SET_CALL(SetBoolean, integers, run_read_integer)
+SET_CALL(SetString, strings, run_read_text)
 
 /* ---- FMU states ------------------------------------------------------------------------------ */
 
@@ -278,37 +239,18 @@ static void call_DoStep(struct run *run) {
     run_write_status(run, run->fmi->DoStep(c, time, step, fmi2False));
 }
 
-static void call_GetStatus(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    fmi2Status value = fmi2Pending;
-    run_write_status(run, run->fmi->GetStatus(c, (fmi2StatusKind)run_read_integer(run), &value));
-}
-
-static void call_GetRealStatus(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
-    run_write_status(run, run->fmi->GetRealStatus(c, kind, run->results));
-    run_write_reals(run, run->results, 1);
-}
-
-static void call_GetIntegerStatus(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
-    run_write_status(run, run->fmi->GetIntegerStatus(c, kind, run->integers));
-}
-
-static void call_GetBooleanStatus(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
-    run_write_status(run, run->fmi->GetBooleanStatus(c, kind, run->integers));
-    run_write_integers(run, run->integers, 1);
-}
-
-static void call_GetStringStatus(struct run *run) {
-    const fmi2Component c = run_read_instance(run);
-    const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);
-    run_write_status(run, run->fmi->GetStringStatus(c, kind, run->strings));
-}
+#define STATUS_CALL(name, to, WRITE)                                                               \
+    static void call_##name(struct run *run) {                                                     \
+        const fmi2Component c = run_read_instance(run);                                            \
+        const fmi2StatusKind kind = (fmi2StatusKind)run_read_integer(run);                         \
+        run_write_status(run, run->fmi->name(c, kind, to));                                        \
+        WRITE(run, to, 1);                                                                         \
+    }
+STATUS_CALL(GetStatus, &(fmi2Status){fmi2Pending}, WRITE_NOTHING)
+STATUS_CALL(GetRealStatus, run->results, run_write_reals)
+STATUS_CALL(GetIntegerStatus, run->integers, WRITE_NOTHING)
+STATUS_CALL(GetBooleanStatus, run->integers, run_write_integers)
+STATUS_CALL(GetStringStatus, run->strings, WRITE_NOTHING)
 
 /* ---- Model Exchange -------------------------------------------------------------------------- */
 

@@ -12,7 +12,7 @@
 enum { MOST_SCRIPTS = 64 };
 
 struct job {
-    const struct fmi2_functions *fmi;
+    const struct fmu_functions *fmi;
     const char *script;
     const char *transcript;
     bool succeeded;
@@ -56,7 +56,7 @@ static void run_job(void *item) {
     free(text);
 }
 
-static bool find_functions(void *library, struct fmi2_functions *fmi) {
+static bool find_functions(void *library, struct fmu_functions *fmi) {
 #define FIND(name, kinds, states)                                                                  \
     if (!system_find(library, "fmi2" #name, &fmi->name)) {                                         \
         fprintf(stderr, "the library has no fmi2%s\n", #name);                                     \
@@ -72,7 +72,7 @@ int main(int argument_count, char *arguments[]) {
         fprintf(stderr, "usage: platform_host LIBRARY SCRIPT TRANSCRIPT [SCRIPT TRANSCRIPT ...]\n");
         return 2;
     }
-    struct fmi2_functions fmi;
+    struct fmu_functions fmi;
     void *library = system_open(arguments[1]);
     if (library == NULL || !find_functions(library, &fmi)) {
         return 2;

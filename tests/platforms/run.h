@@ -3,7 +3,7 @@
 #ifndef RUN_H
 #define RUN_H
 
-#include "fmi2_pointers.h"
+#include "../fmi_harness/fmu_library.h"
 
 #include <stdint.h>
 #include <stdio.h>
@@ -16,7 +16,7 @@ struct bytes {
 };
 
 struct run {
-    const struct fmi2_functions *fmi;
+    const struct fmu_functions *fmi;
     FILE *transcript;
     unsigned line;
     bool is_wrong; /* the script has a mistake */

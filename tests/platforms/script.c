@@ -67,7 +67,7 @@ static void run_line(struct run *run, char *line) {
     }
 }
 
-bool script_run(const struct fmi2_functions *fmi, char *text, FILE *transcript) {
+bool script_run(const struct fmu_functions *fmi, char *text, FILE *transcript) {
     struct run *run = calloc(1, sizeof *run);
     if (run == NULL) {
         fprintf(stderr, "out of memory\n");

@@ -19,11 +19,11 @@
 #ifndef SCRIPT_H
 #define SCRIPT_H
 
-#include "fmi2_pointers.h"
+#include "../fmi_harness/fmu_library.h"
 
 #include <stdio.h>
 
 /* text: the script, which is written to. False, and a line on stderr, if it has a mistake. */
-bool script_run(const struct fmi2_functions *fmi, char *text, FILE *transcript);
+bool script_run(const struct fmu_functions *fmi, char *text, FILE *transcript);
 
 #endif

@@ -213,39 +213,6 @@ static void test_initialization_allocates_nothing(void) {
     }
 }
 
-static struct fmu_bytes bytes_of_run(const struct subject *subject) {
-    const fmi2Component c = running(subject);
-    const struct fmu_bytes bytes = fmu_save_bytes(c);
-    fmu.FreeInstance(c);
-    return bytes;
-}
-
-/* The restored state may ask for another solver than the instance has, or be its first. */
-static void test_restoring_allocates_nothing(void) {
-    for (int i = 0; i < METHODS * METHODS; i++) {
-        const struct subject subject = {fmi2CoSimulation, i % METHODS + 1, true};
-        const struct subject other = {fmi2CoSimulation, i / METHODS + 1, true};
-        struct fmu_bytes bytes = bytes_of_run(&other);
-        const fmi2Component c = running(&subject);
-        const fmi2FMUstate own = fmu_save(c);
-        const fmi2FMUstate foreign = fmu_deserialize(c, &bytes);
-        const fmi2Component unused = instantiate(&subject);
-        const fmi2FMUstate first = fmu_deserialize(unused, &bytes);
-
-        begin_fault(&subject, "fmi2SetFMUstate", 1, ALLOCATOR_ALL);
-        fmu_restore(c, foreign);
-        assert_rest_of_run(c, &other, MIDDLE);
-        fmu_restore(c, own);
-        assert_rest_of_run(c, &subject, MIDDLE);
-        fmu_restore(unused, first);
-        assert_rest_of_run(unused, &other, MIDDLE);
-        TEST_ASSERT_EQUAL_INT_MESSAGE(0, allocator_stop(), about);
-        fmu_bytes_free(&bytes);
-        fmu.FreeInstance(c);
-        fmu.FreeInstance(unused);
-    }
-}
-
 static void test_the_rest_allocates_nothing(void) {
     for (int kind = fmi2ModelExchange; kind <= fmi2CoSimulation; kind++) {
         for (int method = 1; method <= METHODS; method++) {

@@ -180,19 +180,11 @@ static void fail_in_turn(int method, bool has_first_step) {
     }
 }
 
-static void test_cvode_adams(void) {
-    fail_in_turn(INTEGRATOR_CVODE_ADAMS, false);
-    fail_in_turn(INTEGRATOR_CVODE_ADAMS, true);
-}
-
-static void test_cvode_bdf(void) {
-    fail_in_turn(INTEGRATOR_CVODE_BDF, false);
-    fail_in_turn(INTEGRATOR_CVODE_BDF, true);
-}
-
-static void test_erk(void) {
-    fail_in_turn(INTEGRATOR_ERK, false);
-    fail_in_turn(INTEGRATOR_ERK, true);
+static void test_each_method(void) {
+    for (int method = INTEGRATOR_CVODE_ADAMS; method <= INTEGRATOR_ERK; method++) {
+        fail_in_turn(method, false);
+        fail_in_turn(method, true);
+    }
 }
 
 void setUp(void) {

@@ -1,4 +1,6 @@
-/* Booleans, Integers that the model calculates and event indicators through FMI 3.0. */
+/* What only FMI 3.0 has: event mode and early return, that is what a step does at the event where
+ * the stop catches the wheel, for each of the four ways in which importers instantiate; Booleans of
+ * one byte, and counts of values. */
 #include "fmu3_library.h"
 #include "value_references.h"
 
@@ -16,23 +18,52 @@ static void keep(fmi3InstanceEnvironment environment, fmi3Status status, fmi3Str
     snprintf(last_message, sizeof last_message, "%s", message);
 }
 
-static void initialize_mode(void) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(wheel, last_message);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterInitializationMode(wheel, false, 0.0, 0.0, false, 0.0));
+#define ASSERT_OK(call) TEST_ASSERT_EQUAL_INT_MESSAGE(fmi3OK, call, last_message)
+
+static void assert_message(const char *text) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_message, text), last_message);
 }
 
-static void co_simulation(void) {
-    static const fmi3String categories[] = {"logStatusDiscard", "logStatusError"};
-    wheel = fmu3.InstantiateCoSimulation("wheel", WHEEL_TOKEN_FMI3, NULL, false, false, false,
-                                         false, NULL, 0, NULL, keep, NULL);
-    initialize_mode();
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetDebugLogging(wheel, true, 2, categories));
+static void set_speed(double value) {
+    const fmi3ValueReference reference = WHEEL_speed;
+    ASSERT_OK(fmu3.SetFloat64(wheel, &reference, 1, &value, 1));
 }
 
-static void model_exchange(void) {
-    wheel =
-        fmu3.InstantiateModelExchange("wheel", WHEEL_TOKEN_FMI3, NULL, false, false, NULL, keep);
-    initialize_mode();
+static double get_real(fmi3ValueReference reference) {
+    double value = -1.0;
+    ASSERT_OK(fmu3.GetFloat64(wheel, &reference, 1, &value, 1));
+    return value;
+}
+
+static void update(void) {
+    bool needs_update = true, terminate = true, nominals = true, states = true, next = true;
+    double time;
+    ASSERT_OK(fmu3.UpdateDiscreteStates(wheel, &needs_update, &terminate, &nominals, &states, &next,
+                                        &time));
+    TEST_ASSERT_FALSE(needs_update || terminate || nominals || states || next);
+}
+
+static fmi3Instance instantiate(bool event_mode, bool early_return) {
+    fmi3Instance created =
+        fmu3.InstantiateCoSimulation("wheel", WHEEL_TOKEN_FMI3, NULL, false, false, event_mode,
+                                     early_return, NULL, 0, NULL, keep, NULL);
+    TEST_ASSERT_NOT_NULL_MESSAGE(created, last_message);
+    return created;
+}
+
+/* At t = 0, with a stop at 2 rad and a speed of 1 rad/s: it catches the wheel at t = 2 s. */
+static void start(bool event_mode, bool early_return) {
+    const fmi3ValueReference stop = WHEEL_stop;
+    const double angle = 2.0;
+    wheel = instantiate(event_mode, early_return);
+    ASSERT_OK(fmu3.EnterInitializationMode(wheel, false, 0.0, 0.0, false, 0.0));
+    ASSERT_OK(fmu3.SetFloat64(wheel, &stop, 1, &angle, 1));
+    set_speed(1.0);
+    ASSERT_OK(fmu3.ExitInitializationMode(wheel));
+    if (event_mode) {
+        update();
+        ASSERT_OK(fmu3.EnterStepMode(wheel));
+    }
 }
 
 void setUp(void) {
@@ -51,141 +82,254 @@ void tearDown(void) {
     release();
 }
 
-static void assert_message(const char *text) {
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(last_message, text), last_message);
+/* ---- Steps ---------------------------------------------------------------------------------- */
+
+struct outcome {
+    bool needs_event_mode;
+    bool terminates;
+    bool is_early;
+    double reached; /* s */
+};
+
+static struct outcome step(double time, double h) {
+    struct outcome outcome = {true, true, true, -1.0};
+    ASSERT_OK(fmu3.DoStep(wheel, time, h, true, &outcome.needs_event_mode, &outcome.terminates,
+                          &outcome.is_early, &outcome.reached));
+    TEST_ASSERT_FALSE(outcome.terminates);
+    return outcome;
 }
 
-static fmi3Status set_boolean(fmi3ValueReference reference, bool value) {
-    return fmu3.SetBoolean(wheel, &reference, 1, &value, 1);
+static void assert_outcome(struct outcome outcome, bool needs_event_mode, bool is_early) {
+    TEST_ASSERT_EQUAL_INT(needs_event_mode, outcome.needs_event_mode);
+    TEST_ASSERT_EQUAL_INT(is_early, outcome.is_early);
 }
 
-static void set_real(fmi3ValueReference reference, double value) {
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetFloat64(wheel, &reference, 1, &value, 1));
+static void assert_caught(bool expected) {
+    const fmi3ValueReference caught = WHEEL_is_caught;
+    const fmi3ValueReference catches = WHEEL_catches;
+    bool is_caught = !expected;
+    fmi3Int32 count = -1;
+    ASSERT_OK(fmu3.GetBoolean(wheel, &caught, 1, &is_caught, 1));
+    ASSERT_OK(fmu3.GetInt32(wheel, &catches, 1, &count, 1));
+    TEST_ASSERT_EQUAL_INT(expected, is_caught);
+    TEST_ASSERT_EQUAL_INT(expected, count);
+    TEST_ASSERT_TRUE(get_real(WHEEL_lost_speed) == (expected ? 1.0 : 0.0));
+    TEST_ASSERT_TRUE(get_real(WHEEL_rate) == (expected ? 0.0 : 1.0));
 }
 
-static bool get_boolean(fmi3ValueReference reference) {
-    bool values[2] = {true, false};
-    const fmi3ValueReference twice[2] = {reference, reference};
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetBoolean(wheel, twice, 2, values, 2));
-    TEST_ASSERT_TRUE(values[0] == values[1]);
-    return values[0];
+static void assert_at(double time, double angle) {
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, time, get_real(WHEEL_time));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, angle, get_real(WHEEL_angle));
 }
 
-static fmi3Int32 turns(void) {
-    const fmi3ValueReference reference = WHEEL_turns;
-    fmi3Int32 value = -1;
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetInt32(wheel, &reference, 1, &value, 1));
-    return value;
+/* Without event mode and early return the importer sees nothing but the end of the step. */
+static void test_events_inside_the_step(void) {
+    start(false, false);
+    const struct outcome outcome = step(0.0, 5.0);
+    assert_outcome(outcome, false, false);
+    TEST_ASSERT_TRUE(outcome.reached == 5.0);
+    assert_caught(true);
+    assert_at(5.0, 2.0);
 }
 
-static void step(double time) {
-    bool event, terminate, early;
-    double reached = -1.0;
-    TEST_ASSERT_EQUAL_INT(
-        fmi3OK, fmu3.DoStep(wheel, time, 1.0, true, &event, &terminate, &early, &reached));
-    TEST_ASSERT_EQUAL_DOUBLE(time + 1.0, reached);
+static void test_early_return_after_the_event(void) {
+    start(false, true);
+    assert_outcome(step(0.0, 1.0), false, false);
+    const struct outcome outcome = step(1.0, 5.0);
+    assert_outcome(outcome, false, true);
+    TEST_ASSERT_TRUE(outcome.reached == get_real(WHEEL_time));
+    assert_caught(true);
+    assert_at(2.0, 2.0);
+    assert_outcome(step(outcome.reached, 6.0 - outcome.reached), false, false);
+    assert_caught(true);
+    assert_at(6.0, 2.0);
 }
 
-/* At 7 rad/s the wheel has made n whole turns of 2 pi after n seconds, for n < 8. */
-static void test_an_integer_counts_while_a_boolean_input_says_so(void) {
-    co_simulation();
-    set_real(WHEEL_speed, 7.0);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.ExitInitializationMode(wheel));
-    TEST_ASSERT_TRUE(get_boolean(WHEEL_is_turning));
-    for (int n = 1; n < 8; n++) {
-        step(n - 1);
-        TEST_ASSERT_EQUAL_INT(fmi3OK, set_boolean(WHEEL_is_counting, true));
-        TEST_ASSERT_EQUAL_INT(n, turns());
-        TEST_ASSERT_EQUAL_INT(fmi3OK, set_boolean(WHEEL_is_counting, false));
-        TEST_ASSERT_FALSE(get_boolean(WHEEL_is_counting));
-        TEST_ASSERT_EQUAL_INT(0, turns());
+static void test_event_mode_without_early_return(void) {
+    start(true, false);
+    assert_outcome(step(0.0, 1.0), false, false);
+    const struct outcome outcome = step(1.0, 5.0);
+    assert_outcome(outcome, true, false);
+    TEST_ASSERT_TRUE(outcome.reached == 6.0);
+    assert_caught(true);
+    assert_at(6.0, 2.0);
+    ASSERT_OK(fmu3.EnterEventMode(wheel));
+    update();
+    assert_caught(true);
+    ASSERT_OK(fmu3.EnterStepMode(wheel));
+    assert_outcome(step(6.0, 1.0), false, false);
+}
+
+/* Up to the left limit of the event. */
+static double step_to_event(void) {
+    start(true, true);
+    assert_outcome(step(0.0, 1.0), false, false);
+    const struct outcome outcome = step(1.0, 5.0);
+    assert_outcome(outcome, true, true);
+    TEST_ASSERT_TRUE(outcome.reached == get_real(WHEEL_time));
+    assert_caught(false);
+    assert_at(2.0, 2.0);
+    return outcome.reached;
+}
+
+static void test_event_mode_shows_both_limits(void) {
+    const double time = step_to_event();
+    ASSERT_OK(fmu3.EnterEventMode(wheel));
+    assert_caught(false);
+    update();
+    assert_caught(true);
+    update();
+    assert_caught(true);
+    TEST_ASSERT_TRUE(get_real(WHEEL_angle) == 2.0 && get_real(WHEEL_to_stop) == 1.0);
+    ASSERT_OK(fmu3.EnterStepMode(wheel));
+    assert_outcome(step(time, 4.0), false, false);
+    assert_caught(true);
+}
+
+static void test_the_next_step_passes_an_event_that_is_due(void) {
+    const double time = step_to_event();
+    assert_outcome(step(time, 4.0), false, false);
+    assert_caught(true);
+    assert_at(time + 4.0, 2.0);
+}
+
+/* An event at the end of a step is no early return, and it is left all the same. */
+static void test_an_event_at_the_end_of_a_step(void) {
+    start(true, true);
+    assert_outcome(step(0.0, 2.0), true, false);
+    assert_caught(false);
+    ASSERT_OK(fmu3.EnterEventMode(wheel));
+    update();
+    assert_caught(true);
+}
+
+/* Inputs that jump in event mode count together with the event. */
+static void test_inputs_that_jump_at_the_event(void) {
+    const fmi3ValueReference counting = WHEEL_is_counting;
+    const bool off = false;
+    const double time = step_to_event();
+    ASSERT_OK(fmu3.EnterEventMode(wheel));
+    set_speed(-1.0);
+    ASSERT_OK(fmu3.SetBoolean(wheel, &counting, 1, &off, 1));
+    update();
+    TEST_ASSERT_TRUE(get_real(WHEEL_rate) == -1.0 && get_real(WHEEL_lost_speed) == 0.0);
+    ASSERT_OK(fmu3.EnterStepMode(wheel));
+    assert_outcome(step(time, 1.0), false, false);
+    assert_at(time + 1.0, 1.0);
+}
+
+/* No step returns where it began: such an event is passed at once. */
+static void test_an_event_at_the_beginning_of_a_step(void) {
+    const fmi3ValueReference stop = WHEEL_stop;
+    const double angle = 1e-12; // reached 1e-12 s after 1e6 s, which is the same number
+    wheel = instantiate(true, true);
+    ASSERT_OK(fmu3.EnterInitializationMode(wheel, false, 0.0, 1e6, false, 0.0));
+    ASSERT_OK(fmu3.SetFloat64(wheel, &stop, 1, &angle, 1));
+    set_speed(1.0);
+    ASSERT_OK(fmu3.ExitInitializationMode(wheel));
+    update();
+    ASSERT_OK(fmu3.EnterStepMode(wheel));
+    const struct outcome outcome = step(1e6, 1.0);
+    assert_outcome(outcome, true, false);
+    TEST_ASSERT_TRUE(outcome.reached == 1e6 + 1.0);
+    assert_caught(true);
+}
+
+/* ---- FMU states ----------------------------------------------------------------------------- */
+
+/* What a second instance makes of the serialized state of the first one. */
+static void move_to_second(fmi3FMUState state) {
+    static fmi3Byte bytes[8192];
+    size_t size = 0;
+    fmi3FMUState copy = NULL;
+    ASSERT_OK(fmu3.SerializedFMUStateSize(wheel, state, &size));
+    TEST_ASSERT_LESS_OR_EQUAL_size_t(sizeof bytes, size);
+    ASSERT_OK(fmu3.SerializeFMUState(wheel, state, bytes, size));
+    release();
+    wheel = instantiate(true, true);
+    ASSERT_OK(fmu3.DeserializeFMUState(wheel, bytes, size, &copy));
+    ASSERT_OK(fmu3.SetFMUState(wheel, copy));
+}
+
+static double finish(double time) {
+    ASSERT_OK(fmu3.EnterEventMode(wheel));
+    update();
+    ASSERT_OK(fmu3.EnterStepMode(wheel));
+    assert_caught(true);
+    set_speed(-0.7);
+    assert_outcome(step(time, 6.0 - time), false, false);
+    return get_real(WHEEL_angle);
+}
+
+static void test_states_hold_an_event_that_is_due(void) {
+    fmi3FMUState state = NULL;
+    const double time = step_to_event();
+    ASSERT_OK(fmu3.GetFMUState(wheel, &state));
+    const double angle = finish(time);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 - 0.7 * 4.0, angle);
+    for (int again = 0; again < 2; again++) {
+        ASSERT_OK(fmu3.SetFMUState(wheel, state));
+        assert_caught(false);
+        TEST_ASSERT_TRUE(get_real(WHEEL_time) == time);
+        TEST_ASSERT_TRUE(finish(time) == angle);
     }
+    move_to_second(state);
+    assert_caught(false);
+    TEST_ASSERT_TRUE(finish(time) == angle);
+}
+
+/* ---- Wrong states --------------------------------------------------------------------------- */
+
+static void test_calls_in_the_wrong_state(void) {
+    bool flag[5];
+    double number;
+    step_to_event();
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.UpdateDiscreteStates(wheel, &flag[0], &flag[1], &flag[2],
+                                                               &flag[3], &flag[4], &number));
+    assert_message("fmi3UpdateDiscreteStates is not allowed while the instance is between steps");
+    release();
+    step_to_event();
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.EnterStepMode(wheel));
+    release();
+    step_to_event();
+    ASSERT_OK(fmu3.EnterEventMode(wheel));
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.DoStep(wheel, get_real(WHEEL_time), 1.0, true, &flag[0],
+                                                 &flag[1], &flag[2], &number));
+    assert_message("fmi3DoStep is not allowed while the instance is in event mode");
+    release();
+    start(false, true);
+    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.EnterEventMode(wheel));
+    assert_message("Co-Simulation");
+}
+
+/* ---- Values ---------------------------------------------------------------------------------- */
+
+static void in_initialization(void) {
+    const fmi3String category = "logStatusDiscard";
+    wheel = instantiate(false, false);
+    ASSERT_OK(fmu3.EnterInitializationMode(wheel, false, 0.0, 0.0, false, 0.0));
+    ASSERT_OK(fmu3.SetDebugLogging(wheel, true, 1, &category));
 }
 
 /* Memory that holds no bool, as a wrong importer may pass. */
 static void test_a_byte_that_is_no_boolean_is_discarded(void) {
     const fmi3ValueReference reference = WHEEL_is_counting;
     const unsigned char byte = 2;
-    co_simulation();
+    in_initialization();
     TEST_ASSERT_EQUAL_INT(
         fmi3Discard, fmu3.SetBoolean(wheel, &reference, 1, (const bool *)(const void *)&byte, 1));
     assert_message("is_counting = 2 is refused: a value from 0 to 1 is expected");
-    TEST_ASSERT_TRUE(get_boolean(WHEEL_is_counting));
-}
-
-static void test_other_types_and_counts_are_refused(void) {
-    static const struct {
-        fmi3ValueReference reference;
-        const char *text;
-    } cases[] = {
-        {WHEEL_speed, "speed (value reference 20) is accessed as boolean: it is of type float64"},
-        {WHEEL_turns, "accessed as boolean: it is of type int32"},
-        {99, "value reference 99 is unknown"},
-    };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        bool value = true;
-        co_simulation();
-        TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetBoolean(wheel, &cases[i].reference, 1, &value, 1));
-        TEST_ASSERT_TRUE(value);
-        assert_message(cases[i].text);
-        release();
-        co_simulation();
-        TEST_ASSERT_EQUAL_INT(fmi3Error, set_boolean(cases[i].reference, true));
-        assert_message(cases[i].text);
-        release();
-    }
-    const fmi3ValueReference reference = WHEEL_is_counting;
     bool values[2] = {false, false};
-    co_simulation();
+    ASSERT_OK(fmu3.GetBoolean(wheel, &reference, 1, values, 1));
+    TEST_ASSERT_TRUE(values[0] && !values[1]);
     TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetBoolean(wheel, &reference, 1, values, 2));
     assert_message("an array has 2 values: 1 are expected");
 }
 
-/* In Model Exchange, a discrete input can be set in event mode only. */
-static void test_model_exchange(void) {
-    double z[2] = {-1.0, -1.0};
-    const double x = 20.0;
+static void test_the_number_of_indicators(void) {
     size_t count = 0;
-    model_exchange();
-    set_real(WHEEL_stop, 30.0);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.ExitInitializationMode(wheel));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetNumberOfEventIndicators(wheel, &count));
+    wheel =
+        fmu3.InstantiateModelExchange("wheel", WHEEL_TOKEN_FMI3, NULL, false, false, NULL, keep);
+    ASSERT_OK(fmu3.GetNumberOfEventIndicators(wheel, &count));
     TEST_ASSERT_EQUAL_size_t(2, count);
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterContinuousTimeMode(wheel));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.SetContinuousStates(wheel, &x, 1));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.GetEventIndicators(wheel, z, 2));
-    TEST_ASSERT_TRUE(z[0] > 10.0 && z[0] < 10.0 + 1e-11 && z[1] == 1.0);
-    TEST_ASSERT_EQUAL_INT(3, turns());
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterEventMode(wheel));
-    TEST_ASSERT_EQUAL_INT(fmi3OK, set_boolean(WHEEL_is_counting, false));
-    TEST_ASSERT_EQUAL_INT(0, turns());
-    TEST_ASSERT_EQUAL_INT(fmi3OK, fmu3.EnterContinuousTimeMode(wheel));
-    TEST_ASSERT_EQUAL_INT(fmi3Error, set_boolean(WHEEL_is_counting, true));
-    assert_message("is_counting (value reference 21) cannot be set while the time is continuous");
-}
-
-/* Discrete variables are not those of intermediate updates. */
-static void test_no_intermediate_update_of_booleans(void) {
-    const fmi3ValueReference required = WHEEL_is_counting;
-    TEST_ASSERT_NULL(fmu3.InstantiateCoSimulation("wheel", WHEEL_TOKEN_FMI3, NULL, false, false,
-                                                  false, false, &required, 1, NULL, keep, NULL));
-    assert_message("21");
-}
-
-static void test_only_reals_have_derivatives(void) {
-    const fmi3ValueReference counting = WHEEL_is_counting;
-    const fmi3ValueReference rate = WHEEL_rate;
-    const fmi3ValueReference caught = WHEEL_is_caught;
-    const double seed = 1.0;
-    double result = 7.0;
-    co_simulation();
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetDirectionalDerivative(wheel, &rate, 1, &counting, 1,
-                                                                   &seed, 1, &result, 1));
-    assert_message("is_counting (value reference 21) is refused: it is of type boolean");
-    release();
-    co_simulation();
-    TEST_ASSERT_EQUAL_INT(fmi3Error, fmu3.GetAdjointDerivative(wheel, &caught, 1, &counting, 1,
-                                                               &seed, 1, &result, 1));
-    assert_message("is_caught (value reference 40) is refused: it is of type boolean");
-    TEST_ASSERT_EQUAL_DOUBLE(7.0, result);
 }

@@ -1,7 +1,9 @@
 /* Random sequences of all functions of FMI 3.0 with hostile and mixed-up arguments, on several
  * instances of all kinds at once. README.md says how an input is decoded. */
 #include "fuzz_arguments.h"
+#include "fuzz_bytes.h"
 #include "fuzz_fmi3.h"
+#include "fuzz_session.h"
 
 #include <math.h>
 #include <string.h>
@@ -179,7 +181,7 @@ static void instantiate(struct fuzz_session *session, struct fuzz_instance *inst
 }
 
 #define INSTANTIATE_CALL(name)                                                                     \
-    static void call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {        \
+    void fuzz3_call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {         \
         instantiate(session, instance, FMU3_##name);                                               \
     }
 INSTANTIATE_CALL(InstantiateModelExchange)
@@ -188,8 +190,8 @@ INSTANTIATE_CALL(InstantiateScheduledExecution)
 
 /* ---- Modes ----------------------------------------------------------------------------------- */
 
-static void call_EnterInitializationMode(struct fuzz_session *session,
-                                         struct fuzz_instance *instance) {
+void fuzz3_call_EnterInitializationMode(struct fuzz_session *session,
+                                        struct fuzz_instance *instance) {
     struct fuzz_input *input = session->input;
     const bool tolerance_defined = fuzz_below(input, 2) == 0;
     const double tolerance = fuzz_real(input);
@@ -205,12 +207,12 @@ static void call_EnterInitializationMode(struct fuzz_session *session,
     }
 }
 
-static void call_ExitInitializationMode(struct fuzz_session *session,
-                                        struct fuzz_instance *instance) {
+void fuzz3_call_ExitInitializationMode(struct fuzz_session *session,
+                                       struct fuzz_instance *instance) {
     FUZZ_FMI3_CHECKED_PLAIN(instance, ExitInitializationMode);
 }
 
-static void call_EnterStepMode(struct fuzz_session *session, struct fuzz_instance *instance) {
+void fuzz3_call_EnterStepMode(struct fuzz_session *session, struct fuzz_instance *instance) {
     if (FUZZ_FMI3_CHECKED_PLAIN(instance, EnterStepMode) == fmi2OK &&
         !(instance->variety & FUZZ_EVENT_MODE)) {
         fuzz_fail("fmi3EnterStepMode succeeds without event mode");
@@ -218,7 +220,7 @@ static void call_EnterStepMode(struct fuzz_session *session, struct fuzz_instanc
 }
 
 #define NUMBER_CALL(name, expected)                                                                \
-    static void call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {        \
+    void fuzz3_call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {         \
         size_t count = 99;                                                                         \
         if (FUZZ_FMI3_CHECKED(instance, name, &count) == fmi2OK && count != (expected)) {          \
             fuzz_fail("fmi3" #name " returns %zu", count);                                         \
@@ -229,40 +231,18 @@ NUMBER_CALL(GetNumberOfContinuousStates, 4)
 
 /* ---- Steps ----------------------------------------------------------------------------------- */
 
-enum { BYTES_CAPACITY = 4096 };
-
-struct bytes {
-    size_t size;
-    fmi3Byte data[BYTES_CAPACITY];
-};
-
-/* All that the instance is. */
-static void serialize(struct fuzz_instance *instance, struct bytes *bytes) {
-    fmi2FMUstate state = NULL;
-    const bool is_done =
-        FUZZ_CHECKED(instance, GetFMUstate, &state) == fmi2OK &&
-        FUZZ_CHECKED(instance, SerializedFMUstateSize, state, &bytes->size) == fmi2OK &&
-        bytes->size <= BYTES_CAPACITY &&
-        FUZZ_CHECKED(instance, SerializeFMUstate, state, (fmi2Byte *)bytes->data, bytes->size) ==
-            fmi2OK &&
-        FUZZ_CHECKED(instance, FreeFMUstate, &state) == fmi2OK;
-    if (!is_done) {
-        fuzz_fail("the state cannot be serialized before or after a step");
-    }
-}
-
-static void call_DoStep(struct fuzz_session *session, struct fuzz_instance *instance) {
+void fuzz3_call_DoStep(struct fuzz_session *session, struct fuzz_instance *instance) {
     struct fuzz_input *input = session->input;
     const double point = fuzz_below(input, 8) != 7 ? instance->time : fuzz_real(input);
     const double length = fuzz_any_step(input);
-    static struct bytes before;
-    static struct bytes after;
+    static struct fuzz_bytes before;
+    static struct fuzz_bytes after;
     bool event = true;
     bool terminate = true;
     bool early = true;
     double reached;
     fuzz_poison(&reached, 1);
-    serialize(instance, &before);
+    fuzz_serialize(instance, &before);
     memset(&updates, 0, sizeof updates);
     updates.input = input;
     const fmi2Status status =
@@ -274,8 +254,8 @@ static void call_DoStep(struct fuzz_session *session, struct fuzz_instance *inst
         fuzz_fail("a step has the status %d after an error inside it", (int)status);
     }
     if (status == fmi2Discard) {
-        serialize(instance, &after);
-        if (after.size != before.size || memcmp(after.data, before.data, after.size) != 0) {
+        fuzz_serialize(instance, &after);
+        if (!fuzz_are_same_bytes(&before, &after)) {
             fuzz_fail("a discarded step of %g s from %g s has changed the instance", length, point);
         }
     }
@@ -308,57 +288,43 @@ static void choose_variety(unsigned variety) {
     fmu_fmi3_options = variety != 0 ? chosen : none;
 }
 
-/* Calls that mean the same as in FMI 2.0, and those above; the rest is in fuzz_access_fmi3. */
-#define OWN(name)         [FMU3_##name] = call_##name
-#define SAME(name)        [FMU3_##name] = fuzz_call_##name
-#define SAME_AS(name, of) [FMU3_##name] = fuzz_call_##of
-static fuzz_operation *const calls[FMU3_FUNCTION_COUNT] = {
-    OWN(InstantiateModelExchange),
-    OWN(InstantiateCoSimulation),
-    OWN(InstantiateScheduledExecution),
-    OWN(EnterInitializationMode),
-    OWN(ExitInitializationMode),
-    OWN(EnterStepMode),
-    OWN(GetNumberOfEventIndicators),
-    OWN(GetNumberOfContinuousStates),
-    OWN(DoStep),
-    SAME(GetVersion),
-    SAME(SetDebugLogging),
-    SAME(FreeInstance),
-    SAME(EnterEventMode),
-    SAME(Terminate),
-    SAME(Reset),
-    SAME_AS(GetFloat64, GetReal),
-    SAME_AS(SetFloat64, SetReal),
-    SAME_AS(GetInt32, GetInteger),
-    SAME_AS(SetInt32, SetInteger),
-    SAME_AS(GetFMUState, GetFMUstate),
-    SAME_AS(SetFMUState, SetFMUstate),
-    SAME_AS(FreeFMUState, FreeFMUstate),
-    SAME_AS(SerializedFMUStateSize, SerializedFMUstateSize),
-    SAME_AS(SerializeFMUState, SerializeFMUstate),
-    SAME_AS(DeserializeFMUState, DeSerializeFMUstate),
-    SAME(GetDirectionalDerivative),
-    SAME_AS(UpdateDiscreteStates, NewDiscreteStates),
-    SAME(EnterContinuousTimeMode),
-    SAME(CompletedIntegratorStep),
-    SAME(SetTime),
-    SAME(SetContinuousStates),
-    SAME_AS(GetContinuousStateDerivatives, GetDerivatives),
-    SAME(GetEventIndicators),
-    SAME(GetContinuousStates),
-    SAME(GetNominalsOfContinuousStates),
-    SAME_AS(GetOutputDerivatives, GetRealOutputDerivatives),
-};
+#define SAME(name, of)                                                                             \
+    void fuzz3_call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {         \
+        fuzz_call_##of(session, instance);                                                         \
+    }
+SAME(GetVersion, GetVersion)
+SAME(SetDebugLogging, SetDebugLogging)
+SAME(FreeInstance, FreeInstance)
+SAME(EnterEventMode, EnterEventMode)
+SAME(Terminate, Terminate)
+SAME(Reset, Reset)
+SAME(GetFloat64, GetReal)
+SAME(SetFloat64, SetReal)
+SAME(GetInt32, GetInteger)
+SAME(SetInt32, SetInteger)
+SAME(GetFMUState, GetFMUstate)
+SAME(SetFMUState, SetFMUstate)
+SAME(FreeFMUState, FreeFMUstate)
+SAME(SerializedFMUStateSize, SerializedFMUstateSize)
+SAME(SerializeFMUState, SerializeFMUstate)
+SAME(DeserializeFMUState, DeSerializeFMUstate)
+SAME(GetDirectionalDerivative, GetDirectionalDerivative)
+SAME(UpdateDiscreteStates, NewDiscreteStates)
+SAME(EnterContinuousTimeMode, EnterContinuousTimeMode)
+SAME(CompletedIntegratorStep, CompletedIntegratorStep)
+SAME(SetTime, SetTime)
+SAME(SetContinuousStates, SetContinuousStates)
+SAME(GetContinuousStateDerivatives, GetDerivatives)
+SAME(GetEventIndicators, GetEventIndicators)
+SAME(GetContinuousStates, GetContinuousStates)
+SAME(GetNominalsOfContinuousStates, GetNominalsOfContinuousStates)
+SAME(GetOutputDerivatives, GetRealOutputDerivatives)
+
+/* A function of the standard that is missing does not link. */
+#define CALL_OF(name) fuzz3_call_##name,
+static fuzz_operation *const calls[] = {FMU3_FUNCTION_LIST(CALL_OF)};
 
 void fuzz_target_run(struct fuzz_input *input) {
-    static fuzz_operation *all[FMU3_FUNCTION_COUNT];
-    for (size_t i = 0; i < FMU3_FUNCTION_COUNT; i++) {
-        all[i] = calls[i] != NULL ? calls[i] : fuzz_access_fmi3[i];
-        if (all[i] == NULL) {
-            fuzz_fail("%s is never called", fmu3_function_names[i]);
-        }
-    }
     fuzz_choose_variety = choose_variety;
-    fuzz_session_run(input, all, FMU3_FUNCTION_COUNT);
+    fuzz_session_run(input, calls, FMU3_FUNCTION_COUNT);
 }

@@ -125,6 +125,7 @@ void fuzz_session_run(struct fuzz_input *input, fuzz_operation *const calls[], s
         struct fuzz_instance *instance = fuzz_session_instance(&session);
         recover(&session, instance);
         chosen(&session, instance);
+        fuzz_free_arguments();
     }
     for (size_t i = 0; i < FUZZ_COUNT(session.instances); i++) {
         struct fuzz_instance *instance = session.instances[i];

@@ -26,26 +26,6 @@ struct plant {
     bool saved_wrench;
 };
 
-static void require(fmi2Status status, const struct plant *plant, const char *what) {
-    if (status != fmi2OK) {
-        fuzz_fail("%s has the status %d: %s", what, (int)status, plant->instance->text);
-    }
-}
-
-static fmi2FMUstate save(const struct plant *plant) {
-    fmi2FMUstate state = NULL;
-    require(FUZZ_CHECKED(plant->instance, GetFMUstate, &state), plant, "fmi2GetFMUstate");
-    return state;
-}
-
-static void restore(const struct plant *plant, fmi2FMUstate state) {
-    require(FUZZ_CHECKED(plant->instance, SetFMUstate, state), plant, "fmi2SetFMUstate");
-}
-
-static void forget(const struct plant *plant, fmi2FMUstate *state) {
-    require(FUZZ_CHECKED(plant->instance, FreeFMUstate, state), plant, "fmi2FreeFMUstate");
-}
-
 /* ---- Settings -------------------------------------------------------------------------------- */
 
 static void set_inputs(struct plant *plant) {
@@ -56,7 +36,8 @@ static void set_inputs(struct plant *plant) {
     for (int i = 0; i < (plant->has_wrench ? 5 : 2); i++) {
         values[i] = fuzz_signed(plant->input, 1e-3, 100.0);
     }
-    require(FUZZ_CHECKED(plant->instance, SetReal, references, 5, values), plant, "inputs");
+    fuzz_require(FUZZ_CHECKED(plant->instance, SetReal, references, 5, values), plant->instance,
+                 "inputs");
 }
 
 static void set_input_derivative(struct plant *plant) {
@@ -64,16 +45,17 @@ static void set_input_derivative(struct plant *plant) {
         fuzz_below(plant->input, 2) == 0 ? RP_PLANT_tau1 : RP_PLANT_f2;
     const fmi2Integer order = 1 + (fmi2Integer)fuzz_below(plant->input, 3);
     const double value = fuzz_signed(plant->input, 1e-2, 1e3);
-    require(FUZZ_CHECKED(plant->instance, SetRealInputDerivatives, &reference, 1, &order, &value),
-            plant, "fmi2SetRealInputDerivatives");
+    fuzz_require(
+        FUZZ_CHECKED(plant->instance, SetRealInputDerivatives, &reference, 1, &order, &value),
+        plant->instance, "fmi2SetRealInputDerivatives");
     plant->inputs_move = true;
 }
 
 static void set_payload(struct plant *plant) {
     const fmi2ValueReference reference = RP_PLANT_payload_attached;
     const fmi2Boolean is_attached = fuzz_below(plant->input, 2) == 0 ? fmi2True : fmi2False;
-    require(FUZZ_CHECKED(plant->instance, SetBoolean, &reference, 1, &is_attached), plant,
-            "fmi2SetBoolean");
+    fuzz_require(FUZZ_CHECKED(plant->instance, SetBoolean, &reference, 1, &is_attached),
+                 plant->instance, "fmi2SetBoolean");
     plant->is_disturbed = true;
 }
 
@@ -83,7 +65,8 @@ static void initialize(struct plant *plant) {
                                   1 + (fmi2Integer)fuzz_below(plant->input, 20)};
     plant->tolerance = fuzz_magnitude(plant->input, 1e-12, 1e-3);
     fuzz_limit_steps(plant->instance, MAX_INTERNAL_STEPS);
-    require(FUZZ_CHECKED(plant->instance, SetInteger, integers, 2, limits), plant, "limits");
+    fuzz_require(FUZZ_CHECKED(plant->instance, SetInteger, integers, 2, limits), plant->instance,
+                 "limits");
     fuzz_plant_set_arm(plant->input, plant->instance);
     for (unsigned i = 0; i < FUZZ_PLANT_GROUPS; i++) {
         fuzz_plant_set(plant->input, plant->instance, i, plant->limits);
@@ -93,7 +76,8 @@ static void initialize(struct plant *plant) {
         set_payload(plant);
     }
     set_inputs(plant);
-    require(fuzz_initialize(plant->instance, plant->tolerance, 0.0), plant, "initialization");
+    fuzz_require(fuzz_initialize(plant->instance, plant->tolerance, 0.0), plant->instance,
+                 "initialization");
 }
 
 /* ---- Steps ----------------------------------------------------------------------------------- */
@@ -133,7 +117,7 @@ static void step(struct plant *plant) {
     struct fuzz_values after;
     const double length = any_length(plant->input);
     const double begin = instance->time;
-    fmi2FMUstate state = save(plant);
+    fmi2FMUstate state = fuzz_save(plant->instance);
     fuzz_read(instance, &before);
     const fmi2Status status = fuzz_step(instance, length);
     if (status == fmi2Error) {
@@ -150,8 +134,7 @@ static void step(struct plant *plant) {
     }
     if (status != fmi2OK || fuzz_below(plant->input, 3) == 0) {
         struct fuzz_values again;
-        restore(plant, state);
-        instance->time = begin;
+        fuzz_restore(instance, state, begin);
         if (fuzz_step(instance, length) != status) {
             fuzz_fail("a repeated step has another status than %d", (int)status);
         }
@@ -159,101 +142,38 @@ static void step(struct plant *plant) {
         fuzz_assert_same(&after, &again, "a repeated step");
     }
     if (status != fmi2OK) {
-        restore(plant, state);
-        instance->time = begin;
+        fuzz_restore(instance, state, begin);
         if (fuzz_step(instance, length / 1024.0) == fmi2Error) {
             fuzz_fail("a shorter step after a rollback fails: %s", instance->text);
         }
-        restore(plant, state);
-        instance->time = begin;
+        fuzz_restore(instance, state, begin);
     } else {
         plant->inputs_move = false;
         plant->is_disturbed = false;
     }
-    forget(plant, &state);
+    fuzz_forget(plant->instance, &state);
 }
 
-/* ---- Serialized states ----------------------------------------------------------------------- */
-
-/* A forged state that was taken does no harm: a step can be tried, and all values are finite. */
-static void use_forged(struct plant *plant, struct fuzz_instance *other, fmi2FMUstate state) {
-    struct fuzz_values values;
-    if (FUZZ_CHECKED(other, SetFMUstate, state) != fmi2OK) {
-        fuzz_fail("fmi2SetFMUstate of an accepted state fails: %s", other->text);
-    }
-    const fmi2ValueReference limit_reference = RP_PLANT_max_internal_steps;
-    const fmi2ValueReference events_reference = RP_PLANT_max_events;
-    const fmi2ValueReference time_reference = RP_PLANT_time;
-    fmi2Integer steps = 0;
-    fmi2Integer events = 0;
-    if (FUZZ_CHECKED(other, GetInteger, &limit_reference, 1, &steps) != fmi2OK ||
-        FUZZ_CHECKED(other, GetInteger, &events_reference, 1, &events) != fmi2OK ||
-        FUZZ_CHECKED(other, GetReal, &time_reference, 1, &other->time) != fmi2OK ||
-        steps > 3 * MAX_INTERNAL_STEPS || events > 3 * MAX_INTERNAL_STEPS) {
-        return;
-    }
-    if (fuzz_step(other, any_length(plant->input)) != fmi2Error) {
-        fuzz_read(other, &values);
-    }
+static fmi2Status step_plainly(struct fuzz_instance *instance, double length, unsigned choices) {
+    return fuzz_step(instance, length);
 }
 
-/* The same state in another instance, from its bytes: the same step has the same bits. */
-static void use_same(struct plant *plant, struct fuzz_instance *other, fmi2FMUstate state) {
-    struct fuzz_values here;
-    struct fuzz_values there;
-    const double length = any_length(plant->input);
-    const double begin = plant->instance->time;
-    fmi2FMUstate before = save(plant);
-    if (FUZZ_CHECKED(other, SetFMUstate, state) != fmi2OK) {
-        fuzz_fail("fmi2SetFMUstate in another instance fails: %s", other->text);
-    }
-    other->time = begin;
-    const fmi2Status status = fuzz_step(plant->instance, length);
-    if (fuzz_step(other, length) != status) {
-        fuzz_fail("a step in another instance has another status than %d", (int)status);
-    }
-    fuzz_read(plant->instance, &here);
-    fuzz_read(other, &there);
-    fuzz_assert_same(&here, &there, "a step in another instance");
-    restore(plant, before);
-    plant->instance->time = begin;
-    forget(plant, &before);
-}
-
-static void move_state(struct plant *plant) {
-    static struct fuzz_bytes bytes;
-    const bool is_forged = fuzz_below(plant->input, 2) == 0;
-    struct fuzz_instance *other = fuzz_instance_create(fmi2CoSimulation, true, false);
-    fmi2FMUstate state = NULL;
-    fuzz_serialize(plant->instance, &bytes);
-    if (is_forged) {
-        fuzz_forge(plant->input, &bytes);
-    }
-    const fmi2Status status =
-        FUZZ_CHECKED(other, DeSerializeFMUstate, bytes.data, bytes.size, &state);
-    if (!is_forged && status != fmi2OK) {
-        fuzz_fail("a serialized state is refused: %s", other->text);
-    }
-    if (status == fmi2OK) {
-        is_forged ? use_forged(plant, other, state) : use_same(plant, other, state);
-    }
-    fuzz_instance_free(other);
-}
+static const struct fuzz_stepping stepping = {
+    .any_length = any_length, .step = step_plainly, .most = 3 * MAX_INTERNAL_STEPS};
 
 /* ---- Co-Simulation --------------------------------------------------------------------------- */
 
 static void keep_or_go_back(struct plant *plant) {
     if (plant->saved != NULL && fuzz_below(plant->input, 2) == 0) {
-        restore(plant, plant->saved);
-        plant->instance->time = plant->saved_time;
+        fuzz_restore(plant->instance, plant->saved, plant->saved_time);
         plant->has_wrench = plant->saved_wrench;
         plant->inputs_move = plant->is_disturbed = true; // not known any more
         return;
     }
     if (plant->saved != NULL) {
-        forget(plant, &plant->saved);
+        fuzz_forget(plant->instance, &plant->saved);
     }
-    plant->saved = save(plant);
+    plant->saved = fuzz_save(plant->instance);
     plant->saved_time = plant->instance->time;
     plant->saved_wrench = plant->has_wrench;
 }
@@ -284,7 +204,7 @@ static void run_co_simulation(struct plant *plant) {
             set_input_derivative(plant);
             break;
         case 3:
-            move_state(plant);
+            fuzz_move_state(plant->input, plant->instance, &stepping);
             break;
         case 4:
         case 5:
@@ -317,7 +237,7 @@ void fuzz_target_run(struct fuzz_input *input) {
         fuzz_plant_exchange(input, plant.instance);
     }
     if (plant.saved != NULL) {
-        forget(&plant, &plant.saved);
+        fuzz_forget(plant.instance, &plant.saved);
     }
     if (selector >= 224) {
         fuzz_assert_as_new(plant.instance, selector);

@@ -5,8 +5,6 @@
 #include "fuzz_instance.h"
 #include "value_references.h"
 
-enum { FUZZ_PLANT_INDICATORS = 10 };
-
 /* 0, or of either sign. */
 double fuzz_signed(struct fuzz_input *input, double low, double high);
 

@@ -1,8 +1,8 @@
 /* Calls that lead from one state of FMI to another, and those of time in Model Exchange. */
+#include "fuzz_arguments.h"
 #include "fuzz_session.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* ---- Life and logging ------------------------------------------------------------------------ */
@@ -28,14 +28,13 @@ void fuzz_call_SetDebugLogging(struct fuzz_session *session, struct fuzz_instanc
                                              "%s%n"};
     struct fuzz_input *input = session->input;
     const size_t count = fuzz_byte(input) % 4;
-    fmi2String *chosen = fuzz_array(count, sizeof *chosen);
+    fmi2String *chosen = fuzz_argument(count, sizeof *chosen);
     for (size_t i = 0; i < count; i++) {
         chosen[i] = categories[fuzz_below(input, FUZZ_COUNT(categories))];
     }
     if (FUZZ_CHECKED(instance, SetDebugLogging, fuzz_byte(input) % 3, count, chosen) == fmi2OK) {
         instance->tells_refusals = false; // it may not have to
     }
-    free(chosen);
 }
 
 #define PLAIN_CALL(name)                                                                           \

@@ -3,6 +3,7 @@
 #ifndef FUZZ_SESSION_H
 #define FUZZ_SESSION_H
 
+#include "fmu3_library.h"
 #include "fuzz_instance.h"
 #include "value_references.h"
 
@@ -42,6 +43,11 @@ typedef void fuzz_operation(struct fuzz_session *session, struct fuzz_instance *
 #define FUZZ_OPERATION(name, kinds, states) fuzz_operation fuzz_call_##name;
 FMI2_FUNCTION_LIST(FUZZ_OPERATION)
 #undef FUZZ_OPERATION
+
+/* Those of FMI 3.0: fuzz_access_fmi3.c, fuzz_calls_fmi3.c. */
+#define FUZZ3_OPERATION(name) fuzz_operation fuzz3_call_##name;
+FMU3_FUNCTION_LIST(FUZZ3_OPERATION)
+#undef FUZZ3_OPERATION
 
 /* A run of a target: these calls, and sequences of calls that lead further. */
 void fuzz_session_run(struct fuzz_input *input, fuzz_operation *const calls[], size_t count);
