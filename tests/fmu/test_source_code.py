@@ -164,8 +164,8 @@ class Build:
 
 
 BUILDS = (
-    Build("RPPlant", "gcc", ("-O1", "-fPIC")),
-    Build("RPController", "gcc", ("-O2", "-fPIC")),
+    Build("RPManipulator", "gcc", ("-O1", "-fPIC")),
+    Build("RPPlant", "gcc", ("-O2", "-fPIC")),
     Build("RPTrajectory", "clang", ("-fPIC",)),
     Build("RPManipulator", "aarch64-linux-gnu-gcc", ("-O2", "-fPIC"), "aarch64-linux-gnu-"),
     Build("RPManipulator", "x86_64-w64-mingw32-gcc", (), "x86_64-w64-mingw32-"),

@@ -5,14 +5,13 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.simulation import instantiate_fmu
 
 from cosim.errors import UserError
 from cosim.fmu_file import Fmu
 from models.rp_sensor.references.make_references import Encoder
 from tests.rp_sensor.sensor_runs import COUNTS, MODEL, start_values, started
 from tests.support.cosim_project import assert_made_again, declared, fmi3_fmu, load, names_of
-from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
+from tests.support.instances import DISCARD, Instance, LoadedFmu, instantiated, status_of
 
 SCENARIOS = names_of(MODEL.name)
 
@@ -166,15 +165,11 @@ def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: b
     assert all(found) if early_return else not any(found)
 
 
-def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Path) -> None:
+def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path) -> None:
     path = fmi3_fmu(fmu.with_name("RPSensor.fmu"))
-    fmpy.extract(path, tmp_path)
-    description = fmpy.read_model_description(path)
-    reference = {v.name: v.valueReference for v in description.modelVariables}
-    sensor = instantiate_fmu(
-        tmp_path, description, "CoSimulation", early_return_allowed=True, event_mode_used=True
-    )
-    try:
+    options = {"early_return_allowed": True, "event_mode_used": True}
+    with instantiated(path, "CoSimulation", **options) as (sensor, description):
+        reference = {v.name: v.valueReference for v in description.modelVariables}
         sensor.enterInitializationMode(startTime=0.0)
         sensor.setFloat64([reference["resolution1"], reference["sample_time"]], [0.25, 0.125])
         sensor.exitInitializationMode()
@@ -190,8 +185,6 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Pat
             assert sensor.updateDiscreteStates()[-2:] == (True, (k + 1) * 0.125)
             assert sensor.getInt32([reference["counts1"]]) == [k * k]
             sensor.enterStepMode()
-    finally:
-        sensor.freeInstance()
 
 
 # ---- References --------------------------------------------------------------------------------

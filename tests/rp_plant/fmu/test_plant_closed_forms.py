@@ -12,24 +12,16 @@ import pytest
 from cosim.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import (
     FIRM,
-    METHODS,
     RIGID,
-    STEPS,
+    each_method,
+    each_step,
     events,
     last_event,
     modes,
+    near,
     read,
     started,
 )
-
-BOUND = 1e-9  # s
-
-each_method = pytest.mark.parametrize("method", METHODS)
-each_step = pytest.mark.parametrize("h", STEPS.values(), ids=STEPS)
-
-
-def near(time: float) -> float:
-    return pytest.approx(time, rel=0, abs=BOUND)
 
 
 def inertia1(m1: float = 2.0, m2: float = 1.0, q2: float = 0.0) -> float:

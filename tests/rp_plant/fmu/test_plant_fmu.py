@@ -13,7 +13,7 @@ from cosim.fmi_instance import Instance
 from cosim.fmu_file import Fmu
 from cosim.scenario import Scenario
 from cosim.simulation import initialize
-from tests.rp_plant.fmu.plant_runs import COMPLIANT, METHODS, NONE, RIGID, started
+from tests.rp_plant.fmu.plant_runs import COMPLIANT, METHODS, NONE, RIGID, each_method, started
 from tests.support.cosim_project import load, names_of
 
 COUNTS = (
@@ -87,7 +87,7 @@ def record(fmu: Fmu, scenario: Scenario, names: list[str]) -> tuple[np.ndarray, 
     return np.array(values), np.array(counts)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@each_method
 @pytest.mark.parametrize("name", names_of("rp_manipulator"))
 def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method: str) -> None:
     """All Real variables bit for bit, but the sign of zero, and all counters, at each point."""
