@@ -17,13 +17,13 @@ from cosim.report import scenario_page
 from cosim.report.writer import ReportWriter
 from cosim.tolerance_sweep import Sweep
 from tests.report.sizes import OF_SCENARIOS
-from tests.support.all_fmus import FOLDERS
 from tests.support.cosim_project import (
     LONG,
     NAMES,
     SHORT,
     load,
 )
+from tests.support.paths import FOLDERS
 
 
 @pytest.fixture(scope="module")

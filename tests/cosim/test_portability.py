@@ -22,7 +22,6 @@ from cosim import scenario as scenarios
 from cosim.errors import UserError
 from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmu_file import Fmu
-from tests.support.all_fmus import SYSTEMS
 from tests.support.cosim_project import (
     BUILD,
     FMUS,
@@ -35,7 +34,7 @@ from tests.support.cosim_project import (
     reference_file,
     repacked,
 )
-from tests.support.paths import ROOT
+from tests.support.paths import ROOT, SYSTEMS
 
 SOURCES = sorted(path for top in ("cosim", "models") for path in (ROOT / top).rglob("*.py"))
 

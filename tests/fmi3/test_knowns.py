@@ -14,8 +14,8 @@ import pytest
 from fmpy.fmi3 import FMU3Model
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from tests.support.all_fmus import NAMES
 from tests.support.instances import instantiated, set_value
+from tests.support.paths import NAMES
 
 MODES = ("initialization", "event", "continuous-time")
 STEP = 1e-4  # of a value, relative to 1 + its absolute value

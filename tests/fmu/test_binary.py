@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.fmu.symbols import libm, listed, standard
-from tests.support.all_fmus import NAMES, SYSTEMS
-from tests.support.paths import ROOT
+from tests.support.paths import NAMES, ROOT, SYSTEMS
 from tests.support.source_copy import copy_sources, run, settings_of
 
 FMUS = (*NAMES, *(f"fmi3/{name}" for name in NAMES))

@@ -13,7 +13,6 @@ import fmpy
 import pytest
 from lxml import etree
 
-from tests.support.all_fmus import NAMES
 from tests.support.generator import (
     VARIABLES,
     change,
@@ -23,7 +22,7 @@ from tests.support.generator import (
     scalars,
     unknowns,
 )
-from tests.support.paths import ROOT
+from tests.support.paths import NAMES, ROOT
 
 # the table of variables that users rely on: name -> (value reference, causality, unit)
 PUBLISHED = """

@@ -14,7 +14,7 @@ from tests.platforms import refusals, scripts
 from tests.platforms.platforms import PLATFORMS, Platform, Runner, runner
 from tests.platforms.scripts import Model, Script, joined
 from tests.platforms.transcript import first_difference, read
-from tests.support.all_fmus import NAMES
+from tests.support.paths import NAMES
 
 VARIANTS = (1, 2, 3)
 THREADS = 8
