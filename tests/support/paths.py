@@ -1,5 +1,4 @@
-"""Where the project is, and all FMUs and systems of its CMakeLists.txt: what holds for one of them is
-tested with all."""
+"""Where the project is, and all FMUs and systems of its CMakeLists.txt: tests of one are of all."""
 
 import re
 from pathlib import Path
