@@ -1,4 +1,4 @@
-"""Model Exchange: fmpy's CVode follows the references. For single calls: test_fmi2_model_exchange.c."""
+"""Model Exchange: fmpy's CVode follows the references. Single calls: test_fmi2_model_exchange.c."""
 
 import fmpy
 import numpy as np

@@ -18,37 +18,6 @@ SCENARIOS = names_of(MODEL.name)
 # ---- What is refused ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "limits"),
-    [
-        ("sample_time", 0.0, "1e-06 to inf"),
-        ("sample_time", 9.99e-7, "1e-06 to inf"),
-        ("sample_time", -0.001, "1e-06 to inf"),
-        ("latency", -1, "0 to 64"),
-        ("latency", 65, "0 to 64"),
-        ("resolution1", 0.0, "1e-12 to inf"),
-        ("resolution2", -1e-6, "1e-12 to inf"),
-        ("noise1", -1e-9, "0 to inf"),
-        ("noise2", -1.0, "0 to inf"),
-    ],
-)
-def test_values_out_of_range(sensor: Fmu, name: str, value: float, limits: str) -> None:
-    with sensor.instance("sensor") as instance:
-        with pytest.raises(UserError):
-            instance.set(name, value)
-        message = instance.messages[-1]
-        assert message.startswith(f"{name} = {value:g} is refused: a value from {limits} "), message
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-@pytest.mark.parametrize("name", ["sample_time", "resolution1", "noise2", "q1"])
-def test_values_that_are_not_finite(sensor: Fmu, name: str, value: float) -> None:
-    with sensor.instance("sensor") as instance:
-        with pytest.raises(UserError):
-            instance.set(name, value)
-        assert name in instance.messages[-1]
-
-
 @pytest.mark.parametrize("name", start_values())
 def test_parameters_are_fixed(sensor: Fmu, name: str) -> None:
     with started(sensor) as instance, pytest.raises(UserError):
