@@ -80,9 +80,9 @@ def browser() -> Iterator["Browser"]:
 @pytest.fixture(scope="session")
 def firefox() -> Iterator["Browser"]:
     """The same with Firefox."""
-    from tests.support.firefox import opened
+    from tests.support.browser import opened_firefox
 
-    with opened() as browser:
+    with opened_firefox() as browser:
         yield browser
 
 

@@ -1,18 +1,17 @@
 /* Measures the FMU, through its own functions, against MuJoCo and against the plain loop of
  * CVodeReInit and CVode on N_Vector_Serial that a user of CVODE would write, at the same tolerance
- * as the FMU. All do the same work in turns. A figure is the median of the repeats, with the error
- * beside it. */
+ * as the FMU. All do the same work in turns. Figures are medians of the repeats, as JSON on
+ * stdout; compare.py makes tables of them. */
 #include "bench.h"
 
 #include "measure.h"
-#include "race.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 static const char usage[] =
     "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 "
-    "RPManipulator.so-with-idle-integrator RPPlant.so [--repeats N] [--quick] [--json FILE] "
+    "RPManipulator.so-with-idle-integrator RPPlant.so [--repeats N] [--quick] "
     "[--only GROUP[,GROUP...]]";
 
 static const struct {
@@ -44,7 +43,6 @@ static void choose(char *list, bool chosen[GROUPS]) {
 
 int main(int count, char **arguments) {
     struct bench bench = {.repeats = 11};
-    const char *json = NULL;
     bool all = true;
     bool chosen[GROUPS] = {false};
     require(count >= 5, usage);
@@ -54,8 +52,6 @@ int main(int count, char **arguments) {
             bench.quick = true;
         } else if (strcmp(arguments[i], "--repeats") == 0 && has_value) {
             bench.repeats = (int)strtol(arguments[++i], NULL, 10);
-        } else if (strcmp(arguments[i], "--json") == 0 && has_value) {
-            json = arguments[++i];
         } else if (strcmp(arguments[i], "--only") == 0 && has_value) {
             choose(arguments[++i], chosen);
             all = false;
@@ -71,13 +67,12 @@ int main(int count, char **arguments) {
             "the FMU with an integrator that returns at once cannot be loaded");
     require(fmu_library_open(arguments[4], &bench.plant) != NULL, "RPPlant cannot be loaded");
 
-    report_open(&bench.report, json, bench.repeats);
+    report_open(&bench.report, bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {
         if (all || chosen[i]) {
             groups[i].measure(&bench);
         }
     }
     report_close(&bench.report);
-    printf("\n%d of the targets missed\n", bench.report.missed);
     return 0;
 }

@@ -1,10 +1,91 @@
-/* The measurements of the benchmark; bench.c chooses among them. */
+/* The measurements of the benchmark, and what they share: the report, and races. bench.c chooses.
+ */
 #ifndef BENCH_H
 #define BENCH_H
 
-#include "fmu3_library.h"
-#include "fmu_library.h"
-#include "report.h"
+#include "measure.h"
+#include "solvers.h"
+
+/* ---- report.c: a JSON object on stdout ----------------------------------------------------------
+ */
+
+struct report {
+    bool is_first; /* in the object or array that is open */
+};
+
+/* What a figure must be. */
+enum comparison { NO_TARGET, AT_MOST, AT_LEAST };
+struct target {
+    enum comparison comparison;
+    double limit;
+};
+
+/* The object begins with the machine and the repeats. */
+void report_open(struct report *report, int repeats);
+void report_close(struct report *report);
+
+/* A row: which measurement, of what work, done by whom. Its numbers follow; they must be finite. */
+void report_row(struct report *report, const char *group, const char *work, const char *run);
+void report_number(struct report *report, const char *name, double value);
+void report_row_end(struct report *report);
+
+/* A number that has a target, with the target and whether it is met. */
+void report_judged(struct report *report, const char *name, double value, struct target target);
+
+/* ---- race.c: several solvers do the same work in turns, again and again
+ * -------------------------- */
+
+enum { MOST_RUNS = 10, MOST_REPEATS = 101 };
+
+enum solver { PLAIN_LOOP, FMU, FMU3, MUJOCO };
+
+struct run {
+    const char *name;
+    enum solver solver;
+    enum method method; /* of an FMU */
+    double tolerance;   /* of the plain loop, or requested from an FMU */
+    enum mujoco_integrator integrator;
+    int substeps;                      /* of MuJoCo in a communication step */
+    const struct fmu_functions *fmu;   /* of FMU, where it is not that of the race */
+    const struct fmu3_functions *fmu3; /* of FMU3: the FMU of FMI 3.0 */
+};
+
+struct race {
+    int count;
+    int repeats;
+    struct run runs[MOST_RUNS];
+    double seconds[MOST_RUNS][MOST_REPEATS]; /* of one communication step */
+    double error[MOST_RUNS];
+    struct fmu_counts counts[MOST_RUNS]; /* where the solver is an FMU */
+};
+
+void race_add(struct race *race, struct run run);
+
+/* The plain loop at the tolerance at which the FMU runs with CVODE, and the FMU with each method.
+ */
+void race_add_usual(struct race *race, const struct fmu_functions *fmu, double tolerance);
+
+void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
+              int repeats);
+
+/* Index of the run with this name, -1: none. */
+int race_find(const struct race *race, const char *name);
+
+/* Medians over the repeats: time of a communication step, and its ratio to another run's. */
+double race_us(const struct race *race, int run);
+double race_ratio(const struct race *race, int run, int peer);
+
+/* Writes a row for each run; targets of the ratio to the first run, or NULL. */
+void race_report(const struct race *race, struct report *report, const char *group,
+                 const char *work, const struct problem *problem, const struct target *targets);
+
+/* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to a
+ * ten-thousandth of the bound, or 1e-14, is above the bound. MuJoCo: sets the substeps instead. */
+void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
+               double bound);
+
+/* ---- The measurements
+ * ---------------------------------------------------------------------------- */
 
 struct bench {
     struct fmu_functions fmu;
@@ -16,11 +97,10 @@ struct bench {
     bool quick; /* little of everything: shows that it works, the figures mean nothing */
 };
 
-/* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors */
+/* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors;
+ * error and time over the tolerance, time over the communication step size */
 void measure_steps(struct bench *bench);
 void measure_free_motion(struct bench *bench);
-
-/* sweeps.c: error and time over the tolerance, time over the communication step size */
 void measure_precision(struct bench *bench);
 void measure_step_sizes(struct bench *bench);
 
@@ -34,10 +114,9 @@ void measure_threads(struct bench *bench);
 /* energy.c: how the energy of a motion without losses drifts */
 void measure_energy(struct bench *bench);
 
-/* instance_alone.c: a step without the time of its integrator */
+/* calls.c: a step without the time of its integrator, each call by itself, and from fmi2Instantiate
+ * to fmi2FreeInstance */
 void measure_instance(struct bench *bench);
-
-/* calls.c: each call by itself, and from fmi2Instantiate to fmi2FreeInstance */
 void measure_calls(struct bench *bench);
 void measure_life(struct bench *bench);
 

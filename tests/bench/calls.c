@@ -1,9 +1,5 @@
 #include "bench.h"
 
-#include "fmu_run.h"
-#include "measure.h"
-#include "race.h"
-
 #include <malloc.h>
 #include <math.h>
 #include <stdlib.h>
@@ -42,38 +38,27 @@ static double time_calls(const struct fmu_functions *fmu, const struct problem *
 
 static void report_calls(struct report *report, const char *name, struct calls *calls,
                          double error) {
-    const double set = 1e6 * quantile(calls->set, calls->count, 0.5);
-    const double get = 1e6 * quantile(calls->get, calls->count, 0.5);
     const double step = 1e6 * quantile(calls->step, calls->count, 0.5);
     const double late = 1e6 * quantile(calls->step, calls->count, 0.999);
-    const double last = 1e6 * quantile(calls->step, calls->count, 1.0);
-    const double sum = set + step + get;
     report_row(report, "calls", "1 ms steps, inputs changing, each call by itself", name);
     report_number(report, "calls", (double)calls->count);
-    report_number(report, "set_us", set);
+    report_number(report, "set_us", 1e6 * quantile(calls->set, calls->count, 0.5));
     report_number(report, "step_us", step);
-    report_number(report, "get_us", get);
+    report_number(report, "get_us", 1e6 * quantile(calls->get, calls->count, 0.5));
     report_number(report, "step_percentile_us", late);
-    report_number(report, "step_largest_us", last);
+    report_number(report, "step_largest_us", 1e6 * quantile(calls->step, calls->count, 1.0));
     report_number(report, "ratio", late / step);
     report_number(report, "error", error);
     report_row_end(report);
-    printf("  %-12s Set %5.3f us (%2.0f %%), DoStep %6.3f us (%2.0f %%), Get %5.3f us (%2.0f %%); "
-           "DoStep 99.9th percentile %6.2f us = %5.2f medians, largest of %zu: %.0f us\n",
-           name, set, 100.0 * set / sum, step, 100.0 * step / sum, get, 100.0 * get / sum, late,
-           late / step, calls->count, last);
 }
 
 void measure_calls(struct bench *bench) {
     struct problem *problem = problem_create(1e-3, 2000, INPUTS_CHANGING, 0.0);
-    double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
+    double(*states)[4] = allocate((size_t)problem->steps, sizeof states[0]);
     struct calls calls = {.count = bench->quick ? 4000 : 1000000};
-    calls.set = calloc(calls.count, sizeof(double));
-    calls.step = calloc(calls.count, sizeof(double));
-    calls.get = calloc(calls.count, sizeof(double));
-    require(states != NULL && calls.set != NULL && calls.step != NULL && calls.get != NULL,
-            "no memory");
-    printf("\neach call by itself, medians; 1 ms steps, inputs changing\n");
+    calls.set = allocate(calls.count, sizeof(double));
+    calls.step = allocate(calls.count, sizeof(double));
+    calls.get = allocate(calls.count, sizeof(double));
     for (enum method method = FIRST_METHOD; method < METHODS; method++) {
         const double error = time_calls(&bench->fmu, problem, method, states, &calls);
         report_calls(&bench->report, method_names[method], &calls, error);
@@ -89,7 +74,6 @@ void measure_life(struct bench *bench) {
     enum { LIVES = 100 };
     struct problem *problem = problem_create(1e-3, 1, INPUTS_CHANGING, 0.0);
     double us[METHODS][MOST_REPEATS];
-    printf("\nfrom fmi2Instantiate over initialization to fmi2FreeInstance\n");
     for (int repeat = 0; repeat < bench->repeats; repeat++) {
         for (enum method method = FIRST_METHOD; method < METHODS; method++) {
             const double begin = processor_time();
@@ -108,15 +92,38 @@ void measure_life(struct bench *bench) {
         bench->fmu.FreeInstance(c);
         const double life = median(us[method], bench->repeats);
         report_row(&bench->report, "life", "instantiate to free", method_names[method]);
-        printf("  %-12s %6.1f us", method_names[method], life);
         report_judged(&bench->report, "us", life, (struct target){AT_MOST, 30.0});
         report_row_end(&bench->report);
         report_row(&bench->report, "life", "memory of an instance after a step",
                    method_names[method]);
-        printf("; memory after a step %5.1f KiB", kib);
         report_judged(&bench->report, "kib", kib, (struct target){AT_MOST, 32.0});
         report_row_end(&bench->report);
-        printf("\n");
     }
     problem_destroy(problem);
+}
+
+/* A step with an integrator that returns at once, and one with the Taylor method, in turns. */
+static void measure_inputs(struct bench *bench, const char *work, enum problem_inputs inputs) {
+    static const struct run taylor = {
+        .name = "taylor", .solver = FMU, .method = TAYLOR, .tolerance = 1e-8};
+    struct run idle = taylor;
+    idle.name = "instance";
+    idle.fmu = &bench->idle;
+    struct problem *problem = problem_create(1e-3, 2000, inputs, 0.0);
+    struct race race = {0};
+    race_add(&race, idle);
+    race_add(&race, taylor);
+    race_run(&race, &bench->fmu, problem, bench->repeats);
+
+    report_row(&bench->report, "instance", work, idle.name);
+    report_number(&bench->report, "us", race_us(&race, 0));
+    report_number(&bench->report, "ratio", race_ratio(&race, 0, 1));
+    report_number(&bench->report, "internal_steps", race.counts[0].internal_steps);
+    report_row_end(&bench->report);
+    problem_destroy(problem);
+}
+
+void measure_instance(struct bench *bench) {
+    measure_inputs(bench, "1 ms steps, inputs changing", INPUTS_CHANGING);
+    measure_inputs(bench, "1 ms steps, inputs constant", INPUTS_CONSTANT);
 }

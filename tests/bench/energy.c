@@ -1,8 +1,5 @@
 #include "bench.h"
 
-#include "measure.h"
-#include "race.h"
-
 #include <math.h>
 #include <stdlib.h>
 
@@ -64,10 +61,6 @@ static void report_drift(struct report *report, const struct motion *motion, con
             drift = 0.0;
             rows = (int)floor(ROWS_A_DECADE * log10(i + 1.0) + 1e-9) + 1;
         }
-        if (is_last) {
-            printf("  %-12s %7d steps, %6.2f us each: drift %7.1e at most, %7.1e at the end\n",
-                   name, problem->steps, us, largest, at_end);
-        }
     }
 }
 
@@ -75,9 +68,7 @@ static void measure_motion(struct bench *bench, const struct motion *motion) {
     static const enum method methods[] = {CVODE_ADAMS, ERK, TAYLOR};
     struct problem *problem = problem_create_without_reference(1e-3, bench->quick ? 10000 : 1000000,
                                                                motion->start, motion->u, motion->g);
-    double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
-    require(states != NULL, "no memory");
-    printf("\nenergy, %s\n", motion->name);
+    double(*states)[4] = allocate((size_t)problem->steps, sizeof states[0]);
     for (size_t i = 0; i < sizeof methods / sizeof methods[0]; i++) {
         struct fmu_counts counts;
         const double seconds =

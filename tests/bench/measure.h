@@ -29,4 +29,11 @@ static inline void require(bool condition, const char *what) {
     }
 }
 
+/* Zeros; ends the program where there is no memory. */
+static inline void *allocate(size_t count, size_t size) {
+    void *block = calloc(count, size);
+    require(block != NULL, "no memory");
+    return block;
+}
+
 #endif

@@ -2,9 +2,6 @@
  * inputs, and a step with a bounce against one in which an input changes. */
 #include "bench.h"
 
-#include "fmu_run.h"
-#include "measure.h"
-#include "race.h"
 #include "value_references.h"
 
 #include <math.h>
@@ -170,11 +167,7 @@ static void report_plant(struct report *report, const struct work *work, enum me
     report_row(report, "plant", work->name, method_names[method]);
     report_number(report, "us", us);
     report_number(report, "events", events);
-    printf("  %-28s %-12s %7.3f us, %6.3f of a step %s, %4d events", work->name,
-           method_names[method], us, ratio,
-           work->peer == NULL ? "of the arm" : "with a changed input", events);
     report_judged(report, "ratio", ratio, (struct target){most > 0.0 ? AT_MOST : NO_TARGET, most});
-    printf("\n");
     report_row_end(report);
 }
 
@@ -195,7 +188,6 @@ static void measure_work(struct bench *bench, const struct work *work, enum meth
 }
 
 void measure_plant(struct bench *bench) {
-    printf("\nfriction and stops, steps of 1 ms\n");
     for (size_t i = 0; i < sizeof works / sizeof works[0]; i++) {
         for (enum method method = FIRST_METHOD; method < METHODS; method++) {
             measure_work(bench, &works[i], method);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import matplotlib
@@ -64,45 +65,63 @@ def legend_below(figure: Figure, axes: list[Axes], columns: int) -> None:
                   frameon=False)  # fmt: skip
 
 
-def precision(rows: list[dict]) -> Figure:
-    """Time over error, one point a tolerance (MuJoCo: a time step)."""
-    rows = [row for row in rows if row["group"] == "precision"]
-    works = list(dict.fromkeys(row["work"] for row in rows))
-    figure, all_axes = plt.subplots(1, len(works), figsize=(15, 5.8), layout="constrained")
-    for axes, work in zip(all_axes, works, strict=True):
-        for run in STYLES:
-            points = [(row["error"], row["us"]) for row in rows
-                      if (row["work"], row["run"]) == (work, run)]  # fmt: skip
-            if points:
-                curve(axes, run, [max(p[0], 1e-16) for p in points], [p[1] for p in points])
+Points = Callable[[dict], tuple[float, float]]
+
+
+def panels(
+    rows: dict[str, list[dict]], runs: Iterable[str], points: Points, x: str, y: str
+) -> tuple[Figure, list[Axes]]:
+    """Logarithmic plots side by side, by title: a curve for each run that has rows there."""
+    figure, all_axes = plt.subplots(
+        1, len(rows), figsize=(5.2 * len(rows), 5.4), sharey=True, layout="constrained"
+    )
+    for axes, (title, of_title) in zip(all_axes, rows.items(), strict=True):
+        for run in runs:
+            found = [points(row) for row in of_title if row["run"] == run]
+            if found:
+                curve(axes, run, *zip(*found, strict=True))
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.invert_xaxis()
-        title = work[0].upper() + work[1:]
-        frame(axes, title, "error, relative to the largest value (more exact to the right)", "")
-    all_axes[0].set_ylabel("time of a communication step, us")
+        frame(axes, title[0].upper() + title[1:], x, "")
+    all_axes[0].set_ylabel(y)
     legend_below(figure, list(all_axes), 5)
+    return figure, list(all_axes)
+
+
+def by_title(rows: list[dict], group: str, start: int = 0) -> dict[str, list[dict]]:
+    """Rows of a group by their work, or the part of its name from a comma on."""
+    found: dict[str, list[dict]] = {}
+    for row in rows:
+        if row["group"] == group:
+            found.setdefault(", ".join(row["work"].split(", ")[start:]), []).append(row)
+    return found
+
+
+TIME = "time of a communication step, us"
+
+
+def precision(rows: list[dict]) -> Figure:
+    """Time over error, one point a tolerance (MuJoCo: a time step)."""
+    figure, all_axes = panels(
+        by_title(rows, "precision"), STYLES, lambda row: (max(row["error"], 1e-16), row["us"]),
+        "error, relative to the largest value (more exact to the right)", TIME,
+    )  # fmt: skip
+    for axes in all_axes:
+        axes.invert_xaxis()
     return figure
 
 
 def step_size(rows: list[dict]) -> Figure:
     """Time of a communication step over its size."""
-    rows = [row for row in rows if row["group"] == "step size"]
-    kinds = list(dict.fromkeys(row["work"].split(", ")[1] for row in rows))
-    figure, all_axes = plt.subplots(
-        1, len(kinds), figsize=(11, 5), sharey=True, layout="constrained"
-    )
-    for axes, kind in zip(all_axes, kinds, strict=True):
-        for run in ("plain loop", "cvode_bdf", "cvode_adams", "erk", "taylor"):
-            points = [(row["step"], row["us"]) for row in rows
-                      if row["run"] == run and row["work"].endswith(kind)]  # fmt: skip
-            curve(axes, run, *zip(*points, strict=True))
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        frame(axes, f"{kind.capitalize()}, tolerance 1e-8", "communication step size, s", "")
-    all_axes[0].set_ylabel("time of a communication step, us")
-    legend_below(figure, list(all_axes), 5)
-    return figure
+    runs = ("plain loop", "cvode_bdf", "cvode_adams", "erk", "taylor")
+    kinds = by_title(rows, "step size", start=1)
+    return panels(
+        kinds,
+        runs,
+        lambda row: (row["step"], row["us"]),
+        "communication step size, s, at tolerance 1e-8",
+        TIME,
+    )[0]
 
 
 def instances(rows: list[dict]) -> Figure:
@@ -120,30 +139,18 @@ def instances(rows: list[dict]) -> Figure:
     axes.set_xscale("log")
     axes.set_ylim(bottom=0.0)
     frame(axes, "Instances stepped by 1 ms in turn, inputs changing", "number of instances",
-          "time of a communication step, us")  # fmt: skip
+          TIME)  # fmt: skip
     legend_below(figure, [axes], 2)
     return figure
 
 
 def energy_drift(rows: list[dict]) -> Figure:
     """Drift of the energy over the number of steps, in motions without losses."""
-    rows = [row for row in rows if row["group"] == "energy"]
-    works = list(dict.fromkeys(row["work"] for row in rows))
-    figure, all_axes = plt.subplots(
-        1, len(works), figsize=(11, 5), sharey=True, layout="constrained"
-    )
-    for axes, work in zip(all_axes, works, strict=True):
-        for run in ("MuJoCo RK4", "heyoka", "cvode_adams", "erk", "taylor"):
-            points = [(row["steps"], row["drift"] or math.nan) for row in rows
-                      if (row["work"], row["run"]) == (work, run)]  # fmt: skip
-            if points:
-                curve(axes, run, *zip(*points, strict=True))
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        frame(axes, work[0].upper() + work[1:], "steps of 1 ms", "")
-    all_axes[0].set_ylabel("|energy - energy at the start|, relative")
-    legend_below(figure, list(all_axes), 5)
-    return figure
+    runs = ("MuJoCo RK4", "heyoka", "cvode_adams", "erk", "taylor")
+    return panels(
+        by_title(rows, "energy"), runs, lambda row: (row["steps"], row["drift"] or math.nan),
+        "steps of 1 ms", "|energy - energy at the start|, relative",
+    )[0]  # fmt: skip
 
 
 def draw(rows: list[dict], folder: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-#include "problem.h"
+#include "solvers.h"
 
 #include "measure.h"
 

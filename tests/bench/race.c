@@ -1,8 +1,4 @@
-#include "race.h"
-
-#include "measure.h"
-#include "plain_loop.h"
-
+#include "bench.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,8 +57,7 @@ static double run_long_enough(struct race *race, int run, const struct fmu_funct
 
 void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
               int repeats) {
-    double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
-    require(states != NULL && repeats <= MOST_REPEATS, "no memory");
+    double(*states)[4] = allocate((size_t)problem->steps, sizeof states[0]);
     race->repeats = repeats;
     for (int repeat = 0; repeat < repeats; repeat++) {
         for (int run = 0; run < race->count; run++) {
@@ -99,7 +94,6 @@ double race_ratio(const struct race *race, int run, int peer) {
 void race_report(const struct race *race, struct report *report, const char *group,
                  const char *work, const struct problem *problem, const struct target *targets) {
     static const char *const ends[4] = {"end_q1", "end_q2", "end_dq1", "end_dq2"};
-    printf("\n%s\n", work);
     for (int i = 0; i < race->count; i++) {
         const struct run *run = &race->runs[i];
         const double us = race_us(race, i);
@@ -111,36 +105,27 @@ void race_report(const struct race *race, struct report *report, const char *gro
         for (int j = 0; j < 4; j++) { // of the reference, for other references to compare with
             report_number(report, ends[j], problem->reference[problem->steps - 1][j]);
         }
-        printf("  %-20s %8.2f us", run->name, us);
         const double ratio = race_ratio(race, i, 0);
-        printf(" %7.3f  error %7.1e", ratio, race->error[i]);
         if (run->solver == MUJOCO) {
             report_number(report, "substeps", run->substeps);
-            printf("  timestep %g ms", 1e3 * problem->step / run->substeps);
         } else {
             report_number(report, "tolerance", run->tolerance);
-            printf("  tolerance %7.1e", run->tolerance);
         }
         if (run->solver == FMU || run->solver == FMU3) {
             report_number(report, "effective_tolerance", race->counts[i].effective_tolerance);
             report_number(report, "internal_steps", race->counts[i].internal_steps);
             report_number(report, "evaluations", race->counts[i].evaluations);
-            printf(", runs at %7.1e, %6.1f steps, %6.1f evaluations",
-                   race->counts[i].effective_tolerance, race->counts[i].internal_steps,
-                   race->counts[i].evaluations);
         }
         report_judged(report, "ratio", ratio,
                       targets == NULL ? (struct target){NO_TARGET, 0.0} : targets[i]);
-        printf("\n");
         report_row_end(report);
     }
 }
 
 void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
                double bound) {
-    double(*states)[4] = calloc((size_t)problem->steps, sizeof states[0]);
+    double(*states)[4] = allocate((size_t)problem->steps, sizeof states[0]);
     struct fmu_counts counts;
-    require(states != NULL, "no memory");
     if (run->solver == MUJOCO) {
         run->substeps = 10;
         run_once(run, fmu, problem, states, &counts);

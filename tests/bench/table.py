@@ -46,38 +46,66 @@ def steps(rows: list[dict]) -> list[str]:
     return text
 
 
-def instances(rows: list[dict]) -> list[str]:
-    """Many instances in turn."""
-    cells = [
-        [f"{row['run']}, {row['instances']:.0f}", number(row["us"]), number(row["ratio"]),
-         f"{row['more_us']:+.2f}", error(row), result(row)]
-        for row in rows if row["group"] == "instances"
-    ]  # fmt: skip
-    header = ["instances", "us a step", "ratio", "us more than one alone", "error", "must be"]
-    return ["**Many instances, each stepped by 1 ms in turn**", "", *lines(header, cells)]
-
-
 def busy(row: dict) -> str:
     """Say that the threads had to wait for their cores."""
     return " (busy machine)" if row["processor_share"] < 0.97 else ""
 
 
-def threads(rows: list[dict]) -> list[str]:
-    """Two threads."""
-    cells = [
-        [row["run"], number(row["throughput"]), number(row["undisturbed"]),
-         number(row["processor_share"]), error(row), result(row) + busy(row)]
-        for row in rows if row["group"] == "threads"
-    ]  # fmt: skip
-    header = [
-        "",
-        "times one thread",
-        "by processor time",
-        "share of a core each had",
-        "error",
-        "must be",
-    ]
-    return ["**Two threads with an instance each, 1 ms steps**", "", *lines(header, cells)]
+def figures(row: dict, *names: str) -> list[str]:
+    """Figures of a row."""
+    return [number(row[name]) for name in names]
+
+
+def life(row: dict) -> str:
+    """Time or memory of an instance."""
+    return f"{row[row['judged']]:.1f} {'us' if row['judged'] == 'us' else 'KiB'}"
+
+
+# by group: title, heading of the columns, cells of a row
+GROUPS = {
+    "instances": (
+        "Many instances, each stepped by 1 ms in turn",
+        ["instances", "us a step", "ratio", "us more than one alone", "error", "must be"],
+        lambda row: [f"{row['run']}, {row['instances']:.0f}", *figures(row, "us", "ratio"),
+                     f"{row['more_us']:+.2f}", error(row), result(row)],
+    ),
+    "threads": (
+        "Two threads with an instance each, 1 ms steps",
+        ["", "times one thread", "by processor time", "share of a core each had", "error",
+         "must be"],
+        lambda row: [row["run"], *figures(row, "throughput", "undisturbed", "processor_share"),
+                     error(row), result(row) + busy(row)],
+    ),
+    "instance": (
+        "The instance with an integrator that returns at once",
+        ["", "us a step", "share of a step with taylor"],
+        lambda row: [row["work"], *figures(row, "us", "ratio")],
+    ),
+    "plant": (
+        "Friction and stops, steps of 1 ms",
+        ["", "us a step", "ratio", "events in 1000 steps", "must be"],
+        lambda row: [f"{row['work']}, {row['run']}", *figures(row, "us", "ratio"),
+                     f"{row['events']:.0f}", result(row)],
+    ),
+    "calls": (
+        "Each call by itself, 1 ms steps, inputs changing, medians",
+        ["", "Set, us", "DoStep, us", "Get, us", "DoStep 99.9 %, us", "over the median",
+         "largest, us"],
+        lambda row: [row["run"], *figures(row, "set_us", "step_us", "get_us", "step_percentile_us",
+                                          "ratio", "step_largest_us")],
+    ),
+    "life": (
+        "An instance",
+        ["", "", "must be"],
+        lambda row: [f"{row['run']}, {row['work']}", life(row), result(row)],
+    ),
+}  # fmt: skip
+
+
+def of_group(rows: list[dict], group: str) -> list[str]:
+    """The table of a group."""
+    title, header, cells = GROUPS[group]
+    return [f"**{title}**", "", *lines(header, [cells(x) for x in rows if x["group"] == group])]
 
 
 def energy(rows: list[dict]) -> list[str]:
@@ -94,50 +122,6 @@ def energy(rows: list[dict]) -> list[str]:
     return text
 
 
-def instance(rows: list[dict]) -> list[str]:
-    """A step of the instance with an integrator that returns at once."""
-    cells = [
-        [row["work"], number(row["us"]), number(row["ratio"])]
-        for row in rows if row["group"] == "instance"
-    ]  # fmt: skip
-    return ["**The instance with an integrator that returns at once**", "",
-            *lines(["", "us a step", "share of a step with taylor"], cells)]  # fmt: skip
-
-
-def plant(rows: list[dict]) -> list[str]:
-    """Friction and stops, against the arm without them."""
-    cells = [
-        [f"{row['work']}, {row['run']}", number(row["us"]), number(row["ratio"]),
-         f"{row['events']:.0f}", result(row)]
-        for row in rows if row["group"] == "plant"
-    ]  # fmt: skip
-    header = ["", "us a step", "ratio", "events in 1000 steps", "must be"]
-    return ["**Friction and stops, steps of 1 ms**", "", *lines(header, cells)]
-
-
-def calls(rows: list[dict]) -> list[str]:
-    """Each call by itself."""
-    cells = [
-        [row["run"], *(number(row[name]) for name in (
-            "set_us", "step_us", "get_us", "step_percentile_us", "ratio", "step_largest_us"))]
-        for row in rows if row["group"] == "calls"
-    ]  # fmt: skip
-    header = ["", "Set, us", "DoStep, us", "Get, us", "DoStep 99.9 %, us", "over the median",
-              "largest, us"]  # fmt: skip
-    return ["**Each call by itself, 1 ms steps, inputs changing, medians**", "",
-            *lines(header, cells)]  # fmt: skip
-
-
-def life(rows: list[dict]) -> list[str]:
-    """From fmi2Instantiate to fmi2FreeInstance."""
-    cells = [
-        [f"{row['run']}, {row['work']}",
-         f"{row[row['judged']]:.1f} {'us' if row['judged'] == 'us' else 'KiB'}", result(row)]
-        for row in rows if row["group"] == "life"
-    ]  # fmt: skip
-    return ["**An instance**", "", *lines(["", "", "must be"], cells)]
-
-
 def markdown(report: dict) -> str:
     """All tables, from the contents of benchmark.json."""
     rows, machine = report["rows"], report["machine"]
@@ -151,8 +135,10 @@ def markdown(report: dict) -> str:
         f"{machine['python']}, {versions}. {missed} of the targets missed.",
         "",
     ]
-    parts = (steps, instances, threads, energy, instance, plant, calls, life)
-    return "\n".join(head + [line for part in parts for line in part(rows)])
+    tables = {group: of_group(rows, group) for group in GROUPS}
+    order = ("instances", "threads", "energy", "instance", "plant", "calls", "life")
+    tables["energy"] = energy(rows)
+    return "\n".join(head + steps(rows) + [line for group in order for line in tables[group]])
 
 
 # columns of the table of ratios: heading and work

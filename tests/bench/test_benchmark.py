@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 import os
 import sys
 from pathlib import Path
@@ -37,24 +38,6 @@ GROUPS = {
 METHODS = {"cvode_adams", "cvode_bdf", "erk", "taylor"}
 SHORT = arm.Work("1 ms steps, inputs changing", 1e-3, 50, "changing")
 FREE = arm.Work("one step of 2 s, free motion", 2.0, 1, "zero")
-
-# a ratio within one run: work, run or runs, the largest that it may be
-TARGETS = [
-    ("1 ms steps, inputs changing", "cvode_adams", 0.5),
-    ("1 ms steps, inputs changing", "erk", 0.15),
-    ("1 ms steps, inputs changing", "taylor", 0.04),
-    ("1 ms steps, inputs changing", "taylor to erk", 0.42),
-    ("1 ms steps, inputs changing", "erk to MuJoCo RK4", 0.2),
-    ("1 ms steps, inputs changing", "taylor to MuJoCo RK4", 0.13),
-    ("1 ms steps, inputs changing", "error of taylor", 1e-12),
-    ("10 ms steps, inputs changing", "cvode_adams", 0.5),
-    ("10 ms steps, inputs changing", "erk", 0.2),
-    ("10 ms steps, inputs changing", "taylor to erk", 0.42),
-    ("0.1 s steps, inputs changing", "taylor to erk", 0.2),
-    ("1 ms steps, inputs constant", "cvode_adams", 0.6),
-    ("1 ms steps, inputs constant", "taylor to cvode_adams", 0.95),
-    ("10 ms steps, inputs constant", "taylor to cvode_adams", 0.45),
-]
 
 
 @pytest.fixture(scope="module")
@@ -103,16 +86,13 @@ def test_every_method_does_every_work(result: dict) -> None:
         compare.find(rows, work.name, "taylor, FMI 3.0")
 
 
-@pytest.mark.parametrize(("work", "run", "limit"), TARGETS)
-def test_targets_are_judged(result: dict, work: str, run: str, limit: float) -> None:
-    row = compare.find(result["rows"], work, run)
-    assert row["judged"] == ("error" if run.startswith("error") else "ratio")
-    assert (row["comparison"], row["limit"]) == ("<=", limit)
-    assert row["met"] == (row[row["judged"]] <= limit)
-
-
-def test_error_of_taylor_meets_its_target(result: dict) -> None:
-    assert compare.find(result["rows"], TARGETS[0][0], "error of taylor")["met"]
+def test_targets_are_judged(result: dict) -> None:
+    judged = [row for row in result["rows"] if "judged" in row]
+    assert len(judged) > 40
+    for row in judged:
+        compared = {"<=": operator.le, ">=": operator.ge}[row["comparison"]]
+        assert row["met"] == compared(row[row["judged"]], row["limit"]), row
+    assert compare.find(judged, compare.CHANGING[0].name, "error of taylor")["met"]
 
 
 def test_figures_are_finite(result: dict) -> None:

@@ -14,7 +14,7 @@ from tests.closed_loop.test_system import (
     rows_of,
     run,
 )
-from tests.support.libcosim import libcosim, only_variant
+from tests.importers.libcosim import libcosim, only_variant
 from tests.support.ssp_files import SSP, edited
 
 

@@ -17,8 +17,13 @@ from cosim.runs.comparison import Runs
 from cosim.runs.reference import Reference
 from cosim.runs.tolerance_sweep import Sweep
 from tests.report.sizes import OF_SCENARIOS
-from tests.support.all_fmus import FOLDERS
-from tests.support.cosim_project import LONG, NAMES, SHORT, load
+from tests.support.cosim_project import (
+    LONG,
+    NAMES,
+    SHORT,
+    load,
+)
+from tests.support.paths import FOLDERS
 
 
 @pytest.fixture(scope="module")

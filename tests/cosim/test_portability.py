@@ -18,12 +18,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import UserError
-from cosim.fmi import fmu_file
 from cosim.fmi.fmi2_instance import Fmi2Instance
 from cosim.fmi.fmu_file import Fmu
-from cosim.runs import reference, simulation
-from cosim.scenarios import scenario as scenarios
-from tests.support.all_fmus import SYSTEMS
 from tests.support.cosim_project import (
     BUILD,
     FMUS,
@@ -36,7 +32,7 @@ from tests.support.cosim_project import (
     reference_file,
     repacked,
 )
-from tests.support.paths import ROOT
+from tests.support.paths import ROOT, SYSTEMS
 
 SOURCES = sorted(path for top in ("cosim", "models") for path in (ROOT / top).rglob("*.py"))
 

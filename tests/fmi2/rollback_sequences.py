@@ -1,7 +1,9 @@
 """Random sequences of steps, and states that are saved and restored in between."""
 
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from tests.support.instances import ERROR, INPUTS, Instance, LoadedFmu, status_of
 
@@ -45,7 +47,7 @@ def sequence(kind: str, length: int, chance: random.Random) -> list[Move]:
     return moves
 
 
-def times(moves: list[Move]) -> list[float]:
+def times(moves: Sequence[Any]) -> list[float]:
     """Communication points of a master that adds up its steps."""
     found = [0.0]
     for move in moves:

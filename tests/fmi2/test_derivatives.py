@@ -14,7 +14,7 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Integer, fmi2Real, fmi2ValueReference
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Real, fmi2ValueReference
 
 from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, LoadedFmu, status_of
 from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values, random_arm
@@ -426,60 +426,3 @@ def test_a_refused_directional_derivative_writes_nothing(loaded: LoadedFmu) -> N
         call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
         assert_refused(instance, "tau1", call, component, unknowns, 2, knowns, 1, seed, result)
         assert list(result) == [7.0, 8.0]
-
-
-OUTPUT_CASES = {
-    "order 0": ([DDQ1], [0], "order 0"),
-    "order 3": ([DDQ1, DQ1], [1, 3], "order 3"),
-    "a negative order": ([DDQ1], [-1], "order -1"),
-    "an input": ([TAU1], [1], "tau1"),
-    "a local": ([DDQ1, D11], [1, 1], "D11"),
-    "a parameter": ([M1], [1], "m1"),
-    "the time": ([0], [1], "time"),
-    "a counter": ([80], [1], "solver_steps"),
-    "no such reference": ([NOWHERE], [1], "99"),
-}
-
-
-@pytest.mark.parametrize(("references", "orders", "words"), OUTPUT_CASES.values(), ids=OUTPUT_CASES)
-def test_wrong_output_derivatives_are_refused(
-    loaded: LoadedFmu, references: list[int], orders: list[int], words: str
-) -> None:
-    count = len(references)
-    result = (fmi2Real * count)(*range(7, 7 + count))
-    arrays = (fmi2ValueReference * count)(*references), count, (fmi2Integer * count)(*orders)
-    with between_steps(loaded, 0) as instance:
-        call, component = instance.fmi.fmi2GetRealOutputDerivatives, instance.fmi.component
-        assert_refused(instance, words, call, component, *arrays, result)
-        assert list(result) == list(range(7, 7 + count))
-
-
-@pytest.mark.parametrize("missing", range(3))
-def test_missing_arrays_of_output_derivatives_are_refused(loaded: LoadedFmu, missing: int) -> None:
-    arrays = [(fmi2ValueReference * 1)(DDQ1), (fmi2Integer * 1)(1), (fmi2Real * 1)(7.0)]
-    arrays[missing] = None
-    references, orders, result = arrays
-    with between_steps(loaded, 0) as instance:
-        call, component = instance.fmi.fmi2GetRealOutputDerivatives, instance.fmi.component
-        assert status_of(call, component, None, 0, None, None) == OK
-        assert_refused(instance, "NULL", call, component, references, 1, orders, result)
-
-
-INPUT_CASES = {
-    "order 0": ([TAU1], [0], [1.0], "order 0"),
-    "order 4": ([TAU1], [4], [1.0], "order 4"),
-    "an output": ([TAU1, DDQ1], [1, 1], [1.0, 1.0], "ddq1"),
-    "a parameter": ([M1], [1], [1.0], "m1"),
-    "no such reference": ([NOWHERE], [1], [1.0], "99"),
-}
-
-
-@pytest.mark.parametrize(
-    ("references", "orders", "values", "words"), INPUT_CASES.values(), ids=INPUT_CASES
-)
-def test_wrong_input_derivatives_are_refused(
-    loaded: LoadedFmu, references: list[int], orders: list[int], values: list[float], words: str
-) -> None:
-    with between_steps(loaded, 0) as instance:
-        call = instance.fmi.setRealInputDerivatives
-        assert_refused(instance, words, call, references, orders, values)

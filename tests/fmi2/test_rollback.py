@@ -1,26 +1,18 @@
 """Rollback through fmpy: saved, serialized and restored states give the same results, bit for bit.
 
-Run as a program (fmu folder, file of a serialized state, file of a sequence), it is another
-process that restores a state and goes on from there.
+Other processes, phases and failed steps: test_fmi2_serialization.c, test_fmi2_snapshots.c.
 """
 
-import json
 import random
-import subprocess
-import sys
 from ctypes import byref
-from pathlib import Path
 
 import pytest
-from fmpy import fmi2
-from fmpy.fmi1 import FMICallException
 
 from cosim.runs import convergence
 from tests.fmi2.rollback_sequences import (
     KINDS,
     START,
     WHIRL,
-    Move,
     do,
     other,
     run,
@@ -29,13 +21,11 @@ from tests.fmi2.rollback_sequences import (
 )
 from tests.support.cosim_project import declared
 from tests.support.instances import (
-    ERROR,
     STATES,
     Instance,
     LoadedFmu,
     restore,
     serialized,
-    status_of,
 )
 from tests.support.paths import ROOT
 
@@ -93,20 +83,6 @@ def test_random_rollback(loaded: LoadedFmu, number: int) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_snapshots_leave_no_trace(loaded: LoadedFmu, kind: str) -> None:
-    """A state saved at every step, from the initialization on: the same bytes as without."""
-    moves = sequence(kind, 300, random.Random(kind))
-    with Instance(loaded) as instance:
-        instance.fmi.getFMUstate()
-        instance.initialize(**START)
-        for t, move, expected in zip(times(moves), moves, run(loaded, moves), strict=False):
-            state = instance.fmi.getFMUstate()
-            serialized(instance)
-            assert do(instance, t, move) == expected
-            instance.fmi.freeFMUstate(state)
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_rollback_at_every_step_leaves_no_trace(loaded: LoadedFmu, kind: str) -> None:
     """Each step is tried in another way, undone and made: the same bytes as without."""
     chance = random.Random(kind)
@@ -121,68 +97,6 @@ def test_rollback_at_every_step_leaves_no_trace(loaded: LoadedFmu, kind: str) ->
             do(instance, t, trial)
             instance.fmi.setFMUstate(state)
             assert do(instance, t, move) == expected
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_another_process_goes_on_the_same(loaded: LoadedFmu, tmp_path: Path, kind: str) -> None:
-    moves = sequence(kind, 60, random.Random(kind))
-    at, cut = times(moves), 30
-    with Instance(loaded) as instance:
-        instance.initialize(**START)
-        for t, move in zip(at, moves[:cut], strict=False):
-            do(instance, t, move)
-        (tmp_path / "state").write_bytes(serialized(instance))
-        rest = [do(instance, t, m).hex() for t, m in zip(at[cut:], moves[cut:], strict=False)]
-        final = [x.hex() for x in instance.get(*STATES)]
-    plan = [[t, m.length, m.values, m.derivatives] for t, m in zip(at, moves, strict=False)]
-    (tmp_path / "moves").write_text(json.dumps(plan[cut:]))
-    arguments = (loaded.folder, tmp_path / "state", tmp_path / "moves")
-    command = [sys.executable, "-m", "tests.fmi2.test_rollback", *map(str, arguments)]
-    output = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
-    assert output.stdout.split() == [*rest, *final]
-
-
-def main(folder: str, state: str, moves: str) -> None:
-    """Restore and go on; print the bytes after each step and the final state as hexadecimals."""
-    with Instance(LoadedFmu(Path(folder), Path(folder))) as instance:
-        restore(instance, Path(state).read_bytes())
-        for t, *move in json.loads(Path(moves).read_text()):
-            print(do(instance, t, Move(*move)).hex())
-        print(*(x.hex() for x in instance.get(*STATES)))
-
-
-def test_states_of_the_initialization_are_restored(loaded: LoadedFmu) -> None:
-    """Before, in and after initialization, and after the end."""
-    with Instance(loaded) as instance:
-        states = [instance.fmi.getFMUstate()]
-        instance.fmi.setupExperiment(startTime=2.0, stopTime=3.0, tolerance=1e-6)
-        instance.set(q1=1.0)
-        states.append(instance.fmi.getFMUstate())
-        instance.fmi.enterInitializationMode()
-        states.append(instance.fmi.getFMUstate())
-        instance.fmi.exitInitializationMode()
-        instance.step(2.0, 1.0)
-        expected = instance.everything()
-        instance.fmi.terminate()
-        states.append(instance.fmi.getFMUstate())
-        instance.fmi.reset()
-
-        instance.fmi.setFMUstate(states[3])
-        assert instance.everything() == expected
-        assert status_of(instance.fmi.doStep, 3.0, 1.0) == ERROR
-        instance.fmi.setFMUstate(states[2])
-        instance.fmi.exitInitializationMode()
-        instance.step(2.0, 1.0)
-        assert instance.everything() == expected
-        instance.fmi.setFMUstate(states[1])
-        instance.fmi.enterInitializationMode()
-        instance.fmi.exitInitializationMode()
-        instance.step(2.0, 1.0)
-        assert instance.everything() == expected
-        instance.fmi.setFMUstate(states[0])
-        instance.initialize(2.0, 3.0, 1e-6, q1=1.0)
-        instance.step(2.0, 1.0)
-        assert instance.everything() == expected
 
 
 # ---- A master that needs it
@@ -239,29 +153,3 @@ def test_master_with_step_doubling(loaded: LoadedFmu) -> None:
             tell(instance, t)
             instance.step(t, h)
         assert instance.everything() == everything
-
-
-def test_a_failed_step_can_be_undone(loaded: LoadedFmu) -> None:
-    """A step that the integrator cannot finish is fmi2Discard; the state before it is as good."""
-    with Instance(loaded) as instance:
-        instance.fmi.setInteger([loaded.references["max_internal_steps"]], [50])
-        instance.initialize(**START)
-        instance.step(0.0, 0.01)
-        state, own = instance.fmi.getFMUstate(), instance.everything()
-        with pytest.raises(FMICallException) as caught:
-            instance.step(0.01, 100.0)
-        assert caught.value.status == 2
-        assert 0.01 <= instance.fmi.getRealStatus(fmi2.fmi2LastSuccessfulTime) < 100
-        instance.fmi.setFMUstate(state)
-        assert instance.everything() == own
-        instance.step(0.01, 0.01)
-        after = instance.everything()
-    with Instance(loaded) as instance:
-        instance.fmi.setInteger([loaded.references["max_internal_steps"]], [50])
-        instance.initialize(**START)
-        instance.step(instance.step(0.0, 0.01), 0.01)
-        assert instance.everything() == after
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

@@ -1,11 +1,9 @@
 """Start times, long runs, masters that are a little off, and what changes between steps."""
 
 import math
-import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from ctypes import c_double
-from itertools import pairwise
 from types import ModuleType, SimpleNamespace
 
 import heyoka as hy
@@ -13,8 +11,8 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from tests.support.cosim_project import declared, load
-from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, LoadedFmu, status_of
+from tests.support.cosim_project import declared
+from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
@@ -71,13 +69,6 @@ def master(
             rows.append(reals(instance, without))
         assert instance.get("time") == [start + count * h]
     return np.array(rows)
-
-
-@pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
-def test_start_time_does_not_matter_where_points_are_exact(loaded: LoadedFmu, start: float) -> None:
-    """Steps of 1/128 s are exact at all these times: the results are equal bit for bit."""
-    expected = master(loaded, 0.0, 1 / 128, 384)
-    assert np.array_equal(master(loaded, start, 1 / 128, 384), expected)
 
 
 @pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
@@ -197,46 +188,6 @@ def test_stop_time_is_reached_by_600_000_steps(loaded: LoadedFmu) -> None:
         assert "600" in instance.messages[-1].text
 
 
-# ---- Masters that are off ----------------------------------------------------------------------
-
-
-def at_one_second(loaded: LoadedFmu) -> Instance:
-    """An instance at t = 1 s, after steps of 10 ms."""
-    instance = Instance(loaded).initialize(tolerance=1e-10, **START)
-    instance.set(tau1=1.0, f2=-7.0)
-    for i in range(100):
-        instance.step(i / 100, 0.01)
-    return instance
-
-
-@pytest.mark.parametrize("off", [1e-10, -1e-10])
-def test_master_that_is_off_by_rounding_is_followed(loaded: LoadedFmu, off: float) -> None:
-    """The step ends where the master says, and covers the time from where the instance is."""
-    with at_one_second(loaded) as instance, at_one_second(loaded) as exact:
-        instance.step(1.0 + off, 0.01)
-        assert instance.get("time") == [1.0 + off + 0.01]
-        exact.step(1.0, 1.0 + off + 0.01 - 1.0)
-        assert reals(instance) == pytest.approx(reals(exact), rel=1e-13, abs=1e-13)
-        instance.step(1.01, 0.01)  # and back
-        exact.step(exact.get("time")[0], 1.02 - exact.get("time")[0])
-        assert reals(instance) == pytest.approx(reals(exact), rel=1e-13, abs=1e-13)
-        assert not instance.messages
-
-
-@pytest.mark.parametrize("off", [1e-3, -1e-3])
-def test_master_that_is_off_by_a_tenth_of_a_step_is_refused(loaded: LoadedFmu, off: float) -> None:
-    with at_one_second(loaded) as instance:
-        before = instance.everything()
-        assert status_of(instance.fmi.doStep, 1.0 + off, 0.01) == ERROR
-        text = instance.messages[-1].text
-        named = {float(number) for number in re.findall(r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?", text)}
-        assert {1.0, 1.0 + off} <= named
-        assert instance.everything() == before
-        instance.fmi.reset()
-        instance.initialize(**START)
-        instance.step(0.0, 0.01)
-
-
 # ---- Tunable parameters ------------------------------------------------------------------------
 
 
@@ -309,66 +260,6 @@ def test_parameters_set_to_what_they_are_change_nothing(loaded: LoadedFmu) -> No
         for one in (instance, other):
             one.step(0.5, 0.5)
         assert instance.everything() == other.everything()
-
-
-# ---- Logging -----------------------------------------------------------------------------------
-
-
-def debug_run(
-    loaded: LoadedFmu, prepare: Callable[[Instance], object], **options: object
-) -> Instance:
-    """The scenario hanging_swing, from SetupExperiment to Terminate; the instance is freed."""
-    scenario = load("hanging_swing")
-    with Instance(loaded, **options) as instance:
-        prepare(instance)
-        values = scenario.parameters | scenario.initial
-        instance.initialize(scenario.start, scenario.stop, scenario.tolerance, **values)
-        for i, (t, end) in enumerate(pairwise(scenario.times.tolist())):
-            instance.set(**{name: v[i].item() for name, v in scenario.inputs.items()})
-            instance.step(t, end - t)
-            instance.get(*STATES)
-        instance.count("solver_steps")
-        instance.fmi.terminate()
-    return instance
-
-
-@pytest.mark.parametrize("how", ["instantiate", "all", "logAll"])
-def test_debug_run_shows_every_call(loaded: LoadedFmu, how: str) -> None:
-    calls: list[str] = []
-
-    def prepare(instance: Instance) -> None:
-        if how != "instantiate":
-            instance.fmi.setDebugLogging(True, [] if how == "all" else [how])
-            instance.messages.clear()
-            calls.clear()
-
-    instance = debug_run(loaded, prepare, logging_on=how == "instantiate", calls=calls.append)
-    made = [re.match(r"fmi2\w+", call).group() for call in calls]
-    assert made[-1] == "fmi2FreeInstance"
-    assert (made[0] == "fmi2Instantiate") == (how == "instantiate")
-    assert made.count("fmi2DoStep") == 1000
-    told = [m.text for m in instance.messages if m.category == "logAll"]
-    assert [text[: len(name)] for text, name in zip(told, made, strict=True)] == made
-    assert {m.status for m in instance.messages} == {OK}
-
-
-@pytest.mark.parametrize("how", ["default", "off again"])
-def test_nothing_is_logged_when_off(loaded: LoadedFmu, how: str) -> None:
-    def prepare(instance: Instance) -> None:
-        if how == "off again":
-            instance.fmi.setDebugLogging(False, [])
-            instance.messages.clear()
-
-    assert debug_run(loaded, prepare, logging_on=how == "off again").messages == []
-
-
-def test_categories_are_those_declared(loaded: LoadedFmu) -> None:
-    declared = [category.name for category in loaded.description.logCategories]
-    assert "logAll" in declared
-    with Instance(loaded) as instance:
-        for category in declared:
-            instance.fmi.setDebugLogging(True, [category])
-        assert status_of(instance.fmi.setDebugLogging, True, ["logNothing"]) == ERROR
 
 
 # ---- Solver insight ----------------------------------------------------------------------------
@@ -444,16 +335,6 @@ def test_numbers_of_the_solver_are_plausible(loaded: LoadedFmu) -> None:
         assert 0 < now["solver_failed_steps"] < now["solver_steps"] / 10
         # nothing changed: only the history's length asks for restarts
         assert 1 <= now["solver_restarts"] <= 1 + now["solver_steps"] / 500
-
-
-def test_steps_follow_the_tolerance(loaded: LoadedFmu) -> None:
-    steps = []
-    for tolerance in (1e-4, 1e-7, 1e-10):
-        with Instance(loaded) as instance:
-            instance.initialize(tolerance=tolerance, **WHIRL)
-            instance.step(0.0, 10.0)
-            steps.append(instance.count("solver_steps"))
-    assert steps[0] < steps[1] < steps[2]
 
 
 def test_model_exchange_counts_nothing(loaded: LoadedFmu) -> None:

@@ -9,14 +9,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Model, FMU2Slave
-from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.fmi3 import FMU3Model
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from tests.support.all_fmus import NAMES
+from tests.support.instances import instantiated, set_value
+from tests.support.paths import NAMES
 
 MODES = ("initialization", "event", "continuous-time")
 STEP = 1e-4  # of a value, relative to 1 + its absolute value
@@ -34,33 +33,30 @@ MOVED |= {"stribeck_velocity1": 0.8, "stribeck_velocity2": 0.9}
 
 
 @contextmanager
-def moved(fmu: Path, name: str, mode: str) -> Iterator[tuple[FMU3Model, ModelDescription]]:
-    """An instance for Model Exchange in this mode, moved away from its start values."""
-    path = fmu.parent / "fmi3" / f"{name}.fmu"
-    description = fmpy.read_model_description(path)
-    model = FMU3Model(
-        guid=description.guid,
-        modelIdentifier=description.modelExchange.modelIdentifier,
-        unzipDirectory=fmpy.extract(path),
-        instanceName="knowns",
-    )
-    model.instantiate()
-    model.enterInitializationMode()
-    references = {v.name: v.valueReference for v in description.modelVariables}
-    start = {key: value for key, value in MOVED.items() if key in references}
-    settable = [v for v in description.modelVariables if v.name in start and v.causality != "local"]
-    for variable in settable:
-        if variable.initial == "exact" or variable.causality in ("input", "parameter"):
-            model.setFloat64([variable.valueReference], [start[variable.name]])
-    if mode != "initialization":
-        model.exitInitializationMode()
-        model.updateDiscreteStates()
-    if mode == "continuous-time":
-        model.enterContinuousTimeMode()
-        model.setTime(0.4)
-    yield model, description
-    model.terminate() if mode != "initialization" else model.reset()
-    model.freeInstance()
+def in_mode(
+    fmu: Path, version: str, name: str, mode: str
+) -> Iterator[tuple[Any, ModelDescription]]:
+    """A new instance in this mode, moved away from its start values."""
+    path = (fmu.parent if version == "fmi2" else fmu.parent / version) / f"{name}.fmu"
+    kind = "CoSimulation" if mode == "step" else "ModelExchange"
+    with instantiated(path, kind) as (model, description):
+        if version == "fmi2":
+            model.setupExperiment()
+        model.enterInitializationMode()
+        for variable in description.modelVariables:
+            is_start = variable.initial == "exact" or variable.causality in ("input", "parameter")
+            if variable.name in MOVED and is_start:
+                set_value(model, variable, MOVED[variable.name])
+        if mode != "initialization":
+            model.exitInitializationMode()
+        if mode in ("event", "continuous-time"):
+            (model.newDiscreteStates if version == "fmi2" else model.updateDiscreteStates)()
+        if mode == "continuous-time":
+            model.enterContinuousTimeMode()
+            model.setTime(0.4)
+        if mode == "step":
+            model.doStep(0.0, 0.01)
+        yield model, description
 
 
 def can_change(variable: ModelVariable, mode: str) -> bool:
@@ -84,7 +80,7 @@ def change(model: FMU3Model, variable: ModelVariable, value: float) -> None:
 def test_every_dependency_has_the_derivative_of_differences(
     fmu: Path, name: str, mode: str
 ) -> None:
-    with moved(fmu, name, mode) as (model, description):
+    with in_mode(fmu, "fmi3", name, mode) as (model, description):
         compared = 0
         for unknown in [*description.outputs, *description.derivatives]:
             reference = [unknown.variable.valueReference]
@@ -128,76 +124,43 @@ def test_every_dependency_has_the_derivative_of_differences(
 ALL_MODES = (*MODES, "step")
 
 
-KINDS = {"fmi2": (FMU2Model, FMU2Slave), "fmi3": (FMU3Model, FMU3Slave)}
-
-
-def in_mode(path: Path, version: str, mode: str) -> tuple[Any, ModelDescription]:
-    """A new instance in this mode."""
-    is_fmi2 = version == "fmi2"
-    description = fmpy.read_model_description(path)
-    model = KINDS[version][mode == "step"](
-        guid=description.guid,
-        modelIdentifier=description.modelExchange.modelIdentifier,
-        unzipDirectory=fmpy.extract(path),
-        instanceName="all at once",
-    )
-    model.instantiate()
-    if is_fmi2:
-        model.setupExperiment()
-    model.enterInitializationMode()
-    for variable in description.modelVariables:
-        is_start = variable.initial == "exact" or variable.causality == "input"
-        if variable.name in MOVED and is_start:
-            set_reals = model.setReal if is_fmi2 else model.setFloat64
-            set_reals([variable.valueReference], [MOVED[variable.name]])
-    if mode != "initialization":
-        model.exitInitializationMode()
-    if mode in ("event", "continuous-time"):
-        (model.newDiscreteStates if is_fmi2 else model.updateDiscreteStates)()
-    if mode == "continuous-time":
-        model.enterContinuousTimeMode()
-    if mode == "step":
-        model.doStep(0.0, 0.01)
-    return model, description
-
-
-@pytest.mark.parametrize("version", list(KINDS))
+@pytest.mark.parametrize("version", ["fmi2", "fmi3"])
 @pytest.mark.parametrize("name", NAMES)
 def test_all_at_once_is_one_by_one(fmu: Path, name: str, version: str) -> None:
-    path = (fmu.parent if version == "fmi2" else fmu.parent / version) / f"{name}.fmu"
     for mode in ALL_MODES:
-        model, description = in_mode(path, version, mode)
-        real = [v for v in description.modelVariables if v.type in ("Real", "Float64")]
-        states = {d.variable.derivative.name for d in description.derivatives}
-        rates = {d.variable.name for d in description.derivatives}
-        knowns = [v.valueReference for v in real if v.causality == "input" or v.name in states]
-        unknowns = [
-            v
-            for v in real
-            if v.causality == "output"
-            or v.name in rates
-            or (v.causality == "local" and v.variability == "discrete")
-        ]
-        references = [v.valueReference for v in unknowns]
-        one_by_one = np.array(
-            [
-                [model.getDirectionalDerivative([u], [k], [1.0])[0] for k in knowns]
-                for u in references
+        with in_mode(fmu, version, name, mode) as (model, description):
+            real = [v for v in description.modelVariables if v.type in ("Real", "Float64")]
+            states = {d.variable.derivative.name for d in description.derivatives}
+            rates = {d.variable.name for d in description.derivatives}
+            knowns = [v.valueReference for v in real if v.causality == "input" or v.name in states]
+            unknowns = [
+                v
+                for v in real
+                if v.causality == "output"
+                or v.name in rates
+                or (v.causality == "local" and v.variability == "discrete")
             ]
-        ).reshape(len(references), len(knowns))
-        seed = np.random.default_rng(1).normal(size=len(knowns))
-        at_once = model.getDirectionalDerivative(references, knowns, list(seed))
-        scale = np.abs(one_by_one) @ np.abs(seed)
-        np.testing.assert_array_less(np.abs(at_once - one_by_one @ seed), 1e-13 * scale + 1e-300)
-        held = [v.variability == "discrete" for v in unknowns]
-        assert not np.any(one_by_one[held])
-        if version == "fmi3":
-            back = np.random.default_rng(2).normal(size=len(references))
-            adjoint = model.getAdjointDerivative(
-                references, knowns, list(back), nSensitivity=len(knowns)
-            )
-            scale = np.abs(back) @ np.abs(one_by_one)
+            references = [v.valueReference for v in unknowns]
+            one_by_one = np.array(
+                [
+                    [model.getDirectionalDerivative([u], [k], [1.0])[0] for k in knowns]
+                    for u in references
+                ]
+            ).reshape(len(references), len(knowns))
+            seed = np.random.default_rng(1).normal(size=len(knowns))
+            at_once = model.getDirectionalDerivative(references, knowns, list(seed))
+            scale = np.abs(one_by_one) @ np.abs(seed)
             np.testing.assert_array_less(
-                np.abs(adjoint - back @ one_by_one), 1e-13 * scale + 1e-300
+                np.abs(at_once - one_by_one @ seed), 1e-13 * scale + 1e-300
             )
-        model.freeInstance()
+            held = [v.variability == "discrete" for v in unknowns]
+            assert not np.any(one_by_one[held])
+            if version == "fmi3":
+                back = np.random.default_rng(2).normal(size=len(references))
+                adjoint = model.getAdjointDerivative(
+                    references, knowns, list(back), nSensitivity=len(knowns)
+                )
+                scale = np.abs(back) @ np.abs(one_by_one)
+                np.testing.assert_array_less(
+                    np.abs(adjoint - back @ one_by_one), 1e-13 * scale + 1e-300
+                )

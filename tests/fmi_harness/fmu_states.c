@@ -143,7 +143,7 @@ CALL_WITH_STATE(SerializeFMUstate)
 CALL_WITH_STATE(DeSerializeFMUstate)
 
 fmi2Status fmu_call(enum fmu_function function, fmi2Component c, double now, double step) {
-#define CALL_OF(name) call_##name,
+#define CALL_OF(name, kinds, states) call_##name,
     static fmi2Status (*const calls[])(fmi2Component c, double now,
                                        double step) = {FMI2_FUNCTION_LIST(CALL_OF)};
 #undef CALL_OF

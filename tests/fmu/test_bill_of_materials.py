@@ -3,22 +3,28 @@
 import json
 import subprocess
 import sys
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import pytest
 
 from tests.support.paths import ROOT
 
-PROGRAM = ROOT / "fmu" / "bill_of_materials.py"
+sys.path.insert(0, str(ROOT / "fmu"))
+from bill_of_materials import main  # noqa: E402
+
 PART = "Solver,1.2.3,BSD-3-Clause,https://solver.example"
 
 
-def write(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    """Run the program on the files of a folder; later options prevail."""
-    files = sorted(folder.rglob("*.fmu"))
-    command = [sys.executable, PROGRAM, *files, "--output", folder, "--version", "1.0.0"]
-    command += ["--license", ROOT / "LICENSE", *options]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+def write(folder: Path, *options: str) -> tuple[int, str]:
+    """Exit code and standard error for the files of a folder; later options prevail."""
+    arguments = [*map(str, sorted(folder.rglob("*.fmu"))), "--output", str(folder)]
+    arguments += ["--version", "1.0.0", "--license", str(ROOT / "LICENSE"), *options]
+    error = StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stderr(error):
+        patch.setattr(sys, "argv", ["bill_of_materials.py", *arguments])
+        return main(), error.getvalue()
 
 
 @pytest.fixture
@@ -32,8 +38,7 @@ def release(tmp_path: Path) -> Path:
 
 
 def test_sha256sum_accepts_the_checksums_until_a_file_changes(release: Path) -> None:
-    result = write(release)
-    assert result.returncode == 0, result.stderr
+    assert write(release) == (0, "")
     check = ["sha256sum", "--check", "--quiet", "--strict", "SHA256SUMS"]
     assert subprocess.run(check, cwd=release, check=False).returncode == 0
     (release / "One.fmu").write_bytes(b"two")
@@ -41,7 +46,7 @@ def test_sha256sum_accepts_the_checksums_until_a_file_changes(release: Path) -> 
 
 
 def test_the_bill_gives_checksums_and_parts(release: Path) -> None:
-    assert write(release, "--part", PART).returncode == 0
+    assert write(release, "--part", PART) == (0, "")
     bill = json.loads((release / "sbom.cdx.json").read_text())
     components = {component["name"]: component for component in bill["components"]}
     assert set(components) == {"One.fmu", "below/Two.fmu", "Solver"}
@@ -58,7 +63,7 @@ def test_the_bill_gives_checksums_and_parts(release: Path) -> None:
 
 def test_the_same_files_give_the_same_bytes_and_others_another_number(release: Path) -> None:
     def bill() -> bytes:
-        assert write(release, "--part", PART).returncode == 0
+        assert write(release, "--part", PART) == (0, "")
         return (release / "sbom.cdx.json").read_bytes()
 
     first = bill()
@@ -80,8 +85,8 @@ def test_the_same_files_give_the_same_bytes_and_others_another_number(release: P
 def test_what_cannot_be_written_is_told_in_a_line(
     release: Path, options: list[str], reason: str
 ) -> None:
-    result = write(release, *options)
-    assert result.returncode == 2
-    (line,) = result.stderr.splitlines()
+    code, error = write(release, *options)
+    (line,) = error.splitlines()
+    assert code == 2
     assert line.startswith("bill_of_materials.py: ") and reason in line
     assert not (release / "SHA256SUMS").exists()

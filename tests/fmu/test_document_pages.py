@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from tests.support.all_fmus import FOLDERS
 from tests.support.browser import Browser
+from tests.support.paths import FOLDERS
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ import pytest
 from fmpy.util import create_plotly_figure
 from fmpy.validation import validate_fmu
 
-from tests.support.all_fmus import FOLDERS, NAMES
-from tests.support.paths import ROOT
+from tests.support.paths import FOLDERS, NAMES, ROOT
 
 CROSS_CHECK = ("_in.csv", "_ref.csv", "_ref.opt")  # endings of a reference's files
 

@@ -14,10 +14,9 @@ import pytest
 from lxml import etree
 
 from tests.importers.by_fmpy import instance
-from tests.support.all_fmus import CARRIED, FOLDERS
 from tests.support.generator import change, copied
 from tests.support.instances import STATES, LoadedFmu
-from tests.support.paths import ROOT
+from tests.support.paths import CARRIED, FOLDERS, ROOT
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST = "fmi-ls-manifest.xml"

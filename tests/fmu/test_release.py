@@ -15,9 +15,8 @@ import lief
 import pytest
 
 from tests.fmu.symbols import libm, standard
-from tests.support.all_fmus import NAMES, SYSTEMS
 from tests.support.missing import missing
-from tests.support.paths import ROOT
+from tests.support.paths import NAMES, ROOT, SYSTEMS
 
 BELOW = {"fmi2": "", "fmi3": "fmi3/"}  # folder of the archives of a version of FMI
 LARGEST = {"fmi2": 2_500_000, "fmi3": 3_500_000}  # bytes of an FMU

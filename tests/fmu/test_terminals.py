@@ -12,9 +12,8 @@ import fmpy
 import pytest
 from lxml import etree
 
-from tests.support.all_fmus import NAMES
 from tests.support.generator import change, copied, generate
-from tests.support.paths import ROOT
+from tests.support.paths import NAMES, ROOT
 
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
 FILE = "terminalsAndIcons/terminalsAndIcons.xml"

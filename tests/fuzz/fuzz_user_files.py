@@ -31,10 +31,10 @@ from fmi3.model_description import model_description as fmi3_model_description  
 from fmi3.terminals import terminals_and_icons  # noqa: E402
 from provenance import Provenance  # noqa: E402
 
-from cosim.runs import reference  # noqa: E402
 from cosim.errors import UserError  # noqa: E402
 from cosim.fmi.fmu_file import read_model  # noqa: E402
 from cosim.fmi.model import Model  # noqa: E402
+from cosim.runs import reference  # noqa: E402
 from cosim.scenarios import scenario as scenarios  # noqa: E402
 from cosim.system import comparison, ssp  # noqa: E402
 from models.closed_loop.study import EXPERIMENT  # noqa: E402

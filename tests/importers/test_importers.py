@@ -20,9 +20,8 @@ import numpy as np
 import pytest
 
 from tests.importers.by_fmpy import co_simulation, euler
-from tests.support.all_fmus import NAMES
 from tests.support.instances import LoadedFmu
-from tests.support.paths import ROOT
+from tests.support.paths import NAMES, ROOT
 
 SCRIPTS = ROOT / "tests" / "importers"
 BOUND = 1e-12  # of each output's maximum

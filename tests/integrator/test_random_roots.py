@@ -15,6 +15,7 @@ from tests.integrator.exact_roots import Exact, isolate
 from tests.support.paths import ROOT
 
 LENGTH = 32
+POLYNOMIALS = int(os.environ.get("ROOT_POLYNOMIALS", "7000"))  # long_random_roots has more
 FALLS, RISES, TOUCHES = range(3)
 U = 2.0**-53
 KNOWN = 2.0**-94  # part of the sum of the sizes of all terms: a sign beyond it is known
@@ -163,7 +164,7 @@ def wrong_count(p: Exact, c: np.ndarray, found: Found) -> Iterator[str]:
 
 
 def test_random_polynomials_have_their_exact_roots(program: Path) -> None:
-    given = polynomials(21_000, seed=15)
+    given = polynomials(POLYNOMIALS, seed=15)
     wrong = []
     for c, found in zip(given, find(program, given), strict=True):
         p = Exact.of(c)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from models.machine.experiment import STEPS_PER_SECOND, STOP
+from tests.importers.libcosim import libcosim, only_variant
 from tests.machine.test_machine import BOUND, DISCRETE, SCALE, SSP, VARIANTS, reference
-from tests.support.libcosim import libcosim, only_variant
 from tests.support.ssp_files import edited
 
 

@@ -11,7 +11,7 @@ from cosim.system.ssp import Ssp
 from models.machine import wall_limit
 from models.machine.stability import Contact, exact_least_damping, least_damping
 from models.machine.wall_limit import CASES, DEPTH, MASS, MOVED, PUSH, STEP, STEPS, Measure
-from tests.support.libcosim import libcosim
+from tests.importers.libcosim import libcosim
 
 STIFFNESS = 1e4  # N/m
 

@@ -14,7 +14,7 @@ from tests.platforms import refusals, scripts
 from tests.platforms.platforms import Runner, runner
 from tests.platforms.scripts import METHODS, Model, Script, bits, joined
 from tests.platforms.transcript import NOT_WRITTEN, Answer, first_difference, read
-from tests.support.all_fmus import NAMES
+from tests.support.paths import NAMES
 
 each_fmu = pytest.mark.parametrize("name", NAMES)
 

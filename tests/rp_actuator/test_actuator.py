@@ -16,7 +16,7 @@ from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference
 from cosim.runs.comparison import Runs
 from tests.support.cosim_project import assert_made_again, declared, load, names_of
-from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 
 UNIT = "RPActuator"
@@ -147,31 +147,6 @@ def test_dependencies_are_those_of_the_equations(loaded: LoadedFmu) -> None:
 
 
 # ---- What is refused -----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("joint", [1, 2])
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        (name, value)
-        for name in PER_JOINT
-        if name != "gear_ratio"
-        for value in (0.0, -1.5, 1e-10, float("inf"), float("nan"))
-    ],
-)
-def test_values_out_of_range_are_refused(
-    loaded: LoadedFmu, name: str, value: float, joint: int
-) -> None:
-    name = f"{name}{joint}"
-    variables = {v.name: v for v in loaded.description.modelVariables}
-    with Instance(loaded) as instance:
-        assert status_of(lambda: instance.set(**{name: value})) == DISCARD
-        text = instance.messages[-1].text
-        assert f"{name} = " in text and "is refused" in text
-        if value in (-1.5, 0.0):
-            assert f"{name} = {value:g}" in text
-        start = float(variables[name].start)
-        assert instance.initialize().get(name) == [start]
 
 
 @pytest.mark.parametrize("joint", [1, 2])

@@ -41,7 +41,7 @@ from tests.rp_controller.controller_symbolic import (
     terms_of_values,
 )
 from tests.support.cosim_project import assert_made_again, declared, load, names_of
-from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 
 UNIT = "RPController"
@@ -167,23 +167,6 @@ def test_parameters_that_leave_no_inertia_are_refused(loaded: LoadedFmu) -> None
         instance.fmi.enterInitializationMode()
         assert status_of(instance.fmi.exitInitializationMode) == ERROR
         assert "m1 lc1^2 + I1z + I2z = 0 is refused" in instance.messages[-1].text
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("Kp1", -1.0), ("Ki2", -1e-9), ("inertia1", 0.0), ("tracking_time", 0.0), ("f2_max", -1.0)],
-)
-def test_values_out_of_range_are_refused(loaded: LoadedFmu, name: str, value: float) -> None:
-    with Instance(loaded) as instance:
-        assert status_of(lambda: instance.set(**{name: value})) == DISCARD
-        assert name in instance.messages[-1].text
-
-
-def test_unknown_modes_are_refused(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance:
-        for mode in (0, 4):
-            status = status_of(instance.fmi.setInteger, [loaded.references["mode"]], [mode])
-            assert status == DISCARD and "mode" in instance.messages[-1].text
 
 
 def test_the_taylor_method_is_refused_where_the_fmu_integrates(loaded: LoadedFmu) -> None:

@@ -283,13 +283,6 @@ def test_the_scenario_meets_its_reference(path: Path, version: str) -> None:
 # ---- What is refused -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["sample_time", "delay", "payload_mass", "payload_inertia"])
-def test_negative_values_are_refused(loaded: LoadedFmu, name: str) -> None:
-    with Instance(loaded) as instance:
-        assert status_of(lambda: instance.set(**{name: -1e-3})) == DISCARD
-        assert f"{name} = -0.001 is refused" in instance.messages[-1].text
-
-
 REFUSED = {
     "too short": ({"sample_time": 5e-7}, "sample_time = 5e-07 s is refused: it must be 0, "),
     "too late": (

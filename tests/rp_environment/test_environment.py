@@ -21,7 +21,7 @@ from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference
 from cosim.runs.comparison import Runs
 from tests.support.cosim_project import assert_made_again, declared, load, names_of
-from tests.support.instances import DISCARD, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
 
 UNIT = "RPEnvironment"
@@ -297,23 +297,6 @@ def test_fmpy_simulates_it(path: Path, kind: str) -> None:
     assert (np.diff(result["penetration"]) >= 0.0).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("stiffness", -1.0), ("damping", -0.25), ("position", math.inf)]
-)
-def test_values_out_of_range_are_refused(loaded: LoadedFmu, name: str, value: float) -> None:
-    with Instance(loaded) as instance:
-        assert status_of(lambda: instance.set(**{name: value})) == DISCARD
-        text = instance.messages[-1].text
-        assert name in text and f"{value:g}" in text, text
-
-
-@pytest.mark.parametrize("name", [*PARAMETERS, *INPUTS])
-def test_what_is_no_number_is_refused(loaded: LoadedFmu, name: str) -> None:
-    with Instance(loaded) as instance:
-        assert status_of(lambda: instance.set(**{name: math.nan})) == DISCARD
-        assert name in instance.messages[-1].text and "nan" in instance.messages[-1].text
-
-
 def test_a_force_beyond_all_numbers_is_discarded(loaded: LoadedFmu) -> None:
     with running(loaded, {"position": 0.0, "stiffness": 1e308, "ee_x": -1e3}) as instance:
         assert status_of(lambda: instance.get("wall_force")) == DISCARD
@@ -326,20 +309,6 @@ def test_parameters_change_between_steps(loaded: LoadedFmu) -> None:
             instance.set(stiffness=stiffness)
             instance.step(0.1 * i, 0.1)
             assert instance.get("wall_force") == [pytest.approx(0.01 * stiffness, abs=1e-10)]
-
-
-def test_states_are_saved_and_restored(loaded: LoadedFmu) -> None:
-    with running(loaded, generic_point(PRESSED, 1)) as instance:
-        instance.set_input_derivatives(ee_x=[0.01], ee_angle=[0.02])
-        instance.step(0.0, 0.1)
-        state = instance.fmi.getFMUstate()
-        once = instance.everything()
-        instance.set(ee_x=3.0)
-        instance.step(0.1, 0.1)
-        assert instance.everything() != once
-        instance.fmi.setFMUstate(state)
-        assert instance.everything() == once
-        assert status_of(instance.fmi.freeFMUstate, state) == OK
 
 
 # ---- References ----------------------------------------------------------------------------------

@@ -18,8 +18,8 @@ import sympy as sp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from models.rp_manipulator.references.make_references import PARAMETERS, derive
 from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
-from tests.support.rp_symbolic import PARAMETERS, Model
 
 TAYLOR = 4
 NOMINAL_FRACTION = 1e-2
@@ -100,7 +100,7 @@ class Exact:
                 first + hy.time * (second / 2.0 + hy.time * (third / 6.0))
             )
         states = hy.make_vars(*STATES)
-        accelerations = [hy.from_sympy(sp.simplify(e), names) for e in Model().accelerations]
+        accelerations = [hy.from_sympy(e, names) for e in derive().accelerations]
         self.integrator = hy.taylor_adaptive(
             list(zip(states, (states[2], states[3], *accelerations), strict=True)),
             np.zeros(4, dtype=real),

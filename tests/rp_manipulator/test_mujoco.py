@@ -4,16 +4,14 @@ MuJoCo knows nothing of the equations of the notes: it gets masses, inertias and
 (rp_manipulator.xml) and forms its own mass matrix and bias forces.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
-import fmpy
 import mujoco
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Slave
+
+from tests.support.instances import Instance, LoadedFmu
 
 MODEL = Path(__file__).parent / "rp_manipulator.xml"
 STATES = 1000
@@ -31,43 +29,25 @@ PARAMETER_SETS = {
 VARIABLES = ["q1", "q2", "dq1", "dq2", "tau1", "f2"]
 
 
-class Fmu:
-    """RPManipulator.fmu, instantiated once and evaluated at given states."""
-
-    def __init__(self, path: Path, unzip_directory: Path) -> None:
-        description = fmpy.read_model_description(path)
-        self._reference = {v.name: v.valueReference for v in description.modelVariables}
-        self._slave = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=fmpy.extract(path, unzipdir=unzip_directory),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="test_mujoco",
-        )
-        self._slave.instantiate()
-
-    def accelerations(self, values: dict[str, float]) -> np.ndarray:
-        """Accelerations (ddq1, ddq2) in rad/s2 and m/s2 after a reset to the given values."""
-        self._slave.reset()
-        self._slave.setupExperiment()
-        self._slave.enterInitializationMode()
-        self._slave.setReal([self._reference[name] for name in values], list(values.values()))
-        return np.array(self._slave.getReal([self._reference["ddq1"], self._reference["ddq2"]]))
-
-    def close(self) -> None:
-        """Free the instance."""
-        self._slave.freeInstance()
-
-
 @pytest.fixture(scope="module")
-def arm(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fmu]:
+def arm(loaded: LoadedFmu) -> Iterator[Instance]:
     """One instance for all states."""
-    instance = Fmu(fmu, tmp_path_factory.mktemp("fmu"))
-    yield instance
-    instance.close()
+    with Instance(loaded) as instance:
+        yield instance
+
+
+def accelerations(arm: Instance, values: dict[str, float]) -> np.ndarray:
+    """Accelerations (ddq1, ddq2) in rad/s2 and m/s2 after a reset to the given values."""
+    arm.fmi.reset()
+    arm.fmi.setupExperiment()
+    arm.fmi.enterInitializationMode()
+    arm.set(**values)
+    return np.array(arm.get("ddq1", "ddq2"))
 
 
 def mujoco_model(parameters: dict[str, float]) -> mujoco.MjModel:
-    """Compile the arm with the given parameters."""
+    """The arm with these parameters; drives and a welded payload, where they have any."""
+    given = parameters.get
     spec = mujoco.MjSpec.from_file(str(MODEL))
     spec.option.gravity = [0.0, -parameters["g"], 0.0]
     link1, link2 = spec.body("link1"), spec.body("link2")
@@ -75,6 +55,16 @@ def mujoco_model(parameters: dict[str, float]) -> mujoco.MjModel:
     link1.inertia, link2.inertia = [parameters["I1z"]] * 3, [parameters["I2z"]] * 3
     link1.ipos = [parameters["lc1"], 0.0, 0.0]
     link2.pos = [parameters["l1"], parameters["a"], 0.0]
+    for joint in (1, 2):
+        spec.joint(f"q{joint}").armature = given(f"armature{joint}", 0.0)
+        spec.joint(f"q{joint}").damping = [given(f"damping{joint}", 0.0), 0.0, 0.0]
+    if given("attached", 0.0):
+        payload = link2.add_body(name="payload")
+        payload.explicitinertial = True
+        payload.mass = parameters["payload_mass"]
+        payload.inertia = [parameters["payload_inertia"]] * 3
+        # x along the slide, y along the short side of link 1
+        payload.ipos = [parameters["payload_z"], parameters["payload_x"], 0.0]
     return spec.compile()
 
 
@@ -104,14 +94,14 @@ def test_model_file_holds_the_default_parameters() -> None:
 
 
 @pytest.mark.parametrize("name", PARAMETER_SETS)
-def test_accelerations_are_those_of_mujoco(arm: Fmu, name: str) -> None:
+def test_accelerations_are_those_of_mujoco(arm: Instance, name: str) -> None:
     parameters = PARAMETER_SETS[name]
     model = mujoco_model(parameters)
     data = mujoco.MjData(model)
     for state in random_states(seed=len(name)):
         data.qpos, data.qvel, data.qfrc_applied = state[0:2], state[2:4], state[4:6]
         mujoco.mj_forward(model, data)
-        ddq = arm.accelerations(parameters | dict(zip(VARIABLES, state, strict=True)))
+        ddq = accelerations(arm, parameters | dict(zip(VARIABLES, state, strict=True)))
         # MuJoCo factors J + m2 a^2 - m2 a^2, which loses up to 1 + m2 a^2 / J < 16 of its digits:
         # 16 * 2e-16, with a few roundings of each
         error = np.abs(ddq - data.qacc) / acceleration_terms(parameters, state)

@@ -18,8 +18,11 @@ def program(fmu: Path) -> Path:
     return path
 
 
-def opened_in(path: Path, version: str) -> Fmu:
-    return Fmu(path if version == "fmi2" else fmi3_fmu(path))
+@pytest.fixture(scope="session")
+def fmi2_plant(fmu: Path) -> Iterator[Fmu]:
+    """RPPlant of FMI 2.0."""
+    with Fmu(fmu.with_name("RPPlant.fmu")) as opened:
+        yield opened
 
 
 @pytest.fixture(scope="session", params=["fmi2", "fmi3"])
@@ -29,14 +32,17 @@ def version(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="session")
-def plant(fmu: Path, version: str) -> Iterator[Fmu]:
-    """RPPlant."""
-    with opened_in(fmu.with_name("RPPlant.fmu"), version) as opened:
+def plant(fmi2_plant: Fmu, version: str) -> Iterator[Fmu]:
+    """RPPlant of both versions of FMI."""
+    if version == "fmi2":
+        yield fmi2_plant
+        return
+    with Fmu(fmi3_fmu(fmi2_plant.path)) as opened:
         yield opened
 
 
 @pytest.fixture(scope="session")
 def arm(fmu: Path, version: str) -> Iterator[Fmu]:
     """RPManipulator, in the same version of FMI."""
-    with opened_in(fmu, version) as opened:
+    with Fmu(fmu if version == "fmi2" else fmi3_fmu(fmu)) as opened:
         yield opened

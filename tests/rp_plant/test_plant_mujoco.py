@@ -10,10 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.rp_manipulator.test_mujoco import mujoco_model
 from tests.rp_plant.plant_rows import DEFAULT, evaluate
-from tests.support.paths import ROOT
 
-MODEL = ROOT / "tests" / "rp_manipulator" / "rp_manipulator.xml"
 STATES = 500
 FEATURES = {
     "armature": {"armature1": 0.3, "armature2": 0.7},
@@ -25,26 +24,6 @@ FEATURES = {
     },
 }  # fmt: skip
 EVERYTHING = {name: value for feature in FEATURES.values() for name, value in feature.items()}
-Case = dict[str, float]
-
-
-def mujoco_model(case: Case) -> mujoco.MjModel:
-    """The arm with drives and a welded payload; bodies have x along the slide, y along the short
-    side of link 1."""
-    spec = mujoco.MjSpec.from_file(str(MODEL))
-    spec.option.gravity = [0.0, -case["g"], 0.0]
-    for name, joint in (("q1", 1), ("q2", 2)):
-        spec.joint(name).armature = case.get(f"armature{joint}", 0.0)
-        spec.joint(name).damping = [case.get(f"damping{joint}", 0.0), 0.0, 0.0]
-    link2 = spec.body("link2")
-    link2.pos = [case["l1"], case["a"], 0.0]
-    if case.get("attached", 0.0):
-        payload = link2.add_body(name="payload")
-        payload.explicitinertial = True
-        payload.mass = case["payload_mass"]
-        payload.inertia = [case["payload_inertia"]] * 3
-        payload.ipos = [case["payload_z"], case["payload_x"], 0.0]
-    return spec.compile()
 
 
 @pytest.mark.parametrize("name", [*FEATURES, "everything"])

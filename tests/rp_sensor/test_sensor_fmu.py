@@ -5,49 +5,17 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.simulation import instantiate_fmu
 
 from cosim.errors import UserError
 from cosim.fmi.fmu_file import Fmu
 from models.rp_sensor.references.make_references import Encoder
 from tests.rp_sensor.sensor_runs import COUNTS, MODEL, start_values, started
 from tests.support.cosim_project import assert_made_again, declared, fmi3_fmu, load, names_of
-from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
+from tests.support.instances import DISCARD, Instance, LoadedFmu, instantiated, status_of
 
 SCENARIOS = names_of(MODEL.name)
 
 # ---- What is refused ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "limits"),
-    [
-        ("sample_time", 0.0, "1e-06 to inf"),
-        ("sample_time", 9.99e-7, "1e-06 to inf"),
-        ("sample_time", -0.001, "1e-06 to inf"),
-        ("latency", -1, "0 to 64"),
-        ("latency", 65, "0 to 64"),
-        ("resolution1", 0.0, "1e-12 to inf"),
-        ("resolution2", -1e-6, "1e-12 to inf"),
-        ("noise1", -1e-9, "0 to inf"),
-        ("noise2", -1.0, "0 to inf"),
-    ],
-)
-def test_values_out_of_range(sensor: Fmu, name: str, value: float, limits: str) -> None:
-    with sensor.instance("sensor") as instance:
-        with pytest.raises(UserError):
-            instance.set(name, value)
-        message = instance.messages[-1]
-        assert message.startswith(f"{name} = {value:g} is refused: a value from {limits} "), message
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-@pytest.mark.parametrize("name", ["sample_time", "resolution1", "noise2", "q1"])
-def test_values_that_are_not_finite(sensor: Fmu, name: str, value: float) -> None:
-    with sensor.instance("sensor") as instance:
-        with pytest.raises(UserError):
-            instance.set(name, value)
-        assert name in instance.messages[-1]
 
 
 @pytest.mark.parametrize("name", start_values())
@@ -166,15 +134,11 @@ def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: b
     assert all(found) if early_return else not any(found)
 
 
-def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Path) -> None:
+def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path) -> None:
     path = fmi3_fmu(fmu.with_name("RPSensor.fmu"))
-    fmpy.extract(path, tmp_path)
-    description = fmpy.read_model_description(path)
-    reference = {v.name: v.valueReference for v in description.modelVariables}
-    sensor = instantiate_fmu(
-        tmp_path, description, "CoSimulation", early_return_allowed=True, event_mode_used=True
-    )
-    try:
+    options = {"early_return_allowed": True, "event_mode_used": True}
+    with instantiated(path, "CoSimulation", **options) as (sensor, description):
+        reference = {v.name: v.valueReference for v in description.modelVariables}
         sensor.enterInitializationMode(startTime=0.0)
         sensor.setFloat64([reference["resolution1"], reference["sample_time"]], [0.25, 0.125])
         sensor.exitInitializationMode()
@@ -190,8 +154,6 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path, tmp_path: Pat
             assert sensor.updateDiscreteStates()[-2:] == (True, (k + 1) * 0.125)
             assert sensor.getInt32([reference["counts1"]]) == [k * k]
             sensor.enterStepMode()
-    finally:
-        sensor.freeInstance()
 
 
 # ---- References --------------------------------------------------------------------------------

@@ -8,10 +8,8 @@ import pytest
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
-from tests.rp_plant.fmu.test_plant_forged_states import with_hash
-from tests.rp_plant.fmu.test_plant_rollback import packed, unpack
 from tests.rp_sensor.sensor_runs import Shown, Stepper, shown, started
-from tests.support.instances import ERROR, status_of
+from tests.support.instances import ERROR, hashed, restore, serialized, status_of
 
 CUBICS = ((0.3, -0.7, 0.9, -0.2), (0.01, 0.2, -0.3, 0.1))
 OFF_GRID = {"sample_time": 0.00137, "latency": 3, "seed": 11, "noise1": 2e-3, "noise2": 3e-6}
@@ -53,14 +51,14 @@ def test_rollback_leaves_no_trace(sensor: Fmu) -> None:
         for i in range(100):
             t, end = i / 100, (i + 1) / 100
             saved.take()
-            content = packed(instance)
+            content = serialized(instance)
             for _ in range(chance.randrange(3)):
                 stepper.step(t, chance.choice([1e-4, 0.004, 0.01, 0.3]))
                 saved.restore()
             stepper.step(t, end - t)
             assert shown(instance) == expected[i]
             if i % 10 == 0:  # the same in another instance
-                unpack(other, content)
+                restore(other, content)
                 Stepper(other, CUBICS).step(t, end - t)
                 assert shown(other) == expected[i]
         saved.free()
@@ -109,7 +107,7 @@ def samples_of(instance: Instance) -> list[int]:
 def test_forged_states_are_refused(sensor: Fmu) -> None:
     with started(sensor, start=0.0) as instance:
         samples = samples_of(instance)
-        good = packed(instance)
+        good = serialized(instance)
         ticks = struct.pack("<dd", 0.0, 10.0)
         assert integers(samples) in good and ticks in good
         forged = [
@@ -124,26 +122,26 @@ def test_forged_states_are_refused(sensor: Fmu) -> None:
         before = shown(instance)
         for content in forged:
             assert content != good
-            assert status_of(unpack, instance, with_hash(content)) == ERROR
+            assert status_of(restore, instance, hashed(content)) == ERROR
             assert "impossible" in instance.messages[-1]
             assert shown(instance) == before
-            unpack(instance, good)  # an error ends with a state that is restored
+            restore(instance, good)  # an error ends with a state that is restored
         # other counts that ticks could have left are accepted, with the hash that fits
         possible = [5, *samples[1:]]
-        unpack(instance, with_hash(good.replace(integers(samples), integers(possible))))
+        restore(instance, hashed(good.replace(integers(samples), integers(possible))))
 
 
 def test_a_state_of_the_initialization_has_no_ticks(sensor: Fmu) -> None:
     with started(sensor) as instance:
-        place = packed(instance).index(struct.pack("<dd", 0.0, 1.0))
+        place = serialized(instance).index(struct.pack("<dd", 0.0, 1.0))
     with sensor.instance("sensor") as instance:
         instance.set_up(0.0, None)
         instance.enter_initialization()
         before = shown(instance)
-        good = packed(instance)
+        good = serialized(instance)
         assert good[place : place + 16] == struct.pack("<dd", 0.0, 0.0)
         for ticks in (1.0, 1e300, -1.0):
             content = good[:place] + struct.pack("<dd", 0.0, ticks) + good[place + 16 :]
-            assert status_of(unpack, instance, with_hash(content)) == ERROR
+            assert status_of(restore, instance, hashed(content)) == ERROR
             assert shown(instance) == before
-            unpack(instance, good)
+            restore(instance, good)

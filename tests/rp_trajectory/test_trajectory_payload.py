@@ -1,22 +1,14 @@
 """The Boolean output of RPTrajectory: the payload is attached from grasp_time to release_time."""
 
-from pathlib import Path
-
-import fmpy
 import pytest
 from fmpy.fmi2 import FMU2Model
-from fmpy.fmi3 import FMU3Slave
 
 from tests.support.cosim_project import FMUS, fmi3_fmu
-from tests.support.instances import ERROR, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, Instance, LoadedFmu, instantiated, set_value, status_of
 
+UNIT = "RPTrajectory"
 GRASP, RELEASE = 0.3, 0.70001
 GRASPED = {"grasp_time": GRASP, "release_time": RELEASE}
-
-
-@pytest.fixture(scope="module")
-def loaded(tmp_path_factory: pytest.TempPathFactory) -> LoadedFmu:
-    return LoadedFmu(FMUS["rp_trajectory"], tmp_path_factory.mktemp("unit"))
 
 
 def is_attached(instance: Instance) -> bool:
@@ -93,39 +85,31 @@ def test_grasp_and_release_are_time_events_in_model_exchange(loaded: LoadedFmu) 
         assert not is_defined and not is_attached(instance)
 
 
-def test_steps_end_at_grasp_and_release_in_event_mode(tmp_path: Path) -> None:
+def test_steps_end_at_grasp_and_release_in_event_mode() -> None:
     path = fmi3_fmu(FMUS["rp_trajectory"])
-    description = fmpy.read_model_description(path)
-    references = {v.name: v.valueReference for v in description.modelVariables}
-    fmpy.extract(path, tmp_path)
-    unit = FMU3Slave(
-        guid=description.instantiationToken,
-        modelIdentifier="RPTrajectory",
-        unzipDirectory=str(tmp_path),
-        instanceName="grasp",
-    )
+    options = {"event_mode_used": True, "early_return_allowed": True}
+    with instantiated(path, "CoSimulation", **options) as (unit, description):
+        variables = {v.name: v for v in description.modelVariables}
 
-    def attached() -> list[bool]:
-        return [bool(x) for x in unit.getBoolean([references["payload_attached"]])]
+        def attached() -> bool:
+            return bool(unit.getBoolean([variables["payload_attached"].valueReference])[0])
 
-    unit.instantiate(eventModeUsed=True, earlyReturnAllowed=True)
-    unit.setFloat64([references[name] for name in GRASPED], list(GRASPED.values()))
-    unit.enterInitializationMode()
-    unit.exitInitializationMode()
-    t = 0.0
-    for due, after in ((GRASP, True), (RELEASE, False)):
-        *_, is_defined, next_time = unit.updateDiscreteStates()
-        assert is_defined and next_time == due
-        unit.enterStepMode()
-        event, _, early, t = unit.doStep(t, 1.0)
-        assert event and early and t == due
-        assert attached() == [not after]
-        unit.enterEventMode()
-        *_, is_defined, _ = unit.updateDiscreteStates()
-        assert attached() == [after]
-    assert not is_defined
-    unit.terminate()
-    unit.freeInstance()
+        for name, value in GRASPED.items():
+            set_value(unit, variables[name], value)
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+        t = 0.0
+        for due, after in ((GRASP, True), (RELEASE, False)):
+            *_, is_defined, next_time = unit.updateDiscreteStates()
+            assert is_defined and next_time == due
+            unit.enterStepMode()
+            event, _, early, t = unit.doStep(t, 1.0)
+            assert event and early and t == due
+            assert attached() != after
+            unit.enterEventMode()
+            *_, is_defined, _ = unit.updateDiscreteStates()
+            assert attached() == after
+        assert not is_defined
 
 
 def test_times_are_fixed(loaded: LoadedFmu) -> None:

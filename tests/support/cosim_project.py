@@ -17,8 +17,7 @@ from cosim.fmi.fmu_file import read_model
 from cosim.fmi.model import Model
 from cosim.scenarios import scenario as scenarios
 from cosim.scenarios.scenario import Scenario
-from tests.support.all_fmus import FOLDERS
-from tests.support.paths import ROOT
+from tests.support.paths import FOLDERS, ROOT
 
 BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
 FMUS = {folder: BUILD / f"{name}.fmu" for name, folder in FOLDERS.items()}

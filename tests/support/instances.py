@@ -1,13 +1,17 @@
 """Instances of the built FMU as fmpy drives them: variables by name, messages kept."""
 
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import fmpy
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
+from fmpy.model_description import ModelDescription, ModelVariable
+from fmpy.simulation import instantiate_fmu
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 STATES = ("q1", "q2", "dq1", "dq2")
@@ -121,6 +125,29 @@ class Instance:
         """Make a step from `t`; return the time at its end."""
         self.fmi.doStep(t, h)
         return t + h
+
+
+@contextmanager
+def instantiated(path: Path, kind: str, **options: bool) -> Iterator[tuple[Any, ModelDescription]]:
+    """An instance of either version as fmpy has it, with the description of its FMU.
+
+    `kind`: "CoSimulation" or "ModelExchange"; `options`: those of fmpy's instantiate_fmu.
+    """
+    description = fmpy.read_model_description(path)
+    with TemporaryDirectory() as folder:
+        fmpy.extract(path, folder)
+        fmu = instantiate_fmu(folder, description, kind, **options)
+        try:
+            yield fmu, description
+        finally:
+            fmu.freeInstance()
+
+
+def set_value(fmu: Any, variable: ModelVariable, value: float) -> None:
+    """Set a variable of any type, in either version."""
+    integer = "Integer" if isinstance(fmu, fmi2._FMU2) else "Int64"
+    kind = integer if variable.type == "Enumeration" else variable.type
+    getattr(fmu, f"set{kind}")([variable.valueReference], [value])
 
 
 def serialized(instance: Any) -> bytes:

@@ -1,5 +1,17 @@
-"""Where the project is."""
+"""Where the project is, and all FMUs and systems of its CMakeLists.txt: tests of one are of all."""
 
+import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+
+_TEXT = (ROOT / "CMakeLists.txt").read_text()
+_FMU = re.compile(
+    r"^add_fmu\((\w+) FOLDER models/(\w+) LIBRARY \w+(?:\s+REFERENCES ([\w ]+))?\)", re.M
+)
+_DECLARED = _FMU.findall(_TEXT)
+
+NAMES = tuple(name for name, _, _ in _DECLARED)
+FOLDERS = {name: folder for name, folder, _ in _DECLARED}  # below models/
+CARRIED = {name: scenarios.split() for name, _, scenarios in _DECLARED if scenarios}
+SYSTEMS = tuple(re.findall(r"^add_ssp\((\w+)", _TEXT, re.MULTILINE))

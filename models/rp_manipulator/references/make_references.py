@@ -8,6 +8,7 @@ Revolute-Prismatic (RP) manipulator (Problem 7.8)" goes in.
 
 import sys
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import heyoka as hy
@@ -36,6 +37,7 @@ class Equations:
     outputs: dict[str, sp.Expr]
 
 
+@cache
 def derive() -> Equations:
     """Equations of motion by Euler-Lagrange from positions in frame 0, and every Real output."""
     m1, m2, I1z, I2z, l1, lc1, a, g = sp.symbols(PARAMETERS)

@@ -5,13 +5,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from ctypes import c_double
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from fmpy import extract, read_model_description
-from fmpy.simulation import instantiate_fmu
 from fmpy.sundials import CVodeSolver
+
+from tests.support.instances import instantiated, set_value
 
 STATES = ("q1", "q2", "dq1", "dq2")
 
@@ -57,13 +56,7 @@ class PlantModel:
 
     def set(self, name: str, value: float | bool) -> None:
         """Set a variable of any type."""
-        variable = self.variables[name]
-        kind = variable.type
-        if self.is_fmi3 and kind == "Enumeration":
-            kind = "Int64"
-        elif kind == "Enumeration":
-            kind = "Integer"
-        getattr(self.fmu, f"set{kind}")([variable.valueReference], [value])
+        set_value(self.fmu, self.variables[name], value)
 
     def get(self, name: str) -> float:
         """Value of a variable."""
@@ -143,22 +136,15 @@ class PlantModel:
 @contextmanager
 def model(path: Path, updates: int = 1, **values: float | bool) -> Iterator[PlantModel]:
     """An instance at t = 0, with these parameters, start values and inputs."""
-    description = read_model_description(path)
-    with TemporaryDirectory() as folder:
-        extract(path, folder)
-        fmu = instantiate_fmu(folder, description, fmi_type="ModelExchange")
+    with instantiated(path, "ModelExchange") as (fmu, description):
         plant = PlantModel(fmu, description, updates)
-        try:
-            if plant.is_fmi3:
-                fmu.enterInitializationMode(startTime=0.0)
-            else:
-                fmu.setupExperiment(startTime=0.0)
-                fmu.enterInitializationMode()
-            for name, value in values.items():
-                plant.set(name, value)
-            fmu.exitInitializationMode()
-            plant.update({})
-            yield plant
-            fmu.terminate()
-        finally:
-            fmu.freeInstance()
+        start = {"startTime": 0.0}
+        if not plant.is_fmi3:
+            fmu.setupExperiment(**start)
+        fmu.enterInitializationMode(**(start if plant.is_fmi3 else {}))
+        for name, value in values.items():
+            plant.set(name, value)
+        fmu.exitInitializationMode()
+        plant.update({})
+        yield plant
+        fmu.terminate()

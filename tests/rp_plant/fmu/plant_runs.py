@@ -4,6 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
+import pytest
+from fmpy.fmi1 import FMICallException
+
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 
@@ -11,6 +14,8 @@ METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 STEPS = {"1 ms": 1e-3, "10 ms": 1e-2, "1 s": 1.0}
 NONE, RIGID, COMPLIANT = 1, 2, 3  # stops
 KEEP_VELOCITY, AT_REST = 1, 2  # grasp
+each_method = pytest.mark.parametrize("method", METHODS)
+each_step = pytest.mark.parametrize("h", STEPS.values(), ids=STEPS)
 FIRM = 1000.0  # N.m, N: dry friction that holds a joint whatever happens
 
 # friction and stops that give events of all kinds
@@ -32,6 +37,11 @@ BOUNCY_STOPS = {
     "upper2": 0.2,
     "restitution2": 0.7,
 }
+
+
+def near(x: float, bound: float = 1e-9) -> float:
+    """Equal to x within a bound in its unit."""
+    return pytest.approx(x, rel=0, abs=bound)
 
 
 class Event(NamedTuple):
@@ -57,7 +67,10 @@ def started(
             instance.set(name, value)
         instance.enter_initialization()
         instance.exit_initialization()
-        yield instance
+        try:
+            yield instance
+        except FMICallException as error:
+            raise instance.failure(error, "in a call") from error
 
 
 def read(instance: Instance, *names: str) -> list[float]:

@@ -17,25 +17,18 @@ from tests.rp_plant.fmu.plant_model_exchange import model
 from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,
     FIRM,
-    METHODS,
-    STEPS,
+    each_method,
+    each_step,
     events,
     last_event,
     modes,
+    near,
     read,
     started,
 )
 
-BOUND = 1e-9  # s, or in the unit of what is compared
 LOWER, UPPER = -0.2, 0.3
 MASS, STIFFNESS = 1.3, 5e3
-
-each_method = pytest.mark.parametrize("method", METHODS)
-each_step = pytest.mark.parametrize("h", STEPS.values(), ids=STEPS)
-
-
-def near(x: float, bound: float = BOUND) -> float:
-    return pytest.approx(x, rel=0, abs=bound)
 
 
 def block(joint: int = 2, k: float = STIFFNESS, c: float = 0.0, **values: float) -> dict:
@@ -294,37 +287,6 @@ def test_an_importer_pulls_a_joint_out_of_a_stop(plant: Fmu) -> None:
     with model(plant.path, **values) as instance:
         rows = instance.simulate(times, {}, 1e-11, names)
     assert rows[-1].tolist() == [near(x, 1e-7) for x in expected] and expected[2] == 3
-
-
-# ---- Rollback --------------------------------------------------------------------------------
-
-
-@each_method
-@pytest.mark.parametrize("t", [0.19, 0.205, 0.3])
-def test_rollback_across_a_contact(plant: Fmu, method: str, t: float) -> None:
-    """From before, within and after a contact: the same bits as without it."""
-    values = block(c=0.5, dq2=1.5) | {"a": 0.1, "g": 9.81, "coulomb_friction1": 2.0}
-    names = ("q1", "q2", "dq1", "dq2", "stop_force2", "last_event_time", "potential_energy")
-    h = 0.0125
-
-    def run(instance: Instance, begin: float, end: float) -> None:
-        for i in range(round(begin / h), round(end / h)):
-            instance.do_step(i * h, h, goes_back=True)
-
-    back = math.floor(t / h) * h
-    with started(plant, method, **values) as instance:
-        run(instance, 0.0, 1.0)
-        expected = read(instance, *names)
-        assert last_event(instance).count >= 4
-    with started(plant, method, **values) as instance:
-        run(instance, 0.0, back)
-        saved = instance.saved_state()
-        saved.take()
-        run(instance, back, 0.5)
-        saved.restore()
-        run(instance, back, 1.0)
-        assert read(instance, *names) == expected
-        saved.free()
 
 
 @each_method

@@ -6,9 +6,7 @@ away.
 """
 
 import math
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
@@ -17,10 +15,9 @@ from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs import simulation
 from models.rp_plant.references.equations import INPUTS
-from tests.rp_plant.fmu.plant_runs import AT_REST, COMPLIANT, METHODS, RIGID, read, started
+from tests.rp_plant.fmu.plant_runs import AT_REST, COMPLIANT, RIGID, each_method, read, started
 from tests.rp_plant.fmu.random_motions import Case, compliant_case, random_case
 from tests.support.cosim_project import load, names_of
-from tests.support.paths import ROOT
 
 TOLERANCE, ALLOWED = 1e-8, 100.0  # error in tolerances of the largest energy
 BESIDE = 1e-9  # s, from an event to the ends of the steps around it
@@ -30,13 +27,6 @@ STATES_AND_STOPS = ("q1", "q2", "dq1", "dq2", "stop_force1", "stop_force2")
 ENERGIES = ("kinetic_energy", "potential_energy", "impact_loss", "grasp_loss")
 # in the last two rigid ones a slide is lifted off its stop slowly
 CASES = [*((random_case, n) for n in (0, 1, 2, 3, 10, 25)), *((compliant_case, n) for n in (1, 2))]
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Fmu]:
-    path = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu"))
-    with Fmu(path.with_name("RPPlant.fmu")) as fmu:
-        yield fmu
 
 
 class Balance:
@@ -158,9 +148,9 @@ def check(balance: Balance, start: np.ndarray, extra: float) -> None:
 
 
 @pytest.mark.parametrize("name", names_of("rp_plant"))
-def test_energy_of_a_scenario(opened: Fmu, name: str) -> None:
+def test_energy_of_a_scenario(fmi2_plant: Fmu, name: str) -> None:
     scenario = load(name)
-    with opened.instance(name) as instance:
+    with fmi2_plant.instance(name) as instance:
         simulation.initialize(instance, scenario, scenario.tolerance)
 
         def drive(t: float) -> None:
@@ -183,16 +173,16 @@ def test_energy_of_a_scenario(opened: Fmu, name: str) -> None:
         check(balance, start, extra)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@each_method
 @pytest.mark.parametrize(("draw", "number"), CASES)
 def test_energy_of_a_random_motion(
-    opened: Fmu, draw: Callable[[np.random.Generator], Case], number: int, method: str
+    fmi2_plant: Fmu, draw: Callable[[np.random.Generator], Case], number: int, method: str
 ) -> None:
     """Inputs are ramps in about every second case."""
     case = draw(np.random.default_rng((15, number)))
     smooth = INPUTS if case.rates else ()
-    with started(opened, method, TOLERANCE, smooth, **case.values) as instance:
-        check_random(instance, case, dict(opened.model.start_values) | case.values)
+    with started(fmi2_plant, method, TOLERANCE, smooth, **case.values) as instance:
+        check_random(instance, case, dict(fmi2_plant.model.start_values) | case.values)
 
 
 def check_random(instance: Instance, case: Case, values: Mapping[str, float]) -> None:
@@ -224,13 +214,13 @@ def check_random(instance: Instance, case: Case, values: Mapping[str, float]) ->
     check(balance, start, extra)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_elastic_impacts_keep_the_energy(opened: Fmu, method: str) -> None:
+@each_method
+def test_elastic_impacts_keep_the_energy(fmi2_plant: Fmu, method: str) -> None:
     """Ten thousand of them, of a slide between its stops under gravity."""
     impacts, tolerance = 10_000, 1e-10
     values = {"a": 0.0, "q1": math.pi / 2, "q2": 0.1, "dq2": 6.0, "coulomb_friction1": 1000.0}
     stops = {"stops2": RIGID, "lower2": -0.2, "upper2": 0.3, "restitution2": 1.0}
-    with started(opened, method, tolerance, **values, **stops) as instance:
+    with started(fmi2_plant, method, tolerance, **values, **stops) as instance:
         (start,) = read(instance, "total_energy")
         t, count = 0.0, 0
         while count < impacts:

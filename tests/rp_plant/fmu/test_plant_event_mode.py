@@ -5,17 +5,24 @@ import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
-from fmpy.simulation import instantiate_fmu
+from fmpy.model_description import ModelDescription
 
-from tests.rp_plant.fmu.plant_runs import AT_REST, BOUNCY_STOPS, FIRM, FRICTION, METHODS, RIGID
+from tests.rp_plant.fmu.plant_runs import (
+    AT_REST,
+    BOUNCY_STOPS,
+    FIRM,
+    FRICTION,
+    METHODS,
+    RIGID,
+    each_method,
+)
 from tests.support.cosim_project import fmi3_fmu
+from tests.support.instances import instantiated, set_value
 
 STEP, STOP = 0.01, 1.5  # s
 COMBINATIONS = [(False, False), (False, True), (True, False), (True, True)]
@@ -80,7 +87,7 @@ def at_communication_points(result: np.ndarray) -> np.ndarray:
     return result[on_grid[first]]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@each_method
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_the_motion_has_the_same_bits(paths: dict[str, Path], motion: str, method: str) -> None:
     """As with FMI 2.0: states, outputs, events and the integrator's work at all points."""
@@ -111,9 +118,10 @@ class Plant:
 
     NAMES = ("time", "q1", "q2", "dq1", "dq2", "impact_loss", "grasp_loss", "stop_impulse2")
 
-    def __init__(self, fmu: Any, description: Any) -> None:
+    def __init__(self, fmu: Any, description: ModelDescription) -> None:
         self.fmu = fmu
-        self.reference = {v.name: v.valueReference for v in description.modelVariables}
+        self.variables = {v.name: v for v in description.modelVariables}
+        self.reference = {name: v.valueReference for name, v in self.variables.items()}
 
     def values(self) -> list[float]:
         reals = self.fmu.getFloat64([self.reference[name] for name in self.NAMES])
@@ -145,24 +153,16 @@ class Plant:
 
 @contextmanager
 def started(path: Path, **values: float) -> Iterator[Plant]:
-    description = read_model_description(path)
-    with TemporaryDirectory() as folder:
-        extract(path, folder)
-        fmu = instantiate_fmu(
-            folder, description, "CoSimulation", early_return_allowed=True, event_mode_used=True
-        )
-        try:
-            plant = Plant(fmu, description)
-            fmu.enterInitializationMode(startTime=0.0, tolerance=1e-8)
-            for name, value in values.items():
-                kind = "Int64" if name.startswith(("stops", "solver_", "grasp")) else "Float64"
-                getattr(fmu, f"set{kind}")([plant.reference[name]], [value])
-            fmu.exitInitializationMode()
-            fmu.updateDiscreteStates()
-            fmu.enterStepMode()
-            yield plant
-        finally:
-            fmu.freeInstance()
+    options = {"early_return_allowed": True, "event_mode_used": True}
+    with instantiated(path, "CoSimulation", **options) as (fmu, description):
+        plant = Plant(fmu, description)
+        fmu.enterInitializationMode(startTime=0.0, tolerance=1e-8)
+        for name, value in values.items():
+            set_value(fmu, plant.variables[name], value)
+        fmu.exitInitializationMode()
+        fmu.updateDiscreteStates()
+        fmu.enterStepMode()
+        yield plant
 
 
 def test_event_mode_shows_both_limits(paths: dict[str, Path]) -> None:
@@ -208,7 +208,7 @@ def test_a_grasp_in_event_mode_is_one_between_steps(paths: dict[str, Path]) -> N
     assert found[0][6] > 0.0
 
 
-@pytest.mark.parametrize("method", METHODS)
+@each_method
 def test_a_stop_that_is_moved_away_takes_nothing_along(paths: dict[str, Path], method: str) -> None:
     """The impact was due; without the limit the slide goes on, at the same velocity."""
     falling = {"q1": np.pi / 2, "coulomb_friction1": FIRM, "stops2": RIGID, "lower2": -0.5}
@@ -222,7 +222,7 @@ def test_a_stop_that_is_moved_away_takes_nothing_along(paths: dict[str, Path], m
         assert plant.values()[2] < -0.5
 
 
-@pytest.mark.parametrize("method", METHODS)
+@each_method
 def test_a_breakaway_that_is_due_sees_new_efforts(paths: dict[str, Path], method: str) -> None:
     """The arm swings up until its slide is due to be thrown out; an effort then holds it."""
     values = {"tau1": 14.0, "coulomb_friction2": 5.0}
@@ -236,7 +236,7 @@ def test_a_breakaway_that_is_due_sees_new_efforts(paths: dict[str, Path], method
         assert plant.fmu.getFloat64([plant.reference["ddq2"]]) == [0.0]
 
 
-@pytest.mark.parametrize("method", METHODS)
+@each_method
 def test_rollback_over_events_that_are_due(paths: dict[str, Path], method: str) -> None:
     """Saved at any time, also before fmi3UpdateDiscreteStates; all that follows is the same."""
     chance = random.Random(15)

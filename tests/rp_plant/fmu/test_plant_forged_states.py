@@ -8,10 +8,9 @@ import pytest
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID, last_event, modes, started
-from tests.rp_plant.fmu.test_plant_rollback import Run, packed, unpack
-from tests.support.instances import ERROR, status_of
+from tests.rp_plant.fmu.test_plant_rollback import Run
+from tests.support.instances import ERROR, hashed, restore, serialized, status_of
 
-HASH = 8  # bytes at the end: FNV-1a of all before
 STUCK, FREE, RELEASED = 0, 2, 2
 Modes = tuple[int, ...]  # of joint 1, joint 2, payload; contacts of both joints
 
@@ -29,19 +28,12 @@ def fields(modes: Modes) -> bytes:
     return b"".join(map(field, modes))
 
 
-def with_hash(content: bytes) -> bytes:
-    number = 0xCBF29CE484222325
-    for byte in content[:-HASH]:
-        number = (number ^ byte) * 0x100000001B3 % 2**64
-    return content[:-HASH] + struct.pack("<Q", number)
-
-
 def forged(content: bytes, before: Modes, *after: Modes) -> bytes:
     """Other modes, and the hash that fits; after: now, and at the integrator's restart."""
     parts = content.split(fields(before))
     assert len(parts) == 3
     now, since_restart = (*after, after[-1])[:2]
-    return with_hash(parts[0] + fields(now) + parts[1] + fields(since_restart) + parts[2])
+    return hashed(parts[0] + fields(now) + parts[1] + fields(since_restart) + parts[2])
 
 
 @pytest.fixture
@@ -64,15 +56,15 @@ def shown(instance: Instance) -> bytes:
 
 def assert_refused(instance: Instance, content: bytes, text: str) -> None:
     before = shown(instance)
-    good = packed(instance)
-    assert status_of(unpack, instance, content) == ERROR
+    good = serialized(instance)
+    assert status_of(restore, instance, content) == ERROR
     assert text in instance.messages[-1]
     assert shown(instance) == before
-    unpack(instance, good)  # an error ends with a state that is restored
+    restore(instance, good)  # an error ends with a state that is restored
 
 
 def test_the_modes_are_where_the_test_looks_for_them(moving: Run) -> None:
-    content = packed(moving.instance)
+    content = serialized(moving.instance)
     assert forged(content, SLIDING_MODES, SLIDING_MODES) == content
 
 
@@ -82,7 +74,7 @@ def test_the_modes_are_where_the_test_looks_for_them(moving: Run) -> None:
     + [(1, -1, 0), (1, -1, 3), (1, -1, -1), (-(2**31), -(2**31), -(2**31))],
 )
 def test_modes_that_do_not_exist_are_refused(moving: Run, impossible: Modes) -> None:
-    content = packed(moving.instance)
+    content = serialized(moving.instance)
     assert_refused(
         moving.instance,
         forged(content, SLIDING_MODES, impossible),
@@ -97,7 +89,7 @@ def test_modes_that_parameters_or_states_exclude_are_refused(
     moving: Run, impossible: Modes
 ) -> None:
     """With friction no joint is free, and none is held while it moves."""
-    content = packed(moving.instance)
+    content = serialized(moving.instance)
     text = "the modes since the restart are impossible"
     assert_refused(moving.instance, forged(content, SLIDING_MODES, impossible), text)
     # those of now are not those of the restart
@@ -112,7 +104,7 @@ def test_nothing_is_held_without_friction_or_a_closed_stop(plant: Fmu) -> None:
         instance.do_step(0.0, 1e-3)
         instance.do_step(1e-3, 1e-3)
         assert modes(instance) == (FREE, FREE)
-        content = forged(packed(instance), free, held)
+        content = forged(serialized(instance), free, held)
         assert_refused(instance, content, "the modes since the restart are impossible")
 
 
@@ -124,7 +116,7 @@ def test_contacts_follow_from_the_state(plant: Fmu) -> None:
             instance.do_step(0.0, 1e-3)
             instance.do_step(1e-3, 1e-3)
             assert modes(instance) == (FREE, FREE)
-            content = packed(instance)
+            content = serialized(instance)
             free = (FREE, FREE, RELEASED, 0)
             assert forged(content, (*free, contact), (*free, contact)) == content
             for other in impossible:
@@ -135,12 +127,12 @@ def test_contacts_follow_from_the_state(plant: Fmu) -> None:
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_sums_that_are_not_finite_are_refused(moving: Run, value: float) -> None:
     """The four sums follow the modes and contacts."""
-    content = packed(moving.instance)
+    content = serialized(moving.instance)
     place = content.index(fields(SLIDING_MODES)) + 5 * len(field(0))
     for i in range(4):
         at = place + 8 * i
         damaged = content[:at] + struct.pack("<d", value) + content[at + 8 :]
-        assert_refused(moving.instance, with_hash(damaged), " is impossible")
+        assert_refused(moving.instance, hashed(damaged), " is impossible")
 
 
 def test_the_next_step_is_as_if_nothing_had_been_refused(plant: Fmu) -> None:
@@ -150,7 +142,7 @@ def test_the_next_step_is_as_if_nothing_had_been_refused(plant: Fmu) -> None:
             instance.do_step(0.0, 0.01, goes_back=True)
             instance.do_step(0.01, 0.01, goes_back=True)
             if tries:
-                content = forged(packed(instance), SLIDING_MODES, (7, 7, 7))
+                content = forged(serialized(instance), SLIDING_MODES, (7, 7, 7))
                 assert_refused(instance, content, "the modes are impossible")
             instance.do_step(0.02, 0.5, goes_back=True)
             ends.append(shown(instance))

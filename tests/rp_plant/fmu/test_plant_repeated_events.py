@@ -13,13 +13,12 @@ from tests.rp_plant.fmu.plant_runs import (
     FIRM,
     METHODS,
     RIGID,
+    each_method,
     last_event,
     modes,
     read,
     started,
 )
-
-each_method = pytest.mark.parametrize("method", METHODS)
 
 
 def ramp(instance: Instance, begin: dict[str, float], rates: dict[str, float]) -> None:

@@ -5,7 +5,7 @@ import dataclasses
 import os
 import random
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import pytest
 
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
+from tests.fmi2.rollback_sequences import times
 from tests.rp_plant.fmu.plant_runs import (
     AT_REST,
     BOUNCY_STOPS,
@@ -21,12 +22,13 @@ from tests.rp_plant.fmu.plant_runs import (
     FRICTION,
     METHODS,
     RIGID,
+    each_method,
     events,
     last_event,
     modes,
     started,
 )
-from tests.support.instances import DISCARD, LoadedFmu, status_of
+from tests.support.instances import DISCARD, LoadedFmu, restore, serialized, status_of
 from tests.support.instances import Instance as Fmi2Instance
 
 SEQUENCES = int(os.environ.get("PLANT_SEQUENCES", "100"))
@@ -45,8 +47,6 @@ BUFFERS = {
     "stop_stiffness2": 4000.0,
     "stop_damping2": 0.5,
 }
-
-each_method = pytest.mark.parametrize("method", METHODS)
 
 
 # ---- The same bits of every event time -------------------------------------------------------
@@ -109,13 +109,6 @@ def sequence(length: int, chance: random.Random) -> list[Move]:
             values |= {"coulomb_friction1": chance.uniform(0, 2), "upper2": chance.uniform(0.1, 1)}
         moves.append(Move(chance.choice((1e-3, 1e-2, 0.05, 0.2)), values))
     return moves
-
-
-def times(moves: Sequence[Move]) -> list[float]:
-    found = [0.0]
-    for move in moves:
-        found.append(found[-1] + move.length)
-    return found
 
 
 class Run:
@@ -213,32 +206,6 @@ def test_random_rollback(plant: Fmu, number: int) -> None:
             state.free()
 
 
-def packed(instance: Instance) -> bytes:
-    """The state as bytes."""
-    fmi = instance.fmi
-    if instance.fmu.model.fmi_version == "2.0":
-        state = fmi.getFMUstate()
-        content = fmi.serializeFMUstate(state)
-        fmi.freeFMUstate(state)
-        return content
-    state = fmi.getFMUState()
-    content = fmi.serializeFMUState(state)
-    fmi.freeFMUState(state)
-    return content
-
-
-def unpack(instance: Instance, content: bytes) -> None:
-    fmi = instance.fmi
-    if instance.fmu.model.fmi_version == "2.0":
-        state = fmi.deSerializeFMUstate(content)
-        fmi.setFMUstate(state)
-        fmi.freeFMUstate(state)
-        return
-    state = fmi.deserializeFMUState(content)
-    fmi.setFMUState(state)
-    fmi.freeFMUState(state)
-
-
 @each_method
 def test_serialized_states_keep_the_modes(plant: Fmu, method: str) -> None:
     """Another instance goes on the same from each mode: held, sliding, free, on a stop, loaded."""
@@ -248,12 +215,12 @@ def test_serialized_states_keep_the_modes(plant: Fmu, method: str) -> None:
     seen = set()
     with busy(plant, method) as run, busy(plant, "erk") as other:
         for t, move in zip(at, moves, strict=False):
-            content = packed(run.instance)
+            content = serialized(run.instance)
             expected = run.do(t, move)
             if modes(run.instance) not in seen or chance.random() < 0.2:
-                unpack(other.instance, content)
+                restore(other.instance, content)
                 assert other.do(t, move) == expected
-                assert packed(other.instance) == packed(run.instance)
+                assert serialized(other.instance) == serialized(run.instance)
             seen.add(modes(run.instance))
     assert {0, 1, -1} <= {mode for pair in seen for mode in pair}
     assert (0, 0) in seen and len(seen) > 4
