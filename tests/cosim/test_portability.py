@@ -18,8 +18,11 @@ import numpy as np
 import pytest
 
 from cosim.errors import UserError
+from cosim.fmi import fmu_file
 from cosim.fmi.fmi2_instance import Fmi2Instance
 from cosim.fmi.fmu_file import Fmu
+from cosim.runs import reference, simulation
+from cosim.scenarios import scenario as scenarios
 from tests.support.cosim_project import (
     BUILD,
     FMUS,
