@@ -137,16 +137,17 @@ static void call_GetAdjointDerivative(struct fuzz_session *session,
 enum { CLOCKS = 7 }; /* the most of fuzz_any_count */
 
 /* Clocks that are none, and room for all that the calls may have to say of them. */
+static fmi3Clock active[CLOCKS];
+static double times[CLOCKS];
+static fmi3UInt64 counters[CLOCKS];
+static fmi3UInt64 resolutions[CLOCKS];
+static fmi3IntervalQualifier qualifiers[CLOCKS];
+
 #define CLOCK_CALL(name, ...)                                                                      \
     static void call_##name(struct fuzz_session *session, struct fuzz_instance *instance) {        \
         const size_t count = fuzz_any_count(session->input);                                       \
         fmi2ValueReference *clocks =                                                               \
             fuzz_any_references(session->input, count, VARIABLE_FLOAT64, false);                   \
-        static fmi3Clock active[CLOCKS];                                                           \
-        static double times[CLOCKS];                                                               \
-        static fmi3UInt64 counters[CLOCKS];                                                        \
-        static fmi3UInt64 resolutions[CLOCKS];                                                     \
-        static fmi3IntervalQualifier qualifiers[CLOCKS];                                           \
         require_refusal(FUZZ_FMI3_CHECKED(instance, name, clocks, count, __VA_ARGS__),             \
                         "fmi3" #name);                                                             \
         free(clocks);                                                                              \
