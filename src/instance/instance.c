@@ -12,7 +12,7 @@
 
 /* ---- Life ----------------------------------------------------------------------------------- */
 
-/* Blocks of the value structures stay aligned for any type. */
+/* Rounded up, so that what follows a value structure is aligned for any type. */
 static size_t aligned(size_t size) {
     const size_t alignment = _Alignof(max_align_t);
     return (size + alignment - 1) / alignment * alignment;
@@ -29,7 +29,7 @@ static bool is_kept_by_events(const struct model *model, const struct variable *
            (lies_in(events.modes, variable) || lies_in(events.discrete_states, variable));
 }
 
-/* What events keep is calculated and discrete: ints as modes, doubles as discrete states. */
+/* Modes (ints) and discrete states (doubles) are calculated and discrete. */
 static bool is_bound_well(const struct model *model, const struct variable *variable) {
     const struct model_events events = events_of(model);
     const bool is_real = variable->type == VARIABLE_FLOAT64;
@@ -76,19 +76,19 @@ static enum status check_bindings(const struct model_description *description,
 }
 
 /* An input reads as the value set last, also after a step over which it moved. */
-static void place_values(struct instance *instance) {
+static void locate_reals(struct instance *instance) {
     for (size_t i = 0; i < instance->description->variable_count; i++) {
         const struct variable *variable = &instance->description->variables[i];
-        struct instance_real *place = &instance->reals[variable->reference];
-        place->is_calculated = variable->initial == INITIAL_CALCULATED &&
-                               variable->owner == VARIABLE_OF_MODEL &&
-                               !is_kept_by_events(instance->model, variable);
+        struct instance_real *real = &instance->reals[variable->reference];
+        real->is_calculated = variable->initial == INITIAL_CALCULATED &&
+                              variable->owner == VARIABLE_OF_MODEL &&
+                              !is_kept_by_events(instance->model, variable);
         if (variable->type != VARIABLE_FLOAT64) {
             continue;
         }
-        place->value = instance_field(instance, variable);
+        real->value = instance_field(instance, variable);
         if (variable->causality == CAUSALITY_INPUT) {
-            place->value = instance->memory.next_inputs[instance_input_index(instance, variable)].d;
+            real->value = instance->memory.next_inputs[instance_input_index(instance, variable)].d;
         }
     }
 }
@@ -141,7 +141,7 @@ static enum status setup(struct instance *instance) {
     memory->current_inputs = memory->next_inputs + input_count;
     memory->active_inputs = memory->current_inputs + input_count;
     memory->unhandled = (bool *)(void *)(memory->active_inputs + input_count);
-    place_values(instance);
+    locate_reals(instance);
     if (model->events != NULL && !setup_events(instance)) {
         return STATUS_OUT_OF_MEMORY;
     }

@@ -6,8 +6,8 @@
 enum severity {
     SEVERITY_NONE,
     SEVERITY_NOTICE,  /* done, but the user should know something */
-    SEVERITY_DISCARD, /* refused or only partly done, nothing is spoilt: the instance goes on */
-    SEVERITY_ERROR,   /* the instance must be reset or restored before it goes on */
+    SEVERITY_DISCARD, /* refused or only partly done; the instance stays usable */
+    SEVERITY_ERROR,   /* the instance must be reset or restored first */
 };
 
 #define STATUS_LIST(X)                                                                             \

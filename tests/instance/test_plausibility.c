@@ -297,7 +297,7 @@ static void test_the_clock_and_the_history_agree(void) {
     state.experiment_defined = false;
     assert_refused("experiment_defined");
     state.experiment_defined = true;
-    state.event_point = EVENT_PASSED;
+    state.event_point = EVENT_HANDLED;
     assert_refused("event_point");
 }
 

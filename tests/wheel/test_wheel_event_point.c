@@ -67,10 +67,10 @@ static void test_a_change_at_the_event_is_noticed(void) {
     for (int changes = 0; changes < 2; changes++) {
         start();
         step(EVENTS_LEFT);
-        TEST_ASSERT_EQUAL_INT(EVENT_DUE, instance->state.event_point);
+        TEST_ASSERT_EQUAL_INT(EVENT_UNHANDLED, instance->state.event_point);
         set(WHEEL_speed, changes ? 1.5 : 1.0);
         update();
-        TEST_ASSERT_EQUAL_INT(changes ? NO_EVENT : EVENT_PASSED, instance->state.event_point);
+        TEST_ASSERT_EQUAL_INT(changes ? NO_EVENT : EVENT_HANDLED, instance->state.event_point);
     }
 }
 

@@ -90,7 +90,7 @@ static void assert_forged_is_refused(const char *text) {
 
 static void assert_event_points_are_possible(void) {
     const struct instance_state kept = instance->state;
-    instance->state.event_point = EVENT_PASSED;
+    instance->state.event_point = EVENT_HANDLED;
     assert_forged_is_refused("event_point = 2 is impossible"); // before initialization ends
     instance->state.phase = PHASE_STEPPING;
     other_is_integrated_outside = true;
@@ -98,7 +98,7 @@ static void assert_event_points_are_possible(void) {
     other_is_integrated_outside = false;
     instance->state.event_point = (enum event_point)3;
     assert_forged_is_refused("event_point = 3 is impossible");
-    instance->state.event_point = EVENT_DUE;
+    instance->state.event_point = EVENT_UNHANDLED;
     assert_forged_is_refused("causes of the unhandled event = 0 is impossible");
     instance->state = kept;
     instance->memory.unhandled[1] = true;

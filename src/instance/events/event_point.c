@@ -9,17 +9,18 @@
 void instance_leave_event(struct instance *instance, const bool triggered[],
                           struct clock_time end) {
     memcpy(instance->memory.unhandled, triggered, instance_event_size(instance->model));
-    instance->state.event_point = EVENT_DUE;
+    instance->state.event_point = EVENT_UNHANDLED;
     instance->state.cut_end = end;
 }
 
-void instance_note_event(struct instance *instance, struct clock_time end) {
-    instance->state.event_point = EVENT_PASSED;
+void instance_note_handled_event(struct instance *instance, struct clock_time end) {
+    instance->state.event_point = EVENT_HANDLED;
     instance->state.cut_end = end;
 }
 
-/* Forces that have changed at the event decide anew; what a state has reached, it has reached. */
-static void forget_due_forces(struct instance *instance) {
+/* After a change of inputs or parameters, forces may no longer trigger the event; states still do.
+ */
+static void forget_unhandled_forces(struct instance *instance) {
     const struct model_events *events = instance->model->events;
     if (events->describe != NULL) {
         events->describe(instance->memory.values, instance->indicators);
@@ -31,21 +32,21 @@ static void forget_due_forces(struct instance *instance) {
     }
 }
 
-enum status instance_pass_due_event(struct instance *instance, struct event_counts *in_step) {
+enum status instance_handle_event(struct instance *instance, struct event_counts *in_step) {
     struct instance_state *state = &instance->state;
-    if (state->event_point != EVENT_DUE) {
+    if (state->event_point != EVENT_UNHANDLED) {
         return STATUS_OK;
     }
     const bool is_unchanged = instance_is_unchanged(instance);
     enum status status = instance_count_event(instance, instance->memory.unhandled, in_step);
     if (!is_unchanged) {
-        forget_due_forces(instance);
+        forget_unhandled_forces(instance);
     }
     if (status == STATUS_OK) {
         status = instance_update_modes(instance, instance->memory.unhandled);
     }
     if (status == STATUS_OK) {
-        state->event_point = is_unchanged ? EVENT_PASSED : NO_EVENT;
+        state->event_point = is_unchanged ? EVENT_HANDLED : NO_EVENT;
         memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
     }
     return status;

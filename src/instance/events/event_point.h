@@ -1,4 +1,4 @@
-/* The event at which a step has ended: whether it is still due, and how the motion goes on from
+/* The event at which a step has ended: whether it is handled, and how the motion continues from
  * there as if the step had not ended. */
 #ifndef INSTANCE_EVENT_POINT_H
 #define INSTANCE_EVENT_POINT_H
@@ -7,17 +7,17 @@
 #include "model_modes.h"
 
 /* A step that would have lasted until `end` ends at the present time, where these indicators fall
- * to 0: nothing has followed from it so far. */
+ * to 0. The event stays unhandled. */
 NONNULL void instance_leave_event(struct instance *instance, const bool triggered[],
                                   struct clock_time end);
 
-/* The same where the event has been passed already. */
-NONNULL void instance_note_event(struct instance *instance, struct clock_time end);
+/* The same for an event that has been handled. */
+NONNULL void instance_note_handled_event(struct instance *instance, struct clock_time end);
 
-/* Brings modes, states and discrete states to what follows the event that is due, if one is. It
- * counts as one of a communication step. */
-MUST_CHECK NONNULL enum status instance_pass_due_event(struct instance *instance,
-                                                       struct event_counts *in_step);
+/* Updates modes, states and discrete states after the unhandled event, if there is one. It counts
+ * as an event of this communication step. */
+MUST_CHECK NONNULL enum status instance_handle_event(struct instance *instance,
+                                                     struct event_counts *in_step);
 
 /* Nothing has changed since the end of the last step, and no input moved over that step: the modes
  * already follow from the values set now. */

@@ -23,7 +23,7 @@ const struct indicator *instance_describe_indicators(struct instance *instance) 
     return instance->indicators;
 }
 
-/* What the integrator may miss a state by: away from 0 the relative part is the larger one. */
+/* Error that the integrator allows for each state. */
 static void write_tolerances(struct instance *instance) {
     const struct range states = instance->model->states;
     const double *x = doubles_of(instance->memory.values, states);
@@ -38,7 +38,7 @@ static bool is_timed(const struct instance *instance, const bool *triggered) {
     return triggered != NULL && triggered[instance->model->events->indicator_count];
 }
 
-/* Time must get on from one time event to the next. */
+/* Time events must not follow each other at the same time without end. */
 static enum status check_next_time(const struct instance *instance, double passed) {
     const double next = instance_next_time(instance);
     if (next > passed) {

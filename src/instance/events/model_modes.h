@@ -18,8 +18,8 @@ NONNULL double instance_next_time(const struct instance *instance);
 /* No state moves in the present modes. */
 NONNULL bool instance_is_at_rest(const struct instance *instance);
 
-/* Brings modes, states and discrete states to what follows the inputs and parameters set now and,
- * where `triggered` is not NULL, the event at the current time. */
+/* Updates modes, states and discrete states after a change of inputs and parameters and, where
+ * `triggered` is not NULL, after the event at the current time. */
 MUST_CHECK NONNULL_ARGUMENTS(1) enum status
     instance_update_modes(struct instance *instance, const bool *triggered);
 

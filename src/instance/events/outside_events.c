@@ -7,13 +7,14 @@
 #include <math.h>
 #include <string.h>
 
-/* In the unit of an indicator: so far from 0 integrators end at its root. */
+/* In the unit of an indicator: how far from its root integrators stop. */
 static const double near_root = 1e-10;
 
-/* So far beyond its root an indicator falls to 0 for an integrator outside. A mode may begin at the
- * root, and integrators miss falls from 0. Of a state: far above the rounding of its two parts,
- * which are the state's nominal value and the offset; far below what integrators get right. Of the
- * model: how inputs move is not known, so wherever integrators end, the forces have passed. */
+/* What is added to an indicator: it falls to 0 only this far beyond its root. A mode may begin at
+ * the root, and integrators miss falls that begin at 0. For an indicator of a state: far above the
+ * rounding of its two parts, which are the state's nominal value and the offset, and far below the
+ * error of integrators. For one of the model: so large that the force is past its limit wherever an
+ * integrator stops, however the inputs move. */
 static double band_of(const struct instance *instance, const struct indicator *indicator) {
     if (indicator->kind == INDICATOR_UNUSED) {
         return 0.0;
@@ -39,7 +40,7 @@ void instance_add_bands(struct instance *instance) {
     }
 }
 
-/* s: over this time the slope of an indicator is taken. */
+/* s: the slope of an indicator is its difference over this time. */
 static const double slope_time = 1e-7;
 
 /* Indicator i has come to 0 and does not rise; z_ahead: after slope_time. Where a mode has just
@@ -93,21 +94,21 @@ static bool can_fire(const struct instance *instance) {
            events->are_possible(instance->memory.values);
 }
 
-void instance_note_due(struct instance *instance) {
-    instance_forget_due(instance);
+void instance_note_unhandled(struct instance *instance) {
+    instance_forget_unhandled(instance);
     bool is_any = false;
     if (can_fire(instance) &&
         find_triggered(instance, instance->memory.unhandled, &is_any) == STATUS_OK && is_any) {
-        instance->state.event_point = EVENT_DUE;
+        instance->state.event_point = EVENT_UNHANDLED;
     }
 }
 
-void instance_forget_due(struct instance *instance) {
+void instance_forget_unhandled(struct instance *instance) {
     memset(instance->memory.unhandled, 0, instance_event_size(instance->model));
     instance->state.event_point = NO_EVENT;
 }
 
-/* Leaves in triggered the forces that are still below 0 with what is set now. */
+/* Takes forces out of triggered that are not below 0 with the values set now. */
 static enum status forget_past_forces(struct instance *instance, bool triggered[]) {
     if (!can_fire(instance)) {
         return STATUS_OK;
@@ -135,8 +136,8 @@ enum status instance_update_at_point(struct instance *instance, bool *states_cha
     const double now = instance->state.time.s;
     triggered[events->indicator_count] = instance_next_time(instance) - now <= clock_spacing(now);
     const bool is_any =
-        instance->state.event_point == EVENT_DUE || triggered[events->indicator_count];
-    instance_forget_due(instance);
+        instance->state.event_point == EVENT_UNHANDLED || triggered[events->indicator_count];
+    instance_forget_unhandled(instance);
     enum status status = STATUS_OK;
     if (is_any) {
         struct event_counts none = {0};

@@ -34,7 +34,7 @@ static bool is_at_end(const struct instance *instance, double target) {
 
 enum continuation instance_continuation(const struct instance *instance, double target) {
     if (!continues(instance, target)) {
-        return instance->state.event_point == EVENT_PASSED && instance_is_unchanged(instance)
+        return instance->state.event_point == EVENT_HANDLED && instance_is_unchanged(instance)
                    ? CONTINUE_AFTER_EVENT
                    : CONTINUE_AFTER_CHANGE;
     }
@@ -61,7 +61,7 @@ static struct integrator_start start_of(struct instance *instance) {
 }
 
 /* What the integrator runs with from now on: inputs or states. A loop, because they are few. */
-static void hold(struct instance *instance, struct range range) {
+static void activate(struct instance *instance, struct range range) {
     const double *from = doubles_of(instance->memory.values, range);
     double *to = doubles_of(instance->memory.restart_values, range);
     for (size_t i = 0; i < count_of(range); i++) {
@@ -69,7 +69,7 @@ static void hold(struct instance *instance, struct range range) {
     }
 }
 
-static void hold_bytes(struct instance *instance, struct range range) {
+static void activate_bytes(struct instance *instance, struct range range) {
     memcpy(instance->memory.restart_values + range.offset, instance->memory.values + range.offset,
            range.size);
 }
@@ -80,7 +80,7 @@ void instance_end_history(struct instance *instance) {
     instance->history_is_lost = false;
 }
 
-/* Polynomials end with this step, held inputs at the stop time. */
+/* Inputs that move are polynomials for this step only; constant ones may stay to the stop time. */
 double instance_horizon(const struct instance_state *state, struct clock_time restart,
                         double target, bool inputs_move) {
     if (inputs_move) {
@@ -91,20 +91,20 @@ double instance_horizon(const struct instance_state *state, struct clock_time re
                                                : INFINITY;
 }
 
-static inline void hold_all(struct instance *instance, struct clock_time end,
-                            const struct polynomial inputs[], bool has_new_parameters) {
+static inline void activate_values(struct instance *instance, struct clock_time end,
+                                   const struct polynomial inputs[], bool has_new_parameters) {
     struct instance_memory *memory = &instance->memory;
     struct instance_state *state = &instance->state;
     const struct model *model = instance->model;
     if (has_new_parameters) {
-        hold_bytes(instance, model->parameters);
+        activate_bytes(instance, model->parameters);
     }
     if (model->events != NULL) {
-        hold_bytes(instance, model->events->discrete_inputs);
-        hold_bytes(instance, model->events->modes);
+        activate_bytes(instance, model->events->discrete_inputs);
+        activate_bytes(instance, model->events->modes);
     }
-    hold(instance, model->inputs);
-    hold(instance, model->states);
+    activate(instance, model->inputs);
+    activate(instance, model->states);
     memcpy(memory->active_inputs, inputs, count_of(model->inputs) * sizeof *inputs);
     instance_prepare_inputs(instance);
 
@@ -114,9 +114,9 @@ static inline void hold_all(struct instance *instance, struct clock_time end,
     instance_end_history(instance); // until the first advance has succeeded
 }
 
-void instance_hold(struct instance *instance, struct clock_time end,
-                   const struct polynomial inputs[]) {
-    hold_all(instance, end, inputs, !instance_parameters_are_active(instance));
+void instance_activate_values(struct instance *instance, struct clock_time end,
+                              const struct polynomial inputs[]) {
+    activate_values(instance, end, inputs, !instance_parameters_are_active(instance));
 }
 
 static enum status restart(struct instance *instance, struct clock_time end,
@@ -131,8 +131,8 @@ static enum status restart(struct instance *instance, struct clock_time end,
     } else if (!is_event) {
         instance_update_next_step(instance);
     }
-    hold_all(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
-             has_new_parameters);
+    activate_values(instance, end, is_event ? memory->current_inputs : memory->next_inputs,
+                    has_new_parameters);
 
     // note what a replay needs
     state->steps_before_restart = state->statistics.steps;

@@ -1,11 +1,11 @@
 /* The initial value problem of an instance, as the integrator calls it: the model with the
- * parameters held since the last restart, and the inputs as polynomials since then. */
+ * parameters of the last restart, and the inputs as polynomials since then. */
 #ifndef INSTANCE_RIGHT_HAND_SIDE_H
 #define INSTANCE_RIGHT_HAND_SIDE_H
 
 #include "internals.h"
 
-/* After a restart: inputs that are held are evaluated once, not at every call. */
+/* After a restart: constant inputs are evaluated once, not at every call. */
 NONNULL void instance_prepare_inputs(struct instance *instance);
 
 /* context: the instance. t: s since the restart. */

@@ -38,12 +38,12 @@ static bool is_step(double value) {
     return value >= 0.0 && isfinite(value);
 }
 
-/* Time, phase and the settings of the integrator. */
 /* s is the whole time, rounded. */
 static bool is_rest_of(struct clock_time time) {
     return clock_two_sum(time.s, time.rest).s == time.s;
 }
 
+/* Time, phase and the settings of the integrator. */
 static bool has_possible_settings(const struct instance *instance,
                                   const struct instance_state *state) {
     const struct instance_values *own = &state->own;
@@ -181,7 +181,7 @@ static bool are_zeros(const char *values, struct range range) {
 }
 
 /* Modes of values, which may have been set since the last event, and those that the integrator runs
- * with. While it goes on no event has been. */
+ * with. They are equal while the history lasts: an event would have ended it. */
 static bool has_possible_modes(const struct instance *instance, const struct instance_state *state,
                                const char *values, const char *restart_values) {
     const struct model_events *events = instance->model->events;
@@ -202,8 +202,8 @@ static bool has_possible_modes(const struct instance *instance, const struct ins
     return true;
 }
 
-/* Steps pass time events as they come: none is left behind the present time. An importer that
- * integrates outside may pass one over. */
+/* Steps handle time events as they come: none is earlier than the present time. An importer that
+ * integrates outside may skip one. */
 static bool has_possible_next_time(const struct instance *instance,
                                    const struct instance_state *state, const char *values) {
     const struct model_events *events = instance->model->events;
@@ -228,14 +228,14 @@ static bool is_possible_event_point(const struct instance *instance,
     for (size_t i = 0; i < instance_event_size(instance->model) / sizeof *unhandled; i++) {
         count += unhandled[i];
     }
-    const bool is_due = state->event_point == EVENT_DUE;
+    const bool is_unhandled = state->event_point == EVENT_UNHANDLED;
     const bool is_stepping = state->phase == PHASE_STEPPING && instance->model->events != NULL;
-    const bool is_passed = state->event_point == EVENT_PASSED && !instance->is_integrated_outside;
+    const bool is_handled = state->event_point == EVENT_HANDLED && !instance->is_integrated_outside;
     const struct clock_time end = state->cut_end;
     const struct named_value values[] = {
         {"event_point", state->event_point,
-         state->event_point == NO_EVENT || (is_stepping && (is_due || is_passed))},
-        {"the number of causes of the unhandled event", count, is_due == (count > 0)},
+         state->event_point == NO_EVENT || (is_stepping && (is_unhandled || is_handled))},
+        {"the number of causes of the unhandled event", count, is_unhandled == (count > 0)},
         {"the end of the step cut short", end.s, isfinite(end.s)},
         {"the rest of the end of the step cut short", end.rest,
          is_rest_of(end) && (state->event_point == NO_EVENT ||
@@ -244,7 +244,7 @@ static bool is_possible_event_point(const struct instance *instance,
     return are_possible(instance, values, COUNT(values));
 }
 
-/* ---- What stands twice ---------------------------------------------------------------------- */
+/* ---- What is stored twice -------------------------------------------------------------------- */
 
 /* A value by its name, and what the rest of the state says that it is. */
 struct twin {
@@ -364,7 +364,7 @@ static bool has_true_values(const struct instance *instance, const struct instan
 
 enum status instance_check_plausible(const struct instance *instance,
                                      const struct instance_state *state, const char *block) {
-    // places in block as in the instance's own
+    // offsets are those in the instance's own block
     const struct instance_memory *memory = &instance->memory;
     const char *values = block + (memory->values - memory->block);
     const char *restart_values = block + (memory->restart_values - memory->block);

@@ -72,7 +72,7 @@ enum status instance_save(struct instance *instance, unsigned tag,
     return STATUS_OK;
 }
 
-/* Prepares the instance to go on from what was written into its state and memory. */
+/* Prepares the instance to continue from what was written into its state and memory. */
 static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;

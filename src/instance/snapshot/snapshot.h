@@ -2,7 +2,7 @@
  *
  * A restored instance gives the same bits as the saved one would have given. A snapshot is constant
  * in size and does not contain the integrator's own history: that follows from the last restart and
- * is replayed at the next step, if that step goes on from it.
+ * is replayed at the next step, if that step continues from it.
  *
  * A snapshot belongs to its instance, which frees it at its own end at the latest. Functions refuse
  * one of another instance with STATUS_INVALID_ARGUMENT and a message. */

@@ -19,7 +19,7 @@ static inline const struct variable *instance_find(const struct instance *instan
                : instance_refuse_reference(instance, reference, type);
 }
 
-/* The place of a variable's value. */
+/* Location of a variable's value. */
 static inline void *instance_field(struct instance *instance, const struct variable *variable) {
     char *structure = variable->owner == VARIABLE_OF_MODEL ? instance->memory.values
                                                            : (char *)(void *)&instance->state.own;
@@ -38,7 +38,7 @@ static inline size_t instance_input_index(const struct instance *instance,
     return (variable->offset - instance->model->inputs.offset) / sizeof(double);
 }
 
-/* Writes the value; an input of type float64 is held at it from now on. */
+/* Writes the value; that of an input of type float64 also into its polynomial of the next step. */
 static inline void instance_write_field(struct instance *instance, const struct variable *variable,
                                         double value) {
     void *field = instance_field(instance, variable);

@@ -16,15 +16,15 @@
  * (Maestro's is 0.1), and results would lose their digits. */
 #define INSTANCE_COARSEST_EXPERIMENT_TOLERANCE 1e-4
 
-/* Whether the present time is that of an event at which a step has ended. */
+/* Whether a step has ended at an event and the instance is still there. */
 enum event_point {
     NO_EVENT,
-    EVENT_DUE,    /* nothing has followed from it so far */
-    EVENT_PASSED, /* the modes are those after it */
+    EVENT_UNHANDLED, /* the modes are still those before it */
+    EVENT_HANDLED,   /* the modes are those after it */
 };
 
-/* All that later results depend on, but for the values in struct instance_memory. A plain value: a
- * snapshot is a copy of it. */
+/* With the values in struct instance_memory, all that later results depend on. A snapshot is a copy
+ * of both. */
 struct instance_state {
     enum phase phase;
     bool experiment_defined;
@@ -32,8 +32,8 @@ struct instance_state {
     struct instance_values own;
     struct clock_time time;
 
-    /* The integrator's history, from which it goes on while nothing changes. It follows from the
-     * restart and the first and the last advance since then (integrator_advance). */
+    /* The integrator's history, from which it continues while nothing changes. A replay needs only
+     * the restart and the first and the last advance since then (integrator_advance). */
     bool has_history;
     struct clock_time restart_time;
     double horizon;     /* s since the restart that the integrator may not pass */
@@ -61,13 +61,13 @@ struct instance_memory {
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
-    bool *unhandled; /* as triggered of struct instance: the event that is not handled yet */
+    bool *unhandled; /* causes of the unhandled event, as triggered of struct instance */
 };
 
-/* Where the value of a Real lies, and when the value of any variable is up to date. */
+/* Of each value reference. */
 struct instance_real {
-    const double *value; /* NULL: of no Real */
-    bool is_calculated;  /* by the outputs of the model */
+    const double *value; /* NULL: it is no float64 */
+    bool is_calculated;  /* by the outputs of the model: it has to be brought up to date */
 };
 
 struct instance {
@@ -95,9 +95,8 @@ struct instance {
     struct indicator *indicators; /* one per indicator, since the last restart */
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* two per indicator */
-    bool *triggered;              /* one per indicator: it falls to 0; then whether a time event
-                                 has come */
-    bool inputs_move;             /* since the last restart; otherwise u holds their values */
+    bool *triggered;              /* one per indicator: it falls to 0; last: a time event */
+    bool inputs_move;             /* since the last restart; false: u has their constant values */
     double *u;                    /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
@@ -111,7 +110,7 @@ static inline size_t count_of(struct range range) {
     return range.size / sizeof(double);
 }
 
-/* It integrates its states itself. */
+/* The instance integrates the states of its model itself. */
 static inline bool instance_has_integrator(const struct instance *instance) {
     return instance->integrator != NULL && !instance->is_integrated_outside;
 }
@@ -126,12 +125,12 @@ static inline int *ints_of(char *values, struct range range) {
     return (int *)(void *)(values + range.offset);
 }
 
-/* Places in the value structure for what events keep; empty for models without events. */
+/* Of a model without events: no indicators and empty ranges. */
 static inline struct model_events events_of(const struct model *model) {
     return model->events != NULL ? *model->events : (struct model_events){0};
 }
 
-/* Bytes of what says which event it is: triggered of struct instance. */
+/* Bytes of the array triggered of struct instance. */
 static inline size_t instance_event_size(const struct model *model) {
     return model->events != NULL ? (model->events->indicator_count + 1) * sizeof(bool) : 0;
 }

@@ -14,7 +14,7 @@ enum status instance_enter_continuous_time(struct instance *instance) {
     const enum status status = instance_check_parameters(instance);
     if (status == STATUS_OK) {
         instance->state.phase = PHASE_CONTINUOUS_TIME;
-        instance_forget_due(instance);
+        instance_forget_unhandled(instance);
     }
     return status;
 }
@@ -22,7 +22,7 @@ enum status instance_enter_continuous_time(struct instance *instance) {
 void instance_enter_event_mode(struct instance *instance) {
     instance->state.phase = PHASE_STEPPING;
     if (instance->is_integrated_outside) {
-        instance_note_due(instance);
+        instance_note_unhandled(instance);
     }
 }
 
@@ -31,9 +31,9 @@ static enum status update_discrete_states(struct instance *instance, bool *state
         return instance_update_at_point(instance, states_changed);
     }
     *states_changed = false; // continuous states are the integrator's own
-    if (instance->state.event_point == EVENT_DUE) {
+    if (instance->state.event_point == EVENT_UNHANDLED) {
         struct event_counts none = {0};
-        return instance_pass_due_event(instance, &none);
+        return instance_handle_event(instance, &none);
     }
     return instance_is_unchanged(instance) ? STATUS_OK : instance_update_modes(instance, NULL);
 }

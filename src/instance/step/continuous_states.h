@@ -14,8 +14,8 @@ struct discrete_update {
     double next_time;    /* s: of the next time event; INFINITY: there is none */
 };
 
-/* In event mode: brings modes to what follows the values set and the event at the present time.
- * That is the one that a step has left; with integration from outside, a time event, or one where
+/* In event mode: updates the modes for the values set and the event at the present time. That is
+ * the one that a step has left unhandled; with integration from outside, a time event, or one where
  * an event indicator is near 0 and falls. */
 MUST_CHECK NONNULL enum status instance_update_discrete_states(struct instance *instance,
                                                                struct discrete_update *update);

@@ -13,11 +13,11 @@ struct step {
     struct instance *instance;
     const struct step_options *options;
     struct clock_time begin;
-    struct clock_time end;          /* where it is to end; it may come forward */
-    struct clock_time until;        /* end of its present part: that, or a time event before */
+    struct clock_time end;          /* where it will end; may become earlier */
+    struct clock_time until;        /* end of its present part: the same, or a time event before */
     bool meets_time_event;          /* at the end of its present part */
-    bool is_early;                  /* it has come forward */
-    bool is_over;                   /* the step is to end where it is */
+    bool is_early;                  /* end has become earlier */
+    bool is_over;                   /* the step ends where it is */
     struct instance_snapshot *kept; /* the instance before the step; NULL: not needed so far */
     enum status answer;             /* of options->accept */
     struct event_counts events;     /* so far */
@@ -26,11 +26,10 @@ struct step {
 
 /* ---- Integration (step_part.c) -------------------------------------------------------------- */
 
-/* Reports the time of the instance to options->accept; true: the step is to end there, or before
- * the end so far. */
+/* Reports the time of the instance to options->accept; true: the step will end earlier. */
 NONNULL bool instance_report(struct step *step);
 
-/* To step->until, or to a state event before it. step->until may come forward on the way. */
+/* To step->until, or to a state event before it. Both may become earlier on the way. */
 MUST_CHECK NONNULL enum status instance_move(struct step *step, enum continuation continuation);
 
 /* Internal steps that the step may still take. */
@@ -41,8 +40,8 @@ static inline int64_t instance_steps_left(const struct step *step) {
 
 /* ---- Inputs (step_inputs.c) ----------------------------------------------------------------- */
 
-/* Those at the beginning of a step. An input whose derivatives ended with the last step keeps the
- * value they led to until then. */
+/* Sets the inputs to those at the beginning of a step. Until then, inputs have the values to which
+ * the derivatives of the last step led. */
 NONNULL void instance_begin_inputs(struct instance *instance);
 
 /* Those at the time of the instance, elapsed s after the beginning of the step. */
@@ -51,19 +50,19 @@ NONNULL void instance_evaluate_inputs(struct instance *instance, double elapsed)
 /* Sets the inputs of the step to polynomials through the values that the importer gives. */
 MUST_CHECK NONNULL enum status instance_ask_inputs(const struct step *step, double t, double h);
 
-/* STATUS_NOT_FINITE, with a message, where an input that moves ends the step with no finite value:
- * a model without states would not notice. */
+/* STATUS_NOT_FINITE, with a message, if the polynomial of an input overflows within the step, which
+ * no integrator notices in a model without states. */
 MUST_CHECK NONNULL enum status instance_check_inputs(const struct step *step);
 
-/* From now on the last value of an input is the one that was set for the end of the step; where the
- * step ended earlier, the value that the input has there. */
-NONNULL void instance_hold_last_nodes(const struct step *step);
+/* After a step that has asked for inputs: they keep the value given for its end or, where the step
+ * ended earlier, the value there. */
+NONNULL void instance_keep_last_nodes(const struct step *step);
 
 /* ---- Events (step_events.c) ----------------------------------------------------------------- */
 
-/* Sets the end of the next part of the step. A time event behind the end of the step by a millionth
- * of the step, or by some roundings of the time, belongs to this step: importers that add up their
- * steps mean the same time. */
+/* Sets the end of the next part of the step. A time event that comes later than the end of the step
+ * by at most a millionth of the step, or by some roundings of the time, belongs to this step:
+ * importers that add up their steps mean the same time. */
 static inline void instance_set_part(struct step *step) {
     const double time = instance_next_time(step->instance);
     step->until = step->end;

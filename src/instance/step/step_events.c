@@ -5,18 +5,17 @@
 
 #include <string.h>
 
-/* As instance_move where no state moves: time passes until an input sets them free. */
+/* As instance_move in modes in which no state moves: time passes until an input ends them. */
 static enum status rest(struct step *step, enum continuation continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
     const struct polynomial *inputs = continuation == CONTINUE_AFTER_EVENT
                                           ? instance->memory.current_inputs
                                           : instance->memory.next_inputs;
-    // inputs that are held leave the modes as they are; only behind an event it counts what was
-    // held
+    // constant inputs end no mode; the active values matter only after an event
     const bool is_searched = polynomials_move(inputs, count_of(instance->model->inputs));
     if (is_searched || step->meets_time_event) {
-        instance_hold(instance, step->end, inputs);
+        instance_activate_values(instance, step->end, inputs);
     } else {
         instance_end_history(instance);
     }
@@ -29,7 +28,7 @@ static enum status rest(struct step *step, enum continuation continuation) {
                            clock_difference(step->until, state->restart_time), &state->latest_time);
 }
 
-/* The instance goes to the time of an event, and its modes change, unless the event is left. */
+/* The instance goes to the time of an event and handles it, or the step ends there. */
 static enum status meet_event(struct step *step, struct clock_time time) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
@@ -51,17 +50,17 @@ static enum status meet_event(struct step *step, struct clock_time time) {
         status = instance_update_modes(instance, triggered);
     }
     if (status == STATUS_OK && !(clock_difference(step->end, state->time) > 0.0)) {
-        instance_note_event(instance, end);
+        instance_note_handled_event(instance, end);
     }
     return status;
 }
 
-/* The modes at the beginning of a step, and how the integrator goes on from there. */
+/* The modes at the beginning of a step, and how the integrator continues from there. */
 static enum status begin_modes(struct step *step, enum continuation *continuation) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;
-    if (state->event_point == EVENT_DUE) {
-        const enum status status = instance_pass_due_event(instance, &step->events);
+    if (state->event_point == EVENT_UNHANDLED) {
+        const enum status status = instance_handle_event(instance, &step->events);
         if (status != STATUS_OK) {
             return status;
         }

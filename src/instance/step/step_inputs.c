@@ -22,7 +22,7 @@ void instance_evaluate_inputs(struct instance *instance, double elapsed) {
     }
 }
 
-void instance_hold_last_nodes(const struct step *step) {
+void instance_keep_last_nodes(const struct step *step) {
     const struct instance *instance = step->instance;
     const struct instance_memory *memory = &instance->memory;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {

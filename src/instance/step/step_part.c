@@ -36,7 +36,7 @@ static bool is_at_event(const struct instance *instance) {
     return instance->model->events != NULL && integrator_event(instance->integrator) != NULL;
 }
 
-/* To step->until, which may come forward on the way. */
+/* To step->until, which may become earlier on the way. */
 static enum status advance(struct step *step) {
     struct instance *instance = step->instance;
     struct instance_state *state = &instance->state;

@@ -146,7 +146,7 @@ static enum status do_step(struct step *step, double communication_point, double
         return status;
     }
     if (step->options->ask_inputs != NULL) {
-        instance_hold_last_nodes(step);
+        instance_keep_last_nodes(step);
     }
     const bool ends_at_event = instance->state.event_point != NO_EVENT;
     if (step->options->accept != NULL && (!step->is_early || ends_at_event)) {

@@ -4,21 +4,21 @@
 
 #include "snapshot.h"
 
-/* Steps from communication_point to communication_point + step (s) with the inputs held, or as
- * polynomials where derivatives were set.
+/* Steps from communication_point to communication_point + step (s) with constant inputs (zero-order
+ * hold), or polynomials where derivatives were set.
  * STATUS_INVALID_TIME: step not > 0, communication_point not where the instance is (clock_slack),
  * or the end past the stop time. If the integration ends early (severity discard), instance_time is
  * the time it reached, and the states are those of that time. */
 MUST_CHECK NONNULL enum status instance_do_step(struct instance *instance,
                                                 double communication_point, double step);
 
-/* What a step does at an event. Where that is at its beginning, it passes it, so that every step
+/* What a step does at an event. An event at its beginning is always handled, so that every step
  * makes progress. */
 enum event_handling {
-    EVENTS_PASSED, /* it passes the event and continues */
-    EVENTS_END,    /* it passes the event and ends there */
-    EVENTS_LEFT,   /* it ends there. The event is due: instance_update_discrete_states passes it, or
-                      the next step does first */
+    EVENTS_PASSED, /* it handles the event and continues */
+    EVENTS_END,    /* it handles the event and ends there */
+    EVENTS_LEFT,   /* it ends there and leaves the event unhandled:
+                      instance_update_discrete_states or the next step handles it */
 };
 
 /* What a step does on its way; what is NULL is left out. The functions may read values of the

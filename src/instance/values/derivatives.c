@@ -127,9 +127,9 @@ static enum status derive_by_time(struct instance *instance) {
     return propagate(instance, 1.0, instance->second_derivatives);
 }
 
-/* In a value structure of derivatives. Discrete values are held between events: those of the
- * instance are in no structure, those of the model stay 0 unless parameters decide how they read.
- */
+/* From a structure of derivatives. Discrete values are constant between events: those of the
+ * instance are in no structure; those of the model are 0 there, unless their reading depends on
+ * parameters. */
 static double derivative_in(const char *structure, const struct variable *variable) {
     return variable->owner == VARIABLE_OF_MODEL
                ? *(const double *)(const void *)(structure + variable->offset)
@@ -218,7 +218,7 @@ static enum status check_matrix(const struct instance *instance, enum known_kind
     return STATUS_OK;
 }
 
-static double *place_in(char *structure, const struct variable *variable) {
+static double *double_in(char *structure, const struct variable *variable) {
     return (double *)(void *)(structure + variable->offset);
 }
 
@@ -239,7 +239,7 @@ enum status instance_get_directional_derivative(struct instance *instance, enum 
     double dt = 0.0;
     for (size_t i = 0; i < known_count; i++) {
         const struct variable *variable = variable_of(instance->description, knowns[i]);
-        *(is_time(variable) ? &dt : place_in(instance->first_derivatives, variable)) += v[i];
+        *(is_time(variable) ? &dt : double_in(instance->first_derivatives, variable)) += v[i];
     }
     status = propagate(instance, dt, NULL);
     if (status != STATUS_OK) {
@@ -266,7 +266,7 @@ static enum status multiply_column(struct instance *instance, const unsigned unk
                                    const double v[], double *product) {
     memset(instance->first_derivatives, 0, instance->model->values_size);
     double dt = 0.0;
-    *(is_time(known) ? &dt : place_in(instance->first_derivatives, known)) = 1.0;
+    *(is_time(known) ? &dt : double_in(instance->first_derivatives, known)) = 1.0;
     const enum status status = propagate(instance, dt, NULL);
     if (status != STATUS_OK) {
         return status;
@@ -288,17 +288,17 @@ enum status instance_get_adjoint_derivative(struct instance *instance, enum know
     if (status == STATUS_OK) {
         status = instance_update_outputs(instance);
     }
-    // all of them before the first one is written: each waits at the place of its known
+    // nothing is written to result before all have succeeded
     double by_time = 0.0;
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
         const struct variable *known = variable_of(instance->description, knowns[i]);
         status = multiply_column(instance, unknowns, unknown_count, known, v,
                                  is_time(known) ? &by_time
-                                                : place_in(instance->second_derivatives, known));
+                                                : double_in(instance->second_derivatives, known));
     }
     for (size_t i = 0; status == STATUS_OK && i < known_count; i++) {
         const struct variable *known = variable_of(instance->description, knowns[i]);
-        result[i] = is_time(known) ? by_time : *place_in(instance->second_derivatives, known);
+        result[i] = is_time(known) ? by_time : *double_in(instance->second_derivatives, known);
     }
     return status;
 }

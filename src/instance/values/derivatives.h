@@ -1,5 +1,5 @@
 /* Derivatives of an instance's values with respect to time and to other variables. Those of
- * discrete values, which are held between events, are 0. */
+ * discrete values, which are constant between events, are 0. */
 #ifndef INSTANCE_DERIVATIVES_H
 #define INSTANCE_DERIVATIVES_H
 
