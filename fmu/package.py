@@ -34,7 +34,7 @@ def pack(archive: Path, files: dict[str, Path]) -> None:
     archive.parent.mkdir(parents=True, exist_ok=True)
     with (
         atomic_write(archive) as temporary,
-        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as target,
+        zipfile.ZipFile(temporary, "w") as target,
     ):
         for name in sorted(files):
             info = zipfile.ZipInfo(name, FIXED_DATE)
@@ -42,7 +42,8 @@ def pack(archive: Path, files: dict[str, Path]) -> None:
             info.compress_type = zipfile.ZIP_DEFLATED
             executable = name.startswith("binaries/")
             info.external_attr = (0o100755 if executable else 0o100644) << 16
-            target.writestr(info, files[name].read_bytes())
+            # the level of the archive would not hold for a ZipInfo
+            target.writestr(info, files[name].read_bytes(), compresslevel=9)
 
 
 def main() -> int:
