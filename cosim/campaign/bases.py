@@ -13,7 +13,7 @@ import numpy as np
 
 from cosim import project
 from cosim.campaign.campaign_file import Campaign
-from cosim.campaign.job import Component, Held
+from cosim.campaign.job import Component, HeldInputs
 from cosim.campaign.loop import Part
 from cosim.coupling.connected_instance import start_value
 from cosim.errors import UserError, WrongValueError, did_you_mean, hint
@@ -64,8 +64,8 @@ class Base(ABC):
 
     @property
     @abstractmethod
-    def held(self) -> tuple[Held, Held]:
-        """Reals and Booleans that the file gives."""
+    def held(self) -> tuple[HeldInputs, HeldInputs]:
+        """Inputs with zero-order hold that the file gives: Reals and Booleans."""
 
     @property
     @abstractmethod
@@ -152,10 +152,10 @@ class ScenarioBase(Base):
         ]
 
     @property
-    def held(self) -> tuple[Held, Held]:
+    def held(self) -> tuple[HeldInputs, HeldInputs]:
         count = len(self.times)
-        reals = Held.of(self._reals, count, np.float64)
-        return reals, Held.of(self._switches, count, np.int32)
+        reals = HeldInputs.of(self._reals, count, np.float64)
+        return reals, HeldInputs.of(self._switches, count, np.int32)
 
     @property
     def hashes(self) -> dict[str, str]:
@@ -263,9 +263,9 @@ class SystemBase(Base):
         return self._ssp.models[self._names[component]].variables[variable].reference
 
     @property
-    def held(self) -> tuple[Held, Held]:
+    def held(self) -> tuple[HeldInputs, HeldInputs]:
         count = len(self.times)
-        return Held.of({}, count, np.float64), Held.of({}, count, np.int32)
+        return HeldInputs.of({}, count, np.float64), HeldInputs.of({}, count, np.int32)
 
     @property
     def hashes(self) -> dict[str, str]:

@@ -251,17 +251,17 @@ class Campaign(_Table):
             raise ValueError(f"runs: makes {about}, expected at most {most}")
 
 
-def grid_value(distribution: Distribution, place: int) -> float:
+def grid_value(distribution: Distribution, index: int) -> float:
     """Value of a parameter on a grid; both limits are among them if there are two or more."""
     if distribution.kind == "values":
-        return distribution.values[place]
+        return distribution.values[index]
     low, high = distribution.numbers
     last = distribution.size - 1
-    if place in (0, last):
-        return high if place else low
+    if index in (0, last):
+        return high if index else low
     if distribution.kind == "log_uniform":
-        return low * (high / low) ** (place / last)
-    return low + (high - low) * place / last
+        return low * (high / low) ** (index / last)
+    return low + (high - low) * index / last
 
 
 def read(path: Path) -> Campaign:

@@ -32,10 +32,10 @@ def distributions(table: Mapping[str, np.ndarray]) -> Figure:
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(11, 2.6 * rows), layout="constrained")
         axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-        for place, (label, values) in zip(axes, table.items(), strict=False):
-            _histogram(place, values[np.isfinite(values)], label)
-        for place in axes[len(table) :]:
-            place.set_visible(False)
+        for one, (label, values) in zip(axes, table.items(), strict=False):
+            _histogram(one, values[np.isfinite(values)], label)
+        for one in axes[len(table) :]:
+            one.set_visible(False)
         return figure
 
 
@@ -80,14 +80,14 @@ def indices(found: Mapping[str, Sequence[Index]]) -> Figure:
     with mpl.rc_context(TEXTS):
         figure = Figure(figsize=(11, 2.8 * len(found)), layout="constrained")
         axes = figure.subplots(len(found), 1, squeeze=False)[:, 0]
-        for place, (label, rows) in zip(axes, found.items(), strict=True):
+        for one, (label, rows) in zip(axes, found.items(), strict=True):
             middle = np.arange(len(rows))
             kinds = (
                 ("first order", [x.first for x in rows], [x.first_confidence for x in rows]),
                 ("total", [x.total for x in rows], [x.total_confidence for x in rows]),
             )
             for i, (kind, values, half) in enumerate(kinds):
-                place.bar(
+                one.bar(
                     middle + 0.36 * (i - 0.5),
                     values,
                     0.34,
@@ -98,10 +98,10 @@ def indices(found: Mapping[str, Sequence[Index]]) -> Figure:
                     label=kind,
                 )
             width = max(COLUMNS * LONGEST_LINE // len(rows), FEWEST)
-            place.set_xticks(middle, [fill(row.parameter, width) for row in rows])
-            place.set_ylabel("Sobol' index")
-            place.set_title(label, loc="left")
-            place.legend()
+            one.set_xticks(middle, [fill(row.parameter, width) for row in rows])
+            one.set_ylabel("Sobol' index")
+            one.set_title(label, loc="left")
+            one.legend()
         return figure
 
 

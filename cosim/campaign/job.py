@@ -22,18 +22,18 @@ class Component:
 
 
 @dataclass(frozen=True)
-class Held:
-    """Inputs that are held over each step, as a scenario gives them."""
+class HeldInputs:
+    """Inputs with zero-order hold, as a scenario gives them: a row for each step."""
 
     names: tuple[str, ...]
     values: np.ndarray  # (n + 1, names)
 
     @staticmethod
-    def of(inputs: Mapping[str, np.ndarray], count: int, kind: type) -> "Held":
+    def of(inputs: Mapping[str, np.ndarray], count: int, kind: type) -> "HeldInputs":
         """Inputs by name, (count,) each."""
         columns = [values.astype(kind) for values in inputs.values()]
         rows = np.column_stack(columns) if columns else np.zeros((count, 0), kind)
-        return Held(tuple(inputs), np.ascontiguousarray(rows))
+        return HeldInputs(tuple(inputs), np.ascontiguousarray(rows))
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Target:
 
     component: int
     variable: str
-    held: int | None  # column of the held inputs, of an input
+    held: int | None  # column of the held inputs; None: no input
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,11 @@ class Job:
     stop: float  # s
     tolerance: float | None
     times: np.ndarray  # (n + 1,) communication points in s
-    reals: Held
-    switches: Held
+    reals: HeldInputs
+    switches: HeldInputs
     propagates: bool  # outputs feed inputs
     watched: tuple[str, ...]  # what is recorded
-    places: np.ndarray  # (watched,) among the Reals of the loop
+    columns: np.ndarray  # (watched,) of these, among the Reals of the loop
     integers: dict[str, tuple[int, str]]  # component and variable of those read at the end
     tangent: tuple[np.ndarray, np.ndarray] | None  # references of derivatives and states
     targets: tuple[tuple[str, Target], ...]  # by column of the table

@@ -2,8 +2,8 @@
 
 The components of a system step in Jacobi order, as in `cosim.coupling.master`: all of them make a
 step, then all outputs are read. A scenario is a system of one component, whose inputs come from
-its file. Values are laid out in two arrays, one of Reals and one of Booleans: first those that are
-held over a step, which the file gives, then the outputs of each component.
+its file. Values are laid out in two arrays, one of Reals and one of Booleans: first those with
+zero-order hold, which the file gives, then the outputs of each component.
 """
 
 from collections.abc import Sequence
@@ -45,7 +45,7 @@ class Wires(NamedTuple):
 
     inputs: np.ndarray  # (inputs,) value references
     first_input: np.ndarray  # (components + 1,)
-    sources: np.ndarray  # (inputs,) places among the values
+    sources: np.ndarray  # (inputs,) indices among the values
     outputs: np.ndarray  # (outputs,) value references
     first_output: np.ndarray  # (components + 1,)
     values: np.ndarray  # (held + outputs,)
@@ -59,7 +59,7 @@ class Wires(NamedTuple):
         return Wires(
             np.array(inputs, np.uint32),
             np.cumsum([0, *(len(part.inputs) for part in parts)]),
-            np.array([place for part in parts for place in part.sources], np.int64),
+            np.array([source for part in parts for source in part.sources], np.int64),
             np.array(outputs, np.uint32),
             np.cumsum([0, *(len(part.outputs) for part in parts)]),
             np.zeros(held + len(outputs), kind),
@@ -139,13 +139,13 @@ def _read(calls, wires, component, function):
     begin, end = first[component], first[component + 1]
     if begin == end:
         return 0
-    place = len(values) - len(outputs) + begin
+    first_value = len(values) - len(outputs) + begin
     return move_values(
         calls[component, 1 + function],
         calls[component, 0],
         outputs.ctypes.data + begin * outputs.itemsize,
         end - begin,
-        values.ctypes.data + place * values.itemsize,
+        values.ctypes.data + first_value * values.itemsize,
     )
 
 

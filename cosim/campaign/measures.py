@@ -33,19 +33,19 @@ class Measure:
     kind: str
     options: tuple[float, ...] = ()
 
-    def value(self, recorded: Recorded, places: Sequence[int]) -> float:
-        """The number; `places` of the variables: columns of `values`, or among `integers`."""
+    def value(self, recorded: Recorded, columns: Sequence[int]) -> float:
+        """The number; `columns` of the variables, in `values` or `integers`."""
         times, rows = recorded.times, recorded.values
         if self.kind == LYAPUNOV:
             return _log_sum(recorded.growth) / (times[-1] - times[0])
         if self.kind == FINAL_INTEGER:
-            return float(recorded.integers[places[0]])
+            return float(recorded.integers[columns[0]])
         if self.kind in ("largest_distance", "rms_distance"):
-            pairs = np.array(places).reshape(-1, 2)
+            pairs = np.array(columns).reshape(-1, 2)
             distance = _distance(rows, pairs[:, 0], pairs[:, 1])
             largest = self.kind == "largest_distance"
             return float(np.max(distance)) if largest else _rms(times, distance)
-        values = rows[:, places[0]]
+        values = rows[:, columns[0]]
         match self.kind:
             case "start" | "final":
                 return float(values[0 if self.kind == "start" else -1])

@@ -61,7 +61,7 @@ class _Planner:
         self.check_tolerances(components, targets)
         reals, switches = base.held
         first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
-        places = [
+        columns = [
             len(reals.names)
             + first[component]
             + components[component].reals.outputs.index(self.base.variable(name)[1].reference)
@@ -78,7 +78,7 @@ class _Planner:
             switches=switches,
             propagates=len(components) > 1,
             watched=watched,
-            places=np.array(places, np.int64),
+            columns=np.array(columns, np.int64),
             integers=dict(zip(integers, self.read(integers), strict=True)),
             tangent=tangent,
             targets=tuple(targets.items()),

@@ -146,10 +146,10 @@ def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> 
 def _recorded(
     base: Base, job: Job, given: dict[str, float], outputs: dict[str, np.ndarray]
 ) -> Recorded:
-    """Outputs and held inputs of each row: those of the step that ends there."""
-    held = np.maximum(np.arange(len(job.times)) - 1, 0)
+    """Outputs and inputs of each row: those of the step that ends there."""
+    steps = np.maximum(np.arange(len(job.times)) - 1, 0)
     inputs = {
-        name: values[held]
+        name: values[steps]
         for group in (job.reals, job.switches)
         for name, values in zip(group.names, group.values.T, strict=True)
     }

@@ -55,8 +55,8 @@ class Runner:
         self._tangent = loop.Tangent.none() if job.tangent is None else loop.Tangent(*job.tangent)
         self._growth = np.empty(0 if job.tangent is None else job.steps)
         self._integers: list[int] = []  # at the end of the last run
-        place = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
-        self._places = [[place[name] for name in m.variables] for m in job.measures]
+        column = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
+        self._columns = [[column[name] for name in m.variables] for m in job.measures]
 
     def __enter__(self) -> "Runner":
         return self
@@ -82,8 +82,8 @@ class Runner:
             if failure:
                 continue
             recorded = Recorded(job.times, self._record, self._growth, self._integers)
-            for j, (measure, places) in enumerate(zip(job.measures, self._places, strict=True)):
-                measures[i, j] = measure.value(recorded, places)
+            for j, (measure, columns) in enumerate(zip(job.measures, self._columns, strict=True)):
+                measures[i, j] = measure.value(recorded, columns)
             if number in job.trajectories:
                 trajectories[number] = self._record.copy()
         return Rows(np.array(numbers, np.int64), measures, failures, trajectories)
@@ -173,7 +173,7 @@ class Runner:
             job.switches.values,
             reals,
             switches,
-            job.places,
+            job.columns,
             self._record,
             (tangent.derivatives, tangent.states, tangent.deviation),
             self._growth,

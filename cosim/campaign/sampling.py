@@ -27,18 +27,18 @@ class Sampler:
         """Values of the parameters of consecutive runs, (runs, parameters)."""
         if self._campaign.sampling == "grid":
             return self._grid(runs)
-        unit = self._unit(runs)
-        columns = [values(d, unit[:, i]) for i, d in enumerate(self._distributions)]
+        cube = self._cube(runs)
+        columns = [values(d, cube[:, i]) for i, d in enumerate(self._distributions)]
         return np.column_stack(columns)
 
     def _grid(self, runs: range) -> np.ndarray:
         """The last parameter changes fastest."""
         sizes = [d.size for d in self._distributions]
-        places = np.unravel_index(np.arange(runs.start, runs.stop), sizes)
-        axes = zip(self._distributions, places, strict=True)
+        indices = np.unravel_index(np.arange(runs.start, runs.stop), sizes)
+        axes = zip(self._distributions, indices, strict=True)
         return np.column_stack([[grid_value(d, i) for i in axis.tolist()] for d, axis in axes])
 
-    def _unit(self, runs: range) -> np.ndarray:
+    def _cube(self, runs: range) -> np.ndarray:
         """Points of the unit cube, (runs, parameters)."""
         sampling, seed = self._campaign.sampling, self._campaign.seed
         size = len(self._distributions)
@@ -79,17 +79,17 @@ def problem(campaign: Campaign) -> dict[str, object]:
     return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
 
-def values(distribution: Distribution, unit: np.ndarray) -> np.ndarray:
-    """Values of a distribution at probabilities `unit`, (n,)."""
+def values(distribution: Distribution, probabilities: np.ndarray) -> np.ndarray:
+    """Values of a distribution at `probabilities`, (n,)."""
     numbers = distribution.numbers
     match distribution.kind:
         case "uniform":
-            return numbers[0] + (numbers[1] - numbers[0]) * unit
+            return numbers[0] + (numbers[1] - numbers[0]) * probabilities
         case "log_uniform":
             low, high = np.log(numbers)
-            return np.exp(low + (high - low) * unit)
+            return np.exp(low + (high - low) * probabilities)
         case "normal":
-            inside = np.clip(unit, SMALLEST, 1 - SMALLEST / 2)
+            inside = np.clip(probabilities, SMALLEST, 1 - SMALLEST / 2)
             return numbers[0] + numbers[1] * special.ndtri(inside)
-    places = np.minimum((unit * len(numbers)).astype(int), len(numbers) - 1)
-    return np.array(numbers)[places]
+    indices = np.minimum((probabilities * len(numbers)).astype(int), len(numbers) - 1)
+    return np.array(numbers)[indices]

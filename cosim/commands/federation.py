@@ -132,7 +132,7 @@ def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
         begin = time.perf_counter()
         rows = master.run(times)
         seconds = time.perf_counter() - begin
-    places = [master.names.index(name) for name in record.names]
-    expected = rows[:, places]
+    columns = [master.names.index(name) for name in record.names]
+    expected = rows[:, columns]
     scale = np.maximum(np.abs(expected).max(axis=0), np.finfo(float).tiny)
     return float((np.abs(record.values - expected) / scale).max()), seconds

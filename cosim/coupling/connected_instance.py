@@ -17,7 +17,7 @@ class Wiring:
 
     inputs: Sequence[str]  # set before each step
     outputs: Sequence[str]  # read after each step
-    first: int  # place of the first of `outputs` in the system's values
+    first: int  # index of the first of `outputs` in the system's values
     connected: Sequence[int]  # which of `outputs` feed an input
     sources: Sequence[int]  # of each input, in the system's values
     ahead: Sequence[bool]  # of each input, whether its source steps before this component
@@ -40,15 +40,15 @@ class ConnectedInstance:
         self.instance = instance
         self.sources = np.array(wiring.sources, dtype=int)
         self.ahead = np.array(wiring.ahead, dtype=bool)
-        place = wiring.first * sizeof(c_double)
-        memory = (c_double * len(wiring.outputs)).from_buffer(values, place)
+        offset = wiring.first * sizeof(c_double)
+        memory = (c_double * len(wiring.outputs)).from_buffer(values, offset)
         self.outputs = instance.reals(wiring.outputs, memory)
         self.inputs = instance.reals(wiring.inputs)
         self._lines = instance.input_polynomials(wiring.inputs, 1)
         connected = [wiring.outputs[i] for i in wiring.connected]
         self._output_slopes = instance.output_derivatives(connected, 1)
         self._slopes = slopes
-        self._slope_places = wiring.first + np.array(wiring.connected, dtype=int)
+        self._slope_indices = wiring.first + np.array(wiring.connected, dtype=int)
 
     @property
     def name(self) -> str:
@@ -76,7 +76,7 @@ class ConnectedInstance:
     def read_slopes(self) -> None:
         """Read the derivatives of the connected outputs into the system's slopes."""
         self._output_slopes.get()
-        self._slopes[self._slope_places] = self._output_slopes.view
+        self._slopes[self._slope_indices] = self._output_slopes.view
 
 
 def begin(

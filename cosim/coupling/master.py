@@ -7,11 +7,11 @@ what was read at its beginning. In Gauss-Seidel order the components step one af
 each takes the newest outputs: those of the end of the step from components before it, those of its
 beginning from itself and the components behind it.
 
-Inputs are held over a step, or are straight lines through the value of their source at the time at
-which it was read, with its slope there: in Jacobi order they extrapolate from the beginning of the
-step, in Gauss-Seidel order those from components before it meet value and slope at the end of the
-step. FMI 3.0 knows slopes of inputs only within a step: at the start, those of outputs miss what
-they owe to the slopes of inputs.
+Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
+value of their source at the time at which it was read, with its slope there: in Jacobi order they
+extrapolate from the beginning of the step, in Gauss-Seidel order those from components before it
+meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
+the start, those of outputs miss what they owe to the slopes of inputs.
 
 A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
 values jump to what follows from it at this time, as at the start.
@@ -160,7 +160,7 @@ class Master:
 
         # where it is among the system's values
         keys = [(name, output) for name, read in outputs.items() for output in read]
-        place = {key: i for i, key in enumerate(keys)}
+        index = {key: i for i, key in enumerate(keys)}
         self.names = tuple(f"{component}.{name}" for component, name in keys)
         memory = (c_double * max(len(keys), 1))()
         self.values = np.frombuffer(memory)[: len(keys)]
@@ -177,7 +177,7 @@ class Master:
                 outputs=outputs[name],
                 first=first,
                 connected=[i for i, output in enumerate(outputs[name]) if output in feeding],
-                sources=[place[c.start_component, c.start_connector] for c in incoming],
+                sources=[index[c.start_component, c.start_connector] for c in incoming],
                 ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
             )
             self.components[name] = ConnectedInstance(instance, wiring, memory, self.slopes)

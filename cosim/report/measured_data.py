@@ -18,12 +18,12 @@ def with_measured(
     for compared in comparisons:
         name = compared.name
         drawn = (i for i, plot in enumerate(result) if name in [x.name for x in plot.curves])
-        place = next(drawn, len(result))
-        if place == len(result):
+        index = next(drawn, len(result))
+        if index == len(result):
             simulated = Curve(name, without_rounding(compared.simulated))
             result.append(Plot(name, unit(model.variables[name].unit), [simulated]))
         curve = Curve(f"{name} measured", without_rounding(compared.measured))
-        result[place] = replace(result[place], curves=[*result[place].curves, curve])
+        result[index] = replace(result[index], curves=[*result[index].curves, curve])
     return result
 
 

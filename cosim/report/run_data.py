@@ -161,11 +161,11 @@ def _extremes(table: np.ndarray, every: int) -> np.ndarray:
     margin = SEEN * np.ptp(table, axis=0)
     found = [ends]
     for sign in (1, -1):
-        place = np.argmax(sign * padded, axis=1) + ends[:-1, None]  # (bins, columns)
-        place = np.minimum(place, count - 1)
-        value = np.take_along_axis(table, place, axis=0)
+        row = np.argmax(sign * padded, axis=1) + ends[:-1, None]  # (bins, columns)
+        row = np.minimum(row, count - 1)
+        value = np.take_along_axis(table, row, axis=0)
         beside = np.maximum(sign * table[ends[:-1]], sign * table[ends[1:]])
-        found.append(place[sign * value > beside + margin])
+        found.append(row[sign * value > beside + margin])
         found.append(np.argmax(sign * table, axis=0))  # of the whole run, however little it is
     return np.unique(np.concatenate(found))
 
@@ -203,7 +203,7 @@ class _Packer:
         self._known: dict[tuple[str, bytes], int] = {}
 
     def packed(self, content: Any) -> Any:
-        """`content` with arrays, and lists of floats, replaced by their places in `arrays`."""
+        """`content` with arrays, and lists of floats, replaced by their indices in `arrays`."""
         if isinstance(content, dict):
             return {name: self.packed(value) for name, value in content.items()}
         long = isinstance(content, list) and len(content) >= FEWEST_PACKED

@@ -10,7 +10,7 @@ COLUMNS = 60  # the curve's extremes in each are drawn
 
 
 def scale_of(x: np.ndarray, plot: Plot, unit: str) -> str:
-    """Between which values the first curve of a plot runs, over which span of `x` (`unit`)."""
+    """Between which values the first curve of a plot runs, and how long `x` is (`unit`)."""
     values = plot.curves[0].values[np.isfinite(plot.curves[0].values)]
     if not len(values):
         return ""
@@ -30,15 +30,15 @@ def path(x: np.ndarray, y: np.ndarray) -> str:
     if not len(x):
         return ""
     column = np.zeros(len(x), int)
-    span = x[-1] - x[0]
-    if span > 0:
-        column = np.minimum((x - x[0]) / span * COLUMNS, COLUMNS - 1).astype(int)
+    length = x[-1] - x[0]
+    if length > 0:
+        column = np.minimum((x - x[0]) / length * COLUMNS, COLUMNS - 1).astype(int)
     rows = {0, len(x) - 1}
     for i in np.unique(column):
         members = np.flatnonzero(column == i)
         rows |= {int(members[np.argmin(y[members])]), int(members[np.argmax(y[members])])}
     kept = sorted(rows)
-    across = (x[kept] - x[0]) / span if span > 0 else np.zeros(len(kept))
+    across = (x[kept] - x[0]) / length if length > 0 else np.zeros(len(kept))
     height = np.ptp(y)
     up = (y[kept] - y.min()) / height if height > 0 else np.full(len(kept), 0.5)
     points = zip(

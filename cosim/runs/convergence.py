@@ -1,7 +1,7 @@
 """Order of convergence in the communication step, with inputs that are smooth functions of time.
 
-A master knows its inputs at the communication points. An FMU that holds them over a step is off by
-the first power of the step; with their derivatives up to order k it is off by power
+A master knows its inputs at the communication points. With zero-order hold of them, an FMU is off
+by the first power of the step; with their derivatives up to order k it is off by power
 k + 1. An FMU of FMI 3.0 that asks for the inputs at four times of a step (intermediate update) is
 off by power 4. The problems are models/<model>/convergence/<name>.toml, in the format of a
 scenario; the exact final state of each is models/<model>/references/<name>/exact.json.
@@ -29,7 +29,7 @@ from cosim.scenarios.scenario import Scenario
 from cosim.scenarios.signals import Sines
 
 FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
-ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: inputs are held
+ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: zero-order hold
 INTERMEDIATE_UPDATE = len(ORDERS)  # the case after those of the orders
 NAMES = (
     "inputs held",

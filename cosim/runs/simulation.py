@@ -106,7 +106,7 @@ def _step_through(
     inputs = instance.reals([name for name in scenario.inputs if name not in switches])
     outputs = instance.reals(instance.fmu.model.real_outputs)
     columns = [scenario.inputs[name] for name in inputs.names]
-    held = np.column_stack(columns) if columns else None
+    reals = np.column_stack(columns) if columns else None
     switching = _switching(switches)
 
     times, lengths = scenario.times, np.diff(scenario.times)
@@ -122,8 +122,8 @@ def _step_through(
         integers[0] = [instance.integer(name) for name in drawn]
         recorded = 0
         for i, length in enumerate(lengths):
-            if held is not None:
-                inputs.view[:] = held[i]
+            if reals is not None:
+                inputs.view[:] = reals[i]
                 inputs.set()
             for name in switching.get(i, ()):
                 instance.set(name, bool(switches[name][i]))

@@ -35,7 +35,7 @@ class Log:
 
         UserError if there is no such column, or anything in it is wrong; names the line.
         """
-        first, second = self._place(time), self._place(name)
+        first, second = self._index(time), self._index(name)
         found = array("d")
         for line, row in self._rows():
             if len(row) != len(self.names):
@@ -59,7 +59,7 @@ class Log:
             raise self._wrong(f"expected a time after {before!r}, found {after!r}", line)
         return times, values
 
-    def _place(self, name: str) -> int:
+    def _index(self, name: str) -> int:
         found = self.names.count(name)
         if found != 1:
             what = "is there twice" if found else f"is not there{did_you_mean(name, self.names)}"
@@ -77,18 +77,18 @@ class Log:
         except csv.Error as error:
             raise self._wrong(str(error), rows.line_num) from None
 
-    def _no_number(self, row: Sequence[str], places: Sequence[int], line: int) -> UserError:
-        """What is wrong with the first value of a row at `places` that is no finite number."""
-        for place in places:
+    def _no_number(self, row: Sequence[str], columns: Sequence[int], line: int) -> UserError:
+        """What is wrong with the first value in `columns` of a row that is no finite number."""
+        for column in columns:
             expected = "a finite number"
             try:
-                if math.isfinite(float(row[place])):
+                if math.isfinite(float(row[column])):
                     continue
             except ValueError:
                 expected = "a number with a decimal point"
             break
-        column, found = show(self.names[place]), show(row[place])
-        return self._wrong(f"column {column}: expected {expected}, found {found}", line)
+        name, found = show(self.names[column]), show(row[column])
+        return self._wrong(f"column {name}: expected {expected}, found {found}", line)
 
     def _wrong(self, message: str, line: int) -> UserError:
         return UserError(f"{self.path}, line {line}: {message}")

@@ -76,7 +76,7 @@ class Switches:
 
 @dataclass(frozen=True, eq=False)
 class Logged:
-    """A column of a log: linear between its rows, or held from each row on."""
+    """A column of a log: linear between its rows, or with zero-order hold."""
 
     times: np.ndarray  # (rows,) s since the start, in order
     numbers: np.ndarray  # (rows,) values; Booleans of a Boolean input

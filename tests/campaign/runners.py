@@ -5,11 +5,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+from distributed import Client
 
-from cosim.campaign import bases, planning
+from cosim.campaign import bases, campaign_file, planning
 from cosim.campaign.campaign_file import Campaign
+from cosim.campaign.engine import Engine
 from cosim.campaign.job import Job
 from cosim.campaign.points import Points
+from cosim.campaign.results import Results
 from cosim.campaign.runs import Rows, Runner, open_fmus
 
 
@@ -29,3 +32,17 @@ def rows(runs: Runner, job: Job, points: Points, numbers: Sequence[int]) -> Rows
     """Results of some runs of a campaign, in this order."""
     given = np.concatenate([points.of(range(n, n + 1)) for n in numbers])
     return runs.rows(numbers, points.targets(given, job))
+
+
+@contextmanager
+def engine_of(
+    client: Client, file: Path, folder: Path, fmu: Path | None = None
+) -> Iterator[tuple[Engine, Results]]:
+    """An engine for a campaign, and the results that it will write."""
+    given = campaign_file.read(file)
+    with bases.opened(given, fmu) as base:
+        job = planning.plan(given, base, file)
+        points = Points(given, planning.constants(given, base))
+        results = Results(folder, given, job, file.read_text(encoding="utf-8"))
+        results.begin()
+        yield Engine(client, given, job, base.archives, points, results), results

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from cosim import __main__ as cli
-from cosim.campaign import bases, campaign_file, cluster, engine, planning
-from cosim.campaign.points import Points
-from cosim.campaign.results import Results
+from cosim.campaign import cluster, engine
 from tests.campaign.files import HEAD
+from tests.campaign.runners import engine_of
 from tests.support.paths import ROOT
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
@@ -65,15 +64,11 @@ def test_a_run_that_takes_its_worker_down(
     crashing: Path, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(cluster.SETTINGS, "distributed.scheduler.allowed-failures", 1)
-    campaign = campaign_file.read(file)
-    with bases.opened(campaign, crashing) as base:
-        job = planning.plan(campaign, base, file)
-        points = Points(campaign, planning.constants(campaign, base))
-        results = Results(tmp_path / "output", campaign, job, "")
-        results.begin()
-        with results.workers_folder() as folder, cluster.opened(None, 1, folder) as client:
-            made = engine.Engine(client, campaign, job, base.archives, points, results)
-            made.run(range(campaign.blocks), lambda _: None)
+    with (
+        cluster.opened(None, 1, tmp_path / "workers") as client,
+        engine_of(client, file, tmp_path / "output", crashing) as (made, results),
+    ):
+        made.run(range(3), lambda _: None)
     table = results.table(["final(y)", "failure"])
     assert table["failure"].tolist() == ["", "", "", engine.DIED, "", "", "", ""]
     expected = np.arange(8.0)

@@ -8,16 +8,13 @@ import os
 import re
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from distributed import Client
 
-from cosim.campaign import bases, campaign_file, cluster, engine, planning
-from cosim.campaign.points import Points
-from cosim.campaign.results import Results
+from cosim.campaign import cluster, engine
 from cosim.campaign.worker import Plugin
 from cosim.errors import UserError
 from tests.campaign.cluster import processes
@@ -33,9 +30,8 @@ from tests.campaign.cluster.processes import (
     workers,
 )
 from tests.campaign.files import write
+from tests.campaign.runners import engine_of
 from tests.support.hosts import LOOPBACK
-
-Made = tuple[engine.Engine, Results]
 
 RUNS, BLOCK = 240, 6
 CHANGES = [("runs = 40", f"runs = {RUNS}"), ("block = 8", f"block = {BLOCK}")]
@@ -99,18 +95,6 @@ def test_a_campaign_whose_workers_are_gone_ends(
             pytest.raises(UserError, match="has no workers any more; the same command goes on"),
         ):
             made.run(range(RUNS // BLOCK), lambda _: kill_group(arms[0]))
-
-
-@contextmanager
-def engine_of(client: Client, file: Path, folder: Path) -> Iterator[Made]:
-    """An engine and its results."""
-    campaign = campaign_file.read(file)
-    with bases.opened(campaign, None) as base:
-        job = planning.plan(campaign, base, file)
-        points = Points(campaign, planning.constants(campaign, base))
-        results = Results(folder, campaign, job, file.read_text())
-        results.begin()
-        yield engine.Engine(client, campaign, job, base.archives, points, results), results
 
 
 @pytest.fixture(scope="module")

@@ -160,14 +160,6 @@ def test_the_command_checks_and_reports(tmp_path: Path, capsys: pytest.CaptureFi
     assert len(list((tmp_path / "system").iterdir())) == 6
 
 
-def test_an_unknown_variant_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["system", "nominal", "heavy_playload"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.count("\n") == 1
-    assert "no variant 'heavy_playload', did you mean 'heavy_payload'?" in err
-
-
 def test_a_run_beyond_the_bound_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Another payload is not what the reference is of."""
     path = edited(

@@ -209,6 +209,7 @@ def test_help_fits_and_names_every_command(capsys: pytest.CaptureFixture[str]) -
             text = capsys.readouterr().out
             assert caught.value.code == 0 and text.startswith(f"usage: ./run.sh {command} ")
             assert "--json" in text and "--quiet" in text
+            assert ("--tolerance" in text) == (command == "run")
 
 
 def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:
@@ -230,6 +231,7 @@ def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> 
         (["below/other"], "did you mean the file 'below/other.toml'?"),
         (["nothing like it"], "no scenario or command 'nothing like it' (./run.sh --list"),
         (["system", "nominl"], "no variant 'nominl', did you mean 'nominal'?"),
+        (["system", "nominal", "pick_and_plaze"], "did you mean 'pick_and_place'?"),
         (["run", "--tolerence", "1e-8"], "did you mean '--tolerance'?"),
         (["system", "--jsn"], "did you mean '--json'?"),
     ],

@@ -125,18 +125,6 @@ def test_csv_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.Mon
 # ---- FMUs that cannot be run
 
 
-def test_fmu_with_another_guid(project: Path, fmu: Path, tmp_path: Path) -> None:
-    def change(xml: str) -> str:
-        return xml.replace('guid="', 'guid="x', 1)
-
-    reason = r"guid\.fmu: fmi2Instantiate failed: .*(?i:guid)"
-    with (
-        Fmu(repacked(fmu, tmp_path / "guid.fmu", change)) as other,
-        pytest.raises(UserError, match=reason),
-    ):
-        simulation.simulate(other, load(SHORT, project))
-
-
 @pytest.mark.parametrize(
     ("change", "drop", "reason"),
     [

@@ -54,28 +54,30 @@ def gone(children: list[psutil.Process]) -> bool:
     return not left
 
 
-def test_another_variant_elsewhere_is_refused_by_both(start: Start) -> None:
-    address = addresses.free()
-    here = federation(start, "--listen", address, "--elsewhere", "arm")
-    there = federate(start, SSP, "heavy_payload", address)
-    words = "arm: its variant is 'heavy_payload', that of the federation is 'nominal'"
-    for process in (here, there):
-        text, _ = process.communicate(timeout=LIMIT)
-        assert process.returncode == 2, text
-        assert words in text
-
-
-def test_another_ssp_elsewhere_is_refused_by_both(start: Start, tmp_path: Path) -> None:
-    """Of another tolerance of the arm."""
+@pytest.mark.parametrize(
+    ("system", "variant", "words"),
+    [
+        (
+            SSP,
+            "heavy_payload",
+            "its variant is 'heavy_payload', that of the federation is 'nominal'",
+        ),
+        (None, "nominal", "its SSP is not that of the federation"),
+    ],
+)
+def test_something_else_elsewhere_is_refused_by_both(
+    start: Start, tmp_path: Path, system: Path | None, variant: str, words: str
+) -> None:
+    """Another variant, or another SSP, in which the arm has another tolerance."""
     change = {"resources/arm_nominal.ssv": replace("1e-11", "1e-10")}
-    other = edited(SSP, tmp_path / "Other.ssp", change)
+    other = system or edited(SSP, tmp_path / "Other.ssp", change)
     address = addresses.free()
     here = federation(start, "--listen", address, "--elsewhere", "arm")
-    there = federate(start, other, "nominal", address)
+    there = federate(start, other, variant, address)
     for process in (here, there):
         text, _ = process.communicate(timeout=LIMIT)
         assert process.returncode == 2, text
-        assert "arm: its SSP is not that of the federation" in text
+        assert f"arm: {words}" in text
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

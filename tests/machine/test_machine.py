@@ -196,10 +196,3 @@ def test_systems_are_listed_with_their_variants(capsys: pytest.CaptureFixture[st
     at = lines.index("machine")
     assert lines[0] == "closed_loop"
     assert lines[at + 1 : at + 1 + len(VARIANTS)] == [f"  {name}" for name in VARIANTS]
-
-
-def test_an_unknown_variant_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["system", "stick_slop"]) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1
-    assert "no variant 'stick_slop', did you mean 'stick_slip'?" in err

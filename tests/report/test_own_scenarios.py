@@ -201,14 +201,6 @@ def test_two_files_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -
     assert code == 2 and "b/x.toml: its page would have the name of that of a/x.toml" in err
 
 
-def test_a_report_folder_that_cannot_be_made(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("x.toml").write_text(CONTENT, encoding="utf-8")
-    Path("taken").write_text("", encoding="utf-8")
-    code, out, err = call(capsys, "run", "x.toml", "--report", "taken/out")
-    assert (code, out) == (2, "") and "the report cannot be written" in err
-    assert_one_line(err)
-
-
 def test_files_stay_in_the_overview_and_scenarios_beside_them(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

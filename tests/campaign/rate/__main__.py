@@ -25,11 +25,11 @@ import psutil
 
 from cosim.campaign import bases, campaign_file, cluster, engine, planning
 from cosim.campaign.points import Points
-from cosim.campaign.results import Results
 from cosim.campaign.runs import open_fmus
 from tests.campaign.rate.c_loop import CLoop
 from tests.campaign.rate.plain_processes import plain_processes
 from tests.campaign.rate.works import WORKS
+from tests.campaign.runners import engine_of
 
 
 @dataclass(frozen=True)
@@ -56,16 +56,11 @@ class Campaigns:
         folder.mkdir(parents=True)
         file = folder / "rate.toml"
         file.write_text(WORKS[self._work].format(runs=runs), encoding="utf-8")
-        campaign = campaign_file.read(file)
-        with bases.opened(campaign, None) as base:
-            job = planning.plan(campaign, base, file)
-            points = Points(campaign, planning.constants(campaign, base))
-            results = Results(folder, campaign, job, "")
-            results.begin()
-            made = engine.Engine(self._client, campaign, job, base.archives, points, results)
+        with engine_of(self._client, file, folder) as (made, results):
+            blocks = results.missing()
             before, own = self._processor(), time.process_time()
             begin = time.perf_counter()
-            made.run(range(campaign.blocks), lambda _: None)
+            made.run(blocks, lambda _: None)
             wall = time.perf_counter() - begin
         memory = max(worker.memory_info().rss for worker in self._workers)
         assert not results.missing()

@@ -30,7 +30,7 @@ class CLoop:
     def __init__(self, job: Job, fmus: Mapping[str, Fmu], points: np.ndarray, folder: Path) -> None:
         folder.mkdir()
         self._program, self._results = folder / "c_loop", folder / "results"
-        self._read = job.places - len(job.reals.names)  # what is watched, among the outputs
+        self._read = job.columns - len(job.reals.names)  # what is watched, among the outputs
         self._outputs = sum(len(c.reals.outputs) for c in job.components)
         (folder / "work.h").write_text(_header(job, fmus, points), encoding="utf-8")
         headers = Path(fmpy.__file__).parent / "c-code"

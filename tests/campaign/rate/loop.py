@@ -77,8 +77,8 @@ def advance_in_c(library: CDLL, runs: Runner) -> None:
         c_void_p(addressof(c_switches)),
         data(switches.values),
         data(switches.to_set),
-        data(job.places),
-        c_int64(len(job.places)),
+        data(job.columns),
+        c_int64(len(job.columns)),
         data(runs._record),
     )
     assert status == 0, status
