@@ -10,11 +10,11 @@
 
 #include <stddef.h>
 
-/* Defines `outputs`, in a file with arithmetic_double.h. */
-#define DEFINE_OUTPUTS(values_type)                                                                \
+/* Defines `outputs`, in a file with arithmetic_double.h; tag: of the value structure. */
+#define DEFINE_OUTPUTS(tag)                                                                        \
     static enum status outputs(void *values_pointer, double t) {                                   \
-        values_type *values = values_pointer;                                                      \
-        const values_type *from = values;                                                          \
+        struct tag *values = values_pointer;                                                       \
+        const struct tag *from = values;                                                           \
         calculate(&from, &values);                                                                 \
         return STATUS_OK;                                                                          \
     }
@@ -23,16 +23,16 @@
  * that depend on the time itself. Its results are exact but for rounding, and 0 for a field whose
  * arguments do not move; the calculated fields of values are not read. Where the second derivatives
  * are not asked for, the compiler leaves them out. */
-#define DEFINE_PROPAGATE(name, values_type)                                                        \
+#define DEFINE_PROPAGATE(name, tag)                                                                \
     enum status name(const void *values, double t, double dt, void *first, void *second) {         \
         if (second != NULL) {                                                                      \
-            const values_type *const from[SOURCES] = {values, first, second};                      \
-            values_type *const to[TARGETS] = {first, second};                                      \
+            const struct tag *const from[SOURCES] = {values, first, second};                       \
+            struct tag *const to[TARGETS] = {first, second};                                       \
             calculate(from, to);                                                                   \
         } else {                                                                                   \
-            values_type straight = {0};                                                            \
-            const values_type *const from[SOURCES] = {values, first, &straight};                   \
-            values_type *const to[TARGETS] = {first, &straight};                                   \
+            struct tag straight = {0};                                                             \
+            const struct tag *const from[SOURCES] = {values, first, &straight};                    \
+            struct tag *const to[TARGETS] = {first, &straight};                                    \
             calculate(from, to);                                                                   \
         }                                                                                          \
         return STATUS_OK;                                                                          \

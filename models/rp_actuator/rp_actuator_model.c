@@ -35,7 +35,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(struct rp_actuator_values)
+DEFINE_OUTPUTS(rp_actuator_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const double *ratio =

@@ -2,4 +2,4 @@
 #include "calculated.h"
 #include "rp_actuator_calculated.h"
 
-DEFINE_PROPAGATE(rp_actuator_propagate, struct rp_actuator_values)
+DEFINE_PROPAGATE(rp_actuator_propagate, rp_actuator_values)

@@ -47,7 +47,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(struct rp_controller_values)
+DEFINE_OUTPUTS(rp_controller_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_controller_parameters *p =

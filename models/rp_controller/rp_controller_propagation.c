@@ -2,4 +2,4 @@
 #include "calculated.h"
 #include "rp_controller_calculated.h"
 
-DEFINE_PROPAGATE(rp_controller_propagate, struct rp_controller_values)
+DEFINE_PROPAGATE(rp_controller_propagate, rp_controller_values)

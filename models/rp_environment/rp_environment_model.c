@@ -15,7 +15,7 @@ static enum status right_hand_side(const void *values, double t, const double x[
     return STATUS_OK; // there is no state
 }
 
-DEFINE_OUTPUTS(struct rp_environment_values)
+DEFINE_OUTPUTS(rp_environment_values)
 
 /* A parameter with the range that it has to be in. */
 struct checked {

@@ -2,4 +2,4 @@
 #include "calculated.h"
 #include "rp_environment_equations.h"
 
-DEFINE_PROPAGATE(rp_environment_propagate, struct rp_environment_values)
+DEFINE_PROPAGATE(rp_environment_propagate, rp_environment_values)

@@ -35,7 +35,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(struct rp_values)
+DEFINE_OUTPUTS(rp_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
     const struct rp_parameters *p = &((const struct rp_values *)values_pointer)->parameters;

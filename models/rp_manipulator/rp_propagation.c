@@ -2,4 +2,4 @@
 #include "calculated.h"
 #include "rp_calculated.h"
 
-DEFINE_PROPAGATE(rp_propagate, struct rp_values)
+DEFINE_PROPAGATE(rp_propagate, rp_values)

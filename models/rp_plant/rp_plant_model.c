@@ -63,7 +63,7 @@ static enum status jacobian(const void *values_pointer, double t, const double x
     return STATUS_OK;
 }
 
-DEFINE_OUTPUTS(struct rp_plant_values)
+DEFINE_OUTPUTS(rp_plant_values)
 
 const struct model rp_plant_model = {
     .values_size = sizeof(struct rp_plant_values),

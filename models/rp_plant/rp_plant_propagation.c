@@ -2,4 +2,4 @@
 #include "calculated.h"
 #include "rp_plant_calculated.h"
 
-DEFINE_PROPAGATE(rp_plant_propagate, struct rp_plant_values)
+DEFINE_PROPAGATE(rp_plant_propagate, rp_plant_values)
