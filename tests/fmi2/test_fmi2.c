@@ -1,10 +1,9 @@
-/* Instances of the FMU: a whole run, what Instantiate refuses, and that instances are independent.
+/* Instances of the FMU: a whole run, what Instantiate refuses, and free and reset. Many
+ * instances at once: robustness/threads.c.
  * FMI 2.0, sections 2.1.5 and 2.1.6. Values are in test_fmi2_values.c, time in test_fmi2_time.c. */
-#define _POSIX_C_SOURCE 200809L
 #include "fmu_harness.h"
 
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unity.h>
@@ -185,74 +184,4 @@ static void test_free_works_in_the_middle_of_a_run(void) {
     const fmi2Component c = fmu_instantiate(&messages, true);
     ASSERT_OK(fmu_run(c, 0, &run));
     fmu_free(c);
-}
-
-/* ---- Many instances ------------------------------------------------------------------------- */
-
-enum { INSTANCES = 100, THREADS = 2 };
-
-static struct fmu_run alone[INSTANCES];
-
-static void run_alone(unsigned variants) {
-    for (unsigned i = 0; i < variants; i++) {
-        const fmi2Component c = fmu_instantiate(&messages, false);
-        ASSERT_OK(fmu_run(c, i, &alone[i]));
-        fmu_free(c);
-    }
-}
-
-static void test_interleaved_instances_do_not_disturb_each_other(void) {
-    static struct fmu_run together[INSTANCES];
-    fmi2Component c[INSTANCES];
-    run_alone(INSTANCES);
-    memset(together, 0, sizeof together);
-    for (unsigned i = 0; i < INSTANCES; i++) {
-        c[i] = fmu_instantiate(&messages, false);
-        ASSERT_OK(fmu_run_start(fmi2CoSimulation, c[i], i));
-    }
-    for (unsigned step = 0; step < FMU_RUN_STEPS; step++) {
-        for (unsigned i = 0; i < INSTANCES; i++) {
-            ASSERT_OK(fmu_run_step(fmi2CoSimulation, c[i], step, &together[i]));
-        }
-    }
-    TEST_ASSERT_EQUAL_MEMORY(alone, together, sizeof alone);
-    TEST_ASSERT_TRUE(memcmp(&alone[0], &alone[1], sizeof alone[0]) != 0);
-}
-
-struct thread_work {
-    unsigned variant;
-    unsigned differences;
-    struct fmu_log log;
-    struct fmu_run run;
-};
-
-static void *work_in_thread(void *work_pointer) {
-    struct thread_work *work = work_pointer;
-    const fmi2CallbackFunctions callbacks = fmu_callbacks(&work->log);
-    for (int i = 0; i < 50; i++) {
-        const fmi2Component c = fmu.Instantiate("thread", fmi2CoSimulation, RP_MANIPULATOR_GUID,
-                                                NULL, &callbacks, fmi2False, fmi2False);
-        const fmi2Status status = fmu_run(c, work->variant, &work->run);
-        const bool same = memcmp(&work->run, &alone[work->variant], sizeof work->run) == 0;
-        work->differences += status != fmi2OK || !same;
-        fmu.FreeInstance(c);
-    }
-    return NULL;
-}
-
-static void test_threads_do_not_disturb_each_other(void) {
-    static struct thread_work work[THREADS];
-    pthread_t threads[THREADS];
-    run_alone(THREADS);
-    for (unsigned i = 0; i < THREADS; i++) {
-        work[i].variant = i;
-        TEST_ASSERT_EQUAL_INT(0, pthread_create(&threads[i], NULL, work_in_thread, &work[i]));
-    }
-    for (unsigned i = 0; i < THREADS; i++) {
-        TEST_ASSERT_EQUAL_INT(0, pthread_join(threads[i], NULL));
-    }
-    for (unsigned i = 0; i < THREADS; i++) {
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, work[i].differences, work[i].log.texts);
-        TEST_ASSERT_EQUAL_UINT_MESSAGE(0, fmu_log_total(&work[i].log), work[i].log.texts);
-    }
 }

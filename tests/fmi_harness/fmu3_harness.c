@@ -1,5 +1,7 @@
 #include "fmu3_harness.h"
 
+#include "fmu_library.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,24 +19,11 @@ void fmu3_load(void) {
 
 /* ---- An importer ---------------------------------------------------------------------------- */
 
-/* Importers may pass the text to printf, or resolve variables named as #r<reference># in it. */
-static bool is_harmless(const char *text) {
-    if (text == NULL || text[0] == '\0') {
-        return false;
-    }
-    for (; *text != '\0'; text++) {
-        if (*text == '%' || (*text == '#' && *++text != '#')) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /* Called from within the FMU: it only takes notes, an assertion would jump out of the call. */
 static void receive(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                     fmi3String message) {
     struct fmu3_importer *to = environment;
-    to->malformed += category == NULL || !is_harmless(message);
+    to->malformed += category == NULL || !fmu_is_harmless(message);
     to->count[status]++;
     snprintf(to->category, sizeof to->category, "%s", category != NULL ? category : "");
     const size_t used = strlen(to->texts);

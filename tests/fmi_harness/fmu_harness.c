@@ -60,25 +60,11 @@ static void keep(char *to, size_t size, const char *text) {
     snprintf(to, size, "%s", text != NULL ? text : "");
 }
 
-/* Importers may pass the text to printf, or resolve variables named as #r<reference># in it
- * (section 2.1.5). */
-static bool is_harmless(const char *text) {
-    if (text == NULL || text[0] == '\0') {
-        return false;
-    }
-    for (; *text != '\0'; text++) {
-        if (*text == '%' || (*text == '#' && *++text != '#')) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /* Called from within the FMU: it only takes notes, an assertion would jump out of the call. */
 static void receive(fmi2ComponentEnvironment environment, fmi2String instance_name,
                     fmi2Status status, fmi2String category, fmi2String message, ...) {
     struct fmu_log *log = environment;
-    log->malformed += instance_name == NULL || category == NULL || !is_harmless(message);
+    log->malformed += instance_name == NULL || category == NULL || !fmu_is_harmless(message);
     log->count[status]++;
     for (size_t i = 0; category != NULL && i < FMU_COUNT(log->categories); i++) {
         if (log->categories[i].count == 0) {

@@ -47,3 +47,15 @@ void *fmu3_library_open(const char *path, struct fmu3_functions *functions) {
 #undef FMU3_OFFSET
     return fmu_library_load(path, fmu3_function_names, offsets, FMU3_FUNCTION_COUNT, functions);
 }
+
+bool fmu_is_harmless(const char *text) {
+    if (text == NULL || text[0] == '\0') {
+        return false;
+    }
+    for (; *text != '\0'; text++) {
+        if (*text == '%' || (*text == '#' && *++text != '#')) {
+            return false;
+        }
+    }
+    return true;
+}

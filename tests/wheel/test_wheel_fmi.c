@@ -90,32 +90,6 @@ static void test_a_value_that_is_no_boolean_is_discarded(void) {
     TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_counting));
 }
 
-static void test_other_types_are_refused(void) {
-    static const struct {
-        fmi2ValueReference reference;
-        const char *text;
-    } cases[] = {
-        {WHEEL_speed, "speed (value reference 20) is accessed as boolean: it is of type float64"},
-        {WHEEL_turns, "accessed as boolean: it is of type int32"},
-        {99, "value reference 99 is unknown"},
-    };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        fmi2Boolean value = 7;
-        instantiate(fmi2CoSimulation);
-        TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.GetBoolean(c, &cases[i].reference, 1, &value));
-        TEST_ASSERT_EQUAL_INT(7, value);
-        assert_message(cases[i].text);
-        fmu.FreeInstance(c);
-        instantiate(fmi2CoSimulation);
-        TEST_ASSERT_EQUAL_INT(fmi2Error, set_boolean(cases[i].reference, fmi2True));
-        assert_message(cases[i].text);
-        fmu.FreeInstance(c);
-        c = NULL;
-    }
-    instantiate(fmi2CoSimulation);
-    TEST_ASSERT_EQUAL_INT(fmi2Error, fmu.GetBoolean(c, NULL, 1, NULL));
-}
-
 /* In Model Exchange, a discrete input can be set in event mode only. */
 static void test_model_exchange(void) {
     const fmi2ValueReference counting = WHEEL_is_counting;
