@@ -362,7 +362,7 @@ def test_the_command_line_writes_nothing_for_a_wrong_file(tmp_path: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
-# ---- Booleans and event indicators -----------------------------------------------------------------
+# ---- Booleans and event indicators ------------------------------------------------------------
 
 
 @pytest.fixture
