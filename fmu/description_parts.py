@@ -5,7 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from declaration.load import Declaration
-from declaration.schema import Boolean, Experiment, Unit, Variable
+from declaration.schema import Boolean, Enumeration, Experiment, Unit, Variable
 from provenance import Provenance
 
 LOG_CATEGORIES = {
@@ -47,6 +47,12 @@ def add_units(root: ET.Element, units: dict[str, Unit]) -> None:
 def type_name(variable: str) -> str:
     """Name of the type of an enumeration, for example SolverMethodType for solver_method."""
     return "".join(word[:1].upper() + word[1:] for word in variable.split("_")) + "Type"
+
+
+def add_items(parent: ET.Element, variable: Enumeration) -> None:
+    """Write the items of an enumeration: their values count from 1."""
+    for value, (item, keys) in enumerate(variable.items.items(), start=1):
+        ET.SubElement(parent, "Item", name=item, value=str(value), description=keys.description)
 
 
 def value_attributes(variable: Variable) -> dict[str, str]:

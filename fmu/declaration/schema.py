@@ -368,7 +368,7 @@ class Include(Table):
     @model_validator(mode="before")
     @classmethod
     def check_path(cls, value: Any) -> Any:
-        """Take a path alone."""
+        """Accept just a path."""
         return {"file": value} if isinstance(value, str) else value
 
 

@@ -9,6 +9,7 @@ from declaration.load import Declaration, DeclarationError
 from declaration.schema import Enumeration, Float64, Unit, Variable
 from description_parts import (
     add_experiment,
+    add_items,
     add_log_categories,
     add_units,
     document,
@@ -114,10 +115,7 @@ def add_types(root: ET.Element, variables: dict[str, Variable]) -> None:
     for name, variable in enumerations.items():
         simple = ET.SubElement(definitions, "SimpleType", name=type_name(name))
         enumeration = ET.SubElement(simple, "Enumeration")
-        for value, (item, keys) in enumerate(variable.items.items(), start=1):
-            ET.SubElement(
-                enumeration, "Item", name=item, value=str(value), description=keys.description
-            )
+        add_items(enumeration, variable)
 
 
 def add_variable(

@@ -8,6 +8,7 @@ from declaration.load import Declaration
 from declaration.schema import Enumeration, Float64, Unit, Variable
 from description_parts import (
     add_experiment,
+    add_items,
     add_log_categories,
     add_units,
     document,
@@ -84,10 +85,7 @@ def add_types(root: ET.Element, declaration: Declaration) -> None:
     for name, variable in declaration.variables.items():
         if isinstance(variable, Enumeration):
             enumeration = ET.SubElement(definitions, "EnumerationType", name=type_name(name))
-            for value, (item, keys) in enumerate(variable.items.items(), start=1):
-                ET.SubElement(
-                    enumeration, "Item", name=item, value=str(value), description=keys.description
-                )
+            add_items(enumeration, variable)
 
 
 def float_type_name(variable: Float64) -> str:

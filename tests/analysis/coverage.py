@@ -29,7 +29,7 @@ PYTHON_TESTS = (
 
 
 def run(*command: object, **options: object) -> None:
-    """Run a command that must succeed; its output is told if it does not."""
+    """Run a command that must succeed; print its output if it does not."""
     arguments = [str(argument) for argument in command]
     result = subprocess.run(arguments, capture_output=True, text=True, check=False, **options)
     if result.returncode != 0:

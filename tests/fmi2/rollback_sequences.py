@@ -24,7 +24,7 @@ class Move:
 def sequence(kind: str, length: int, chance: random.Random) -> list[Move]:
     """Random steps.
 
-    undisturbed: nothing changes, the integrator goes on with its history; held: inputs change now
+    undisturbed: nothing changes, the integrator continues its history; held: inputs change now
     and then; changing: at every step; moving: with derivatives at every step; mixed: all this, and
     parameters too.
     """

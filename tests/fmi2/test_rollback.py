@@ -109,7 +109,7 @@ def test_master_with_step_doubling(loaded: LoadedFmu) -> None:
     )
     stop, bound = problem.scenario.stop, 1e-5
 
-    def tell(instance: Instance, t: float) -> None:
+    def set_inputs(instance: Instance, t: float) -> None:
         values = {name: sines.derivative(t, 0).item() for name, sines in problem.inputs.items()}
         instance.set(**values)
         slopes = {name: [s.derivative(t, 1).item()] for name, s in problem.inputs.items()}
@@ -124,13 +124,13 @@ def test_master_with_step_doubling(loaded: LoadedFmu) -> None:
         while t < stop:
             h = min(h, stop - t)
             instance.fmi.fmi2GetFMUstate(instance.fmi.component, byref(begin))
-            tell(instance, t)
+            set_inputs(instance, t)
             instance.step(t, h)
             coarse = instance.get(*STATES)
             instance.fmi.setFMUstate(begin)
-            tell(instance, t)
+            set_inputs(instance, t)
             middle = instance.step(t, h / 2)
-            tell(instance, middle)
+            set_inputs(instance, middle)
             instance.step(middle, t + h - middle)
             fine = instance.get(*STATES)
             error = max(abs(a - b) for a, b in zip(coarse, fine, strict=True))
@@ -150,6 +150,6 @@ def test_master_with_step_doubling(loaded: LoadedFmu) -> None:
     with Instance(loaded) as instance:  # the same steps, none of them undone
         instance.initialize(0.0, stop, 1e-10, **problem.scenario.initial)
         for t, h in accepted:
-            tell(instance, t)
+            set_inputs(instance, t)
             instance.step(t, h)
         assert instance.everything() == everything

@@ -233,7 +233,7 @@ def test_new_parameters_are_those_of_a_new_instance(
 def test_new_parameters_at_a_time_that_is_rounded(loaded: LoadedFmu) -> None:
     """The new instance knows the time as a double, the old one what rounding left over as well.
 
-    Its first step is shorter or longer by that, so that the integrator may take other internal
+    Its first step differs in length by that, so the integrator may take other internal
     steps: equal to what the integration is accurate to.
     """
     step, tolerance = 1 / 60, 1e-9

@@ -41,7 +41,7 @@ def test_the_archive_holds_what_importers_look_for(path: Path) -> None:
     with zipfile.ZipFile(path) as archive:
         assert archive.testzip() is None
         entries = {info.filename: info for info in archive.infolist()}
-    # extra/ has tests of its own, and pictures are those that the page shows
+    # extra/ is tested in test_references.py; the pictures are those on the page
     pictures = {n for n in entries if re.fullmatch(r"documentation/[^/]+\.(svg|png)", n)}
     assert {n for n in entries if n not in pictures and not n.startswith("extra/")} == {
         f"binaries/x86_64-linux/{path.stem}.so",

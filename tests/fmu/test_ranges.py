@@ -1,4 +1,7 @@
-"""Values out of the declared ranges, of all FMUs in both versions: refused, with name and range."""
+"""Values that all FMUs refuse in both versions: out of their ranges, or not fitting each other.
+
+All cases of the latter are in the C tests of each model; here the model's words reach the importer.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -80,3 +83,30 @@ def test_values_out_of_range_are_refused(
             reals = instance.reals([name])
             reals.get()
             assert reals.view.item() == start
+
+
+TOGETHER = [
+    ("RPController", {"m1": 0.0, "I1z": 0.0, "I2z": 0.0}, "m1 lc1^2 + I1z + I2z = 0 is refused"),
+    ("RPController", {"delay": 0.001},
+     "delay = 0.001 s is refused: it must not be above sample_time = 0 s"),
+    ("RPActuator", {"gear_ratio2": 0.0},
+     "gear_ratio2 = 0 is refused: its magnitude must be 1e-09 or more"),
+    ("RPTrajectory", {"turns": 0.25, "frequency": -0.5, "ramp_time": 0.75},
+     "turns / |frequency| = 0.5 s is refused: it must be at least ramp_time = 0.75 s"),
+    ("RPPlant", {"stops2": 2, "q2": 0.75}, "q2 = 0.75 is refused: a start must be within lower2"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("below", ["", "fmi3/"])
+@pytest.mark.parametrize(("unit", "values", "words"), TOGETHER)
+def test_values_that_do_not_fit_each_other_are_refused(
+    opened_unit: Callable[[str], Fmu], below: str, unit: str, values: dict[str, float], words: str
+) -> None:
+    with opened_unit(f"{below}{unit}.fmu").instance("unit") as instance:
+        instance.set_up(0.0, None)
+        for name, value in values.items():
+            instance.set(name, value)
+        with pytest.raises(UserError) as refusal:
+            instance.enter_initialization()
+            instance.exit_initialization()
+        assert words in str(refusal.value)

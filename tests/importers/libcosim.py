@@ -1,4 +1,4 @@
-"""Systems in libcosim, which has an environment of its own."""
+"""Systems in libcosim, which is installed in a separate environment."""
 
 import json
 import os

@@ -10,16 +10,8 @@ import numpy as np
 import pytest
 
 from tests.importers.test_importers import run
+from tests.rp_plant.fmu.plant_runs import FRICTION
 
-FRICTION = {
-    "g": 0.0,
-    "coulomb_friction1": 1.5,
-    "breakaway_friction1": 2.0,
-    "stribeck_velocity1": 0.2,
-    "coulomb_friction2": 2.0,
-    "breakaway_friction2": 2.6,
-    "stribeck_velocity2": 0.1,
-}
 OUTPUTS = ["time", "q1", "q2", "dq1", "dq2", "mode1", "mode2"]
 EVENT_MODE, EARLY_RETURN = "--event-mode-used", "--early-return-allowed"
 STOP = 1.0  # s
@@ -38,7 +30,7 @@ def simulate(fmu: Path, step: float, folder: Path, interface: str, *options: str
         "start": 0.0,
         "step": step,
         "steps": steps,
-        "parameters": FRICTION,
+        "parameters": FRICTION | {"g": 0.0},
         "initial": {"dq1": 1.0, "dq2": -0.8},
         "inputs": {"tau1": [0.0] * (steps + 1), "f2": [0.0] * (steps + 1)},
         "outputs": OUTPUTS,

@@ -206,7 +206,7 @@ class Runner:
         finish([row.compiler, "-shared", "-o", f"../{self.library}", *objects], sources)
 
     def run(self, *scripts: Script) -> list[bytes]:
-        """Transcripts of scripts, each in a thread of its own."""
+        """Transcripts of scripts, each run in a separate thread."""
         arguments = []
         for i, script in enumerate(scripts):
             (self.folder / f"{i}.script").write_bytes(script.text.encode())

@@ -102,7 +102,7 @@ def test_a_run_goes_on_on_another_platform(
 def test_threads_do_not_disturb_each_other(
     runners: Runners, row: Platform | None, name: str
 ) -> None:
-    """Each of them gets what it gets alone, on this machine."""
+    """Each gets the transcript of a single thread on this machine."""
     native, tested = runners(None, name), runners(row, name)
     several = [
         scripts.co_simulation(native.model, VARIANTS[i % len(VARIANTS)], shift=i / 1024)
@@ -139,7 +139,7 @@ def test_allocations_that_fail(runners: Runners, row: Platform | None, name: str
         else:
             assert answer.status == "OK", line
             assert f"fail {scripts.MOST_ALLOCATIONS} " in line or failed[function], line
-    # alone and with all later ones; and the last number is beyond what a call allocates
+    # one at a time and with all later ones; the last number is beyond what a call allocates
     assert set(failed) == {"Instantiate", "GetFMUstate", "DeSerializeFMUstate"}
     assert failed["GetFMUstate"] == failed["DeSerializeFMUstate"] == 2
     assert 2 * 3 <= failed["Instantiate"] < 2 * scripts.MOST_ALLOCATIONS

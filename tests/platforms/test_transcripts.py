@@ -1,9 +1,9 @@
 """What the native transcripts say is right, so that others are not compared with nonsense.
 
-Statuses are those of the standard, values those of physics; no number was stored here before.
+Statuses are those of the standard; values are tested where the FMUs are, here that they vary and
+that limits, stops and events are met.
 """
 
-import math
 from collections import Counter
 from itertools import pairwise
 from pathlib import Path
@@ -172,78 +172,6 @@ def test_methods_agree_and_have_other_bits(arm: Runner) -> None:
         values = [end[state] for end in ends]
         assert len(set(values)) == len(METHODS)
         assert max(values) - min(values) < 1e-4 * max(map(abs, values))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_the_arm_obeys_its_equations(arm: Runner, method: int) -> None:
-    script = scripts.co_simulation(arm.model, method)
-    answers = answers_of(arm, script)
-    points = rows(arm.model, answers, 0)
-    held = held_rows(arm.model, answers)
-    assert len(points) > scripts.STEPS and len(held) > scripts.STEPS / 2
-    for p in held:
-        moved = (
-            p["D11"] * p["ddq1"] + p["D12"] * p["ddq2"] + p["coriolis1"] + p["gravity1"],
-            p["D12"] * p["ddq1"] + p["D22"] * p["ddq2"] + p["coriolis2"] + p["gravity2"],
-        )
-        scale = 1.0 + max(abs(p[name]) for name in ("coriolis1", "coriolis2", "gravity1", "tau1"))
-        assert moved == pytest.approx((p["tau1"], p["f2"]), abs=1e-12 * scale)
-        assert math.hypot(p["ee_x"], p["ee_y"]) == pytest.approx(
-            math.hypot(p["l1"] + p["q2"], p["a"]), rel=1e-12
-        )
-        assert p["total_energy"] == pytest.approx(p["kinetic_energy"] + p["potential_energy"])
-    # speed is the slope of the position, over steps without a jump of an input
-    slopes = 0
-    for before, after in pairwise(points):
-        length = after["time"] - before["time"]
-        if 0.0 < length < 0.011:
-            mean = (before["dq1"] + after["dq1"]) / 2
-            bend = length * (abs(before["ddq1"]) + abs(after["ddq1"]))
-            assert after["q1"] - before["q1"] == pytest.approx(length * mean, abs=length * bend)
-            slopes += 1
-    assert slopes > scripts.STEPS / 3
-
-
-def test_derivatives_of_outputs_are_those_of_the_motion(arm: Runner) -> None:
-    model = arm.model
-    script = scripts.co_simulation(model, 1)
-    answers = answers_of(arm, script)
-    asked = 0
-    point: dict[str, float] = {}
-    for answer in answers:
-        found = rows(model, [answer], 0)
-        point = found[0] if found else point
-        if answer.call.startswith("GetRealOutputDerivatives 0"):
-            first = dict(zip(model.outputs, answer.reals[0::2], strict=True))
-            second = dict(zip(model.outputs, answer.reals[1::2], strict=True))
-            for joint in ("1", "2"):
-                position = model[f"q{joint}"].reference
-                assert first[position] == point[f"dq{joint}"]
-                assert second[position] == point[f"ddq{joint}"]
-            asked += 1
-        if answer.call.startswith("GetDirectionalDerivative 0") and asked:
-            moved = dict(zip(model.outputs, answer.reals, strict=True))
-            ddq1, ddq2 = (moved[model[name].reference] for name in ("ddq1", "ddq2"))
-            # the seeds of scripts.derivatives
-            assert point["D11"] * ddq1 + point["D12"] * ddq2 == pytest.approx(0.25, rel=1e-12)
-            assert point["D12"] * ddq1 + point["D22"] * ddq2 == pytest.approx(1.0, rel=1e-12)
-    assert asked == scripts.STEPS / 10
-
-
-@pytest.mark.parametrize("name", ["RPTrajectory"])
-def test_the_trajectory_moves_as_its_speeds_say(native: Runner) -> None:
-    for motion in (1, 2, 3):
-        script = scripts.co_simulation(native.model, motion)
-        points = rows(native.model, answers_of(native, script), 0)
-        moved = 0
-        for before, after in pairwise(points):
-            length = after["time"] - before["time"]
-            for joint in ("q1", "q2"):
-                mean = (before[f"d{joint}_ref"] + after[f"d{joint}_ref"]) / 2
-                difference = after[f"{joint}_ref"] - before[f"{joint}_ref"]
-                assert difference == pytest.approx(length * mean, abs=50 * abs(length) ** 3)
-                moved += difference != 0.0
-        assert moved > scripts.STEPS / 2
 
 
 @pytest.mark.parametrize("name", ["RPController"])

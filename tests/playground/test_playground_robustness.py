@@ -1,4 +1,4 @@
-"""The playground under all that users may do to it: it goes on, and its memory stays as large."""
+"""The playground keeps running whatever users do to it, and its memory does not grow."""
 
 import math
 import random

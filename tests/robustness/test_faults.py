@@ -23,6 +23,20 @@ LONG = ("run", "constant_effort")
 FMU_SOURCES = ROOT / "fmu"
 
 
+def limit_files(largest: int | None) -> None:
+    """In a process to be: it can write files of at most so many bytes."""
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    if largest is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
+
+
+STOPS = pytest.mark.parametrize(
+    ("stop", "code", "said"),
+    [(signal.SIGINT, 130, "interrupted\n"), (signal.SIGTERM, 143, "")],
+    ids=["Ctrl-C", "SIGTERM"],
+)
+
+
 class Place:
     """Folders of a command: where it is run, its report, its temporary files."""
 
@@ -40,11 +54,6 @@ class Place:
         """Start a command, which may write files of at most `largest` bytes."""
         given = ("--fmu", str(self.fmu)) if arguments[0] == "run" else ("--ssp", str(SSP))
 
-        def limit() -> None:
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            if largest is not None:
-                resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
-
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
         return subprocess.Popen(
             [sys.executable, "-P", "-m", "cosim", *arguments, *given, "--report", "report"],
@@ -56,7 +65,7 @@ class Place:
                 **options.pop("env", {}),
             },
             text=True,
-            preexec_fn=limit,
+            preexec_fn=lambda: limit_files(largest),
             **{key: value for key, value in streams.items() if key != "env"},
         )
 
@@ -137,13 +146,9 @@ def test_what_builds_an_fmu_leaves_nothing_broken(tmp_path: Path, program: str) 
     }[program]
     (output / file).write_bytes(b"\xff older")
 
-    def limit() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
-
     done = subprocess.run(
         [sys.executable, "-B", FMU_SOURCES / f"{program}.py", *arguments],
-        preexec_fn=limit,
+        preexec_fn=lambda: limit_files(3000),
         capture_output=True,
         text=True,
         check=False,
@@ -206,11 +211,7 @@ def test_a_message_is_one_line_whatever_it_quotes(capsys: pytest.CaptureFixture[
 # ---- the user stops it -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("stop", "code", "said"),
-    [(signal.SIGINT, 130, "interrupted\n"), (signal.SIGTERM, 143, "")],
-    ids=["Ctrl-C", "SIGTERM"],
-)
+@STOPS
 @pytest.mark.parametrize("arguments", [LONG, ("system",)], ids=["run", "system"])
 def test_stopped_in_the_middle(
     place: Place,
@@ -229,19 +230,15 @@ def test_stopped_in_the_middle(
     place.assert_clean()
 
 
-@pytest.mark.parametrize(
-    ("stop", "code", "said"),
-    [("SIGINT", 130, "interrupted\n"), ("SIGTERM", 143, "")],
-    ids=["Ctrl-C", "SIGTERM"],
-)
-def test_a_library_may_hide_that_it_was_stopped(stop: str, code: int, said: str) -> None:
+@STOPS
+def test_a_library_may_hide_that_it_was_stopped(stop: signal.Signals, code: int, said: str) -> None:
     program = f"""
 import os, signal, sys
 from cosim import __main__ as cli
 
 def main():
     try:
-        os.kill(os.getpid(), signal.{stop})
+        os.kill(os.getpid(), signal.{stop.name})
         signal.pause()
     except BaseException:
         raise ValueError("Invalid affine transformation matrix")

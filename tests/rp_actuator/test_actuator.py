@@ -149,24 +149,6 @@ def test_dependencies_are_those_of_the_equations(loaded: LoadedFmu) -> None:
 # ---- What is refused -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("joint", [1, 2])
-def test_a_gear_ratio_of_0_is_refused(loaded: LoadedFmu, joint: int) -> None:
-    name = f"gear_ratio{joint}"
-    expected_text = f"{name} = 0 is refused: its magnitude must be 1e-09 or more"
-    with Instance(loaded) as instance:
-        instance.fmi.setupExperiment()
-        instance.set(**{name: 0.0})
-        instance.fmi.enterInitializationMode()
-        assert status_of(instance.fmi.exitInitializationMode) == ERROR
-        assert expected_text in instance.messages[-1].text
-    with Instance(loaded) as instance:
-        instance.initialize()
-        instance.step(0.0, 0.01)
-        instance.set(**{name: 0.0})
-        assert status_of(instance.step, 0.01, 0.01) == ERROR
-        assert expected_text in instance.messages[-1].text
-
-
 def test_the_taylor_method_is_refused(loaded: LoadedFmu) -> None:
     with Instance(loaded) as instance:
         instance.fmi.setInteger([loaded.references["solver_method"]], [4])

@@ -160,15 +160,6 @@ def test_gravity_compensation_holds_the_arm_in_place(
 # ---- As a unit -----------------------------------------------------------------------------------
 
 
-def test_parameters_that_leave_no_inertia_are_refused(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance:
-        instance.fmi.setupExperiment()
-        instance.set(m1=0.0, I1z=0.0, I2z=0.0)
-        instance.fmi.enterInitializationMode()
-        assert status_of(instance.fmi.exitInitializationMode) == ERROR
-        assert "m1 lc1^2 + I1z + I2z = 0 is refused" in instance.messages[-1].text
-
-
 def test_the_taylor_method_is_refused_where_the_fmu_integrates(loaded: LoadedFmu) -> None:
     references = [loaded.references["solver_method"]]
     with Instance(loaded) as instance:

@@ -18,7 +18,7 @@ from cosim.fmi.fmu_file import Fmu
 from cosim.runs import reference
 from cosim.runs.comparison import Runs
 from tests.support.cosim_project import declared, fmi3_fmu, load
-from tests.support.instances import DISCARD, ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 
 UNIT = "RPController"
 
@@ -283,31 +283,6 @@ def test_the_scenario_meets_its_reference(path: Path, version: str) -> None:
 # ---- What is refused -----------------------------------------------------------------------------
 
 
-REFUSED = {
-    "too short": ({"sample_time": 5e-7}, "sample_time = 5e-07 s is refused: it must be 0, "),
-    "too late": (
-        {"sample_time": 0.5, "delay": 0.5 + 2.0**-52},
-        "delay = 0.5000000000000002 s is refused: it must not be above sample_time = 0.5 s",
-    ),
-    "delay of the continuous form": (
-        {"delay": 0.001},
-        "delay = 0.001 s is refused: it must not be above sample_time = 0 s",
-    ),
-}
-
-
-@pytest.mark.parametrize(("values", "text"), REFUSED.values(), ids=REFUSED.keys())
-def test_times_that_do_not_fit_are_refused(
-    loaded: LoadedFmu, values: dict[str, float], text: str
-) -> None:
-    with Instance(loaded) as instance:
-        instance.fmi.setupExperiment()
-        instance.set(**values)
-        instance.fmi.enterInitializationMode()
-        assert status_of(instance.fmi.exitInitializationMode) == ERROR
-        assert text in instance.messages[-1].text
-
-
 def test_a_start_at_which_samples_have_no_times_is_refused(loaded: LoadedFmu) -> None:
     with Instance(loaded) as instance:
         assert status_of(lambda: instance.initialize(start=1e12, sample_time=0.01)) == ERROR
@@ -319,11 +294,3 @@ def test_times_are_fixed(sampled: Callable[..., Instance]) -> None:
     instance = sampled(0.01)
     for name in ("sample_time", "delay"):
         assert status_of(lambda name=name: instance.set(**{name: 0.01})) == ERROR
-
-
-def test_a_law_that_is_not_finite_is_discarded(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance:
-        assert (
-            status_of(lambda: instance.initialize(sample_time=0.01, q1_ref=1e308, Kp1=1e308))
-            == DISCARD
-        )

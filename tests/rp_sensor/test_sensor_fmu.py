@@ -37,7 +37,7 @@ def test_a_start_that_swallows_the_sample_time(sensor: Fmu) -> None:
 
 
 def test_positions_that_overflow_within_a_step(fmu: Path, tmp_path: Path) -> None:
-    """The step is discarded; from a saved state the instance goes on."""
+    """The step is discarded; from a saved state the instance continues."""
     with Instance(LoadedFmu(fmu.with_name("RPSensor.fmu"), tmp_path), logging_on=True) as instance:
         instance.initialize()
         instance.step(0.0, 0.01)

@@ -145,27 +145,6 @@ def test_outputs_are_held_between_ticks(sensor: Fmu) -> None:
         assert shown(instance)[0] == (400, 0)
 
 
-def test_outputs_during_initialization_follow_the_inputs(sensor: Fmu) -> None:
-    with sensor.instance("sensor") as instance:
-        instance.set_up(0.0, None)
-        instance.set("noise1", 0.01)
-        instance.set("latency", 3)
-        instance.enter_initialization()
-        before = shown(instance)
-        instance.set("q1", 0.5)
-        during = shown(instance)
-        instance.exit_initialization()
-        assert shown(instance) == during != before
-
-
-def test_the_counter_stops_at_its_ends(sensor: Fmu) -> None:
-    with started(sensor, resolution1=1e-12, sample_time=0.01) as instance:
-        for i, (q, counts) in enumerate([(1.0, 2**31 - 1), (-1e300, 1 - 2**31), (0.001, 10**9)]):
-            instance.set("q1", q)
-            instance.do_step(i * 0.01, 0.01)
-            assert shown(instance)[0][0] == counts
-
-
 def refusal_of_step(instance: Instance, length: float) -> str:
     """The last message of a step from 0 s that is discarded."""
     with pytest.raises(FMICallException):

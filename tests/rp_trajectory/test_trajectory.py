@@ -14,7 +14,7 @@ from fmpy.fmi1 import FMICallException
 
 from models.rp_trajectory.references import make_references
 from tests.support.cosim_project import assert_made_again, declared, load, names_of
-from tests.support.instances import ERROR, Instance, LoadedFmu
+from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
 
 UNIT = "RPTrajectory"
@@ -202,55 +202,6 @@ def test_the_motion_does_not_depend_on_when_it_starts(loaded: LoadedFmu, start: 
 
 
 # ---- what is refused ---------------------------------------------------------------------------
-
-REFUSED = {
-    "no_frequency": ({"frequency": 0.0}, "frequency = 0 is refused"),
-    "short": (
-        {"turns": 0.25, "frequency": -0.5, "ramp_time": 0.75},
-        "turns / |frequency| = 0.5 s is refused: it must be at least ramp_time = 0.75 s",
-    ),
-    "circle_too_near": (
-        {"x_center": 0.15, "y_center": 0.0},
-        "there it is 0.05 m from the axis of joint 1, and it must stay beyond the smallest "
-        "reachable distance |a| = 0.1 m",
-    ),
-    "circle_around_too_near": (
-        {"x_center": 0.0, "y_center": 0.25, "radius": 0.3, "branch": "backward"},
-        "the path to (0, -0.05) m is refused: there it is 0.05 m from the axis",
-    ),
-    "line_too_near": (
-        {"motion": "line", "ee_x_from": 0.5, "ee_y_from": -0.0625, "ee_x_to": -0.5}
-        | {"ee_y_to": -0.0625, "a": -0.08},
-        "(0, -0.0625) m is refused: there it is 0.0625 m from the axis of joint 1, and it must "
-        "stay beyond the smallest reachable distance |a| = 0.08 m",
-    ),
-    "singular": (
-        {"motion": "line", "ee_x_from": 0.5, "ee_y_from": 0.125, "ee_x_to": -0.5}
-        | {"ee_y_to": 0.125, "a": 0.125},
-        "there it is 0.125 m",
-    ),
-    "release before grasp": (
-        {"grasp_time": 2.0, "release_time": 1.5},
-        "release_time = 1.5 s is refused: it must not be before grasp_time = 2 s",
-    ),
-    "at_the_axis": (
-        {"motion": "line", "ee_x_from": 0.0, "ee_y_from": 0.0, "a": 0.0},
-        "there it is 0 m",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", REFUSED)
-def test_parameters_that_do_not_go_together(loaded: LoadedFmu, case: str) -> None:
-    parameters, words = REFUSED[case]
-    with Instance(loaded, logging_on=True) as instance:
-        give(instance, parameters)
-        instance.fmi.setupExperiment()
-        instance.fmi.enterInitializationMode()
-        with pytest.raises(FMICallException) as caught:
-            instance.fmi.exitInitializationMode()
-        assert caught.value.status == ERROR
-        assert any(words in message.text for message in instance.messages), instance.messages
 
 
 def test_an_arc_that_leaves_out_the_nearest_point_is_accepted(loaded: LoadedFmu) -> None:

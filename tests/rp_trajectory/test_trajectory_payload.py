@@ -43,14 +43,6 @@ def test_initialization_knows_it(loaded: LoadedFmu, start: float, expected: bool
         assert is_attached(instance) == expected
 
 
-def test_it_is_never_attached_by_default(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance:
-        instance.initialize(start=-0.5)
-        for i in range(10):
-            instance.step(-0.5 + 0.1 * i, 0.1)
-            assert not is_attached(instance)
-
-
 def test_rollback_over_grasp_and_release(loaded: LoadedFmu) -> None:
     with Instance(loaded) as instance, Instance(loaded) as other:
         instance.initialize(**GRASPED)

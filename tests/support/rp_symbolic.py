@@ -101,7 +101,7 @@ class SmoothPlant:
 
 @functools.cache
 def terms_of_the_motion(is_attached: bool = False) -> dict[str, sp.Expr]:
-    """D, C dq and g(q) of the arm, alone or with the payload."""
+    """D, C dq and g(q) of the arm, with or without the payload."""
     e = SmoothPlant().expressions
     D = e["mass_matrix"].subs(dict.fromkeys(DRIVES, 0))
     terms = (D[0, 0], D[0, 1], D[1, 1], *e["coriolis"], *e["gravity"])

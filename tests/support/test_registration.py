@@ -105,7 +105,7 @@ def test_what_the_list_gets_wrong_does_not_compile(
 # ---- Labels --------------------------------------------------------------------------------------
 
 FIXTURES = {"browser", "firefox", "each_browser", "apart"}  # of tests/conftest.py
-# they skip a test for want of something
+# they skip a test where something is missing
 FUNCTIONS = {
     ("tests.support.missing", "missing"),
     ("tests.platforms.platforms", "runner"),

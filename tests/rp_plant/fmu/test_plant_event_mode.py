@@ -210,7 +210,7 @@ def test_a_grasp_in_event_mode_is_one_between_steps(paths: dict[str, Path]) -> N
 
 @each_method
 def test_a_stop_that_is_moved_away_takes_nothing_along(paths: dict[str, Path], method: str) -> None:
-    """The impact was due; without the limit the slide goes on, at the same velocity."""
+    """The impact was due; without the limit the slide moves on at the same velocity."""
     falling = {"q1": np.pi / 2, "coulomb_friction1": FIRM, "stops2": RIGID, "lower2": -0.5}
     with started(paths["fmi3"], solver_method=METHODS[method], **falling) as plant:
         assert plant.advance(1.0)

@@ -8,12 +8,11 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from cosim.errors import UserError
 from cosim.fmi.fmi_instance import Instance
 from cosim.fmi.fmu_file import Fmu
 from cosim.runs.simulation import initialize
 from cosim.scenarios.scenario import Scenario
-from tests.rp_plant.fmu.plant_runs import COMPLIANT, METHODS, NONE, RIGID, each_method, started
+from tests.rp_plant.fmu.plant_runs import METHODS, each_method
 from tests.support.cosim_project import load, names_of
 
 COUNTS = (
@@ -103,33 +102,6 @@ def test_with_start_values_it_is_the_arm(plant: Fmu, arm: Fmu, name: str, method
 
 
 # ---- Refused ---------------------------------------------------------------------------------
-
-TOGETHER = [
-    ({"coulomb_friction1": 2.0, "breakaway_friction1": 1.5}, ("breakaway_friction1 = 1.5", "= 2")),
-    ({"coulomb_friction2": 2.0, "breakaway_friction2": 2.5}, ("stribeck_velocity2 = 0", "2.5")),
-    ({"stops1": RIGID, "lower1": 0.5, "upper1": 0.5}, ("lower1 = 0.5", "upper1 = 0.5")),
-    ({"stops2": RIGID, "q2": 0.75}, ("q2 = 0.75", "upper2 = 0.5")),
-    ({"stops1": RIGID, "q1": -3.0}, ("q1 = -3", "lower1 = -2.5")),
-    ({"stops1": COMPLIANT}, ("stop_stiffness1 = 0",)),
-    (
-        {"stops2": COMPLIANT, "stop_stiffness2": 1e4, "lower2": 0.5, "upper2": 0.25},
-        ("lower2 = 0.5", "upper2 = 0.25"),
-    ),
-]
-
-
-@pytest.mark.parametrize(("values", "texts"), TOGETHER)
-def test_values_that_do_not_fit_each_other_are_refused(
-    plant: Fmu, values: dict[str, float], texts: tuple[str, ...]
-) -> None:
-    with pytest.raises(UserError) as refusal, started(plant, **values):
-        pass
-    assert all(text in str(refusal.value) for text in texts)
-
-
-def test_limits_play_no_role_without_stops(plant: Fmu) -> None:
-    with started(plant, stops2=NONE, lower2=1.0, upper2=-1.0, q2=5.0) as instance:
-        instance.do_step(0.0, 1e-3)
 
 
 def test_terminals_fit_those_of_the_arm(fmu: Path) -> None:

@@ -1,4 +1,4 @@
-"""A serialized state with modes that cannot be is refused, and the instance goes on as before."""
+"""A serialized state with impossible modes is refused, and the instance continues as before."""
 
 import struct
 from collections.abc import Iterator

@@ -226,7 +226,7 @@ def test_cvode_on_the_scenarios(plant: Fmu, path: Path) -> None:
 
 
 def test_a_joint_past_its_stop_that_leaves_is_no_event(plant: Fmu) -> None:
-    """An importer may enter event mode there; the joint is put on its stop and goes on."""
+    """An importer may enter event mode there; the joint is put on its stop and moves on."""
     upper = STOPS["upper2"]
     with model(plant.path, **STOPS, dq2=0.1) as instance:
         for dq, count in (-0.1, 0), (0.1, 1):

@@ -158,7 +158,7 @@ class RandomCase:
 
 
 def random_case(number: int) -> tuple[RandomCase, random.Random]:
-    """The case of this number, and the chance that goes on from there. A third of the cases have
+    """The case of this number, and its random numbers from there on. A third of the cases have
     compliant stops."""
     chance = random.Random(number)
     moves = sequence(chance.randint(10, 50), chance)
@@ -208,7 +208,7 @@ def test_random_rollback(plant: Fmu, number: int) -> None:
 
 @each_method
 def test_serialized_states_keep_the_modes(plant: Fmu, method: str) -> None:
-    """Another instance goes on the same from each mode: held, sliding, free, on a stop, loaded."""
+    """Another instance continues alike from each mode: held, sliding, free, on a stop, loaded."""
     chance = random.Random(1)
     moves = sequence(150, chance)
     at = times(moves)
