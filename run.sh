@@ -105,7 +105,7 @@ if [ "$command" = playground ]; then
   build "the playground" --target playground
   echo "$page: $(wc -c <"$page") bytes, built in $SECONDS s"
   [[ " $* " != *" --open "* ]] || PYTHONPATH="$root" "$root/build/venv/bin/python" -P -c \
-    "import pathlib, sys; from cosim.report import browser; browser.show(pathlib.Path(sys.argv[1]))" "$page"
+    "import pathlib, sys; from rparm.report import browser; browser.show(pathlib.Path(sys.argv[1]))" "$page"
   exit
 fi
 
@@ -121,4 +121,4 @@ case "$command" in
 esac
 [ -n "$command" ] || set -- run "$@"
 export PYTHONPATH="$root"
-exec "$root/build/venv/bin/python" -P -m cosim "$@"  # -P: no modules from the current folder
+exec "$root/build/venv/bin/python" -P -m rparm "$@"  # -P: no modules from the current folder

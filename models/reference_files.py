@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim import project, trajectory_csv
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import read_model
-from cosim.output_files import whole
-from cosim.scenarios import scenario as scenarios
-from cosim.scenarios.scenario import Scenario
+from rparm import project, trajectory_csv
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import read_model
+from rparm.output_files import whole
+from rparm.scenarios import scenario as scenarios
+from rparm.scenarios.scenario import Scenario
 
 # Writes the reference of a scenario to a folder.
 Writer = Callable[[Scenario, Path], None]

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cosim.report.style import DASHED, ERRORS, MUTED, REFERENCE, RUN
-from cosim.system.comparison import Outcome
-from cosim.system.study import Measure
+from rparm.report.style import DASHED, ERRORS, MUTED, REFERENCE, RUN
+from rparm.system.comparison import Outcome
+from rparm.system.study import Measure
 
 JOINTS = (("q1", "rad"), ("q2", "m"))
 REACHED = 0.999  # share of a limit

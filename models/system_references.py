@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cosim import trajectory_csv
-from cosim.errors import UserError
-from cosim.fmi.model import Value
+from rparm import trajectory_csv
+from rparm.errors import UserError
+from rparm.fmi.model import Value
 
 NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
 KEPT = 20  # every so many communication points go into the files

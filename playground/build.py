@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 PAGE = Path(__file__).parent / "page"
-SHARED = Path(__file__).parents[1] / "cosim" / "report" / "assets"  # of the report, too
+SHARED = Path(__file__).parents[1] / "rparm" / "report" / "assets"  # of the report, too
 STYLES = (SHARED / "page.css", PAGE / "playground.css")
 SCRIPTS = (
     SHARED / "shapes.js",

@@ -12,7 +12,7 @@ from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 if TYPE_CHECKING:
-    from cosim.fmi.fmu_file import Fmu
+    from rparm.fmi.fmu_file import Fmu
     from tests.support.browser import Browser
     from tests.support.hosts import Network
     from tests.support.instances import LoadedFmu
@@ -35,8 +35,8 @@ def path(request: pytest.FixtureRequest, fmu: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def opened(path: Path) -> Iterator["Fmu"]:
-    """The same FMU, opened by cosim."""
-    from cosim.fmi.fmu_file import Fmu
+    """The same FMU, opened by rparm."""
+    from rparm.fmi.fmu_file import Fmu
 
     with Fmu(path) as opened:
         yield opened
@@ -53,10 +53,10 @@ def loaded(path: Path, tmp_path_factory: pytest.TempPathFactory) -> "LoadedFmu":
 @pytest.fixture
 def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A copy of the project with two scenarios, for the command line to work in."""
-    from tests.support.cosim_project import copy_project
+    from tests.support.rparm_project import copy_project
 
     copy_project(tmp_path)
-    monkeypatch.setattr("cosim.project.ROOT", tmp_path)
+    monkeypatch.setattr("rparm.project.ROOT", tmp_path)
     return tmp_path
 
 

@@ -1,7 +1,8 @@
 """What the report animates of the closed loop: the arm, and the motion that it has to follow."""
 
-from cosim.report.motion import Animation, Recorded
-from models.rp_manipulator.animation import EFFORTS, JOINTS, acting, geometry, joints
+from rparm.models.rp_manipulator.animation import EFFORTS, JOINTS, acting, geometry, joints
+
+from rparm.report.motion import Animation, Recorded
 
 
 def animation(recorded: Recorded) -> Animation:

@@ -2,12 +2,12 @@
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from rparm.models.system_figure import draw, draw_limit
 
-from cosim.report.style import STYLE
-from cosim.system.comparison import Outcome
-from cosim.system.ssp import Ssp
-from models import system_figure
-from models.system_figure import draw, draw_limit
+from rparm.models import system_figure
+from rparm.report.style import STYLE
+from rparm.system.comparison import Outcome
+from rparm.system.ssp import Ssp
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 ARM = "arm"  # the component

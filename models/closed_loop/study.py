@@ -1,14 +1,15 @@
-"""What cosim asks of this folder: measures and picture of a run, and the study of the coupling.
+"""What rparm asks of this folder: measures and picture of a run, and the study of the coupling.
 
-cosim/system/study.py says what each name means.
+rparm/system/study.py says what each name means.
 """
 
 from pathlib import Path
 
-from cosim.system.study import Diagram
-from models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
-from models.closed_loop.motion_figure import ARM, figure
-from models.system_figure import tracking_error
+from rparm.models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
+from rparm.models.closed_loop.motion_figure import ARM, figure
+from rparm.models.system_figure import tracking_error
+
+from rparm.system.study import Diagram
 
 __all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure", "study_coupling"]
 
@@ -35,6 +36,6 @@ DIAGRAMS = (
 
 def study_coupling(ssp: Path, report: Path) -> dict[str, dict[str, object]]:
     """Study what the coupling costs; see coupling.md."""
-    from models.closed_loop.coupling.run_study import run  # only `coupling` needs it
+    from rparm.models.closed_loop.coupling.run_study import run  # only `coupling` needs it
 
     return run(report, ssp)

@@ -1,8 +1,9 @@
 """What the report animates of the machine: plant, efforts of the drives, payload, wall."""
 
-from cosim.report.motion import Animation, Recorded
-from models.rp_manipulator.animation import EFFORTS, JOINTS, acting, joints
-from models.rp_plant.animation import FORCES, geometry, plant_columns
+from rparm.models.rp_manipulator.animation import EFFORTS, JOINTS, acting, joints
+from rparm.models.rp_plant.animation import FORCES, geometry, plant_columns
+
+from rparm.report.motion import Animation, Recorded
 
 WALL = ("position", "angle", "tip_x", "tip_z")
 

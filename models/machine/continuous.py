@@ -5,9 +5,9 @@ coupling is left between the co-simulation and references/monolithic.py. The err
 the first power of the step where inputs are held, with the second where they are extrapolated.
 What remains as the step goes to 0 is calculated from several steps by Richardson extrapolation.
 
-    build/venv/bin/python -m models.machine.continuous
+    build/venv/bin/python -m rparm.models.machine.continuous
 
-runs it in Ecos and under cosim's master, prints tables, and draws continuous.png beside this file.
+runs it in Ecos and under rparm's master, prints tables, and draws continuous.png beside this file.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,17 +17,17 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from rparm.models.machine.experiment import STOP
+from rparm.models.machine.systems import SENSOR, direct, fmus_of, run_in_ecos
 
-from cosim import project, trajectory_csv
-from cosim.coupling.master import Master
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import Fmu
-from cosim.fmi.model import Value
-from cosim.report.style import ERRORS, RUN, STYLE, save
-from cosim.system import ssp
-from cosim.system.ssp import Ssp
-from models.machine.experiment import STOP
-from models.machine.systems import SENSOR, direct, fmus_of, run_in_ecos
+from rparm import project, trajectory_csv
+from rparm.coupling.master import Master
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Value
+from rparm.report.style import ERRORS, RUN, STYLE, save
+from rparm.system import ssp
+from rparm.system.ssp import Ssp
 
 FOLDER = Path(__file__).resolve().parent
 VARIANTS = ("pick_and_place", "pick_and_place_untold")
@@ -136,7 +136,7 @@ def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tup
 def largest_error(columns: Columns, expected: Columns) -> tuple[float, str]:
     """Largest difference of all variables, relative to the largest value of each, and whose it is.
 
-    As the errors of `cosim.runs.reference`, but never relative to a sum. `columns` have the first
+    As the errors of `rparm.runs.reference`, but never relative to a sum. `columns` have the first
     rows of `expected`, or all.
     """
     errors = {

@@ -6,12 +6,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from rparm.models.system_figure import draw, draw_limit
 
-from cosim.report.style import ERRORS, MUTED, RUN, STYLE
-from cosim.system.comparison import Outcome
-from cosim.system.ssp import Ssp
-from models import system_figure
-from models.system_figure import draw, draw_limit
+from rparm.models import system_figure
+from rparm.report.style import ERRORS, MUTED, RUN, STYLE
+from rparm.system.comparison import Outcome
+from rparm.system.ssp import Ssp
 
 EFFORTS = (("tau1", "N·m"), ("f2", "N"))
 MOTORS = (("current", "A"), ("voltage", "V"))

@@ -1,15 +1,15 @@
-"""What cosim asks of this folder: measures and picture of a run.
+"""What rparm asks of this folder: measures and picture of a run.
 
-cosim/system/study.py says what each name means.
+rparm/system/study.py says what each name means.
 """
 
 import numpy as np
+from rparm.models.machine.experiment import START, STEPS_PER_SECOND, STOP
+from rparm.models.machine.machine_figure import ARM, figure
+from rparm.models.system_figure import tracking_error
 
-from cosim.system.comparison import Outcome
-from cosim.system.study import Diagram, Measure
-from models.machine.experiment import START, STEPS_PER_SECOND, STOP
-from models.machine.machine_figure import ARM, figure
-from models.system_figure import tracking_error
+from rparm.system.comparison import Outcome
+from rparm.system.study import Diagram, Measure
 
 __all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure"]
 

@@ -10,11 +10,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from lxml import etree
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.fmi.model import Model, Value
-from cosim.system import ecos, ssp
-from cosim.system.ssp import Ssp
-from cosim.system.structure import Connection
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Model, Value
+from rparm.system import ecos, ssp
+from rparm.system.ssp import Ssp
+from rparm.system.structure import Connection
 
 STRUCTURE = "SystemStructure.ssd"
 VARIANT = "changed"
@@ -97,7 +97,7 @@ def run_in_ecos(
     with_sensor: bool = True,
 ) -> np.ndarray:
     """Values after each step in Ecos, (rows, names), of the system that `write_system` writes."""
-    with TemporaryDirectory(prefix="cosim-") as folder:
+    with TemporaryDirectory(prefix="rparm-") as folder:
         path = Path(folder) / "Changed.ssp"
         write_system(opened, path, parameters, stop, step, with_sensor)
         with ssp.unpacked(path) as other:

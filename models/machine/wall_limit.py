@@ -5,9 +5,9 @@ equilibrium. Whether this dies out or grows is seen in the motion: the depth obe
 x_n+2 = s x_n+1 - p x_n + c, and p, the square of the factor of growth in a step, is 1 at the limit.
 stability.py has the theory.
 
-    build/venv/bin/python -m models.machine.wall_limit
+    build/venv/bin/python -m rparm.models.machine.wall_limit
 
-measures it in Ecos and under cosim's master, and draws wall_limit.png beside this file.
+measures it in Ecos and under rparm's master, and draws wall_limit.png beside this file.
 """
 
 import math
@@ -17,15 +17,15 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from rparm.models.machine.stability import Contact, exact_least_damping, least_damping
+from rparm.models.machine.systems import direct, fmus_of, run_in_ecos, write_system
 
-from cosim import project
-from cosim.coupling.master import Master
-from cosim.fmi.fmu_file import Fmu
-from cosim.report.style import ERRORS, RUN, STYLE, save
-from cosim.system import ssp
-from cosim.system.ssp import Ssp
-from models.machine.stability import Contact, exact_least_damping, least_damping
-from models.machine.systems import direct, fmus_of, run_in_ecos, write_system
+from rparm import project
+from rparm.coupling.master import Master
+from rparm.fmi.fmu_file import Fmu
+from rparm.report.style import ERRORS, RUN, STYLE, save
+from rparm.system import ssp
+from rparm.system.ssp import Ssp
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -95,11 +95,11 @@ def write_pressed(opened: Ssp, path: Path, stiffness: float, damping: float) -> 
     write_system(opened, path, pressed(stiffness, damping), STEPS * STEP, STEP)
 
 
-# ---- cosim's master ------------------------------------------------------------------------------
+# ---- rparm's master ------------------------------------------------------------------------------
 
 
 def under_master(opened: Ssp, fmus: Mapping[str, Fmu], order: str, inputs: str) -> Measure:
-    """Runs the machine under cosim's master; the controller sees the joints themselves."""
+    """Runs the machine under rparm's master; the controller sees the joints themselves."""
     connections = direct(opened.system.connections)
 
     def measure(stiffness: float, damping: float) -> np.ndarray:
@@ -135,7 +135,7 @@ def draw(measured: Mapping[str, list[float]], in_engine: list[float]) -> Figure:
             STIFFNESSES, in_engine, "s", color="none", markeredgecolor=RUN, markersize=13,
             label="measured in Ecos",
         )  # fmt: skip
-        axes.loglog([], [], "o", color="#6b7885", label="measured under cosim's master")
+        axes.loglog([], [], "o", color="#6b7885", label="measured under rparm's master")
         axes.set_xlabel("stiffness of the wall (N/m)")
         axes.set_ylabel("least damping of the wall (N·s/m)")
         axes.set_title(

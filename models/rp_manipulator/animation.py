@@ -1,6 +1,6 @@
 """What the report animates: the arm, of this model and of the models and systems that contain it.
 
-cosim/report/motion.py says what the names mean, cosim/report/assets/arm.js draws them.
+rparm/report/motion.py says what the names mean, rparm/report/assets/arm.js draws them.
 """
 
 from collections.abc import Mapping
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.fmi.model import Value
-from cosim.report.motion import Animation, Recorded
+from rparm.fmi.model import Value
+from rparm.report.motion import Animation, Recorded
 
 JOINTS = ("q1", "q2")
 EFFORTS = ("tau1", "f2")

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from rparm.models.rp_manipulator.animation import EFFORTS, acting, ghost, joints
+from rparm.models.rp_manipulator.animation import geometry as arm_geometry
 
-from cosim.fmi.model import Value
-from cosim.report.motion import Animation, Recorded
-from models.rp_manipulator.animation import EFFORTS, acting, ghost, joints
-from models.rp_manipulator.animation import geometry as arm_geometry
+from rparm.fmi.model import Value
+from rparm.report.motion import Animation, Recorded
 
 FORCES = ("ee_fx", "ee_fy")
 WITHOUT_STOPS = 1  # item of stops1 and stops2

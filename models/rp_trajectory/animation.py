@@ -1,7 +1,8 @@
 """What the report animates: the arm on its reference motion."""
 
-from cosim.report.motion import Animation, Recorded
-from models.rp_manipulator.animation import JOINTS
+from rparm.models.rp_manipulator.animation import JOINTS
+
+from rparm.report.motion import Animation, Recorded
 
 UNKNOWN = dict.fromkeys(("lc1", "g", "stops", "wall", "payload"))  # to this model
 

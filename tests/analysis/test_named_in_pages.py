@@ -14,7 +14,7 @@ import pytest
 
 from tests.support.paths import ROOT
 
-TOPS = "cmake|cosim|fmu|models|playground|requirements|src|tests"
+TOPS = "cmake|rparm|fmu|models|playground|requirements|src|tests"
 SOURCE = {".c", ".cmake", ".h", ".js", ".md", ".py", ".sh", ".toml", ".txt"}
 CODE = SOURCE - {".md"} | {".css", ".html", ".in", ".ini", ".xml"}
 WRITTEN = {"value_references.h", "benchmark.md"}  # by the generator and the benchmark
@@ -120,7 +120,7 @@ def unknown_paths(text: str, folder: str) -> Iterator[str]:
         if not is_known_path(path, folder):
             yield path
     for module in MODULE.findall(text):
-        path = module.replace(".", "/")
+        path = module.removeprefix("rparm." * module.startswith("rparm.models.")).replace(".", "/")
         if not {f"{path}.py", f"{path}/__main__.py"} & files():
             yield module
 
@@ -202,12 +202,12 @@ def test_what_pages_name_exists(page: str) -> None:
             "clock_two_sum of stepping.c",
         ),
         ("see `arm_forward_dynamics` of `rp_plant.h`", "arm_forward_dynamics of rp_plant.h"),
-        ("- `cosim/fmi/model.py`: `Model.seek` finds", "Model.seek of cosim/fmi/model.py"),
+        ("- `rparm/fmi/model.py`: `Model.seek` finds", "Model.seek of rparm/fmi/model.py"),
         ("`src/instance/steppings.c` does", "src/instance/steppings.c"),
         ("by tests/fuzz/replays.c", "tests/fuzz/replays.c"),
         ("`steppings.c` does", "steppings.c"),
-        ("```sh\npython -m cosim.report.recordings\n```", "cosim.report.recordings"),
-        ("[x](cosim/nowhere.py)", "cosim/nowhere.py"),
+        ("```sh\npython -m rparm.report.recordings\n```", "rparm.report.recordings"),
+        ("[x](rparm/nowhere.py)", "rparm/nowhere.py"),
         ("[x](CONTRIBUTING.md#nowhere)", "CONTRIBUTING.md#nowhere"),
         ("calls fmi2SetReals", "fmi2SetReals"),
         ("`instance_do_steps(x)` does", "instance_do_steps"),

@@ -27,15 +27,15 @@ OPTIONS = {"-r run.in", "-r run.txt", "--only-binary :all:"}
 # What each environment runs: patterns of files; what they import of the project belongs to it too.
 COMMANDS = {
     "run": (
-        "cosim/__main__.py", "cosim/commands/[!cf]*.py", "cosim/commands/coupling.py",
-        "cosim/system/ecos.py", "models/*/animation.py", "models/*/study.py",
+        "rparm/__main__.py", "rparm/commands/[!cf]*.py", "rparm/commands/coupling.py",
+        "rparm/system/ecos.py", "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
         "fmu/source_code.py",
     ),
-    "campaign": ("cosim/commands/campaign.py", "cosim/campaign/*.py"),
-    "federation": ("cosim/commands/fed*.py", "cosim/federation/*.py"),
+    "campaign": ("rparm/commands/campaign.py", "rparm/campaign/*.py"),
+    "federation": ("rparm/commands/fed*.py", "rparm/federation/*.py"),
     "release": ("fmu/bill_of_materials.py", "playground/build.py"),
-    "dev": ("cosim/report/recording.py", "fmu/*.py", "models/**/*.py", "tests/**/*.py"),
+    "dev": ("rparm/report/recording.py", "fmu/*.py", "models/**/*.py", "tests/**/*.py"),
 }  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]
@@ -148,10 +148,12 @@ def imported(path: Path) -> set[str]:
 def own_modules() -> dict[str, list[Path]]:
     """The project's files by names to import, from the root or, of scripts, a folder."""
     found: dict[str, list[Path]] = {}
-    for top in ("cosim", "fmu", "models", "playground", "tests"):
+    for top in ("rparm", "fmu", "models", "playground", "tests"):
         for path in (ROOT / top).rglob("*.py"):
             parts = path.relative_to(ROOT).with_suffix("").parts
             parts = parts[:-1] if path.stem == "__init__" else parts
+            if top == "models":  # rparm/models.py
+                parts = ("rparm", *parts)
             for i in range(len(parts)):
                 found.setdefault(".".join(parts[i:]), []).append(path)
     return found
@@ -184,7 +186,7 @@ def test_imports_are_found(tmp_path: Path) -> None:
         "def f():\n    from two import x\n"
     )
     assert imported(tmp_path / "a.py") == {"os", "one.part", "b", "two", "two.x"}
-    assert {"numpy", "fmpy"} <= set(foreign_imports(("cosim/runs/simulation.py",)))
+    assert {"numpy", "fmpy"} <= set(foreign_imports(("rparm/runs/simulation.py",)))
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cosim.report.recording import ASSETS, SCRIPTS, STYLES
+from rparm.report.recording import ASSETS, SCRIPTS, STYLES
 from tests.support.browser import Browser
 
 PAGE = """<!DOCTYPE html>

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu
 from tests.animation.player_page import ARM, show, synthetic
 from tests.support.browser import Browser
 

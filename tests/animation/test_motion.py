@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import project, trajectory_csv
-from cosim.fmi.fmu_file import Fmu
-from cosim.report import motion
-from cosim.runs.comparison import Run, Runs
-from cosim.system import comparison, ecos, ssp
-from cosim.system.comparison import Outcome
+from rparm import project, trajectory_csv
+from rparm.fmi.fmu_file import Fmu
+from rparm.report import motion
+from rparm.runs.comparison import Run, Runs
+from rparm.system import comparison, ecos, ssp
+from rparm.system.comparison import Outcome
 from tests.animation.player_page import show
 from tests.support.browser import Browser
-from tests.support.cosim_project import BUILD, FMUS, load, names_of
 from tests.support.paths import ROOT
+from tests.support.rparm_project import BUILD, FMUS, load, names_of
 
 ANIMATED = ("rp_manipulator", "rp_plant", "rp_trajectory")
 SYSTEMS = {"closed_loop": "ClosedLoop", "machine": "Machine"}

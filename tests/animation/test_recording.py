@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cosim.report import recording
+from rparm.report import recording
 from tests.animation.player_page import show, synthetic
 from tests.support.browser import Browser
 from tests.support.paths import ROOT

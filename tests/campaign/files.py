@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from html import unescape
 from pathlib import Path
 
-from cosim.campaign import campaign_file
-from cosim.campaign.campaign_file import Campaign
+from rparm.campaign import campaign_file
+from rparm.campaign.campaign_file import Campaign
 
 HEAD = """title = "Test"
 description = "Of a test."

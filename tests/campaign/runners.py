@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from distributed import Client
 
-from cosim.campaign import bases, campaign_file, planning
-from cosim.campaign.campaign_file import Campaign
-from cosim.campaign.engine import Engine
-from cosim.campaign.job import Job
-from cosim.campaign.points import Points
-from cosim.campaign.results import Results
-from cosim.campaign.runs import Rows, Runner, open_fmus
+from rparm.campaign import bases, campaign_file, planning
+from rparm.campaign.campaign_file import Campaign
+from rparm.campaign.engine import Engine
+from rparm.campaign.job import Job
+from rparm.campaign.points import Points
+from rparm.campaign.results import Results
+from rparm.campaign.runs import Rows, Runner, open_fmus
 
 
 @contextmanager

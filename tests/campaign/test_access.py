@@ -13,7 +13,7 @@ import psutil
 import pytest
 from distributed import Client
 
-from cosim.campaign import cluster
+from rparm.campaign import cluster
 from tests.campaign.cluster import processes
 from tests.campaign.cluster.processes import ENVIRONMENT
 from tests.campaign.files import write

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.campaign import analysis
-from cosim.campaign.points import Points
+from rparm.campaign import analysis
+from rparm.campaign.points import Points
 from tests.campaign.files import ARM, campaign
 from tests.campaign.runners import rows, runner
 

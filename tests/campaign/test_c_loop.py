@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.campaign import bases, planning
-from cosim.campaign.points import Points
-from cosim.campaign.runs import Runner, open_fmus
+from rparm.campaign import bases, planning
+from rparm.campaign.points import Points
+from rparm.campaign.runs import Runner, open_fmus
 from tests.campaign.files import campaign
 from tests.campaign.rate.c_loop import CLoop
 from tests.campaign.rate.works import WORKS

@@ -5,11 +5,11 @@ from zipfile import ZipFile
 
 import pytest
 
-from cosim import __main__ as cli
-from cosim.campaign import bases, planning
-from cosim.errors import UserError
+from rparm import __main__ as cli
+from rparm.campaign import bases, planning
+from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
-from tests.support.cosim_project import FMUS, assert_one_line
+from tests.support.rparm_project import FMUS, assert_one_line
 
 MISTAKES = {
     "no file of TOML": ([("seed = 3", "seed = ")], "not valid TOML"),

@@ -12,9 +12,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim import __main__ as cli
-from cosim.campaign import figures, page
-from cosim.commands.campaign import _command
+from rparm import __main__ as cli
+from rparm.campaign import figures, page
+from rparm.commands.campaign import _command
 from tests.campaign.cluster.processes import ENVIRONMENT, finish, start, table
 from tests.campaign.files import commands, write
 from tests.support.paths import ROOT
@@ -70,7 +70,7 @@ def test_its_commands_work_in_the_projects_folder(tmp_path: Path) -> None:
     folder.mkdir()
     changes = [("runs = 40", 'runs = 2\nworst = ["m2"]'), ("[3, 17]", "[0]")]
     write(folder, changes=changes)
-    program = [sys.executable, "-P", "-m", "cosim"]
+    program = [sys.executable, "-P", "-m", "rparm"]
     arguments = ["campaign", "test.toml", "--output", "the output", "--workers", "1"]
     subprocess.run([*program, *arguments], cwd=folder, env=ENVIRONMENT, check=True)
     page = folder / "the output" / "index.html"
@@ -196,8 +196,8 @@ def test_a_replay_before_the_campaign_leads_to_no_page(tmp_path: Path) -> None:
 
 def test_no_other_command_imports_what_campaigns_need() -> None:
     code = (
-        "import sys; from cosim.__main__ import main; main(['list']);"
-        "import cosim.commands.run, cosim.commands.system, cosim.commands.coupling;"
+        "import sys; from rparm.__main__ import main; main(['list']);"
+        "import rparm.commands.run, rparm.commands.system, rparm.commands.coupling;"
         "print(*(set(sys.modules) & {'dask', 'distributed', 'numba', 'pyarrow', 'SALib'}))"
     )
     run = subprocess.run(
@@ -210,14 +210,14 @@ def test_no_other_command_imports_what_campaigns_need() -> None:
 def test_it_says_what_is_not_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("cosim.commands.campaign.NEEDED", ("numpy", "no_such_package"))
+    monkeypatch.setattr("rparm.commands.campaign.NEEDED", ("numpy", "no_such_package"))
     assert cli.main(["campaign", str(write(tmp_path))]) == 2
     error = capsys.readouterr().err
     assert error == "error: no_such_package: not installed, ./setup.sh --campaign does it\n"
 
 
 def test_the_campaigns_that_ship_are_right() -> None:
-    from cosim.campaign import bases, campaign_file, planning
+    from rparm.campaign import bases, campaign_file, planning
 
     found = sorted(ROOT.glob("models/*/campaigns/*.toml"))
     assert {path.stem for path in found} == {"free_motion", "tolerance"}

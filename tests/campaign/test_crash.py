@@ -8,8 +8,8 @@ import fmpy
 import numpy as np
 import pytest
 
-from cosim import __main__ as cli
-from cosim.campaign import cluster, engine
+from rparm import __main__ as cli
+from rparm.campaign import cluster, engine
 from tests.campaign.files import HEAD
 from tests.campaign.runners import engine_of
 from tests.support.paths import ROOT
@@ -54,7 +54,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     scenario = tmp_path / "models" / "crashing" / "scenarios" / "toy.toml"
     scenario.parent.mkdir(parents=True)
     scenario.write_text(SCENARIO)
-    monkeypatch.setattr("cosim.project.ROOT", tmp_path)
+    monkeypatch.setattr("rparm.project.ROOT", tmp_path)
     path = tmp_path / "test.toml"
     path.write_text(CAMPAIGN)
     return path

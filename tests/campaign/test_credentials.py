@@ -6,9 +6,9 @@ from pathlib import Path
 import dask
 import pytest
 
-from cosim import __main__ as cli
-from cosim.campaign import cluster, credentials
-from cosim.errors import UserError
+from rparm import __main__ as cli
+from rparm.campaign import cluster, credentials
+from rparm.errors import UserError
 from tests.campaign.cluster import certificates, processes
 from tests.campaign.files import write
 from tests.support.hosts import LOOPBACK

@@ -14,9 +14,9 @@ from types import SimpleNamespace
 import pytest
 from distributed import Client
 
-from cosim.campaign import cluster, engine
-from cosim.campaign.worker import Plugin
-from cosim.errors import UserError
+from rparm.campaign import cluster, engine
+from rparm.campaign.worker import Plugin
+from rparm.errors import UserError
 from tests.campaign.cluster import processes
 from tests.campaign.cluster.processes import (
     blocks,
@@ -137,7 +137,7 @@ def test_campaigns_share_workers(
         with engine_of(client, file, tmp_path / name) as (again, results):
             again.run(results.missing(), lambda _: None)
     assert [first_results.digest(), other_results.digest()] == tables
-    assert not list(folder.glob("**/cosim-*"))
+    assert not list(folder.glob("**/rparm-*"))
 
 
 def test_a_stopped_campaign_leaves_nothing_on_workers(
@@ -146,12 +146,12 @@ def test_a_stopped_campaign_leaves_nothing_on_workers(
     client, folder = local
 
     def stop(_: int) -> None:
-        assert list(folder.glob("**/cosim-*"))
+        assert list(folder.glob("**/rparm-*"))
         raise KeyboardInterrupt
 
     with engine_of(client, small[0], tmp_path) as (made, _), pytest.raises(KeyboardInterrupt):
         made.run(range(5), stop)
-    wait_for(lambda: not list(folder.glob("**/cosim-*")))
+    wait_for(lambda: not list(folder.glob("**/rparm-*")))
 
 
 def test_an_error_of_the_system_is_not_one_of_the_scheduler(
@@ -231,7 +231,7 @@ def test_fmus_stay_until_runs_under_way_have_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shop = Shop()
-    monkeypatch.setattr("cosim.campaign.worker.Workshop", lambda *_: shop)
+    monkeypatch.setattr("rparm.campaign.worker.Workshop", lambda *_: shop)
     plugin = Plugin("name", None, {})
     plugin.setup(SimpleNamespace(local_directory=tmp_path))
     assert plugin.rows(plugin, None)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from cosim.campaign import figures
-from cosim.campaign.analysis import Index
-from cosim.report.style import save
+from rparm.campaign import figures
+from rparm.campaign.analysis import Index
+from rparm.report.style import save
 
 RANDOM = np.random.default_rng(4)
 STRANGE = r"a $\frac$ b"  # no formula of matplotlib's

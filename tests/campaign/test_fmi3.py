@@ -9,16 +9,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim import __main__ as cli
-from cosim.campaign.fmi_calls import DO_STEP
-from cosim.campaign.loop import COLUMNS
-from cosim.campaign.measures import LYAPUNOV
-from cosim.campaign.runs import Rows
+from rparm import __main__ as cli
+from rparm.campaign.fmi_calls import DO_STEP
+from rparm.campaign.loop import COLUMNS
+from rparm.campaign.measures import LYAPUNOV
+from rparm.campaign.runs import Rows
 from tests.campaign.cluster.processes import completed
 from tests.campaign.files import ARM, HEAD, campaign, commands, write
 from tests.campaign.runners import rows, runner
-from tests.support.cosim_project import BUILD, FMUS, fmi3_fmu, repacked
 from tests.support.paths import ROOT
+from tests.support.rparm_project import BUILD, FMUS, fmi3_fmu, repacked
 
 ARM2 = FMUS["rp_manipulator"]
 ARM3 = fmi3_fmu(ARM2)

@@ -14,8 +14,8 @@ from ctypes import (
 )
 from typing import Any
 
-from cosim.campaign.fmi3_adapters import ADDRESSES
-from cosim.campaign.fmi_calls import DERIVATIVE, GET_BOOLEAN, SET_BOOLEAN
+from rparm.campaign.fmi3_adapters import ADDRESSES
+from rparm.campaign.fmi_calls import DERIVATIVE, GET_BOOLEAN, SET_BOOLEAN
 
 INSTANCE = 0x1234
 COUNT = 3

@@ -1,4 +1,4 @@
-"""Modules of cosim.campaign use each other in one direction; workers load only what they need."""
+"""Modules of rparm.campaign use each other in one direction; workers load only what they need."""
 
 import ast
 import re
@@ -7,18 +7,18 @@ import sys
 
 import pytest
 
-from cosim import campaign
+from rparm import campaign
 from tests.campaign.cluster.processes import ENVIRONMENT
 from tests.support.paths import ROOT
 
-FOLDER = ROOT / "cosim" / "campaign"
+FOLDER = ROOT / "rparm" / "campaign"
 LAYERS = [
     re.findall(r"\w+", line[4:34])
     for line in campaign.__doc__.splitlines()
     if line.startswith("    ")
 ]
 MODULES = {path.stem for path in FOLDER.glob("*.py")} - {"__init__"}
-PREFIX = "cosim.campaign"
+PREFIX = "rparm.campaign"
 
 
 def used(module: str) -> set[str]:

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim import __main__ as cli
-from cosim.campaign import bases, quantities
-from cosim.campaign.campaign_file import Campaign
-from cosim.campaign.points import Points
-from cosim.errors import UserError
+from rparm import __main__ as cli
+from rparm.campaign import bases, quantities
+from rparm.campaign.campaign_file import Campaign
+from rparm.campaign.points import Points
+from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.campaign.runners import rows, runner
-from tests.support.cosim_project import BUILD, FMUS, assert_one_line
+from tests.support.rparm_project import BUILD, FMUS, assert_one_line
 
 RIGHT_ANGLE = repr(math.pi / 2)
 # with units, and the same in SI

@@ -13,15 +13,15 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim import project
-from cosim.campaign import bases
-from cosim.campaign.campaign_file import MAX_RUNS
-from cosim.campaign.results import Results
-from cosim.campaign.runs import Rows
-from cosim.errors import UserError
+from rparm import project
+from rparm.campaign import bases
+from rparm.campaign.campaign_file import MAX_RUNS
+from rparm.campaign.results import Results
+from rparm.campaign.runs import Rows
+from rparm.errors import UserError
 from tests.campaign.files import campaign
 from tests.campaign.runners import runner
-from tests.support.cosim_project import FMUS
+from tests.support.rparm_project import FMUS
 
 
 class Folder:

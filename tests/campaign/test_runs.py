@@ -1,4 +1,4 @@
-"""Runs by the compiled loop: those of cosim's own simulation and master, to the last bit."""
+"""Runs by the compiled loop: those of rparm's own simulation and master, to the last bit."""
 
 import dataclasses
 from pathlib import Path
@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.campaign.measures import LYAPUNOV
-from cosim.coupling.master import Master
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs.simulation import simulate
-from cosim.system import ssp
+from rparm.campaign.measures import LYAPUNOV
+from rparm.coupling.master import Master
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs.simulation import simulate
+from rparm.system import ssp
 from tests.campaign.files import ARM, HEAD, campaign
 from tests.campaign.runners import rows, runner
-from tests.support.cosim_project import BUILD, FMUS, fmi3_fmu, load
 from tests.support.paths import ROOT
+from tests.support.rparm_project import BUILD, FMUS, fmi3_fmu, load
 
 OUTPUTS = ("q1", "q2", "dq1", "dq2", "total_energy", "ee_x")
 

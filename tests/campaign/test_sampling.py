@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from cosim.campaign.campaign_file import Distribution, grid_value
-from cosim.campaign.points import Points
-from cosim.campaign.sampling import Sampler
+from rparm.campaign.campaign_file import Distribution, grid_value
+from rparm.campaign.points import Points
+from rparm.campaign.sampling import Sampler
 from tests.campaign.files import ARM, campaign
 
 SAMPLINGS = ("random", "sobol", "latin", "indices")

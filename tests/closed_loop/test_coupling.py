@@ -8,14 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from cosim.__main__ import main
-from cosim.errors import UserError
-from models.closed_loop.coupling import delays, run_study, step_doubling, step_errors, tables
-from models.closed_loop.coupling import loop as closed_loop
-from models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
-from models.closed_loop.coupling.payload import study_payload
-from models.closed_loop.coupling.step_doubling import (
+from rparm.models.closed_loop.coupling import delays, run_study, step_doubling, step_errors, tables
+from rparm.models.closed_loop.coupling import loop as closed_loop
+from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, REFERENCES, ClosedLoop
+from rparm.models.closed_loop.coupling.payload import study_payload
+from rparm.models.closed_loop.coupling.step_doubling import (
     CORNERS,
     FAST,
     FAST_AND_SLOW,
@@ -23,7 +20,10 @@ from models.closed_loop.coupling.step_doubling import (
     STATES,
     FastAndSlow,
 )
-from models.closed_loop.coupling.step_errors import StepErrors
+from rparm.models.closed_loop.coupling.step_errors import StepErrors
+
+from rparm.__main__ import main
+from rparm.errors import UserError
 from tests.support.paths import ROOT
 
 VARIANTS = (
@@ -83,7 +83,7 @@ def test_jacobi_steps_meet_the_sampled_reference(loop: ClosedLoop, variant: str)
 @pytest.mark.parametrize("variant", ["nominal", "limited_effort"])
 def test_gauss_seidel_steps_meet_their_reference(loop: ClosedLoop, variant: str) -> None:
     """With the trajectory first, then the controller, then the arm."""
-    from models.closed_loop.references.closed_loop import sampled
+    from rparm.models.closed_loop.references.closed_loop import sampled
 
     columns, _ = loop.run(REFERENCE_AHEAD, STEP, variant, stop=1.0)
     expected = sampled(flat(loop.parameters(variant)), columns["time"], order="gauss_seidel")
@@ -162,7 +162,7 @@ def test_integral_action_removes_what_the_payload_costs(loop: ClosedLoop) -> Non
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-5])
 def test_step_doubling_holds_the_local_error(motion: FastAndSlow, tolerance: float) -> None:
     """Against the continuous loop, started from every accepted state."""
-    from models.closed_loop.references.closed_loop import monolithic
+    from rparm.models.closed_loop.references.closed_loop import monolithic
 
     run, local, names = motion.controlled(tolerance)
     columns = [names.index(name) for name in STATES]
@@ -198,7 +198,7 @@ def test_the_motion_meets_its_reference(motion: FastAndSlow) -> None:
 
 
 def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
-    from models.closed_loop.references import make_coupling
+    from rparm.models.closed_loop.references import make_coupling
 
     made = tmp_path / "made.csv"
     make_coupling.write(made)

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rparm.models.closed_loop.coupling import loop as closed_loop
+from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, ClosedLoop, Method
 
-from cosim.__main__ import main
-from cosim.errors import UserError
-from cosim.system import comparison, ecos, ssp
-from models.closed_loop.coupling import loop as closed_loop
-from models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, ClosedLoop, Method
+from rparm.__main__ import main
+from rparm.errors import UserError
+from rparm.system import comparison, ecos, ssp
 from tests.support.ssp_files import SSP, edited, edited_fmu, replace
 
 SSP3 = SSP.parent / "fmi3" / SSP.name

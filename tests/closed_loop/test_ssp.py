@@ -8,10 +8,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from cosim.__main__ import main
-from cosim.errors import UserError
-from cosim.system import ssp
-from cosim.system.structure import Connector
+from rparm.__main__ import main
+from rparm.errors import UserError
+from rparm.system import ssp
+from rparm.system.structure import Connector
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
 
 STRUCTURE = "SystemStructure.ssd"

@@ -8,10 +8,10 @@ import fmpy
 import pytest
 from lxml import etree
 
-from cosim import project
-from cosim.project import VERSIONS
-from cosim.system import ssp
-from cosim.system.ssp_reader import NAMESPACES
+from rparm import project
+from rparm.project import VERSIONS
+from rparm.system import ssp
+from rparm.system.ssp_reader import NAMESPACES
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
+from rparm.models.closed_loop.study import EXPERIMENT
 
-from cosim.__main__ import main
-from cosim.errors import UserError
-from cosim.report import overview
-from cosim.system import comparison, ecos, ssp
-from models.closed_loop.study import EXPERIMENT
+from rparm.__main__ import main
+from rparm.errors import UserError
+from rparm.report import overview
+from rparm.system import comparison, ecos, ssp
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace
 
@@ -291,7 +291,7 @@ def test_ecos_that_crashes_is_reported(tmp_path: Path, capsys: pytest.CaptureFix
 
 def test_an_interrupted_run_leaves_nothing(tmp_path: Path) -> None:
     report = tmp_path / "report"
-    command = [sys.executable, "-m", "cosim", "system", "--report", str(report)]
+    command = [sys.executable, "-m", "rparm", "system", "--report", str(report)]
     environment = os.environ | {"TMPDIR": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
     with subprocess.Popen(
         command,

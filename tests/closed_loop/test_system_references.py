@@ -6,13 +6,19 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from rparm.models.closed_loop.references import closed_loop, equations, make_references
+from rparm.models.closed_loop.references.closed_loop import (
+    COLUMNS,
+    STATE,
+    Columns,
+    monolithic,
+    sampled,
+)
 
-from cosim.errors import UserError
-from models.closed_loop.references import closed_loop, equations, make_references
-from models.closed_loop.references.closed_loop import COLUMNS, STATE, Columns, monolithic, sampled
-from tests.support.cosim_project import declared
+from rparm.errors import UserError
 from tests.support.paths import ROOT
 from tests.support.rp_symbolic import PARAMETERS, STATES, TERMS, terms_of_the_motion
+from tests.support.rparm_project import declared
 from tests.support.ssp_files import read_csv
 
 FOLDER = ROOT / "models" / "closed_loop" / "references"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from cosim import project
-from cosim.__main__ import main
-from cosim.errors import UserError
-from cosim.system import study
+from rparm import project
+from rparm.__main__ import main
+from rparm.errors import UserError
+from rparm.system import study
 from tests.support.ssp_files import SSP, Edit, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"

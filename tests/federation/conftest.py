@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.federation.network import KEY
+from rparm.federation.network import KEY
 from tests.federation.processes import Start, starting
 
 _status = [0]

@@ -28,7 +28,7 @@ def starting(temporary: Path) -> Iterator[Start]:
 
     def start(*arguments: str, host: Host = LOOPBACK) -> Process:
         made = subprocess.Popen(
-            [*host.enter, sys.executable, "-m", "cosim", *arguments],
+            [*host.enter, sys.executable, "-m", "rparm", *arguments],
             cwd=ROOT,
             env=os.environ | {"TMPDIR": str(temporary)},
             stdout=subprocess.PIPE,

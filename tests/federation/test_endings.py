@@ -13,12 +13,12 @@ import numpy as np
 import psutil
 import pytest
 
-from cosim.errors import UserError
-from cosim.federation import addresses, component, watching
-from cosim.federation.federation import run
-from cosim.federation.network import KEY, Broker, Federate
-from cosim.federation.parts import parts
-from cosim.system import ssp
+from rparm.errors import UserError
+from rparm.federation import addresses, component, watching
+from rparm.federation.federation import run
+from rparm.federation.network import KEY, Broker, Federate
+from rparm.federation.parts import parts
+from rparm.system import ssp
 from tests.federation.processes import Process, Start, federation
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
@@ -170,14 +170,14 @@ def test_a_standstill_is_ended() -> None:
 
 def test_a_component_that_cannot_join_ends_the_federation(monkeypatch: pytest.MonkeyPatch) -> None:
     """Also if what it says is what others say when the federation has ended."""
-    monkeypatch.setattr("cosim.federation.federation.ABSENT", "(--help explains)")
-    monkeypatch.setattr("cosim.federation.federation.arguments", lambda *_: ["no-command"])
+    monkeypatch.setattr("rparm.federation.federation.ABSENT", "(--help explains)")
+    monkeypatch.setattr("rparm.federation.federation.arguments", lambda *_: ["no-command"])
     with ssp.unpacked(SSP) as system, pytest.raises(UserError, match="--help explains"):
         run(system, "nominal", addresses.free(), elsewhere=["arm"])
 
 
 def test_a_broker_that_does_not_open_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cosim.federation.federation.Broker", lambda *_: time.sleep(LIMIT))
+    monkeypatch.setattr("rparm.federation.federation.Broker", lambda *_: time.sleep(LIMIT))
     address = addresses.free()
     words = f"no broker at {address}: HELICS has not returned for 1 s"
     with ssp.unpacked(SSP) as system, pytest.raises(UserError, match=words):
@@ -205,7 +205,7 @@ def test_what_helics_writes_as_it_ends_is_nobodys_message() -> None:
     """Such as "asio system error in context loop", now and then after Ctrl-C."""
     code = (
         "import os, sys, threading;"
-        "from cosim.federation import screen, watching;"
+        "from rparm.federation import screen, watching;"
         "screen.apart();"
         "wait, noise = threading.Event().wait, lambda _: os.write(2, b'asio\\n');"
         "os.write(2, b'library\\n'); print('ours', file=sys.stderr)\n"

@@ -15,14 +15,14 @@ import numpy as np
 import psutil
 import pytest
 
-from cosim.__main__ import main
-from cosim.coupling.master import Master
-from cosim.errors import UserError
-from cosim.federation import addresses, federation
-from cosim.federation.parts import parts, real_connections
-from cosim.fmi.fmu_file import Fmu
-from cosim.system import ssp
-from cosim.system.ssp import Ssp
+from rparm.__main__ import main
+from rparm.coupling.master import Master
+from rparm.errors import UserError
+from rparm.federation import addresses, federation
+from rparm.federation.parts import parts, real_connections
+from rparm.fmi.fmu_file import Fmu
+from rparm.system import ssp
+from rparm.system.ssp import Ssp
 from tests.federation.processes import Start
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP, edited, replace
@@ -127,7 +127,7 @@ def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
 
 def test_it_is_a_document(short: Ssp) -> None:
     """Whatever the processes of the components print."""
-    command = [sys.executable, "-P", "-m", "cosim", "federation", "nominal", "--json"]
+    command = [sys.executable, "-P", "-m", "rparm", "federation", "nominal", "--json"]
     done = subprocess.run(
         [*command, "--ssp", str(short.path)],
         env={**os.environ, "PYTHONPATH": str(ROOT)},

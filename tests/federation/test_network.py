@@ -8,9 +8,9 @@ from contextlib import ExitStack, suppress
 import numpy as np
 import pytest
 
-from cosim.errors import UserError
-from cosim.federation import addresses
-from cosim.federation.network import Broker, Federate
+from rparm.errors import UserError
+from rparm.federation import addresses
+from rparm.federation.network import Broker, Federate
 
 LIMIT = 30.0  # s
 

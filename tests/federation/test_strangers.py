@@ -8,8 +8,8 @@ from contextlib import suppress
 import psutil
 import pytest
 
-from cosim.federation import addresses
-from cosim.federation.network import KEY
+from rparm.federation import addresses
+from rparm.federation.network import KEY
 from tests.federation.processes import Start, federation, wait_for_steps
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP

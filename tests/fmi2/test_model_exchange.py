@@ -4,12 +4,12 @@ import fmpy
 import numpy as np
 import pytest
 
-from cosim.runs import reference
-from cosim.runs.reference import Reference
-from cosim.runs.simulation import Result
-from cosim.scenarios.scenario import Scenario
-from tests.support.cosim_project import declared, load, names_of
+from rparm.runs import reference
+from rparm.runs.reference import Reference
+from rparm.runs.simulation import Result
+from rparm.scenarios.scenario import Scenario
 from tests.support.instances import INPUTS, LoadedFmu
+from tests.support.rparm_project import declared, load, names_of
 
 NAMES = names_of("rp_manipulator")
 # ---- fmpy's solver against the references ------------------------------------------------------

@@ -8,7 +8,7 @@ from ctypes import byref
 
 import pytest
 
-from cosim.runs import convergence
+from rparm.runs import convergence
 from tests.fmi2.rollback_sequences import (
     KINDS,
     START,
@@ -19,7 +19,6 @@ from tests.fmi2.rollback_sequences import (
     sequence,
     times,
 )
-from tests.support.cosim_project import declared
 from tests.support.instances import (
     STATES,
     Instance,
@@ -28,6 +27,7 @@ from tests.support.instances import (
     serialized,
 )
 from tests.support.paths import ROOT
+from tests.support.rparm_project import declared
 
 SEQUENCES = 100
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from tests.support.cosim_project import declared
 from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
+from tests.support.rparm_project import declared
 
 START = {"q1": -1.43, "q2": 0.58, "dq1": 1.97, "dq2": 0.12}
 # In the horizontal plane a constant force draws link 2 in, the spin drives it out: bounded for

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.cosim_project import FMUS
+from tests.support.rparm_project import FMUS
 
 MODELS = list(FMUS)
 

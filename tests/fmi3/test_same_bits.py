@@ -8,10 +8,10 @@ import fmpy
 import numpy as np
 import pytest
 
-from cosim.project import model_folder
-from cosim.scenarios.scenario import Scenario
-from tests.support.cosim_project import FILES, FMUS, NAMES, fmi3_fmu, load
+from rparm.project import model_folder
+from rparm.scenarios.scenario import Scenario
 from tests.support.instances import instantiated, set_value
+from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load
 
 MODES = {  # eventModeUsed, earlyReturnAllowed
     "plain": (False, False),

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import Fmu
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
 
 # by unit: values, each beyond a limit that its model needs
 BEYOND = {

@@ -18,10 +18,10 @@ import pytest
 
 from tests.fmu.symbols import libm, listed, standard
 from tests.rp_manipulator.random_motions import random_case, simulate
-from tests.support.cosim_project import load
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.missing import missing
 from tests.support.paths import FOLDERS, NAMES, ROOT
+from tests.support.rparm_project import load
 
 TAYLOR = {"RPManipulator"}  # compared with the Taylor method, too
 STEPS = 250  # of each scenario

@@ -30,14 +30,14 @@ from fmi2.model_description import model_description  # noqa: E402
 from fmi3.model_description import model_description as fmi3_model_description  # noqa: E402
 from fmi3.terminals import terminals_and_icons  # noqa: E402
 from provenance import Provenance  # noqa: E402
+from rparm.models.closed_loop.study import EXPERIMENT  # noqa: E402
 
-from cosim.errors import UserError  # noqa: E402
-from cosim.fmi.fmu_file import read_model  # noqa: E402
-from cosim.fmi.model import Model  # noqa: E402
-from cosim.runs import reference  # noqa: E402
-from cosim.scenarios import scenario as scenarios  # noqa: E402
-from cosim.system import comparison, ssp  # noqa: E402
-from models.closed_loop.study import EXPERIMENT  # noqa: E402
+from rparm.errors import UserError  # noqa: E402
+from rparm.fmi.fmu_file import read_model  # noqa: E402
+from rparm.fmi.model import Model  # noqa: E402
+from rparm.runs import reference  # noqa: E402
+from rparm.scenarios import scenario as scenarios  # noqa: E402
+from rparm.system import comparison, ssp  # noqa: E402
 
 SLOWEST = 20.0  # s, of one file
 MODEL = "rp_manipulator"

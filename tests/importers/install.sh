@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-ci_tools=(ecospy libcosimpy fmuloader fmu-manipulation-toolbox casadi)
+ci_tools=(ecospy osp fmuloader fmu-manipulation-toolbox casadi)
 heavy_tools=(fmi-sim cofmupy pathsim-fmi gemseo-fmu) # minutes, up to 1 GB each
 
 usage() {
@@ -29,6 +29,7 @@ lock() { echo "tests/importers/requirements/$1.txt"; }
 # Python module that must load once the tool is installed
 module() {
   case "$1" in
+    osp) echo libcosimpy ;;
     fmu-manipulation-toolbox) echo fmu_manipulation_toolbox ;;
     *) echo "${1//-/_}" ;;
   esac

@@ -44,7 +44,7 @@ IMPORTERS = {
     # The FMI Library in libcosimpy 0.0.6 wants a start value for the independent variable, which
     # FMI 2.0.5, section 2.2.7, forbids; corrected upstream (fmi-library, pull request 129).
     # libcosim leaves enumerations out, and says so.
-    "libcosimpy": Importer(
+    "osp": Importer(
         versions=["fmi2"],
         false_alarm=r"Start attribute is required for this causality, variability and initial"
         r"|FMI 2.0 Enumeration variable type not supported, variable with name solver_method",
@@ -59,7 +59,7 @@ CHECKER = "fmu-manipulation-toolbox"
 OPTIMIZER = "casadi"  # test_casadi.py
 REQUIRED = set(os.environ.get("REQUIRED_IMPORTERS", "").replace(",", " ").split())
 if os.environ.get("CI"):
-    REQUIRED |= {"ecospy", "libcosimpy", "fmuloader", CHECKER, OPTIMIZER}
+    REQUIRED |= {"ecospy", "osp", "fmuloader", CHECKER, OPTIMIZER}
 
 
 class Built(NamedTuple):

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 
 import pytest
+from rparm.models.machine.systems import fmus_of
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.system import ssp
-from cosim.system.ssp import Ssp
-from models.machine.systems import fmus_of
+from rparm.fmi.fmu_file import Fmu
+from rparm.system import ssp
+from rparm.system.ssp import Ssp
 from tests.support.ssp_files import MACHINE
 
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from rparm.models.machine import continuous
+from rparm.models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, Method
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs.convergence import slope
-from cosim.system.ssp import Ssp
-from models.machine import continuous
-from models.machine.continuous import BOUND, METHODS, SMALLEST, VARIANTS, Method
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs.convergence import slope
+from rparm.system.ssp import Ssp
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)

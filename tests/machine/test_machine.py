@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 
-from cosim.__main__ import main
-from cosim.system import comparison, ecos, ssp
-from models.machine.experiment import STEPS_PER_SECOND, STOP
+from rparm.__main__ import main
+from rparm.system import comparison, ecos, ssp
 from tests.support.paths import ROOT
 from tests.support.ssp_files import MACHINE as SSP
 from tests.support.ssp_files import read_csv

@@ -8,10 +8,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
+from rparm.models.machine.references import make_references
+from rparm.models.rp_plant.references.solver import Solver
 
-from models.machine.experiment import STEPS_PER_SECOND, STOP
-from models.machine.references import make_references
-from models.rp_plant.references.solver import Solver
 from tests.machine.test_machine import STEPS, VARIANTS, reference, run
 
 LEAST = 4.0  # times the error that a margin is, at the worst sample

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from rparm.models.machine import continuous
+from rparm.models.machine.continuous import SMALLEST, VARIANTS
+from rparm.models.machine.references.machine import completed
+from rparm.models.machine.references.make_references import variants
+from rparm.models.machine.references.monolithic import COLUMNS, monolithic
 from scipy.integrate import solve_ivp
 
-from cosim.errors import UserError
-from models.machine import continuous
-from models.machine.continuous import SMALLEST, VARIANTS
-from models.machine.references.machine import completed
-from models.machine.references.make_references import variants
-from models.machine.references.monolithic import COLUMNS, monolithic
+from rparm.errors import UserError
 
 STATES = ("plant.q1", "plant.q2", "plant.dq1", "plant.dq2")
 CURRENTS = ("actuator.current1", "actuator.current2")

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from rparm.models.machine.experiment import STEPS_PER_SECOND
+from rparm.models.machine.references import make_references
+from rparm.models.machine.references.components import Actuator, Environment, Sensor, Ticks, real
+from rparm.models.machine.references.machine import COMPONENTS, completed, declared
+from rparm.models.rp_plant.references.solver import Solver
 
-from cosim.errors import UserError
-from models.machine.experiment import STEPS_PER_SECOND
-from models.machine.references import make_references
-from models.machine.references.components import Actuator, Environment, Sensor, Ticks, real
-from models.machine.references.machine import COMPONENTS, completed, declared
-from models.rp_plant.references.solver import Solver
+from rparm.errors import UserError
 from tests.machine.test_machine import VARIANTS, reference
 
 STOP = 0.3  # s, of what is made again

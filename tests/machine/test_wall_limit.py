@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rparm.models.machine import wall_limit
+from rparm.models.machine.stability import Contact, exact_least_damping, least_damping
+from rparm.models.machine.wall_limit import CASES, DEPTH, MASS, MOVED, PUSH, STEP, STEPS, Measure
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.system.ssp import Ssp
-from models.machine import wall_limit
-from models.machine.stability import Contact, exact_least_damping, least_damping
-from models.machine.wall_limit import CASES, DEPTH, MASS, MOVED, PUSH, STEP, STEPS, Measure
-from tests.importers.libcosim import libcosim
+from rparm.fmi.fmu_file import Fmu
+from rparm.system.ssp import Ssp
+from tests.importers.osp import libcosim
 
 STIFFNESS = 1e4  # N/m
 

@@ -17,7 +17,7 @@ from tests.support.paths import ROOT
 def page(fmu: Path) -> Path:
     """The page beside the built FMU; tests are skipped where it was not built, and fail in CI."""
     path = fmu.parent / "playground" / "index.html"
-    scripts = [*(ROOT / "playground").rglob("*.*"), *(ROOT / "cosim/report/assets").iterdir()]
+    scripts = [*(ROOT / "playground").rglob("*.*"), *(ROOT / "rparm/report/assets").iterdir()]
     newest = max(newest_source(), *(script.stat().st_mtime for script in scripts))
     if path.is_file() and path.stat().st_mtime >= newest:
         return path

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.__main__ import main
+from rparm.__main__ import main
 from tests.support.browser import Browser
 
 SCENARIOS = ("thrown_against_stop", "actuator_torque_steps", "constant_effort_single_step")

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cosim.report.assets import SOURCES
+from rparm.report.assets import SOURCES
 
 TEXTS = ("ink", "muted", "accent", "good", "bad")
 LINES = ("reference", "effort", "stop", *(f"curve{i}" for i in range(1, 7)))

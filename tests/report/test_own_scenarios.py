@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from cosim.report import browser as shown
-from cosim.report.overview import Entry, forget, read, record
-from cosim.report.signal_texts import describe
-from cosim.scenarios import scenario
-from cosim.scenarios.signals import Table
+from rparm.report import browser as shown
+from rparm.report.overview import Entry, forget, read, record
+from rparm.report.signal_texts import describe
+from rparm.scenarios import scenario
+from rparm.scenarios.signals import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
-from tests.support.cosim_project import FMUS, assert_one_line, call, declared
+from tests.support.rparm_project import FMUS, assert_one_line, call, declared
 
 
 @pytest.fixture(autouse=True)

@@ -6,9 +6,9 @@ from urllib.parse import quote
 
 import pytest
 
-from cosim import project
-from cosim.report.system_page import MOST_ROWS
-from cosim.system import comparison, ssp
+from rparm import project
+from rparm.report.system_page import MOST_ROWS
+from rparm.system import comparison, ssp
 from tests.report import sizes
 from tests.report.conftest import LATE, SCENARIOS, STRANGE, VARIANT, show
 from tests.support.browser import Browser
@@ -268,7 +268,7 @@ def test_every_plot_and_picture_has_a_text(browser: Browser, report: Path) -> No
 
 
 def test_the_whole_report_stays_small(report: Path) -> None:
-    """By what a variant takes; tests/cosim/test_accuracy.py holds the rest to its share."""
+    """By what a variant takes; tests/rparm/test_accuracy.py holds the rest to its share."""
     csv = report / f"system/{VARIANT}.csv"
     assert (report / f"system/{VARIANT}.html").stat().st_size <= sizes.OF_VARIANT_PAGE
     whole = sizes.OF_SCENARIOS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cosim.report.run_data import (
+from rparm.report.run_data import (
     MOST_ROWS,
     Curve,
     Plot,

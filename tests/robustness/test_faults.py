@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.__main__ import main
+from rparm.__main__ import main
 from tests.support.paths import ROOT
 from tests.support.ssp_files import SSP
 
@@ -56,7 +56,7 @@ class Place:
 
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
         return subprocess.Popen(
-            [sys.executable, "-P", "-m", "cosim", *arguments, *given, "--report", "report"],
+            [sys.executable, "-P", "-m", "rparm", *arguments, *given, "--report", "report"],
             cwd=self.here,
             env={
                 **os.environ,
@@ -80,7 +80,7 @@ class Place:
 
     def assert_clean(self) -> None:
         """No temporary file is left, under whatever name."""
-        assert [x.name for x in self.temporary.iterdir() if x.name.startswith("cosim-")] == []
+        assert [x.name for x in self.temporary.iterdir() if x.name.startswith("rparm-")] == []
         assert [name for name in self.written() if name.startswith(".")] == []
 
 
@@ -186,7 +186,7 @@ def test_no_room_for_errors(place: Place) -> None:
 
 
 def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "cosim", tmp_path / "cosim")
+    shutil.copytree(ROOT / "rparm", tmp_path / "rparm")
     model = tmp_path / "models" / "m"
     (model / "scenarios").mkdir(parents=True)
     text = (
@@ -194,7 +194,7 @@ def test_names_that_the_output_cannot_encode(tmp_path: Path) -> None:
     )
     (model / "scenarios" / "ü.toml").write_text(text)
     done = subprocess.run(
-        [sys.executable, "-m", "cosim", "list"],
+        [sys.executable, "-m", "rparm", "list"],
         cwd=tmp_path,
         env={**os.environ, "PYTHONIOENCODING": "ascii"},
         capture_output=True,
@@ -234,7 +234,7 @@ def test_stopped_in_the_middle(
 def test_a_library_may_hide_that_it_was_stopped(stop: signal.Signals, code: int, said: str) -> None:
     program = f"""
 import os, signal, sys
-from cosim import __main__ as cli
+from rparm import __main__ as cli
 
 def main():
     try:
@@ -278,7 +278,7 @@ def test_the_scripts_take_no_modules_from_elsewhere(tmp_path: Path) -> None:
     calls = re.findall(r"/bin/python\" (\S+)", text)
     assert len(calls) == text.count("/bin/python") == 2 and set(calls) == {"-P"}
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "cosim", "list"],
+        [sys.executable, "-P", "-m", "rparm", "list"],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,

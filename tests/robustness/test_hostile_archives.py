@@ -12,13 +12,13 @@ from zipfile import ZipFile, ZipInfo
 
 import pytest
 
-from cosim import __main__ as cli
-from cosim import archives
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import Fmu
-from cosim.system import ssp
-from tests.support.cosim_project import assert_one_line, repacked
+from rparm import __main__ as cli
+from rparm import archives
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.system import ssp
 from tests.support.paths import ROOT
+from tests.support.rparm_project import assert_one_line, repacked
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -235,7 +235,7 @@ def test_archives_that_grow(refuse: Callable[..., None], monkeypatch: pytest.Mon
 
 def test_a_system_whose_fmus_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each within its limit: some commands unpack all of them."""
-    monkeypatch.setattr("cosim.system.ssp_checks.LARGEST_SYSTEM", SSP.stat().st_size // 2)
+    monkeypatch.setattr("rparm.system.ssp_checks.LARGEST_SYSTEM", SSP.stat().st_size // 2)
     with pytest.raises(UserError, match="the FMUs up to component '.*' have more than"):
         ssp_opened(SSP)
 

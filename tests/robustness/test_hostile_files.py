@@ -8,16 +8,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rparm.models.closed_loop.coupling.loop import opened as opened_loop
 
-from cosim import input_files
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs import reference
-from cosim.scenarios import scenario as scenarios
-from cosim.system import ssp
-from models.closed_loop.coupling.loop import opened as opened_loop
-from tests.support.cosim_project import declared
+from rparm import input_files
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import reference
+from rparm.scenarios import scenario as scenarios
+from rparm.system import ssp
 from tests.support.paths import ROOT
+from tests.support.rparm_project import declared
 from tests.support.ssp_files import SSP, Edit, edited, replace
 
 MODEL = "rp_manipulator"
@@ -233,8 +233,8 @@ def test_an_fmu_without_what_is_compared(
 ) -> None:
     """It must not pass because there is nothing to compare."""
     path = edited(fmu, tmp_path / "a.fmu", {DESCRIPTION: change})
-    command = [sys.executable, "-m", "cosim", "run", SCENARIO, "--fmu", str(path)]
-    shutil.copytree(ROOT / "cosim", tmp_path / "cosim")
+    command = [sys.executable, "-m", "rparm", "run", SCENARIO, "--fmu", str(path)]
+    shutil.copytree(ROOT / "rparm", tmp_path / "rparm")
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert message in done.stderr and done.stderr.count("\n") == 1

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs import reference
-from cosim.runs.comparison import Runs
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import reference
+from rparm.runs.comparison import Runs
 from tests.rp_controller.controller_symbolic import (
     ARM,
     CASES,
@@ -40,9 +40,9 @@ from tests.rp_controller.controller_symbolic import (
     numbers,
     terms_of_values,
 )
-from tests.support.cosim_project import assert_made_again, declared, load, names_of
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
+from tests.support.rparm_project import assert_made_again, declared, load, names_of
 
 UNIT = "RPController"
 

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs import reference
-from cosim.runs.comparison import Runs
-from tests.support.cosim_project import declared, fmi3_fmu, load
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import reference
+from rparm.runs.comparison import Runs
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
+from tests.support.rparm_project import declared, fmi3_fmu, load
 
 UNIT = "RPController"
 

@@ -17,12 +17,12 @@ import pytest
 import sympy as sp
 from fmpy import fmi2
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs import reference
-from cosim.runs.comparison import Runs
-from tests.support.cosim_project import assert_made_again, declared, load, names_of
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import reference
+from rparm.runs.comparison import Runs
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
+from tests.support.rparm_project import assert_made_again, declared, load, names_of
 
 UNIT = "RPEnvironment"
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from models.machine.stability import (
+from rparm.models.machine.stability import (
     AGE,
     Contact,
     effective_mass,
@@ -20,9 +19,10 @@ from models.machine.stability import (
     rate_of_growth,
     transition,
 )
-from tests.support.cosim_project import FMUS
+
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
+from tests.support.rparm_project import FMUS
 
 ORDERS = tuple(AGE)
 INPUTS = ("held", "extrapolated")
@@ -140,7 +140,7 @@ WRENCH = ("ee_fx", "ee_fy", "ee_mz")
 
 
 class Loop:
-    """Plant and wall, stepped as cosim/coupling/master.py does, the plant first."""
+    """Plant and wall, stepped as rparm/coupling/master.py does, the plant first."""
 
     def __init__(self, arm: Instance, wall: Instance, order: str, inputs: str) -> None:
         self.arm, self.wall = arm, wall

@@ -18,7 +18,8 @@ import sympy as sp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from models.rp_manipulator.references.make_references import PARAMETERS, derive
+from rparm.models.rp_manipulator.references.make_references import PARAMETERS, derive
+
 from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
 
 TAYLOR = 4

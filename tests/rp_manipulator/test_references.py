@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-
-from cosim.scenarios.scenario import Scenario
-from models.rp_manipulator.references.make_references import (
+from rparm.models.rp_manipulator.references.make_references import (
     INPUTS,
     PARAMETERS,
     STATES,
     Reference,
     derive,
 )
-from tests.support.cosim_project import declared, load, names_of
+
+from rparm.scenarios.scenario import Scenario
 from tests.support.paths import ROOT
+from tests.support.rparm_project import declared, load, names_of
 
 MODEL = ROOT / "models" / "rp_manipulator"
 SCRIPT = MODEL / "references" / "make_references.py"

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from cosim.scenarios.scenario import Scenario
-from tests.support.cosim_project import declared, load, names_of
+from rparm.scenarios.scenario import Scenario
+from tests.support.rparm_project import declared, load, names_of
 
 SHIPPED = {name: load(name) for name in names_of("rp_manipulator")}
 DECLARED = declared("rp_manipulator").start_values

@@ -5,17 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rparm.models.rp_manipulator.references import make_references
 
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs import reference, simulation
-from cosim.runs.comparison import Runs
-from cosim.runs.reference import Reference
-from cosim.runs.tolerance_sweep import TOLERANCES, sweep
-from cosim.scenarios.scenario import Scenario
-from models.rp_manipulator.references import make_references
-from tests.support.cosim_project import load as load_scenario
-from tests.support.cosim_project import names_of
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import reference, simulation
+from rparm.runs.comparison import Runs
+from rparm.runs.reference import Reference
+from rparm.runs.tolerance_sweep import TOLERANCES, sweep
+from rparm.scenarios.scenario import Scenario
 from tests.support.paths import ROOT
+from tests.support.rparm_project import load as load_scenario
+from tests.support.rparm_project import names_of
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 SCENARIOS = names_of("rp_manipulator")

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rparm.models.rp_plant.references import make_references
 
-from cosim.scenarios.scenario import Scenario
-from models.rp_plant.references import make_references
-from tests.support.cosim_project import load, names_of
+from rparm.scenarios.scenario import Scenario
+from tests.support.rparm_project import load, names_of
 
 SCENARIOS = {name: load(name) for name in names_of("rp_plant")}
 FILES = ("RPPlant_ref.csv", "RPPlant_in.csv", "RPPlant_ref.opt")

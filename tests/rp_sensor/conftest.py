@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmi.fmu_file import Fmu
-from tests.support.cosim_project import fmi3_fmu
+from rparm.fmi.fmu_file import Fmu
+from tests.support.rparm_project import fmi3_fmu
 
 
 @pytest.fixture(scope="session", params=["fmi2", "fmi3"])

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
-from tests.support.cosim_project import declared
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.support.paths import ROOT
+from tests.support.rparm_project import declared
 
 MODEL = ROOT / "models" / "rp_sensor"
 INPUTS = ("q1", "q2")

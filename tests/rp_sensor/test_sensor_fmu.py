@@ -5,13 +5,13 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from rparm.models.rp_sensor.references.make_references import Encoder
 
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import Fmu
-from models.rp_sensor.references.make_references import Encoder
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import COUNTS, MODEL, start_values, started
-from tests.support.cosim_project import assert_made_again, declared, fmi3_fmu, load, names_of
 from tests.support.instances import DISCARD, Instance, LoadedFmu, instantiated, status_of
+from tests.support.rparm_project import assert_made_again, declared, fmi3_fmu, load, names_of
 
 SCENARIOS = names_of(MODEL.name)
 

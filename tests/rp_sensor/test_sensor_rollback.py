@@ -6,8 +6,8 @@ import struct
 
 import pytest
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import Shown, Stepper, shown, started
 from tests.support.instances import ERROR, hashed, restore, serialized, status_of
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import pytest
 from fmpy.fmi1 import FMICallException
+from rparm.models.rp_sensor.references.make_references import Encoder
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
-from models.rp_sensor.references.make_references import Encoder
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import (
     INPUTS,
     Cubic,

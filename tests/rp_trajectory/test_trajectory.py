@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
+from rparm.models.rp_trajectory.references import make_references
 
-from models.rp_trajectory.references import make_references
-from tests.support.cosim_project import assert_made_again, declared, load, names_of
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
+from tests.support.rparm_project import assert_made_again, declared, load, names_of
 
 UNIT = "RPTrajectory"
 

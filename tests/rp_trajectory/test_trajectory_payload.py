@@ -3,8 +3,8 @@
 import pytest
 from fmpy.fmi2 import FMU2Model
 
-from tests.support.cosim_project import FMUS, fmi3_fmu
 from tests.support.instances import ERROR, Instance, LoadedFmu, instantiated, set_value, status_of
+from tests.support.rparm_project import FMUS, fmi3_fmu
 
 UNIT = "RPTrajectory"
 GRASP, RELEASE = 0.3, 0.70001

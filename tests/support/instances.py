@@ -151,7 +151,7 @@ def set_value(fmu: Any, variable: ModelVariable, value: float) -> None:
 
 
 def serialized(instance: Any) -> bytes:
-    """The state of an instance of either version, by fmpy or cosim, as bytes."""
+    """The state of an instance of either version, by fmpy or rparm, as bytes."""
     state = instance.fmi.getFMUState()
     content = instance.fmi.serializeFMUState(state)
     instance.fmi.freeFMUState(state)

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import mpmath
 import sympy as sp
+from rparm.models.rp_manipulator.references.make_references import PARAMETERS, derive
+from rparm.models.rp_plant.references import equations as plant
+from rparm.models.rp_plant.references.equations import ACCELERATIONS, PAYLOAD, STATES
 
-from models.rp_manipulator.references.make_references import PARAMETERS, derive
-from models.rp_plant.references import equations as plant
-from models.rp_plant.references.equations import ACCELERATIONS, PAYLOAD, STATES
 from tests.support.instances import INPUTS
 
 KNOWNS = (*PARAMETERS, *INPUTS, *STATES)

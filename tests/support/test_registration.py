@@ -109,7 +109,7 @@ FIXTURES = {"browser", "firefox", "each_browser", "apart"}  # of tests/conftest.
 FUNCTIONS = {
     ("tests.support.missing", "missing"),
     ("tests.platforms.platforms", "runner"),
-    ("tests.importers.libcosim", "libcosim"),
+    ("tests.importers.osp", "libcosim"),
 }
 NEEDS_NOTHING = {"tests/platforms/test_missing.py"}  # it tests what they say
 

@@ -7,7 +7,7 @@ from zipfile import ZipFile
 
 from fmpy import read_model_description
 
-from cosim.fmi.model import Model, described
+from rparm.fmi.model import Model, described
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Toy" guid="{0}">

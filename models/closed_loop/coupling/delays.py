@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from models.closed_loop.coupling.loop import (
+from rparm.models.closed_loop.coupling.loop import (
     CONTROLLER_FIRST,
     FINEST,
     METHODS,

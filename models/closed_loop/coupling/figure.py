@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from rparm.models.closed_loop.coupling.delays import Tracking
+from rparm.models.closed_loop.coupling.step_doubling import LOCAL, Doubling
+from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
-from cosim.report.style import DASHED, GRID, INK, MUTED, STYLE
-from cosim.texts import short
-from models.closed_loop.coupling.delays import Tracking
-from models.closed_loop.coupling.step_doubling import LOCAL, Doubling
-from models.closed_loop.coupling.step_errors import StepErrors
+from rparm.report.style import DASHED, GRID, INK, MUTED, STYLE
+from rparm.texts import short
 
 COLORS = ("#d1793a", "#1d4e79", "#b0435f", "#2f8f83")
 

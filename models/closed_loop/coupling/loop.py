@@ -1,4 +1,4 @@
-"""The closed loop, stepped by the master of cosim.coupling in several ways.
+"""The closed loop, stepped by the master of rparm.coupling in several ways.
 
 The same components, connections and parameters as in Ecos (ClosedLoop.ssp). Errors are relative to
 the closed loop in continuous time (../references). The page ../coupling.md says which results are
@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from rparm.models.closed_loop.experiment import STOP
 
-from cosim import trajectory_csv
-from cosim.coupling.master import Master
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import Fmu
-from cosim.fmi.model import Value
-from cosim.system import ssp
-from cosim.system.structure import Connection
-from models.closed_loop.experiment import STOP
+from rparm import trajectory_csv
+from rparm.coupling.master import Master
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Value
+from rparm.system import ssp
+from rparm.system.structure import Connection
 
 FOLDER = Path(__file__).resolve().parents[1]
 REFERENCES = FOLDER / "references"

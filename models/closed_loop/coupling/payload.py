@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-
-from models.closed_loop.coupling.delays import path_error
-from models.closed_loop.coupling.loop import METHODS, VARIANTS, ClosedLoop, Columns
+from rparm.models.closed_loop.coupling.delays import path_error
+from rparm.models.closed_loop.coupling.loop import METHODS, VARIANTS, ClosedLoop, Columns
 
 HOLD = 9.0  # s: the circle ends at 5.5 s, what is left of the motion has died out
 

@@ -6,16 +6,16 @@ The page ../coupling.md says which results are expected.
 from pathlib import Path
 
 import numpy as np
+from rparm.models.closed_loop.coupling import tables
+from rparm.models.closed_loop.coupling.delays import study_tracking, tracking_passed
+from rparm.models.closed_loop.coupling.figure import figure
+from rparm.models.closed_loop.coupling.loop import opened
+from rparm.models.closed_loop.coupling.payload import study_payload
+from rparm.models.closed_loop.coupling.step_doubling import study_doubling
+from rparm.models.closed_loop.coupling.step_errors import StepErrors, study_step_errors
 
-from cosim.output_files import from_here, written
-from cosim.report.style import save
-from models.closed_loop.coupling import tables
-from models.closed_loop.coupling.delays import study_tracking, tracking_passed
-from models.closed_loop.coupling.figure import figure
-from models.closed_loop.coupling.loop import opened
-from models.closed_loop.coupling.payload import study_payload
-from models.closed_loop.coupling.step_doubling import study_doubling
-from models.closed_loop.coupling.step_errors import StepErrors, study_step_errors
+from rparm.output_files import from_here, written
+from rparm.report.style import save
 
 FILE = "coupling.png"
 

@@ -5,9 +5,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from rparm.models.closed_loop.coupling.loop import (
+    FINEST,
+    STATES,
+    ClosedLoop,
+    Method,
+    read_reference,
+)
 
-from cosim.coupling import step_control
-from models.closed_loop.coupling.loop import FINEST, STATES, ClosedLoop, Method, read_reference
+from rparm.coupling import step_control
 
 FAST_AND_SLOW = Path(__file__).resolve().with_name("fast_and_slow.csv")
 RATES = ("arm.dq1", "arm.dq2", "arm.ddq1", "arm.ddq2")

@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from cosim.runs.convergence import slope
-from models.closed_loop.coupling.loop import (
+from rparm.models.closed_loop.coupling.loop import (
     METHODS,
     REFERENCES,
     STATES,
@@ -15,6 +13,8 @@ from models.closed_loop.coupling.loop import (
     Method,
     read_reference,
 )
+
+from rparm.runs.convergence import slope
 
 STEPS = (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)  # s
 COMMON = 0.04  # s, all steps and the reference's rows divide it

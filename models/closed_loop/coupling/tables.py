@@ -1,12 +1,12 @@
 """The study as tables of text, with verdicts."""
 
 import numpy as np
+from rparm.models.closed_loop.coupling.delays import LARGEST_ERROR, Tracking, tracking_passed
+from rparm.models.closed_loop.coupling.payload import Payload
+from rparm.models.closed_loop.coupling.step_doubling import Doubling
+from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
-from cosim.texts import short, verdict
-from models.closed_loop.coupling.delays import LARGEST_ERROR, Tracking, tracking_passed
-from models.closed_loop.coupling.payload import Payload
-from models.closed_loop.coupling.step_doubling import Doubling
-from models.closed_loop.coupling.step_errors import StepErrors
+from rparm.texts import short, verdict
 
 
 def step_error_lines(study: StepErrors) -> list[str]:

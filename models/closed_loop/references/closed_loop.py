@@ -9,14 +9,14 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from rparm.models.closed_loop.references import equations
+from rparm.models.closed_loop.references.loop import COEFFICIENTS, INTEGRALS, SIGNALS, Loop
+from rparm.models.rp_manipulator.references.make_references import INPUTS, STATES
 
-from cosim import project
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import read_model
-from cosim.fmi.model import Value, Variable
-from models.closed_loop.references import equations
-from models.closed_loop.references.loop import COEFFICIENTS, INTEGRALS, SIGNALS, Loop
-from models.rp_manipulator.references.make_references import INPUTS, STATES
+from rparm import project
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import read_model
+from rparm.fmi.model import Value, Variable
 
 MODELS = Path(__file__).resolve().parents[2]
 COMPONENTS = {

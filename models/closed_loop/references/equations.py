@@ -8,8 +8,7 @@ component in front.
 """
 
 import sympy as sp
-
-from models.rp_manipulator.references.make_references import PARAMETERS, STATES, derive
+from rparm.models.rp_manipulator.references.make_references import PARAMETERS, STATES, derive
 
 REFERENCES = ("q1_ref", "q2_ref", "dq1_ref", "dq2_ref", "ddq1_ref", "ddq2_ref")
 PATH = ("ee_x_ref", "ee_y_ref", "ee_vx_ref", "ee_vy_ref")

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping
 import heyoka as hy
 import numpy as np
 import sympy as sp
+from rparm.models.closed_loop.references import equations
+from rparm.models.closed_loop.references.equations import PROGRESS_TERMS, REFERENCES
+from rparm.models.rp_manipulator.references.make_references import INPUTS, STATES
 
-from cosim.errors import UserError
-from models.closed_loop.references import equations
-from models.closed_loop.references.equations import PROGRESS_TERMS, REFERENCES
-from models.rp_manipulator.references.make_references import INPUTS, STATES
+from rparm.errors import UserError
 
 SIGNALS = (*REFERENCES, *STATES)  # what the controller reads
 INTEGRALS = ("integral1", "integral2")

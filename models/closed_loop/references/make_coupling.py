@@ -14,14 +14,15 @@ FOLDER = Path(__file__).resolve().parent
 ROOT = FOLDER.parents[2]
 sys.path.insert(0, str(ROOT))
 
-from cosim import trajectory_csv  # noqa: E402
-from models.closed_loop.coupling.loop import STATES  # noqa: E402
-from models.closed_loop.coupling.step_doubling import (  # noqa: E402
+from rparm.models.closed_loop.coupling.loop import STATES  # noqa: E402
+from rparm.models.closed_loop.coupling.step_doubling import (  # noqa: E402
     FAST,
     FAST_AND_SLOW,
     FAST_STOP,
 )
-from models.closed_loop.references.closed_loop import monolithic  # noqa: E402
+from rparm.models.closed_loop.references.closed_loop import monolithic  # noqa: E402
+
+from rparm import trajectory_csv  # noqa: E402
 
 ROWS_PER_SECOND = 50
 PARAMETERS = {f"{c}.{name}": value for c, values in FAST.items() for name, value in values.items()}

@@ -14,16 +14,17 @@ import numpy as np
 FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parents[2]))
 
-from cosim.fmi.model import Value
-from models import system_references
-from models.closed_loop.experiment import STEPS_PER_SECOND, STOP
-from models.closed_loop.references.closed_loop import (
+from rparm.models.closed_loop.experiment import STEPS_PER_SECOND, STOP
+from rparm.models.closed_loop.references.closed_loop import (
     COMPONENTS,
     Columns,
     monolithic,
     sampled,
 )
-from models.system_references import KEPT, communication_points
+from rparm.models.system_references import KEPT, communication_points
+
+from rparm.fmi.model import Value
+from rparm.models import system_references
 
 
 def variants() -> dict[str, dict[str, Value]]:

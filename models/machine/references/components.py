@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import mpmath as mp
 import numpy as np
+from rparm.models.rp_plant.references.equations import PARAMETERS as PLANT_PARAMETERS
+from rparm.models.rp_plant.references.solver import NUMBERS, PLACE, Solver
+from rparm.models.rp_sensor.references.make_references import noise
 
-from cosim.errors import UserError
-from models.rp_plant.references.equations import PARAMETERS as PLANT_PARAMETERS
-from models.rp_plant.references.solver import NUMBERS, PLACE, Solver
-from models.rp_sensor.references.make_references import noise
+from rparm.errors import UserError
 
 real = np.longdouble
 Values = Mapping[str, float]

@@ -10,21 +10,21 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-
-from cosim import project
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import read_model
-from cosim.fmi.model import Model, Value
-from models.closed_loop.references.closed_loop import reference_motion
-from models.machine.references.components import (
+from rparm.models.closed_loop.references.closed_loop import reference_motion
+from rparm.models.machine.references.components import (
     Actuator,
     Controller,
     Environment,
     Sensor,
     real,
 )
-from models.rp_plant.references.motion import Motion
-from models.rp_plant.references.solver import Solver
+from rparm.models.rp_plant.references.motion import Motion
+from rparm.models.rp_plant.references.solver import Solver
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import read_model
+from rparm.fmi.model import Model, Value
 
 MODELS = Path(__file__).resolve().parents[2]
 COMPONENTS = {

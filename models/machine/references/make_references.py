@@ -16,14 +16,15 @@ import numpy as np
 FOLDER = Path(__file__).resolve().parent
 sys.path.insert(0, str(FOLDER.parents[2]))
 
-from cosim.fmi.model import Value
-from models import system_references
-from models.machine.experiment import STEPS_PER_SECOND, STOP
-from models.machine.references.components import Sample
-from models.machine.references.machine import COMPONENTS, DISCRETE, Machine, columns
-from models.machine.references.monolithic import monolithic
-from models.rp_plant.references.solver import Solver
-from models.system_references import KEPT, communication_points
+from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
+from rparm.models.machine.references.components import Sample
+from rparm.models.machine.references.machine import COMPONENTS, DISCRETE, Machine, columns
+from rparm.models.machine.references.monolithic import monolithic
+from rparm.models.rp_plant.references.solver import Solver
+from rparm.models.system_references import KEPT, communication_points
+
+from rparm.fmi.model import Value
+from rparm.models import system_references
 
 FILES = ("sampled.csv", "ecos.csv")  # read before inputs are set, and after it
 TIGHTEST = 200  # samples of either joint that are kept

@@ -4,7 +4,7 @@ The controller's law is that of its continuous form and reads the joints themsel
 sampled, counted, held or late. The motion is smooth between the corners of the reference motion and
 the times of grasp and release, and heyoka starts again at each of them. The arm and what the
 controller knows of it come from the Lagrangian of models/rp_plant/references, the reference motion
-from models/closed_loop/references.
+from rparm.models/closed_loop/references.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,16 +12,16 @@ from collections.abc import Iterable, Mapping, Sequence
 import heyoka as hy
 import numpy as np
 import sympy as sp
+from rparm.models.closed_loop.references import equations as motion
+from rparm.models.closed_loop.references.closed_loop import prepare
+from rparm.models.closed_loop.references.loop import COEFFICIENTS
+from rparm.models.machine.references.components import UNKNOWN_TO_THE_CONTROLLER, Environment, real
+from rparm.models.machine.references.machine import completed
+from rparm.models.rp_plant.references import equations as plant
+from rparm.models.rp_plant.references.equations import INPUTS, STATES
 
-from cosim.errors import UserError
-from cosim.fmi.model import Value
-from models.closed_loop.references import equations as motion
-from models.closed_loop.references.closed_loop import prepare
-from models.closed_loop.references.loop import COEFFICIENTS
-from models.machine.references.components import UNKNOWN_TO_THE_CONTROLLER, Environment, real
-from models.machine.references.machine import completed
-from models.rp_plant.references import equations as plant
-from models.rp_plant.references.equations import INPUTS, STATES
+from rparm.errors import UserError
+from rparm.fmi.model import Value
 
 EFFORTS = ("tau1", "f2")
 CURRENTS = ("current1", "current2")

@@ -16,8 +16,8 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim.scenarios.scenario import Scenario
-from models import reference_files
+from rparm.models import reference_files
+from rparm.scenarios.scenario import Scenario
 
 MODEL = "RPActuator"
 INPUTS = ("tau1_cmd", "f2_cmd", "dq1", "dq2")

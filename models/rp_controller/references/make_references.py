@@ -19,8 +19,8 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim.scenarios.scenario import Scenario
-from models import reference_files
+from rparm.models import reference_files
+from rparm.scenarios.scenario import Scenario
 
 MODEL = "RPController"
 ARM = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")

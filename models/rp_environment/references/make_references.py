@@ -15,8 +15,8 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim.scenarios.scenario import Scenario
-from models import reference_files
+from rparm.models import reference_files
+from rparm.scenarios.scenario import Scenario
 
 MODEL = "RPEnvironment"
 INPUTS = ("ee_x", "ee_y", "ee_vx", "ee_vy", "ee_angle", "ee_rate")

@@ -19,9 +19,9 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim.errors import UserError
-from cosim.scenarios.scenario import Scenario
-from models import reference_files
+from rparm.errors import UserError
+from rparm.models import reference_files
+from rparm.scenarios.scenario import Scenario
 
 MODEL = "RPManipulator"
 PARAMETERS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")

@@ -15,14 +15,14 @@ import numpy as np
 import sympy as sp
 from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 
-from cosim import project
-from cosim.errors import UserError
-from cosim.fmi.fmu_file import read_model
-from cosim.output_files import whole
-from cosim.runs import convergence
-from cosim.scenarios import scenario as scenarios
-from cosim.scenarios.scenario import Scenario
-from cosim.scenarios.signals import Sines
+from rparm import project
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import read_model
+from rparm.output_files import whole
+from rparm.runs import convergence
+from rparm.scenarios import scenario as scenarios
+from rparm.scenarios.scenario import Scenario
+from rparm.scenarios.signals import Sines
 
 equations = functools.cache(derive)
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cosim.errors import UserError
+from rparm.errors import UserError
 
 MOST_SWEEPS = 20_000
 MOST_IMPACTS = 50  # at one instant, of two joints that drive each other into their stops

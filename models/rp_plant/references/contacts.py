@@ -8,8 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import sympy as sp
-
-from models.rp_plant.references.automaton import real
+from rparm.models.rp_plant.references.automaton import real
 
 COMPLIANT = 3  # item of stops
 PARAMETERS = tuple(f"stop_{what}{joint}" for what in ("stiffness", "damping") for joint in (1, 2))

@@ -14,11 +14,12 @@ MODEL_FOLDER = Path(__file__).resolve().parents[1]
 ROOT = MODEL_FOLDER.parents[1]
 sys.path.insert(0, str(ROOT))
 
-from cosim.scenarios.scenario import Scenario
-from models import reference_files
-from models.rp_plant.references.equations import INPUTS
-from models.rp_plant.references.motion import Motion
-from models.rp_plant.references.solver import Solver
+from rparm.models.rp_plant.references.equations import INPUTS
+from rparm.models.rp_plant.references.motion import Motion
+from rparm.models.rp_plant.references.solver import Solver
+
+from rparm.models import reference_files
+from rparm.scenarios.scenario import Scenario
 
 MODEL = "RPPlant"
 ATTACHED = "payload_attached"

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import heyoka as hy
 import numpy as np
+from rparm.models.rp_plant.references.automaton import real
+from rparm.models.rp_plant.references.plant import Plant
+from rparm.models.rp_plant.references.solver import PLACE, Solver
 
-from cosim.errors import UserError
-from models.rp_plant.references.automaton import real
-from models.rp_plant.references.plant import Plant
-from models.rp_plant.references.solver import PLACE, Solver
+from rparm.errors import UserError
 
 PROBES = np.linspace(0, 1, 17)[1:-1]  # of a step, for indicators that fall below 0 within it
 MISSED = -1e-13  # in the unit of an indicator

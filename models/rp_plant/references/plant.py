@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from rparm.models.rp_plant.references import automaton, contacts, equations
+from rparm.models.rp_plant.references.automaton import real
+from rparm.models.rp_plant.references.equations import INPUTS, STATES
+from rparm.models.rp_plant.references.solver import LIMITS, NUMBERS, PLACE, RATES, Solver
 
-from cosim.errors import UserError
-from models.rp_plant.references import automaton, contacts, equations
-from models.rp_plant.references.automaton import real
-from models.rp_plant.references.equations import INPUTS, STATES
-from models.rp_plant.references.solver import LIMITS, NUMBERS, PLACE, RATES, Solver
+from rparm.errors import UserError
 
 RIGID, AT_REST = 2, 2  # items of stops and of grasp
 FREE = 2  # a mode

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import heyoka as hy
 import numpy as np
 import sympy as sp
+from rparm.models.rp_plant.references import contacts, equations
+from rparm.models.rp_plant.references.automaton import real
+from rparm.models.rp_plant.references.equations import INPUTS, PARAMETERS, STATES, SWITCHES
 
-from cosim.errors import UserError
-from models.rp_plant.references import contacts, equations
-from models.rp_plant.references.automaton import real
-from models.rp_plant.references.equations import INPUTS, PARAMETERS, STATES, SWITCHES
+from rparm.errors import UserError
 
 LIMITS = ("lower1", "lower2", "upper1", "upper2")
 RATES = tuple(f"rate_{name}" for name in INPUTS)

@@ -40,7 +40,7 @@ def _heed_signals() -> None:
 
 def start(file: Path, output: Path, *options: object, host: Host = LOOPBACK) -> subprocess.Popen:
     """Begin a campaign."""
-    return python("cosim", "campaign", file, "--output", output, *options, host=host)
+    return python("rparm", "campaign", file, "--output", output, *options, host=host)
 
 
 def finish(process: subprocess.Popen) -> tuple[int, str, str]:

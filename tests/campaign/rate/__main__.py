@@ -23,9 +23,9 @@ from tempfile import TemporaryDirectory
 
 import psutil
 
-from cosim.campaign import bases, campaign_file, cluster, engine, planning
-from cosim.campaign.points import Points
-from cosim.campaign.runs import open_fmus
+from rparm.campaign import bases, campaign_file, cluster, engine, planning
+from rparm.campaign.points import Points
+from rparm.campaign.runs import open_fmus
 from tests.campaign.rate.c_loop import CLoop
 from tests.campaign.rate.plain_processes import plain_processes
 from tests.campaign.rate.works import WORKS

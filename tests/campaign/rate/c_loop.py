@@ -7,8 +7,8 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from cosim.campaign.job import Job
-from cosim.fmi.fmu_file import Fmu
+from rparm.campaign.job import Job
+from rparm.fmi.fmu_file import Fmu
 from tests.support.paths import ROOT
 
 KINDS = {"Real": "reals", "Integer": "integers", "Enumeration": "integers", "Boolean": "booleans"}

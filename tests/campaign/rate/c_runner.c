@@ -1,4 +1,4 @@
-/* The stepping loop of cosim/campaign/loop.py in C, over the same arrays: what a compiled runner
+/* The stepping loop of rparm/campaign/loop.py in C, over the same arrays: what a compiled runner
  * would gain. loop.py loads it as a shared library.
  */
 #include <stdint.h>

@@ -19,9 +19,9 @@ from tempfile import TemporaryDirectory
 import fmpy
 import numpy as np
 
-from cosim.campaign import campaign_file
-from cosim.campaign.loop import Wires
-from cosim.campaign.runs import Runner
+from rparm.campaign import campaign_file
+from rparm.campaign.loop import Wires
+from rparm.campaign.runs import Runner
 from tests.campaign.rate.works import WORKS
 from tests.campaign.runners import runner
 from tests.support.paths import ROOT

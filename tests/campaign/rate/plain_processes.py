@@ -9,8 +9,8 @@ from multiprocessing.connection import Connection
 import numpy as np
 import psutil
 
-from cosim.campaign.job import Job
-from cosim.campaign.runs import Workshop
+from rparm.campaign.job import Job
+from rparm.campaign.runs import Workshop
 
 
 def _serve(connection: Connection, job: Job, archives: Mapping[str, bytes]) -> None:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 STEPS = {"1 ms": 1e-3, "10 ms": 1e-2, "1 s": 1.0}

@@ -19,12 +19,13 @@ from fmpy.fmi1 import FMICallException
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from cosim.errors import UserError
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
-from models.rp_plant.references.equations import INPUTS, STATES
-from models.rp_plant.references.motion import Event, Motion
-from models.rp_plant.references.solver import Solver
+from rparm.models.rp_plant.references.equations import INPUTS, STATES
+from rparm.models.rp_plant.references.motion import Event, Motion
+from rparm.models.rp_plant.references.solver import Solver
+
+from rparm.errors import UserError
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import (
     AT_REST,
     COMPLIANT,

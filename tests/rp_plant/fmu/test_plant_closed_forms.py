@@ -9,7 +9,7 @@ import math
 import mpmath
 import pytest
 
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import (
     FIRM,
     RIGID,

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu
 from tests.fmi2.rollback_sequences import times
 from tests.rp_plant.fmu.plant_runs import (
     FIRM,

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_model_exchange import model
 from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_model_exchange import STATES, PlantModel, model, unknowns
 from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID, modes, started
 

@@ -10,14 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pytest
+from rparm.models.rp_plant.references.equations import INPUTS
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs import simulation
-from models.rp_plant.references.equations import INPUTS
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import simulation
 from tests.rp_plant.fmu.plant_runs import AT_REST, COMPLIANT, RIGID, each_method, read, started
 from tests.rp_plant.fmu.random_motions import Case, compliant_case, random_case
-from tests.support.cosim_project import load, names_of
+from tests.support.rparm_project import load, names_of
 
 TOLERANCE, ALLOWED = 1e-8, 100.0  # error in tolerances of the largest energy
 BESIDE = 1e-9  # s, from an event to the ends of the steps around it

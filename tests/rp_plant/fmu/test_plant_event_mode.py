@@ -21,8 +21,8 @@ from tests.rp_plant.fmu.plant_runs import (
     RIGID,
     each_method,
 )
-from tests.support.cosim_project import fmi3_fmu
 from tests.support.instances import instantiated, set_value
+from tests.support.rparm_project import fmi3_fmu
 
 STEP, STOP = 0.01, 1.5  # s
 COMBINATIONS = [(False, False), (False, True), (True, False), (True, True)]

@@ -8,12 +8,12 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs.simulation import initialize
-from cosim.scenarios.scenario import Scenario
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs.simulation import initialize
+from rparm.scenarios.scenario import Scenario
 from tests.rp_plant.fmu.plant_runs import METHODS, each_method
-from tests.support.cosim_project import load, names_of
+from tests.support.rparm_project import load, names_of
 
 COUNTS = (
     "solver_steps",

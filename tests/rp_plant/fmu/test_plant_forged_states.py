@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID, last_event, modes, started
 from tests.rp_plant.fmu.test_plant_rollback import Run
 from tests.support.instances import ERROR, hashed, restore, serialized, status_of

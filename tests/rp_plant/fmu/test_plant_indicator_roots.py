@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_model_exchange import STATES, PlantModel, model
 from tests.rp_plant.fmu.plant_runs import COMPLIANT, RIGID
 

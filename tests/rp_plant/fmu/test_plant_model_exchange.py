@@ -9,11 +9,11 @@ import fmpy
 import numpy as np
 import pytest
 
-from cosim import project
-from cosim.fmi.fmu_file import Fmu
-from cosim.runs.reference import bound
-from cosim.runs.simulation import initialize
-from cosim.scenarios.scenario import load
+from rparm import project
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs.reference import bound
+from rparm.runs.simulation import initialize
+from rparm.scenarios.scenario import load
 from tests.rp_plant.fmu.plant_model_exchange import STATES, model
 from tests.rp_plant.fmu.plant_runs import (
     AT_REST,

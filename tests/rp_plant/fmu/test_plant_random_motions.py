@@ -6,9 +6,9 @@ long_plant_random_motions and long_plant_compliant_motions have hundreds of othe
 from collections import Counter
 
 import pytest
+from rparm.models.rp_plant.references.solver import Solver
 
-from cosim.fmi.fmu_file import Fmu
-from models.rp_plant.references.solver import Solver
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import COMPLIANT, each_method
 from tests.rp_plant.fmu.random_motions import (
     MOST_EVENTS,

@@ -6,8 +6,8 @@ import random
 
 import pytest
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.rp_plant.fmu.plant_runs import (
     COMPLIANT,
     FIRM,

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.fmi.fmi_instance import Instance
-from cosim.fmi.fmu_file import Fmu
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
 from tests.fmi2.rollback_sequences import times
 from tests.rp_plant.fmu.plant_runs import (
     AT_REST,

@@ -1,0 +1,123 @@
+"""Runs a command, a module of rparm.commands each, and ends as it ends."""
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from io import TextIOWrapper
+from typing import NoReturn, TextIO
+
+from rparm import command_line, project
+from rparm.commands import Ended
+from rparm.errors import UserError, reason
+from rparm.interruption import handle_endings
+from rparm.output import streams
+
+LONGEST_MESSAGE = 2000  # characters; some quote what a file says
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; the exit code: 0 passed, 1 a bound exceeded, 2 a user's mistake.
+
+    2 also if the system gives out: no memory, no room on the disk or for the output.
+    """
+    if isinstance(sys.stdout, TextIOWrapper):  # names that it cannot encode are no reason to stop
+        sys.stdout.reconfigure(errors="backslashreplace")
+    # keeps matplotlib's font cache in the project
+    os.environ.setdefault("MPLCONFIGDIR", str(project.ROOT / "build" / "matplotlib"))
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = given[: given.index("--")] if "--" in given else given
+    as_json = "--json" in options  # a mistake in the arguments is a document, too
+    try:
+        if not given:
+            print(command_line.overview(), file=sys.stderr)
+            return 2
+        with streams.of_results(as_json, "--quiet" in options) as results:
+            return _say(_ended(given), as_json, results)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # whoever read the output has left
+        _drop_output()
+        return 1
+    except OSError as error:
+        _drop_output()
+        return _refuse(f"{error.filename or 'output or temporary files'}: {reason(error)}")
+    except MemoryError:
+        return _refuse("out of memory")
+
+
+def _ended(arguments: Sequence[str]) -> Ended:
+    """Run a command to its end."""
+    try:
+        options = command_line.parsed(arguments)
+        # imported here because it takes long: so Ctrl-C during the import leaves no traceback
+        return import_module(f"rparm.commands.{options.command}").run(options)
+    except UserError as error:
+        return Ended(2, "", error=error)
+
+
+def _say(ended: Ended, as_json: bool, results: TextIO | None) -> int:
+    """Print how a command has ended; the exit code."""
+    document = {"exit_code": ended.code, **ended.document}
+    if ended.error is not None:
+        document["error"] = str(ended.error)
+        _refuse(document["error"])
+    if ended.verdict:
+        print(ended.verdict, file=sys.stdout if as_json else results)
+    if as_json:
+        print(streams.document(document), file=results)
+    for stream in (sys.stdout, results):
+        if stream is not None:
+            stream.flush()
+    return ended.code
+
+
+def _refuse(text: str) -> int:
+    """Say in one line what is wrong, with what would move the cursor escaped."""
+    text = "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+    text = text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ..."
+    with suppress(OSError):  # standard error may be full too
+        print(f"error: {text}", file=sys.stderr)
+    return 2
+
+
+def _drop_output() -> None:
+    """Discard what is still buffered, or the interpreter would fail to write it at exit."""
+    with suppress(OSError, ValueError, AttributeError):  # closed, or not of the system
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _as_program() -> int:
+    """`main`, ended by Ctrl-C or another signal of its kind: temporary files are removed then.
+
+    Compiled code of libraries may turn the exception of a signal into another one: whatever
+    arrives after a signal counts as its end.
+    """
+    received = handle_endings()
+    try:
+        return main()
+    except SystemExit as ending:
+        return ending.code
+    except Exception:
+        if not received:
+            raise
+        if received[0] == signal.SIGINT:
+            print("interrupted", file=sys.stderr)
+        return 128 + received[0]
+
+
+def _end(code: int) -> NoReturn:
+    """End the process, but not HELICS, which may wait for ever for a process that is gone."""
+    if "helics" in sys.modules:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError, AttributeError):  # closed, full, or not there
+                stream.flush()
+        os._exit(code or 0)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    _end(_as_program())

@@ -1,0 +1,306 @@
+"""Checks what a campaign says of its scenario or system, and makes the job of it."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from typing import NoReturn
+
+import numpy as np
+
+from rparm.campaign.bases import Base, ScenarioBase
+from rparm.campaign.campaign_file import Campaign, Distribution
+from rparm.campaign.expressions import Expression
+from rparm.campaign.job import Component, Job, Target
+from rparm.campaign.measures import (
+    FINAL_INTEGER,
+    LYAPUNOV,
+    PLAIN,
+    Measure,
+    final_integer,
+    plain,
+)
+from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
+from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
+from rparm.texts import unit
+
+RUN, FAILURE = "run", "failure"  # columns of every table
+MAX_RECORDED = 100_000_000  # numbers that a run records
+
+
+def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
+    """The job of a campaign, which records the variables `also`, too.
+
+    UserError for the first mistake, beginning with `where`.
+    """
+    return _Planner(campaign, base, where).job(also)
+
+
+class _Planner:
+    def __init__(self, campaign: Campaign, base: Base, where: object) -> None:
+        self.campaign, self.base, self.where = campaign, base, where
+
+    def fail(self, place: str, message: object) -> NoReturn:
+        raise UserError(f"{self.where}: {place}: {message}")
+
+    def placed(self, place: str) -> AbstractContextManager[None]:
+        return placed(f"{self.where}: {place}")
+
+    def job(self, also: Sequence[str]) -> Job:
+        campaign, base = self.campaign, self.base
+        targets = self.targets()
+        fixed = self.fixed()
+        measures = self.measures()
+        integers = {m.variables[0]: None for m in measures if m.kind == FINAL_INTEGER}
+        measured = (v for measure in measures for v in measure.variables if v not in integers)
+        watched = tuple(dict.fromkeys([*measured, *also]))
+        tangent = self.tangent()
+        if len(watched) * len(base.times) > MAX_RECORDED:
+            self.fail("keep", f"{len(watched)} variables at {len(base.times)} times are too many")
+        read = self.read(watched)
+        components = tuple(base.components(list(read), fixed))
+        self.check_tolerances(components, targets)
+        reals, switches = base.held
+        first = np.cumsum([0, *(len(c.reals.outputs) for c in components)])
+        columns = [
+            len(reals.names)
+            + first[component]
+            + components[component].reals.outputs.index(self.base.variable(name)[1].reference)
+            for name, component in ((name, base.variable(name)[0]) for name in watched)
+        ]
+        self.check_columns(measures)
+        return Job(
+            components=components,
+            start=float(base.times[0]),
+            stop=float(base.times[-1]),
+            tolerance=base.tolerance,
+            times=base.times,
+            reals=reals,
+            switches=switches,
+            propagates=len(components) > 1,
+            watched=watched,
+            columns=np.array(columns, np.int64),
+            integers=dict(zip(integers, self.read(integers), strict=True)),
+            tangent=tangent,
+            targets=tuple(targets.items()),
+            measures=tuple(measures),
+            trajectories=frozenset(campaign.keep.trajectories),
+            hashes=base.hashes,
+        )
+
+    # ---- Values that are set -----------------------------------------------------------------
+
+    def targets(self) -> dict[str, Target]:
+        """Where each parameter and derived value goes that is a variable."""
+        campaign = self.campaign
+        used = set().union(*(e.names for e in campaign.expressions.values()))
+        targets = {}
+        for name, distribution in campaign.parameters.items():
+            place = f"[parameters.{name}]"
+            found = self.settable(name, place, name in used)
+            if found is not None:
+                self.check_distribution(distribution, found[1], place)
+                targets[name] = self.target(name, *found)
+        known_numbers, varying = constants(self.campaign, self.base), set(campaign.parameters)
+        for name, expression in campaign.expressions.items():
+            place = f"[derived] {name}"
+            known = varying | set(known_numbers)
+            for other in expression.names - known:
+                self.fail(place, f"unknown name {other!r}{did_you_mean(other, known)}")
+            if expression.names & varying:
+                varying.add(name)
+            else:
+                known_numbers[name] = self.constant(expression, known_numbers, place)
+            found = self.settable(name, place, name in used)
+            if found is not None:
+                if found[1].type != "Real":
+                    self.fail(place, f"is of type {found[1].type}, expected Real")
+                targets[name] = self.target(name, *found)
+        return targets
+
+    def constant(self, expression: Expression, constants: Mapping[str, float], place: str) -> float:
+        """Value of an expression that is the same in all runs."""
+        try:
+            return expression.value(constants)
+        except (ArithmeticError, ValueError) as error:
+            self.fail(place, f"has no value: {one_line(error)}")
+
+    def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
+        """The variable; None if it is none but `used` by an expression."""
+        try:
+            self.base.variable(name)
+        except WrongValueError as error:
+            if used:
+                return None
+            self.fail(place, f"{error}, and no derived value uses it")
+        with self.placed(place):
+            return self.base.settable(name)
+
+    def target(self, name: str, component: int, variable: Variable) -> Target:
+        held = None
+        if variable.is_a(INPUTS) and isinstance(self.base, ScenarioBase):
+            held = self.base.hold(name, 0.0)
+        return Target(component, variable.name, held)
+
+    def check_distribution(
+        self, distribution: Distribution, variable: Variable, place: str
+    ) -> None:
+        numbers = distribution.numbers
+        with self.placed(f"{place} {distribution.kind}"):
+            if variable.type == "Integer" and distribution.kind == "values":
+                for number in numbers:
+                    variable.checked(number)
+            elif variable.type != "Real":
+                self.fail(place, f"is of type {variable.type}, expected Real, or Integer by values")
+            elif distribution.kind != "normal":
+                variable.check_range(min(numbers), max(numbers))
+
+    def check_tolerances(
+        self, components: Sequence[Component], targets: Mapping[str, Target]
+    ) -> None:
+        """Refuse tolerances that the methods of integration cannot reach.
+
+        Derived values and normal distributions are not known before the runs.
+        """
+        varied = {
+            (target.component, target.variable): name
+            for name, target in targets.items()
+            if name in self.campaign.parameters
+        }
+        for i, (model, component) in enumerate(zip(self.base.models, components, strict=True)):
+            name = varied.get((i, TOLERANCE))
+            if name is None:
+                place = f"{component.name}: {TOLERANCE}"
+                numbers = [component.values.get(TOLERANCE) or self.base.tolerance]
+            else:
+                place, distribution = f"[parameters.{name}]", self.campaign.parameters[name]
+                numbers = [] if distribution.kind == "normal" else distribution.numbers
+            for number in filter(None, numbers):  # 0: that of the scenario
+                with self.placed(place):
+                    model.check_tolerance(number, component.values)
+
+    def fixed(self) -> dict[tuple[int, str], Value]:
+        """Section [set]."""
+        result: dict[tuple[int, str], Value] = {}
+        for name, given in self.campaign.set.items():
+            with self.placed(f"[set] {name}"):
+                component, variable = self.base.settable(name)
+                value = variable.checked(given)
+            if variable.is_a(INPUTS) and isinstance(self.base, ScenarioBase):
+                self.base.hold(name, float(value))
+            else:
+                result[component, variable.name] = value
+        return result
+
+    # ---- What is kept ------------------------------------------------------------------------
+
+    def measures(self) -> list[Measure]:
+        keep = self.campaign.keep
+        found = []
+        for kind in PLAIN:
+            types = ("Real", "Integer") if kind == "final" else ("Real",)
+            for name in getattr(keep, kind):
+                variable = self.readable(name, f"[keep] {kind}", types)
+                is_integer = variable.type == "Integer"
+                found.append(final_integer(name) if is_integer else plain(kind, name))
+        for name, settling in keep.settling.items():
+            self.readable(settling.variable, f"[keep.settling.{name}]")
+            options = (settling.target, settling.band)
+            found.append(Measure(f"settling({name})", (settling.variable,), "settling", options))
+        for name, crossings in keep.crossings.items():
+            self.readable(crossings.variable, f"[keep.crossings.{name}]")
+            variables, options = (crossings.variable,), (crossings.level,)
+            found.append(Measure(f"crossings({name})", variables, "crossings", options))
+        for name, tracking in keep.tracking.items():
+            variables = tuple(variable for pair in tracking.of for variable in pair)
+            for variable in variables:
+                self.readable(variable, f"[keep.tracking.{name}]")
+            for kind in ("largest_distance", "rms_distance"):
+                found.append(Measure(f"{kind}({name})", variables, kind))
+        if keep.lyapunov:
+            found.append(Measure(LYAPUNOV, (), LYAPUNOV))
+        if not found:
+            self.fail("[keep]", "keeps nothing of a run")
+        return found
+
+    def readable(self, name: str, place: str, types: Sequence[str] = ("Real",)) -> Variable:
+        with self.placed(place):
+            _, variable = self.base.variable(name)
+        if variable.type not in types or variable.causality == "independent":
+            self.fail(place, f"{name!r} is not a {' or '.join(types)} variable")
+        return variable
+
+    def read(self, names: Iterable[str]) -> dict[tuple[int, str], None]:
+        """Component and name of each variable."""
+        found = (self.base.variable(name) for name in names)
+        return {(component, variable.name): None for component, variable in found}
+
+    def tangent(self) -> tuple[np.ndarray, np.ndarray] | None:
+        if not self.campaign.keep.lyapunov:
+            return None
+        if not isinstance(self.base, ScenarioBase):
+            self.fail("[keep] lyapunov", "goes with a scenario only")
+        with self.placed("[keep] lyapunov"):
+            pairs = self.base.derivatives()
+        if not pairs:
+            self.fail("[keep] lyapunov", "the model has no continuous states")
+        derivatives, states = zip(*pairs, strict=True)
+        return np.array(derivatives, np.uint32), np.array(states, np.uint32)
+
+    def check_columns(self, measures: Sequence[Measure]) -> None:
+        """Columns that the page asks for are there, and no name stands for two."""
+        places = {name: f"[parameters.{name}]" for name in self.campaign.parameters}
+        places |= {name: f"[derived] {name}" for name in self.campaign.derived}
+        for name in (RUN, FAILURE):
+            if name in places:
+                self.fail(places[name], "every table has a column of that name")
+        columns = columns_of(self.campaign, measures)
+        for column in columns:
+            if columns.count(column) > 1:
+                self.fail("[keep]", f"column {column!r} is there twice")
+        asked = [("worst", name) for name in self.campaign.worst]
+        for i, drawn in enumerate(self.campaign.maps):
+            asked += [(f"maps[{i}]", name) for name in (drawn.x, drawn.y, drawn.colour)]
+        for place, name in asked:
+            if name not in columns:
+                self.fail(place, f"no column {name!r}{hint(name, columns, 'there are')}")
+
+
+def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:
+    """Columns of the table that hold numbers."""
+    return [*campaign.parameters, *campaign.derived, *(measure.column for measure in measures)]
+
+
+def units(campaign: Campaign, base: Base, measures: Iterable[Measure]) -> dict[str, str]:
+    """Units of the columns of numbers; empty texts where there is none, or it is not known."""
+
+    def of(name: str) -> str:
+        try:
+            found = base.variable(name)[1].unit
+        except WrongValueError:  # only derived values use it
+            return ""
+        return "" if found == "1" else unit(found)
+
+    found = {name: of(name) for name in (*campaign.parameters, *campaign.derived)}
+    for measure in measures:
+        match measure.kind:
+            case "settling":
+                text = "s"
+            case "crossings":
+                text = ""
+            case "integral":
+                text = of(measure.variables[0])
+                text = f"({text})·s" if "/" in text else f"{text}·s".strip("·")
+            case _:
+                text = "1/s" if measure.kind == LYAPUNOV else of(measure.variables[0])
+        found[measure.column] = text
+    return found
+
+
+def constants(campaign: Campaign, base: Base) -> dict[str, float]:
+    """Numbers that a campaign's expressions may name: the start values of all its variables."""
+    known = base.start_values() | campaign.set
+    return {
+        name: float(value)
+        for name, value in known.items()
+        if isinstance(value, int | float) and math.isfinite(value)
+    }

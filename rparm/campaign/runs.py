@@ -1,0 +1,246 @@
+"""Makes runs of a job on a worker: a runner per thread, whose instances are reset between runs."""
+
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from rparm.campaign import loop
+from rparm.campaign.fmi_calls import DISCARD, TERMINATED, functions
+from rparm.campaign.job import Job, Target
+from rparm.campaign.measures import Recorded
+from rparm.errors import UserError, one_line
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+
+LONGEST_REASON = 500  # characters
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Results of some runs."""
+
+    runs: np.ndarray  # (rows,) their numbers
+    measures: np.ndarray  # (rows, measures); NaN in a run that failed
+    failures: list[str]  # why each run failed, "" if it did not
+    trajectories: dict[int, np.ndarray]  # (n + 1, watched) by number of the run
+
+
+class Runner:
+    """Instances of all components; a context manager that frees them.
+
+    Parameters
+    ----------
+    fmus : mapping of str to Fmu
+        By their hash.
+    """
+
+    def __init__(self, job: Job, fmus: Mapping[str, Fmu]) -> None:
+        self._job, self._fmus = job, fmus
+        self._stack = ExitStack()
+        self._instances: list[Instance] = []
+        self._reals = loop.Wires.of(
+            [c.reals for c in job.components], len(job.reals.names), np.float64
+        )
+        self._switches = loop.Wires.of(
+            [c.switches for c in job.components], len(job.switches.names), np.int32
+        )
+        self._held = job.reals.values.copy()
+        self._record = np.empty((len(job.times), len(job.watched)))
+        self._tangent = loop.Tangent.none() if job.tangent is None else loop.Tangent(*job.tangent)
+        self._growth = np.empty(0 if job.tangent is None else job.steps)
+        self._integers: list[int] = []  # at the end of the last run
+        column = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
+        self._columns = [[column[name] for name in m.variables] for m in job.measures]
+
+    def __enter__(self) -> "Runner":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.__exit__(*error)
+
+    def instantiate(self) -> None:
+        """Load the FMUs and make their instances; UserError if that fails."""
+        for component in self._job.components:
+            instance = self._fmus[component.archive].instance(component.name)
+            self._instances.append(self._stack.enter_context(instance))
+        self._calls = loop.component_calls(self._instances)
+
+    def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
+        """Make runs, with the values (runs, targets) of the job's targets."""
+        job = self._job
+        measures = np.full((len(numbers), len(job.measures)), np.nan)
+        failures, trajectories = [], {}
+        for i, (number, point) in enumerate(zip(numbers, points, strict=True)):
+            failure = self._run(point)
+            failures.append(failure)
+            if failure:
+                continue
+            recorded = Recorded(job.times, self._record, self._growth, self._integers)
+            for j, (measure, columns) in enumerate(zip(job.measures, self._columns, strict=True)):
+                measures[i, j] = measure.value(recorded, columns)
+            if number in job.trajectories:
+                trajectories[number] = self._record.copy()
+        return Rows(np.array(numbers, np.int64), measures, failures, trajectories)
+
+    def _run(self, point: np.ndarray) -> str:
+        """Make one run; why it failed, or an empty text."""
+        try:
+            self._initialize(point)
+            self._advance()
+            self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
+            return ""
+        except UserError as error:
+            self._drop_instances()
+            return one_line(error)[:LONGEST_REASON]
+
+    def _drop_instances(self) -> None:
+        """Free the instances of a failed run, which are not used again."""
+        with suppress(UserError):  # the run has failed already
+            self._stack.close()
+        self._instances = []
+
+    # ---- Initialization --------------------------------------------------------------------------
+
+    def _initialize(self, point: np.ndarray) -> None:
+        """From new or used instances to the first communication point, outputs read."""
+        job = self._job
+        if self._instances:
+            for instance in self._instances:
+                instance.reset()
+        else:
+            self.instantiate()
+        for instance, component in zip(self._instances, job.components, strict=True):
+            instance.set_up(job.start, job.stop, job.tolerance)
+            for name, value in component.values.items():
+                instance.set(name, value)
+        for (_, target), value in zip(job.targets, point, strict=True):
+            self._set_target(target, float(value))
+        for instance in self._instances:
+            instance.enter_initialization()
+        self._propagate()
+        for instance in self._instances:
+            instance.exit_initialization()
+        self._check(loop.read_outputs(*self._state()), f"at the start, t = {job.start!r} s,")
+        self._tangent.deviation[:] = 1 / np.sqrt(max(len(self._tangent.deviation), 1))
+
+    def _set_target(self, target: Target, value: float) -> None:
+        if not np.isfinite(value):
+            raise UserError(f"{target.variable}: its value is not defined")
+        if target.held is not None:
+            self._held[:, target.held] = value
+            return
+        instance = self._instances[target.component]
+        kind = instance.fmu.model.variables[target.variable].type
+        instance.set(target.variable, int(value) if kind == "Integer" else value)
+
+    def _propagate(self) -> None:
+        """Set inputs in initialization mode until no output follows any more."""
+        reals, switches = self._reals, self._switches
+        reals.values[: self._held.shape[1]] = self._held[0]
+        switches.values[: self._job.switches.values.shape[1]] = self._job.switches.values[0]
+        when = "in initialization"
+        if not self._job.propagates:
+            self._check(loop.set_inputs(*self._state(), True), when)
+            return
+        before = None
+        for _ in range(len(self._instances) + 2):
+            self._check(loop.read_outputs(*self._state()), when)
+            found = np.concatenate([reals.values, switches.values])
+            if before is not None and np.array_equal(before, found):
+                return
+            before = found
+            self._check(loop.set_inputs(*self._state(), True), when)
+        raise UserError("the connections form an algebraic loop")
+
+    # ---- Steps -----------------------------------------------------------------------------------
+
+    def _state(self) -> tuple:
+        return self._calls, tuple(self._reals), tuple(self._switches)
+
+    def _advance(self) -> None:
+        job, tangent = self._job, self._tangent
+        calls, reals, switches = self._state()
+        *failure, step = loop.advance(
+            calls,
+            job.times,
+            self._held,
+            job.switches.values,
+            reals,
+            switches,
+            job.columns,
+            self._record,
+            (tangent.derivatives, tangent.states, tangent.deviation),
+            self._growth,
+        )
+        self._check(failure, f"in the step from t = {float(job.times[step])!r} s")
+
+    def _check(self, failure: Sequence[int], when: str) -> None:
+        """Raise the user's error if the loop says that a function failed."""
+        status, function, component = failure
+        if status < DISCARD:
+            return
+        instance = self._instances[component]
+        if status == TERMINATED:
+            raise UserError(f"{instance.name}: the FMU ends the simulation {when}")
+        error = FMICallException(functions(instance)[function], status)
+        raise instance.failure(error, when)
+
+
+@contextmanager
+def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str, Fmu]]:
+    """FMUs by their hash, unpacked in a folder."""
+    with ExitStack() as stack:
+        fmus = {}
+        for digest, content in archives.items():
+            path = _copy(folder, digest)
+            path.write_bytes(content)
+            fmus[digest] = stack.enter_context(Fmu(path, folder))
+        yield fmus
+
+
+def check(job: Job, archives: Mapping[str, bytes], path: Path) -> None:
+    """Load the FMUs of a job and make an instance of each; UserError of `path` if that fails."""
+    with TemporaryDirectory(prefix="rparm-") as name:
+        folder = Path(name)
+        try:
+            with open_fmus(archives, folder) as fmus, Runner(job, fmus) as runner:
+                runner.instantiate()
+        except UserError as error:
+            text = str(error)
+            for digest in archives:
+                text = text.replace(str(_copy(folder, digest)), str(path))
+            raise UserError(text) from None
+
+
+def _copy(folder: Path, digest: str) -> Path:
+    return folder / f"{digest}.fmu"
+
+
+class Workshop:
+    """The FMUs of a job, unpacked on a worker, and a runner for each of its threads."""
+
+    def __init__(self, job: Job, archives: Mapping[str, bytes], within: Path | None) -> None:
+        self._job, self._local = job, threading.local()
+        self._stack, self._runners = ExitStack(), []
+        folder = self._stack.enter_context(TemporaryDirectory(prefix="rparm-", dir=within))
+        self._fmus = self._stack.enter_context(open_fmus(archives, Path(folder)))
+
+    def close(self) -> None:
+        """Free the instances and remove the unpacked FMUs; nothing may run any more."""
+        for runner in self._runners:
+            with suppress(UserError):
+                runner.__exit__(None, None, None)
+        self._stack.close()
+
+    def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
+        """Make runs in this thread."""
+        if not hasattr(self._local, "runner"):
+            self._local.runner = Runner(self._job, self._fmus)
+            self._runners.append(self._local.runner)
+        return self._local.runner.rows(numbers, points)

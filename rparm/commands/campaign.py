@@ -1,0 +1,205 @@
+"""`campaign`: run a scenario or a system many times, over parameters."""
+
+import argparse
+import shlex
+import sys
+import time
+from collections.abc import Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rparm import project
+from rparm.commands import Ended
+from rparm.errors import UserError, one_line
+from rparm.interruption import arrived
+from rparm.options import count, number
+from rparm.output import console
+from rparm.output.progress import Progress
+from rparm.output_files import from_here, written
+
+if TYPE_CHECKING:
+    from distributed import Security
+
+    from rparm.campaign.campaign_file import Campaign
+    from rparm.campaign.job import Job
+    from rparm.campaign.points import Points
+    from rparm.campaign.results import Results
+
+DESCRIPTION = (
+    "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a page. A "
+    "campaign that was stopped resumes. Exit code: 0 all runs are there, 1 the run of --replay "
+    "fails, 2 wrong use or stopped."
+)
+NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which campaign, and where it runs."""
+    parser.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
+    parser.add_argument(
+        "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
+    )
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder for the results (default: that in the file, or in build/campaigns/)",
+    )
+    parser.add_argument(
+        "--replay",
+        type=number,
+        metavar="N",
+        help="run only run N again; writes all its Real outputs and a page",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="a scheduler that runs elsewhere, as tls://192.168.0.1:8786; with tcp://, whoever "
+        "reaches it or its workers runs code there",
+    )
+    where.add_argument(
+        "--workers",
+        type=count,
+        metavar="N",
+        help="processes on this machine (default: one per core)",
+    )
+    for name, text in (
+        ("ca", "certificate of the authority that signs those of scheduler, workers and client"),
+        ("cert", "certificate of the client"),
+        ("key", "its private key"),
+    ):
+        parser.add_argument(f"--tls-{name}", type=Path, metavar="PEM", help=f"for tls://: {text}")
+    parser.add_argument(
+        "--no-dashboard",
+        action="store_true",
+        help="no pages of Dask on this machine, which all its users can read",
+    )
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
+    # imported here: what a campaign needs may not be installed
+    from rparm.campaign import bases, campaign_file, page, planning, quantities, replay, runs
+    from rparm.campaign.points import Points
+    from rparm.campaign.results import Results
+
+    security = _security(options)
+    campaign = campaign_file.read(options.file)
+    with bases.opened(campaign, options.fmu, options.file) as base:
+        texts = (*base.questions, *quantities.questions(campaign, base))
+        console.messages(f"warning: {options.file}", texts)
+        campaign = quantities.in_si(campaign, base, options.file)
+        job = planning.plan(campaign, base, options.file)
+        points = Points(campaign, planning.constants(campaign, base))
+        folder = _folder(options, campaign)
+        text = Path(options.file).read_text(encoding="utf-8")
+        results = Results(folder, campaign, job, text)
+        if options.replay is not None:
+            results.check()
+            again = f"{_command(options)} --replay {options.replay}"
+            made = replay.replay(campaign, base, points, options.replay, folder, again)
+            print(*made.lines, sep="\n")
+            verdict = f"failed: {made.failure}" if made.failure else f"ran: run {options.replay}"
+            return Ended(1 if made.failure else 0, verdict, made.document)
+        runs.check(job, base.archives, base.path)
+        results.begin()
+        _run_missing(options, security, campaign, job, base.archives, points, results)
+        failed = results.failed()
+        digest = results.digest()
+        print(f"table: {digest}")
+        document = {"runs": campaign.count, "failed": failed, "table": digest}
+        document["results"] = folder.absolute()
+        verdict = f"complete: {campaign.count} runs" + (f", {failed} of them failed" * bool(failed))
+        if campaign.count > page.MOST:
+            print(f"results: {from_here(folder)}, no page of more than {page.MOST} runs")
+            return Ended(0, verdict, document)
+        units = planning.units(campaign, base, job.measures)
+        try:
+            with written(folder):
+                index = page.Page(campaign, job, results, units, _command(options)).write(digest)
+        except UserError:
+            raise
+        except Exception as error:  # the libraries that draw raise what they like
+            raise UserError(
+                f"{folder}: the page cannot be written: {type(error).__name__}: {one_line(error)}; "
+                "the results are complete"
+            ) from error
+    print(f"page: {from_here(index)}")
+    return Ended(0, verdict, {**document, "page": index.absolute()})
+
+
+def _security(options: argparse.Namespace) -> "Security | None":
+    """Certificates for a scheduler elsewhere; refuses options of another kind of cluster."""
+    certificates = options.tls_ca, options.tls_cert, options.tls_key
+    if options.scheduler is None:
+        if any(path is not None for path in certificates):
+            raise UserError("--tls-ca, --tls-cert, --tls-key: are for a --scheduler")
+        return None
+    if options.no_dashboard:
+        raise UserError("--no-dashboard: that of a --scheduler is switched off where it starts")
+    from rparm.campaign import credentials  # takes long
+
+    return credentials.of(options.scheduler, *certificates)
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What to type for the campaign, in the project's folder."""
+    parts = ["./run.sh", "campaign", str(project.from_root(options.file))]
+    for name in ("fmu", "output"):
+        value = getattr(options, name)
+        parts += [] if value is None else [f"--{name}", str(project.from_root(value))]
+    return shlex.join(parts)
+
+
+def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:
+    if options.output is not None:
+        return options.output
+    if campaign.output is not None:
+        return options.file.parent / campaign.output
+    return project.ROOT / "build" / "campaigns" / options.file.stem
+
+
+def _run_missing(
+    options: argparse.Namespace,
+    security: "Security | None",
+    campaign: "Campaign",
+    job: "Job",
+    archives: Mapping[str, bytes],
+    points: "Points",
+    results: "Results",
+) -> None:
+    """Run the blocks whose results are not there."""
+    blocks = results.missing()
+    if not blocks:
+        return
+    from rparm.campaign import cluster, engine  # takes long
+
+    count = campaign.count
+    ahead = sum(len(campaign.block_range(block)) for block in blocks)
+    console.stage("starting workers" if options.scheduler is None else "calling the scheduler")
+    if ahead < count:
+        print(f"goes on: {count - ahead} of {count} runs are there")
+    try:
+        with (
+            results.workers_folder() as files,
+            cluster.opened(
+                options.scheduler, options.workers, files, security, not options.no_dashboard
+            ) as client,
+        ):
+            if not options.no_dashboard:
+                print(f"dashboard: {client.dashboard_link}", flush=True)
+            made = engine.Engine(client, campaign, job, archives, points, results)
+            begin = time.perf_counter()
+            with Progress(campaign.title, ahead, "runs") as progress:
+                made.run(blocks, progress)
+            seconds = time.perf_counter() - begin
+    except BaseException:  # Dask may turn that of a signal into another one
+        if arrived():
+            print(f"stopped; {engine.GOES_ON}", file=sys.stderr)
+        raise
+    print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")

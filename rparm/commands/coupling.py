@@ -1,0 +1,33 @@
+"""`coupling`: the study of what the coupling of a system costs, which its folder has."""
+
+import argparse
+
+from rparm import project
+from rparm.commands import Ended
+from rparm.options import add_report, add_system
+from rparm.output import console
+from rparm.output_files import check_writable
+from rparm.system import study
+
+DESCRIPTION = (
+    "Steps the system in several orders, with inputs held and extrapolated and with step-size "
+    "control, and compares it with the solution in continuous time. Exit code: 0 as expected, "
+    "1 not, 2 wrong use."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which system, and where the picture goes."""
+    add_system(parser)
+    add_report(parser, "system")
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Make the study."""
+    folder, known = study.of_coupling()
+    path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
+    check_writable(options.report)
+    console.stage(f"studying the coupling of {folder.name}")
+    parts = known.study_coupling(path, options.report)
+    failed = [name for name, part in parts.items() if not part["passed"]]
+    return Ended(1 if failed else 0, console.verdict_line(failed, parts, "part"), {"parts": parts})

@@ -1,0 +1,138 @@
+"""`federation`: run variants of a system with each FMU in its own process, coupled by HELICS."""
+
+import argparse
+import shlex
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from rparm import project
+from rparm.commands import Ended
+from rparm.coupling.master import Master
+from rparm.errors import UserError, hint
+from rparm.federation import SILENCE, addresses, federation, screen
+from rparm.federation.federation import Record
+from rparm.federation.network import KEY, key
+from rparm.federation.parts import parts, real_connections
+from rparm.options import add_silence, add_system
+from rparm.output import console
+from rparm.output.progress import Progress
+from rparm.output.result_tables import FederationTable
+from rparm.system import comparison, ecos, ssp, study
+from rparm.system.ssp import Ssp
+from rparm.texts import counted
+
+DESCRIPTION = (
+    "Runs variants of the closed loop with each FMU in its own process, coupled by HELICS, and "
+    "compares every value with that of the master that steps all in one process in Jacobi order. "
+    "The processes may be on several machines. Exit code: 0 all within the bound, 1 not, 2 wrong "
+    "use or a process that fails."
+)
+BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which variants, and where their processes are."""
+    parser.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
+    add_system(
+        parser,
+        "the system (default: the closed loop in build/)",
+        "the system in build/ with FMUs of this version of FMI",
+    )
+    parser.add_argument(
+        "--listen",
+        metavar="ADDRESS",
+        help="where processes of other machines find the federation, as tcp://192.168.0.1:23404 "
+        "(default: a free port that only this machine sees)",
+    )
+    parser.add_argument(
+        "--elsewhere",
+        nargs="+",
+        default=[],
+        metavar="COMPONENT",
+        help="components that are not started here, in one variant: prints the command for each",
+    )
+    add_silence(parser, SILENCE, "processes that do not answer for so long end the federation")
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Run the variants; compare each with the master that steps all in one process."""
+    screen.apart()
+    path = options.ssp
+    if path is None:
+        folder, _ = study.of_coupling()
+        path = project.built(folder, ".ssp", "--ssp", options.fmi)
+    address = addresses.free() if options.listen is None else options.listen
+    addresses.check_free(address)
+    key()  # what is wrong with it is said before anything runs
+    with ssp.unpacked(path) as system:
+        _check_names(system, options)
+        names = options.names or list(system.system.parameters)
+        for component in options.elsewhere:
+            print(f"waiting for: {_command(path, names[0], component, address)}", flush=True)
+
+        def connected() -> None:
+            if options.elsewhere:
+                print(f"connected: {', '.join(options.elsewhere)}", flush=True)
+
+        console.stage(f"stepping {counted(names, 'variant')} in processes coupled by HELICS")
+        table = FederationTable(names, BOUND)
+        failed, rows = [], []
+        for name in names:
+            label, steps = f"{name} by HELICS", system.system.steps
+            with Progress(label, steps) as progress:
+                record = federation.run(
+                    system, name, address, options.elsewhere, options.silence, progress, connected
+                )
+            difference, master_time = _master(system, name, record)
+            ecos_time = ecos.run(system, name, comparison.recorded(system)).wall_time
+            passed = difference <= BOUND
+            seconds = {"helics": record.wall_time, "ecos": ecos_time, "master": master_time}
+            times = {by: 1e6 * s / steps for by, s in seconds.items()}
+            table.row(name, steps, difference, list(times.values()), passed)
+            row = {"name": name, "steps": steps, "difference": difference, "bound": BOUND}
+            rows.append({**row, "microseconds_per_step": times, "passed": passed})
+            failed += [] if passed else [name]
+    code = 1 if failed else 0
+    return Ended(code, console.verdict_line(failed, names, "variant"), {"variants": rows})
+
+
+def _command(path: Path, variant: str, component: str, address: str) -> str:
+    """What steps a component on another machine, in the folder of the project there."""
+    place = project.from_root(path)
+    arguments = federation.arguments(place, variant, component, address)
+    return f"{KEY}={key()} ./run.sh {shlex.join(arguments)}"
+
+
+def _check_names(system: Ssp, options: argparse.Namespace) -> None:
+    for kind, given, known in (
+        ("variant", options.names, system.system.parameters),
+        ("component", options.elsewhere, system.models),
+    ):
+        for name in given:
+            if name not in known:
+                known = hint(name, known, "there are")
+                raise UserError(f"{system.path}: has no {kind} {name!r}{known}")
+    if options.elsewhere and len(options.names) != 1:
+        raise UserError("--elsewhere: name one variant, which the other machine steps too")
+
+
+def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
+    """Largest relative difference to the Jacobi master, and its time for all steps, s."""
+    with ExitStack() as stack:
+        fmus = {
+            c.name: stack.enter_context(system.unpacked_fmu(c.name))
+            for c in system.system.components
+        }
+        master = stack.enter_context(Master(fmus, real_connections(system)))
+        times = next(iter(parts(system, variant).values())).times
+        master.initialize(times[0], times[-1], system.system.parameter_sets[variant])
+        begin = time.perf_counter()
+        rows = master.run(times)
+        seconds = time.perf_counter() - begin
+    columns = [master.names.index(name) for name in record.names]
+    expected = rows[:, columns]
+    scale = np.maximum(np.abs(expected).max(axis=0), np.finfo(float).tiny)
+    return float((np.abs(record.values - expected) / scale).max()), seconds

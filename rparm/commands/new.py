@@ -1,0 +1,73 @@
+"""`new`: write a scenario with comments, for a user to start from."""
+
+import argparse
+from pathlib import Path
+
+from rparm import project
+from rparm.commands import Ended
+from rparm.errors import UserError, reason
+from rparm.fmi.fmu_file import read_model
+from rparm.output_files import whole
+from rparm.scenarios import template
+
+DESCRIPTION = (
+    "Writes NAME.toml, a scenario with comments that runs as it is: ./run.sh NAME.toml. Exit code: "
+    "0 written, 2 the file exists or cannot be written."
+)
+SUFFIX = ".toml"
+# what no file can be called on Windows, with any suffix
+RESERVED = {"CON", "PRN", "AUX", "NUL"} | {f"{x}{i}" for x in ("COM", "LPT") for i in range(1, 10)}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which scenario."""
+    parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
+    parser.add_argument(
+        "--model",
+        metavar="MODEL",
+        help="what to simulate (default: the model with the most scenarios)",
+    )
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Write the file."""
+    path = _path(options.name)
+    folder = project.model(options.model) if options.model else _usual_model()
+    model = read_model(project.built(folder, ".fmu"))
+    text = template.text(path.stem, folder.name, model)
+    try:
+        path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
+    except FileExistsError:
+        raise UserError(f"{path}: exists already, choose another name") from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    try:
+        with whole(path) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        path.unlink(missing_ok=True)
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    verdict = f"{path}: written; run it by ./run.sh '{path}'"
+    return Ended(0, verdict, {"file": path.absolute(), "model": folder.name})
+
+
+def _path(name: str) -> Path:
+    """File for a name, with or without its suffix; UserError for one that no file can have."""
+    path = Path(name)
+    if not path.name or not path.stem.strip() or name.endswith(("/", "\\")):
+        raise UserError(f"{name!r} is no name for a scenario")
+    if any(not character.isprintable() for character in name):
+        raise UserError(f"{name!r}: a name has printable characters only")
+    if path.name.startswith("-"):
+        raise UserError(f"{name!r}: a name begins with no hyphen, or run.sh takes it for an option")
+    if path.name.partition(".")[0].rstrip().upper() in RESERVED:
+        raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
+    return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
+
+
+def _usual_model() -> Path:
+    """Folder of the model that has the most scenarios."""
+    folders = list(project.models().values())
+    if not folders:
+        raise UserError(f"{project.ROOT / 'models'}: has no scenarios")
+    return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))

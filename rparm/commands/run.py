@@ -1,0 +1,389 @@
+"""`run`: simulate scenarios, compare them with their references, write a report.
+
+Files of users are run in the same way; they have no references.
+"""
+
+import argparse
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+
+from rparm import project
+from rparm.command_line import COMMANDS, PROGRAM
+from rparm.commands import Ended
+from rparm.commands import list as scenario_list
+from rparm.errors import UserError, did_you_mean, placed, together
+from rparm.fmi.fmu_file import Fmu
+from rparm.options import add_fmi, add_open, add_report, relative_tolerance
+from rparm.output import console, results
+from rparm.output.progress import Progress
+from rparm.output.result_tables import RunTable, SweepTable, measured
+from rparm.output.result_tables import convergence as convergence_table
+from rparm.output.results import Done
+from rparm.output_files import check_writable, from_here, written
+from rparm.project import VERSIONS
+from rparm.report import pages
+from rparm.report.browser import show
+from rparm.report.writer import ReportWriter
+from rparm.runs import convergence
+from rparm.runs.comparison import Failure, Run, Runs
+from rparm.runs.convergence import Convergence
+from rparm.runs.tolerance_sweep import TIGHTEST, TOLERANCES, Sweep, sweep
+from rparm.scenarios import scenario as scenarios
+from rparm.scenarios.scenario import Scenario
+from rparm.texts import counted, short
+
+DESCRIPTION = (
+    "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "
+    "1e-11; compares all outputs with the reference, and prints the largest errors. Without names, "
+    "measures the order of convergence in the communication step too. The FMUs are of FMI 2.0; "
+    "those of FMI 3.0 must give the same bits. Exit code: 0 all as it should be, 1 not, 2 wrong "
+    "use."
+)
+SUFFIX = ".toml"
+FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
+QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which scenarios, on which FMUs, and where the report goes."""
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="scenarios, or files FILE.toml of your own (default: all scenarios)",
+    )
+    parser.add_argument("--list", action="store_true", help="name the scenarios, run nothing")
+    parser.add_argument(
+        "--fmu",
+        type=Path,
+        metavar="PATH",
+        help="the FMU, for the scenarios of its model (default: that of each model, in build/)",
+    )
+    add_fmi(parser, None, "run only FMUs of this version of FMI")
+    add_report(parser)
+    add_open(parser)
+    parser.add_argument(
+        "--tolerance",
+        type=relative_tolerance,
+        metavar="X",
+        help="run at this relative tolerance only, without the sweep",
+    )
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Run the scenarios and files that the options name, or all scenarios."""
+    if options.list:
+        return scenario_list.run(options)
+    with ExitStack() as stack:
+        chosen, own, fmus, twins = _open(options, stack)
+        _check(options, chosen, own, fmus)
+        for scenario in (*chosen, *own):
+            texts = (f"{from_here(scenario.path)}: {x}" for x in scenario.questions)
+            console.messages("warning", texts)
+        runs = Runs(fmus, twins)
+        for scenario in chosen:
+            runs.reference(scenario)  # so that a missing reference is reported before anything runs
+        check_writable(options.report)
+        writer = ReportWriter(options.report)
+        with written(options.report):
+            writer.begin()
+            if chosen:
+                writer.forget({scenario.name for scenario in chosen} if options.names else None)
+        done = Done(chosen, own)
+        if options.tolerance is not None:
+            done.runs = _runs(runs, chosen, bool(twins), done.failures, options.tolerance)
+        else:
+            done.runs = _runs(runs, chosen, bool(twins), done.failures, None, TIGHTEST)
+            swept = _quick(done.runs) if options.names else chosen
+            done.sweeps = _sweeps(runs, _finished(swept, done.failures), bool(options.names))
+            done.studies = [] if options.names else _convergence(fmus, twins)
+        done.runs += _estimated(runs, own, done.failures, options.tolerance)
+        console.stage("writing the report")
+        groups = writer.grouped(done.runs)
+        for group in groups.values():
+            measured(group[0])
+        with written(options.report), Progress("report", len(groups), "pages") as progress:
+            page = writer.write(groups, done.sweeps, done.studies, progress, done.failures)
+    print()
+    for name, file in writer.files.items():
+        print(f"{name}: {from_here(file)}")
+    index = options.report / pages.INDEX
+    print(f"report: {from_here(index)}")
+    if options.open:
+        show(page)
+    return _ended(done, index.absolute())
+
+
+def _ended(done: Done, report: Path) -> Ended:
+    """How the command ends."""
+    wrong = [x.scenario.name for x in (*done.runs, *done.sweeps, *done.studies) if not x.passed]
+    wrong += [failure.scenario.name for failure in done.failures]
+    everything = [*done.chosen, *done.own]
+    verdict = console.verdict_line(wrong, everything, "scenario")
+    if not wrong and done.own:
+        verdict = f"ran: {counted(everything, 'scenario')}, errors estimated"
+        verdict = f"{verdict} of {len(done.own)}" if done.chosen else verdict
+    document = {"passed": not wrong, **results.document(done), "report": report}
+    if done.failures:
+        error = together([UserError(failure.text) for failure in done.failures])
+        return Ended(2, verdict, document, error)
+    return Ended(1 if wrong else 0, verdict, document)
+
+
+def _check(
+    options: argparse.Namespace,
+    chosen: Sequence[Scenario],
+    own: Sequence[Scenario],
+    fmus: Mapping[str, Fmu],
+) -> None:
+    """Refuse a tolerance for all scenarios that one of them cannot be run at."""
+    if options.tolerance is None:
+        return
+    for scenario in (*chosen, *own):
+        with placed(f"--tolerance: {scenario.name}"):
+            model = fmus[scenario.model].model
+            model.check_tolerance(options.tolerance, scenario.parameters)
+
+
+def _open(
+    options: argparse.Namespace, stack: ExitStack
+) -> tuple[list[Scenario], list[Scenario], dict[str, Fmu], dict[str, Fmu]]:
+    """Scenarios that the options name, or all; users' own; FMUs by their models; and their twins.
+
+    An FMU is opened once, and every scenario of its model is checked against it. Without names, one
+    that is given runs only the scenarios of its model. There are twins if no FMU and no version of
+    FMI is given, of the models whose scenarios have references.
+    """
+    given = stack.enter_context(Fmu(options.fmu)) if options.fmu else None
+    if given is not None and options.fmi not in (None, given.model.fmi_version):
+        found = given.model.fmi_version
+        raise UserError(f"{given.path}: is an FMU of FMI {found}, --fmi wants {options.fmi}")
+    files, own = _files(options.names)
+    if not options.names:
+        files = [
+            file
+            for file in project.scenario_files().values()
+            if given is None or project.is_built_from(given.model.name, project.model_folder(file))
+        ]
+    if not files and not own:
+        which = f" of {given.model.name}, the model of {options.fmu}" if given else ""
+        raise UserError(f"{project.ROOT / 'models'}: has no scenarios{which}")
+    folders = {file: scenarios.folder_of(file) for file in (*files, *own)}
+    models = {folder.name: folder for folder in folders.values()}
+    compared = {folders[file].name: folders[file] for file in files}
+    if given is not None:
+        fmus, twins = dict.fromkeys(models, given), {}
+    elif options.fmi is not None:
+        fmus, twins = _built(models, options.fmi, "--fmu", stack), {}
+    else:
+        fmus = _built(models, FIRST, "--fmu", stack)
+        twins = _built(compared, TWIN, "", stack)
+    for file in files if twins else ():
+        scenarios.load(file, twins[folders[file].name].model)
+    loaded, users = (
+        [scenarios.load(file, fmus[folders[file].name].model) for file in some]
+        for some in (files, own)
+    )
+    return loaded, users, fmus, twins
+
+
+def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
+    """Files of the project's scenarios that are named, and users' own files, by their paths."""
+    files: dict[Path, None] = {}
+    own: dict[str, Path] = {}
+    for name in dict.fromkeys(names):
+        path = Path(name)
+        if path.suffix.lower() != SUFFIX:
+            files[_named(name)] = None
+        elif project.is_ours(path):
+            files[path.resolve()] = None
+        elif not os.path.lexists(path):
+            guess = did_you_mean(name, map(str, _siblings(path)))
+            raise UserError(f"{path}: no such file{guess}")
+        elif own.setdefault(path.stem, path) != path:
+            other = own[path.stem]
+            raise UserError(f"{path}: its page would have the name of that of {other}")
+    return list(files), list(own.values())
+
+
+def _named(name: str) -> Path:
+    """File of a scenario of the project; a UserError guesses what else may be meant."""
+    known = project.scenario_files()
+    if name in known:
+        return known[name]
+    if name in (*COMMANDS, "help"):
+        raise UserError(f"no scenario {name!r}: the command {name} goes first, {PROGRAM} {name}")
+    own = {file.name: file for file in _siblings(Path(name))}
+    file = own.get(f"{Path(name).name}{SUFFIX}")
+    if file is not None:
+        raise UserError(f"no scenario {name!r}, did you mean the file {str(file)!r}?")
+    guess = did_you_mean(name, [*known, *COMMANDS, *map(str, own.values())])
+    raise UserError(
+        f"no scenario or command {name!r}{guess} ({PROGRAM} --list names all scenarios)"
+    )
+
+
+def _siblings(path: Path) -> list[Path]:
+    """Files of the folder of a path that may be scenarios."""
+    with suppress(OSError, ValueError):  # not there, or a name that no folder has
+        return [x for x in sorted(path.parent.iterdir()) if x.suffix.lower() == SUFFIX]
+    return []
+
+
+def _built(
+    folders: Mapping[str, Path], version: str, option: str, stack: ExitStack
+) -> dict[str, Fmu]:
+    """FMUs in build/ of one version of FMI, by their models."""
+    return {
+        name: stack.enter_context(Fmu(project.built(folder, ".fmu", option, version)))
+        for name, folder in folders.items()
+    }
+
+
+def _runs(
+    runs: Runs,
+    chosen: Sequence[Scenario],
+    with_twins: bool,
+    failures: list[Failure],
+    *tolerances: float | None,
+) -> list[Run]:
+    """Run `chosen` at `tolerances`; None: at the tolerance of the scenario.
+
+    A run that an FMU does not finish is added to `failures`.
+    """
+    if not chosen:
+        return []
+    console.stage(f"simulating {counted(chosen, 'scenario')}")
+    own = {s: [t or s.tolerance for t in dict.fromkeys(tolerances)] for s in chosen}
+    table = RunTable(
+        [s.name for s in chosen], [first for first, *_ in own.values()], len(tolerances) > 1
+    )
+    done = []
+    for scenario in chosen:
+        ended, why = [], []
+        for tolerance in dict.fromkeys(own[scenario]):
+            label = f"{scenario.name} at {tolerance:g}"
+            ahead = runs.steps_ahead(scenario, [tolerance], compared=True)
+            found = _one(runs, failures, runs.compared, scenario, tolerance, label, ahead)
+            ended += found
+            if not found:
+                why.append(f"tolerance {short(tolerance)}: did not run to its end")
+        table.row(scenario.name, own[scenario][0], ended, why)
+        done += ended
+    if with_twins:
+        differ = {run.scenario.name for run in done if run.twin and run.twin.differing}
+        same = {run.scenario.name for run in done} - differ
+        print(f"\nsame bits in FMI {FIRST} and {TWIN}: {counted(same, 'scenario')}")
+    return done
+
+
+def _one(
+    runs: Runs,
+    failures: list[Failure],
+    run: Callable[..., Run],
+    scenario: Scenario,
+    tolerance: float,
+    label: str,
+    steps: int,
+) -> list[Run]:
+    """The run that `run` makes; none, but a failure, if the FMU does not finish it."""
+    try:
+        with Progress(label, steps) as progress:
+            found = run(scenario, tolerance, progress)
+    except UserError as error:
+        failures.append(runs.failure(scenario, tolerance, error))
+        return []
+    console.messages(f"{label}: the FMU says", found.result.messages)
+    return [found]
+
+
+def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
+    """Those of `chosen` that did not fail."""
+    failed = {failure.scenario.path for failure in failures}
+    return [scenario for scenario in chosen if scenario.path not in failed]
+
+
+def _estimated(
+    runs: Runs, own: Sequence[Scenario], failures: list[Failure], tolerance: float | None
+) -> list[Run]:
+    """Run scenarios of users, which have no references; None: at their own tolerances.
+
+    A run that an FMU does not finish is added to `failures`.
+    """
+    if not own:
+        return []
+    console.stage(f"simulating {counted(own, 'scenario')} of your own")
+    used = [tolerance or scenario.tolerance for scenario in own]
+    table = RunTable([scenario.name for scenario in own], used)
+    done = []
+    for scenario, at in zip(own, used, strict=True):
+        steps = 2 * (len(scenario.times) - 1)
+        found = _one(runs, failures, runs.estimated, scenario, at, scenario.name, steps)
+        table.row(scenario.name, at, found, [] if found else ["did not run to its end"])
+        done += found
+    return done
+
+
+def _quick(done: Sequence[Run]) -> list[Scenario]:
+    """Scenarios of `done` whose sweep takes seconds; says which ones are left out."""
+    slowest: dict[Scenario, float] = {}
+    for run in done:
+        slowest[run.scenario] = max(slowest.get(run.scenario, 0.0), run.result.wall_time)
+    quick = []
+    for scenario, wall_time in slowest.items():
+        seconds = wall_time * len(TOLERANCES)
+        if seconds <= QUICK:
+            quick.append(scenario)
+        else:
+            text = f"{scenario.name}: no sweep, it would take {seconds:.0f} s (run all: with sweep)"
+            console.remark(text)
+    return quick
+
+
+def _sweeps(runs: Runs, chosen: Sequence[Scenario], in_full: bool) -> list[Sweep]:
+    """Run `chosen` over the tolerances; shows all of them `in_full`, else those that are wrong."""
+    if not chosen:
+        return []
+    console.stage(f"simulating at {counted(TOLERANCES, 'tolerance')}")
+    sweeps = []
+    for scenario in chosen:
+        ahead = runs.steps_ahead(scenario, TOLERANCES)
+        with Progress(f"{scenario.name}, all tolerances", ahead) as progress:
+            sweeps.append(sweep(runs, scenario, progress))
+    shown = [x for x in sweeps if in_full or not x.passed]
+    if shown:
+        table = SweepTable((x.scenario.name for x in shown), TOLERANCES)
+        for one in shown:
+            table.row(one)
+    if not in_full:
+        good = counted([x for x in sweeps if x.passed], "scenario")
+        print(f"errors follow the tolerance, {short(TOLERANCES[0])} to {short(TIGHTEST)}: {good}")
+    return sweeps
+
+
+def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Convergence]:
+    """Study the order of convergence of the models whose FMUs are open.
+
+    An FMU that asks for inputs within a step, or else its twin, shows that of intermediate update.
+    """
+    studies = []
+    for file in project.convergence_files():
+        folder = project.model_folder(file).name
+        fmu = fmus.get(folder)
+        if fmu is None:
+            continue
+        problem = convergence.load(file, fmu.model)
+        name = problem.scenario.name
+        if not fmu.model.interpolates_inputs:
+            console.remark(f"{name}: left out, the FMU does not interpolate inputs")
+            continue
+        both = (fmu, twins.get(folder))
+        updated = next((x for x in both if x is not None and x.model.asks_for_inputs), None)
+        ahead = convergence.steps_ahead(problem, updated is not None)
+        with Progress(f"{name}, all steps", ahead) as progress:
+            study = convergence.study(fmu, problem, progress, updated)
+        convergence_table(study)
+        studies.append(study)
+    return studies

@@ -1,0 +1,200 @@
+"""`system`: run variants of the systems in Ecos, compare them with references, write a report."""
+
+import argparse
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from rparm import project
+from rparm.command_line import PROGRAM
+from rparm.commands import Ended
+from rparm.errors import UserError, did_you_mean, hint, together
+from rparm.options import add_open, add_report, add_system
+from rparm.output import console
+from rparm.output.result_tables import VariantTable
+from rparm.output_files import check_writable, from_here, written
+from rparm.report import overview, system_page
+from rparm.report.browser import show
+from rparm.report.overview import Entry
+from rparm.report.system_page import Section
+from rparm.system import comparison, ssp
+from rparm.system.comparison import Outcome, Reference
+from rparm.texts import counted
+
+DESCRIPTION = (
+    "Runs the variants of the systems in Ecos and compares every variable with the reference. Exit "
+    "code: 0 all within the bound, 1 not, 2 wrong use, a wrong system or a component that fails."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which variants, and where the report goes."""
+    add_system(parser)
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="variants, or systems with all theirs (default: all)",
+    )
+    add_report(parser)
+    add_open(parser)
+    parser.add_argument(
+        "--pictures",
+        type=Path,
+        metavar="DIR",
+        help="draw each variant into a picture in this folder, too",
+    )
+    parser.add_argument("--list", action="store_true", help="name the systems and their variants")
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Run the variants that the options name, or all; or name them."""
+    with ExitStack() as stack:
+        try:
+            systems = [_opened(path, stack) for path in _paths(options)]
+        except UserError:
+            if not options.list:
+                # if a system cannot be run, older results must not pass for new ones
+                with written(options.report):
+                    for name, folder in project.systems().items():
+                        known = comparison.reference_names(folder)
+                        system_page.remove(options.report, name, known)
+            raise
+        chosen = _choose(systems, options.names)
+        if options.list:
+            return _listed(chosen)
+        check_writable(options.report)
+        with written(options.report):
+            for system, names in chosen:
+                system_page.remove(options.report, system.name, names)
+        plans = [(system, _references(system, names)) for system, names in chosen]
+        return _run(plans, options)
+
+
+def _listed(chosen: Sequence[tuple[Section, Sequence[str]]]) -> Ended:
+    """The names of systems and variants."""
+    found = {system.name: names for system, names in chosen}
+    lines = [line for name, names in found.items() for line in (name, *(f"  {n}" for n in names))]
+    return Ended(0, "\n".join(lines), {"systems": found})
+
+
+def _paths(options: argparse.Namespace) -> list[Path]:
+    """The SSPs to open: the one that is given, or those that the names may be of."""
+    if options.ssp:
+        return [options.ssp]
+    folders = project.systems()
+    if options.names and set(options.names) <= set(folders):
+        folders = {name: folders[name] for name in dict.fromkeys(options.names)}
+    return [project.built(folder, ".ssp", "--ssp", options.fmi) for folder in folders.values()]
+
+
+def _opened(path: Path, stack: ExitStack) -> Section:
+    """The system in an SSP, with the folder that it is from."""
+    unpacked = stack.enter_context(ssp.unpacked(path))
+    name, folders = unpacked.system.name, project.systems()
+    if name not in folders:
+        raise UserError(f"{path}: no system {name!r} has references{hint(name, folders)}")
+    return Section(folders[name], unpacked)
+
+
+def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Section, list[str]]]:
+    """Variants to run of each system: those named, all of a system that is named, or all.
+
+    UserError if a name is unknown, or stands for two things.
+    """
+    owners: dict[str, str] = {system.name: "a system" for system in systems}
+    for system in systems:
+        for variant in system.variants:
+            if variant in owners:
+                where = f"{system.ssp.path}: the name of variant {variant!r}"
+                raise UserError(f"{where} is taken by {owners[variant]}")
+            owners[variant] = f"a variant of {system.name}"
+    for name in names:
+        if name not in owners:
+            guess = did_you_mean(name, owners)
+            raise UserError(f"no variant {name!r}{guess} ({PROGRAM} system --list names them)")
+    chosen = []
+    for system in systems:
+        own = [name for name in dict.fromkeys(names) if name in system.variants]
+        if not names or system.name in names:
+            own = system.variants
+        if own:
+            chosen.append((system, own))
+    return chosen
+
+
+def _references(section: Section, names: Sequence[str]) -> dict[str, Reference]:
+    """References by variant."""
+    return {
+        name: comparison.load_reference(section.ssp, name, section.folder, section.study.EXPERIMENT)
+        for name in names
+    }
+
+
+def _run(
+    plans: Sequence[tuple[Section, Mapping[str, Reference]]], options: argparse.Namespace
+) -> Ended:
+    """Run the plans; a row appears as a variant ends, and its files are written then."""
+    outcomes: list[Outcome] = []
+    failures: dict[str, UserError] = {}
+    entries: list[Entry] = []
+    rows: list[dict[str, object]] = []
+    for section, references in plans:
+        console.stage(f"simulating {counted(references, 'variant')} of {section.name} in Ecos")
+        table = VariantTable(references, section.study.MEASURES)
+        for name, reference in references.items():
+            try:
+                outcome = comparison.simulate(section.ssp, name, reference)
+            except UserError as error:
+                failures[name] = error
+                table.failed(name)
+                rows.append({"system": section.name, "name": name, "error": str(error)})
+                with written(options.report):
+                    entries.append(system_page.write_failed(options.report, section, name, error))
+                continue
+            table.row(outcome)
+            rows.append(_row(section, outcome))
+            console.messages(name, outcome.run.messages)
+            with written(options.report):
+                entries.append(system_page.write_variant(options.report, section, outcome))
+            if options.pictures:
+                with written(options.pictures):
+                    _draw(options.pictures, section, outcome)
+            outcomes.append(outcome)
+        print()
+    with written(options.report):
+        index = overview.record(options.report, overview.SYSTEM, entries)
+    print(f"report: {from_here(index)}")
+    if options.open:
+        show(index)
+    failed = [*failures, *(outcome.variant for outcome in outcomes if not outcome.passed)]
+    verdict = console.verdict_line(failed, rows, "variant")
+    document = {"passed": not failed, "variants": rows, "report": index.absolute()}
+    if failures:
+        return Ended(2, verdict, document, together(list(failures.values())))
+    return Ended(1 if failed else 0, verdict, document)
+
+
+def _row(section: Section, outcome: Outcome) -> dict[str, object]:
+    """A variant for programs."""
+    return {
+        "system": section.name,
+        "name": outcome.variant,
+        "steps": outcome.steps,
+        "error": outcome.error,
+        "worst": outcome.worst,
+        "bound": comparison.BOUND,
+        "measures": {
+            m.name: {"value": m.value(outcome), "unit": m.unit} for m in section.study.MEASURES
+        },
+        "seconds": outcome.run.wall_time,
+        "passed": outcome.passed,
+    }
+
+
+def _draw(folder: Path, section: Section, outcome: Outcome) -> None:
+    """Write the picture of a run, as READMEs have it."""
+    from rparm.report.style import save  # matplotlib takes long to import
+
+    folder.mkdir(parents=True, exist_ok=True)
+    save(section.study.figure(section.ssp, outcome), folder / f"{outcome.variant}.png")

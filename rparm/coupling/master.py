@@ -1,0 +1,351 @@
+"""A master that steps connected FMUs.
+
+Every component is an instance of an FMU; connections lead from Real outputs to Real inputs, or from
+Boolean outputs to Boolean inputs. Other inputs keep their values from before initialization. In
+Jacobi order all components make a step, then all outputs are read; each step takes its inputs from
+what was read at its beginning. In Gauss-Seidel order the components step one after the other, and
+each takes the newest outputs: those of the end of the step from components before it, those of its
+beginning from itself and the components behind it.
+
+Inputs keep their values over a step, a zero-order hold ("held"), or are straight lines through the
+value of their source at the time at which it was read, with its slope there: in Jacobi order they
+extrapolate from the beginning of the step, in Gauss-Seidel order those from components before it
+meet value and slope at the end of the step. FMI 3.0 knows slopes of inputs only within a step: at
+the start, those of outputs miss what they owe to the slopes of inputs.
+
+A Boolean that has changed in a step is passed on at the end of the step, in both orders. Then all
+values jump to what follows from it at this time, as at the start.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from ctypes import c_double
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from rparm.coupling.connected_instance import ConnectedInstance, Wiring, check_finite
+from rparm.coupling.switches import Switches, split
+from rparm.errors import UserError
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Value
+from rparm.system.structure import Connection
+
+ORDERS = ("jacobi", "gauss_seidel")
+INPUTS = ("held", "extrapolated")
+
+
+class Snapshot:
+    """The state of a whole system at a communication point; a context manager that frees it."""
+
+    def __init__(self, master: "Master") -> None:
+        self._master = master
+        for component in master.components.values():
+            fmu = component.instance.fmu
+            if not fmu.model.saves_states:
+                raise UserError(f"{component.name}: {fmu.path} has no FMU state to go back to")
+        self._states = [
+            component.instance.saved_state() for component in master.components.values()
+        ]
+
+    def __enter__(self) -> "Snapshot":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for state in self._states:
+            state.free()
+
+    def take(self) -> None:
+        """Keep the present state, in place of the one kept before."""
+        master = self._master
+        for component, state in zip(master.components.values(), self._states, strict=True):
+            with component.instance.explained(self._when()):
+                state.take()
+        self._kept = master.time, master.values.copy(), master.slopes.copy()
+
+    def restore(self) -> None:
+        """Bring the system back to the state kept, as often as wanted."""
+        master = self._master
+        for component, state in zip(master.components.values(), self._states, strict=True):
+            with component.instance.explained(self._when()):
+                state.restore()
+        master.time, master.values[:], master.slopes[:] = self._kept
+
+    def _when(self) -> str:
+        return f"at the communication point t = {self._master.time!r} s"
+
+
+class Master:
+    """A system of connected components; a context manager that frees their instances.
+
+    UserError if names are unknown, a Real input is connected not once, or an FMU cannot do what is
+    asked.
+
+    Parameters
+    ----------
+    fmus : mapping of str to Fmu
+        By name of the component. Their order is that of stepping in Gauss-Seidel order.
+    order : str
+        One of ORDERS.
+    inputs : str
+        One of INPUTS.
+    also : sequence of (component, variable), optional
+        Real variables that are read besides all Real outputs.
+
+    Attributes
+    ----------
+    names : tuple of str
+        "component.variable" of all that is read, by component, outputs first.
+    values : ndarray, shape (len(names),)
+        As read right after the last step, before inputs are set for the next one; where a Boolean
+        has changed, after all that follows from it.
+    slopes : ndarray, shape (len(names),)
+        Their derivatives with respect to time; only those that are connected, and only if
+        `inputs` is "extrapolated".
+    time : float
+        s.
+    do_steps : int
+        Steps of components so far, rolled back ones included.
+    """
+
+    def __init__(
+        self,
+        fmus: Mapping[str, Fmu],
+        connections: Iterable[Connection],
+        order: str = "jacobi",
+        inputs: str = "held",
+        also: Sequence[tuple[str, str]] = (),
+    ) -> None:
+        if order not in ORDERS or inputs not in INPUTS:
+            raise UserError(f"expected an order of {ORDERS} and inputs of {INPUTS}")
+        self.extrapolates = inputs == "extrapolated"
+        self.jacobi = order == "jacobi"
+        self.time, self.do_steps = 0.0, 0
+        switches, real = split(fmus, connections)
+        _check(fmus, real, self.extrapolates)
+        for component, name in also:
+            _find(fmus, component, name, None)
+        self._stack = ExitStack()
+        try:
+            instances = {}
+            for name, fmu in fmus.items():
+                fed = [c.end_connector for c in real if c.end_component == name]
+                instance = fmu.instance(name, fed if self.extrapolates else ())
+                instances[name] = self._stack.enter_context(instance)
+        except BaseException:
+            self._stack.close()
+            raise
+        self._connect(instances, real, also)
+        self._switches = Switches(instances, switches)
+
+    def __enter__(self) -> "Master":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.__exit__(*error)
+
+    def _connect(
+        self,
+        instances: Mapping[str, Instance],
+        connections: Sequence[Connection],
+        also: Sequence[tuple[str, str]],
+    ) -> None:
+        """Lay out the system's values, and find the source of each input among them."""
+        # what is read, by component
+        outputs = {}
+        for name, instance in instances.items():
+            further = [variable for component, variable in also if component == name]
+            outputs[name] = list(dict.fromkeys([*instance.fmu.model.real_outputs, *further]))
+
+        # where it is among the system's values
+        keys = [(name, output) for name, read in outputs.items() for output in read]
+        index = {key: i for i, key in enumerate(keys)}
+        self.names = tuple(f"{component}.{name}" for component, name in keys)
+        memory = (c_double * max(len(keys), 1))()
+        self.values = np.frombuffer(memory)[: len(keys)]
+        self.slopes = np.zeros(len(keys))
+
+        # the components with their sources
+        self.components: dict[str, ConnectedInstance] = {}
+        first = 0
+        for name, instance in instances.items():
+            incoming = [c for c in connections if c.end_component == name]
+            feeding = {c.start_connector for c in connections if c.start_component == name}
+            wiring = Wiring(
+                inputs=[c.end_connector for c in incoming],
+                outputs=outputs[name],
+                first=first,
+                connected=[i for i, output in enumerate(outputs[name]) if output in feeding],
+                sources=[index[c.start_component, c.start_connector] for c in incoming],
+                ahead=[c.start_component in self.components and not self.jacobi for c in incoming],
+            )
+            self.components[name] = ConnectedInstance(instance, wiring, memory, self.slopes)
+            first += len(outputs[name])
+
+    # ---- Initialization --------------------------------------------------------------------------
+
+    def initialize(
+        self,
+        start: float,
+        stop: float | None = None,
+        parameters: Mapping[str, Mapping[str, Value]] | None = None,
+    ) -> None:
+        """From instantiated to the first communication point, with consistent outputs there.
+
+        Parameters
+        ----------
+        start, stop : float
+            s.
+        parameters : mapping, optional
+            Parameters and start values of states by component and name.
+        """
+        parameters = parameters or {}
+        for name in parameters:
+            if name not in self.components:
+                raise UserError(
+                    f"{name}: no such component (there are: {', '.join(self.components)})"
+                )
+        self.time = start
+        for component in self.components.values():
+            component.begin(start, stop, parameters.get(component.name, {}))
+        self._propagate(self._read_early, "in initialization")
+        for component in self.components.values():
+            component.instance.exit_initialization()
+        if self.extrapolates:
+            self._propagate_slopes()
+
+    def _propagate(self, read: Callable[[ConnectedInstance], object], when: str) -> None:
+        """Set inputs until no output follows any more: along direct feedthrough, once each."""
+        before = np.full(len(self.names), np.nan)
+        for _ in range(len(self.components) + 2):
+            switched = self._switches.transfer()
+            for component in self.components.values():
+                read(component)
+            changing = np.flatnonzero(before != self.values)
+            if not (len(changing) or switched):
+                return
+            before = self.values.copy()
+            for component in self.components.values():
+                with component.instance.explained(when):
+                    component.set_inputs(self.values[component.sources])
+        names = ", ".join([*(self.names[i] for i in changing), *switched])
+        raise UserError(f"the connections form an algebraic loop: {names}")
+
+    def _read_early(self, component: ConnectedInstance) -> None:
+        with component.instance.explained_early():
+            component.read()
+        check_finite(component.name, component.outputs, "in initialization")
+
+    def _propagate_slopes(self) -> None:
+        """Slopes at one time: once per component, since those of inputs show in outputs'."""
+        when = f"for slopes at t = {self.time!r} s"
+        for _ in self.components:
+            for component in self.components.values():
+                with component.instance.explained(when):
+                    component.read_slopes()
+            for component in self.components.values():
+                with component.instance.explained(when):
+                    component.set_lines(
+                        self.values[component.sources], self.slopes[component.sources]
+                    )
+        for component in self.components.values():
+            with component.instance.explained(when):
+                component.read_slopes()
+
+    # ---- Steps -----------------------------------------------------------------------------------
+
+    def advance(self, end: float) -> None:
+        """One step to the time `end`, s."""
+        length = end - self.time
+        components = list(self.components.values())
+        groups = [components] if self.jacobi else [[component] for component in components]
+        for group in groups:
+            for component in group:
+                try:
+                    self._set_inputs(component, length)
+                    component.instance.do_step(self.time, length, goes_back=True)
+                except FMICallException as error:
+                    when = f"in the step from t = {self.time!r} s"
+                    raise component.instance.failure(error, when) from error
+                self.do_steps += 1
+            for component in group:
+                self._read(component, end)
+        self.time = end
+        if self._switches.transfer():
+            self._propagate(lambda component: self._read(component, end), f"at t = {end!r} s")
+            if self.extrapolates:
+                self._propagate_slopes()
+
+    def _set_inputs(self, component: ConnectedInstance, length: float) -> None:
+        """Inputs at the beginning of the step, of sources ahead and of others."""
+        values = self.values[component.sources]
+        if self.extrapolates:
+            slopes = self.slopes[component.sources]
+            component.set_lines(values - length * component.ahead * slopes, slopes)
+        else:
+            component.set_inputs(values)
+
+    def _read(self, component: ConnectedInstance, end: float) -> None:
+        try:
+            component.read()
+            if self.extrapolates:
+                component.read_slopes()
+        except FMICallException as error:
+            raise component.instance.failure(error, f"at t = {end!r} s") from error
+        check_finite(component.name, component.outputs, f"at t = {end!r} s")
+
+    def run(
+        self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
+    ) -> np.ndarray:
+        """Steps from the present time, times[0], to each of `times`.
+
+        Returns
+        -------
+        ndarray, shape (len(times), len(names))
+            Row i is what is read right after the step to times[i]; row 0 the present values.
+        """
+        rows = np.empty((len(times), len(self.names)))
+        rows[0] = self.values
+        for i, end in enumerate(np.asarray(times)[1:].tolist(), start=1):
+            self.advance(end)
+            rows[i] = self.values
+            if i % 100 == 0:
+                progress(100)
+        return rows
+
+
+def _find(fmus: Mapping[str, Fmu], component: str, name: str, causality: str | None) -> None:
+    if component not in fmus:
+        raise UserError(f"{component}: no such component (there are: {', '.join(fmus)})")
+    variable = fmus[component].model.variables.get(name)
+    fits = variable is not None and variable.type == "Real"
+    if not fits or causality not in (None, variable.causality):
+        kind = f"Real {causality}" if causality else "Real variable"
+        raise UserError(f"{component}: {fmus[component].path} has no {kind} {name!r}")
+
+
+def _check(fmus: Mapping[str, Fmu], connections: Sequence[Connection], sloped: bool) -> None:
+    """Every connection leads from an output to an input, and one to every input."""
+    seen = set()
+    for connection in connections:
+        _find(fmus, connection.start_component, connection.start_connector, "output")
+        _find(fmus, connection.end_component, connection.end_connector, "input")
+        end = connection.end_component, connection.end_connector
+        if end in seen:
+            raise UserError(f"{'.'.join(end)}: is connected more than once")
+        seen.add(end)
+        source, target = fmus[connection.start_component], fmus[connection.end_component]
+        if sloped and not source.model.gives_output_derivatives:
+            raise UserError(
+                f"{connection.start_component}: {source.path} has no output derivatives"
+            )
+        if sloped and not target.model.interpolates_inputs:
+            raise UserError(
+                f"{connection.end_component}: {target.path} does not interpolate inputs"
+            )
+    for component, fmu in fmus.items():
+        for variable in fmu.model.variables.values():
+            connects = variable.causality == "input" and variable.type == "Real"
+            if connects and (component, variable.name) not in seen:
+                raise UserError(f"{component}.{variable.name}: the input is not connected")

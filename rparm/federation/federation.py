@@ -1,0 +1,230 @@
+"""A federation: the broker, a process for each component, and the one that records."""
+
+import itertools
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.federation import SILENCE, watching
+from rparm.federation.network import ABSENT, ANSWER, ENDED, Broker, Federate
+from rparm.federation.parts import Part, parts
+from rparm.federation.watching import LEAVE, POLL, Silence
+from rparm.interruption import temporary_folder, uninterrupted
+from rparm.system.ssp import Ssp
+
+RECORDER = "recorder"
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What the components published at each communication point."""
+
+    names: tuple[str, ...]  # component.variable, of all Real outputs
+    times: np.ndarray  # (rows,) s
+    values: np.ndarray  # (rows, len(names)) in the variables' units
+    wall_time: float  # s, of all steps
+
+
+def arguments(ssp: Path, variant: str, component: str, address: str) -> list[str]:
+    """Of the command line, to step a component on this machine or on another one."""
+    return ["federate", ssp.as_posix(), variant, component, "--broker", address]
+
+
+def run(
+    ssp: Ssp,
+    variant: str,
+    address: str,
+    elsewhere: Collection[str] = (),
+    silence: float = SILENCE,
+    progress: Callable[[int], object] = lambda _: None,
+    connected: Callable[[], object] = lambda: None,
+) -> Record:
+    """Run a variant, each component in its own process.
+
+    UserError if a process fails; its text is the first one that one of them gave.
+
+    Parameters
+    ----------
+    address : str
+        Where the broker listens, as "tcp://127.0.0.1:23404".
+    elsewhere : collection of str
+        Components that other machines step: they are waited for.
+    silence : float
+        s, after which a process that is silent ends the federation.
+    progress : callable, optional
+        Called with the number of steps made.
+    connected : callable, optional
+        Called when all components have been initialized and the first step begins.
+    """
+    made = parts(ssp, variant)
+    whole = next(iter(made.values())).system
+    local = [component for component in made if component not in elsewhere]
+    started = {
+        c: [*arguments(ssp.path, variant, c, address), "--silence", str(silence), "--owned"]
+        for c in local
+    }
+    recorder = Federate(RECORDER, address, list(made), publishes=False)
+    with (
+        temporary_folder() as folder,
+        _opened(len(made) + 1, address, whole, recorder, silence) as broker,
+        _processes(started, folder) as processes,
+    ):
+        still, stuck = Silence(recorder, silence), Silence(recorder, 2.0 * silence)
+        ended = (
+            itertools.count()
+        )  # looks since a process here has failed, perhaps as the federation ended
+
+        def look() -> None:
+            failure = _failure(processes, folder)
+            texts = _texts(processes, folder)
+            if texts and not failure and next(ended) * POLL > ANSWER:
+                failure = UserError(texts[0])  # it has not
+            if failure:
+                raise failure
+            if still.too_long():
+                # one without inputs may be far ahead, and at the end
+                there = [c for c in made if c in elsewhere or processes[c].poll() is None]
+                silent = broker.silent(there, () if recorder.all_here else elsewhere)
+                if silent:
+                    verb = "have" if len(silent) > 1 else "has"
+                    names = ", ".join(silent)
+                    raise UserError(f"{names} {verb} been silent for {silence:g} s (--silence)")
+            if stuck.too_long() and recorder.all_here:
+                raise UserError(f"all answer, but nothing has moved for {2.0 * silence:g} s")
+
+        def end(error: BaseException) -> None:
+            broker.end(str(error) if isinstance(error, UserError) else "it was interrupted")
+
+        try:
+            return watching.run(lambda: _recorded(recorder, made, progress, connected), look, end)
+        except UserError as error:
+            _wait(processes)
+            raise _failure(processes, folder) or error from error
+
+
+@contextmanager
+def _opened(
+    count: int, address: str, system: str, recorder: Federate, silence: float
+) -> Iterator[Broker]:
+    """A federation that the recorder has joined: only then may another one refuse to step it."""
+    still = Silence(recorder, silence)
+
+    def work() -> Broker:
+        with ExitStack() as stack:
+            broker = stack.enter_context(Broker(count, address))
+            with broker.shielded():
+                recorder.join()
+            broker.announce(system)
+            stack.pop_all()
+            return broker
+
+    def look() -> None:
+        if still.too_long():
+            raise UserError(f"no broker at {address}: HELICS has not returned for {silence:g} s")
+
+    with watching.run(work, look, lambda _: None) as broker:
+        yield broker
+
+
+def _recorded(
+    recorder: Federate,
+    made: Mapping[str, Part],
+    progress: Callable[[int], object],
+    connected: Callable[[], object],
+) -> Record:
+    """Follow the federation to its end, and record what is published."""
+    first = next(iter(made.values()))
+    names = tuple(f"{c}.{output}" for c, part in made.items() for output in part.published)
+    rows = np.empty((len(first.times), len(names)))
+
+    def read(point: int) -> None:
+        published = recorder.read()
+        rows[point] = [value for component in made for value in published[component]]
+
+    recorder.enter_initialization()
+    for _ in range(first.rounds):
+        recorder.exchange()
+    recorder.begin()
+    read(0)
+    connected()
+    begin = time.perf_counter()
+    for point in range(1, len(rows)):
+        recorder.go_to(point)
+        read(point)
+        if point % 100 == 0:
+            progress(100)
+    wall_time = time.perf_counter() - begin
+    recorder.leave()
+    return Record(names, first.times, rows, wall_time)
+
+
+# ---- Processes -----------------------------------------------------------------------------------
+
+
+@contextmanager
+def _processes(
+    commands: Mapping[str, list[str]], folder: Path
+) -> Iterator[dict[str, subprocess.Popen]]:
+    """Processes by component. None is left: they end when their standard input is closed.
+
+    Their texts and temporary files are in `folder`.
+    """
+    places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
+    environment = os.environ | places | {"PYTHONPATH": str(project.ROOT)}
+    processes: dict[str, subprocess.Popen] = {}
+    try:
+        for component, command in commands.items():
+            with (folder / component).open("wb") as log, uninterrupted():
+                processes[component] = subprocess.Popen(
+                    [sys.executable, "-P", "-m", "rparm", *command],
+                    stdin=subprocess.PIPE,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=environment,
+                )
+        yield processes
+    finally:
+        for process in processes.values():
+            process.stdin.close()
+        _wait(processes)
+        for process in processes.values():
+            process.kill()
+            process.wait()
+
+
+def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
+    """Wait until all processes have ended, but not for long: some may still be starting."""
+    latest = time.monotonic() + LEAVE
+    for process in processes.values():
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(max(0.0, latest - time.monotonic()))
+
+
+def _failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
+    """What a process here says that has failed: others only say that the federation ended."""
+    texts = _texts(processes, folder)
+    causes = (text for text in texts if ENDED not in text and ABSENT not in text)
+    return next(map(UserError, causes), None)
+
+
+def _texts(processes: Mapping[str, subprocess.Popen], folder: Path) -> list[str]:
+    """What processes that have failed say last."""
+    texts = []
+    for component, process in processes.items():
+        if process.poll() in (None, 0):
+            continue
+        lines = (folder / component).read_text(encoding="utf-8", errors="replace").splitlines()
+        text = lines[-1].removeprefix("error: ") if lines else f"{component}: failed silently"
+        if process.returncode < 0:
+            text = f"{component}: its process was ended by signal {-process.returncode}"
+        texts.append(text)
+    return texts

@@ -1,0 +1,327 @@
+"""The functions of HELICS that a federation calls, with errors as the user's.
+
+HELICS counts communication points: its time k is the k-th of them, whatever its time in s. So no
+time is rounded to HELICS's own resolution, and every process calculates it from its own counter.
+"""
+
+import os
+import re
+import secrets
+import time
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+from threading import Thread
+from typing import Any
+
+import numpy as np
+
+from rparm.errors import UserError, one_line
+
+ENDED = "the federation ended"  # in what processes say that others have stopped
+ABSENT = "no federation at"  # the same of one that comes later
+ANSWER = 5.0  # s, for another process to answer
+JOIN = 25.0  # s, for the broker to answer
+JOINS = 5  # attempts, because a stranger who is refused may end one of them
+TOO_EARLY = "already moved to operating state"  # what HELICS says then
+PAUSE = 0.05  # s, before the same question
+NOT_FOUND = 404  # HELICS's code of an answer
+SYSTEM = "system"  # what all must step, a global value of the federation
+KEY = "RPARM_FEDERATION_KEY"  # variable of the environment, which only its user can read
+QUIET = "--loglevel=none"
+# One port, the broker's: with "zmq" each process needs one, by its number, and "zmq_ss" drops
+# messages when a process runs ahead.
+NETWORK = "tcp_ss"
+
+
+def helics() -> Any:
+    """The package helics; UserError if it is not installed."""
+    try:
+        import helics as package
+    except (ImportError, OSError) as error:
+        raise UserError(
+            f"helics, which only federations need, cannot be loaded: {one_line(error)} "
+            "(./setup.sh --federation installs it)"
+        ) from error
+    warnings.filterwarnings("ignore", "This function will return a JSON", UserWarning)
+    return package
+
+
+def key() -> str:
+    """What processes must know to join the federation; made if this one does not know any.
+
+    UserError if it could be guessed, or HELICS would not take it.
+    """
+    found = os.environ.setdefault(KEY, secrets.token_hex(16))
+    if not re.fullmatch(r"[0-9A-Za-z]{16,128}", found):
+        raise UserError(f"{KEY}: expected 16 to 128 letters and digits in the environment")
+    return found
+
+
+class Broker:
+    """What all processes of a federation are connected to.
+
+    Parameters
+    ----------
+    count : int
+        Of processes.
+    address : str
+        Where it listens.
+    """
+
+    def __init__(self, count: int, address: str) -> None:
+        h = self._h = helics()
+        self._questions = _Questions()
+        self._address = address
+        options = (
+            f"-f {count} --maxfederates={count} --brokerkey={key()} --local_interface={address} "
+            f"{QUIET}"
+        )
+        try:
+            self._broker = h.helicsCreateBroker(NETWORK, "", options)
+        except h.HelicsException as error:
+            raise UserError(f"no broker at {address}: {one_line(error)}") from error
+        if not h.helicsBrokerIsConnected(self._broker):
+            self._close()
+            raise UserError(f"no broker at {address}: nothing can listen there any more")
+
+    def __enter__(self) -> "Broker":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._close()
+
+    def _close(self) -> None:
+        self._h.helicsBrokerDisconnect(self._broker)
+        if self._questions.ended():  # else they still use it
+            self._h.helicsBrokerFree(self._broker)
+
+    @contextmanager
+    def shielded(self) -> Iterator[None]:
+        """Where the first process joins; then those that are refused end nothing.
+
+        They take leave without a number, which HELICS 3.6 reads as that of the first that joined:
+        so that is one which has left.
+        """
+        h = self._h
+        options = f"--federates=1 --brokerkey={key()} --broker_address={self._address} {QUIET}"
+        try:
+            first = h.helicsCreateCore(NETWORK, f"first-{secrets.token_hex(8)}", options)
+            h.helicsCoreConnect(first)
+        except h.HelicsException as error:
+            raise UserError(f"no broker at {self._address}: {one_line(error)}") from error
+        try:
+            yield
+        finally:
+            h.helicsCoreDisconnect(first)
+
+    def announce(self, system: str) -> None:
+        """Say what all must step."""
+        self._h.helicsBrokerSetGlobal(self._broker, SYSTEM, system)
+
+    def end(self, text: str) -> None:
+        """End the federation for all, and say why."""
+        self._h.helicsBrokerGlobalError(self._broker, 1, text.encode())  # takes no str
+
+    def silent(self, names: Sequence[str], to_come: Collection[str]) -> list[str]:
+        """Processes that do not answer; if all do, those that are unknown and not `to_come`.
+
+        HELICS forgets a process that has not answered for some time, and one that has left.
+        """
+
+        def ask(name: str) -> object:
+            query = self._h.helicsCreateQuery(name, "current_time")
+            return self._h.helicsQueryBrokerExecute(query, self._broker)
+
+        answers = self._questions.answers(ask, names)
+        unknown = {n for n, a in answers.items() if isinstance(a, dict) and "error" in a}
+        silent = [n for n in names if n not in answers]
+        return silent or [n for n in names if n in unknown and n not in to_come]
+
+
+class _Questions:
+    """Questions to other processes, in threads: HELICS may wait for an answer without end."""
+
+    def __init__(self) -> None:
+        self._threads: list[Thread] = []
+
+    def answers(self, ask: Callable[[str], object], names: Sequence[str]) -> dict[str, object]:
+        """What `ask` returns in time, by name."""
+        answers: dict[str, object] = {}
+
+        def put(name: str) -> None:
+            with suppress(helics().HelicsException):  # an error is no answer
+                answers[name] = ask(name)
+
+        self._threads = [Thread(target=put, args=(name,), daemon=True) for name in names]
+        for thread in self._threads:
+            thread.start()
+        self.ended()
+        return dict(answers)
+
+    def ended(self) -> bool:
+        """Wait for the answers, but not for long."""
+        latest = time.monotonic() + ANSWER
+        for thread in self._threads:
+            thread.join(max(0.0, latest - time.monotonic()))
+        return not any(thread.is_alive() for thread in self._threads)
+
+
+class Federate:
+    """A process in a federation: publishes one vector, and reads those of others.
+
+    All federates make the same exchanges. The first number of a vector is the count of exchanges
+    before it: what is read is of the present exchange, or an error.
+
+    Parameters
+    ----------
+    name : str
+        Also of what it publishes.
+    address : str
+        Of the broker.
+    sources : sequence of str
+        Names of federates whose values it reads.
+    """
+
+    def __init__(
+        self, name: str, address: str, sources: Sequence[str], publishes: bool = True
+    ) -> None:
+        self._h = helics()
+        self._name, self._address, self._sources = name, address, sources
+        self._publishes = publishes
+        self._federate: Any = None  # before it has joined
+        self.exchanges = 0  # made so far
+        self.all_here = False  # whether all others have joined
+        self.waits = False  # for others
+        self.calls = 0  # changes of `waits`
+
+    @contextmanager
+    def _waiting(self, text: str) -> Iterator[None]:
+        self.waits, self.calls = True, self.calls + 1
+        try:
+            yield
+        except self._h.HelicsException as error:
+            said = re.sub(r"^\[-?\d+\] ", "", one_line(error))
+            raise UserError(f"{text}: {said}") from error
+        finally:
+            self.waits, self.calls = False, self.calls + 1
+
+    def join(self) -> None:
+        """Connect to the broker."""
+        h = self._h
+        for left in reversed(range(JOINS)):
+            try:
+                with self._waiting(f"{ABSENT} {self._address}"):
+                    self._federate = h.helicsCreateValueFederate(self._name, self._information())
+                break
+            except UserError as error:
+                if TOO_EARLY not in str(error) or not left:
+                    raise
+        if self._publishes:
+            self._publication = h.helicsFederateRegisterGlobalPublication(
+                self._federate, self._name, h.HELICS_DATA_TYPE_VECTOR, ""
+            )
+        self._subscriptions = {
+            source: h.helicsFederateRegisterSubscription(self._federate, source, "")
+            for source in self._sources
+        }
+
+    def _information(self) -> Any:
+        """What HELICS needs to make the federate."""
+        h = self._h
+        info = h.helicsCreateFederateInfo()
+        h.helicsFederateInfoSetCoreTypeFromString(info, NETWORK)
+        # not one that another federate of this process has
+        h.helicsFederateInfoSetCoreName(info, f"{self._name}-{secrets.token_hex(8)}")
+        h.helicsFederateInfoSetCoreInitString(
+            info,
+            f"--federates=1 --broker_address={self._address} --network_timeout={JOIN:g}s {QUIET}",
+        )
+        h.helicsFederateInfoSetBrokerKey(info, key())
+        h.helicsFederateInfoSetTimeProperty(info, h.HELICS_PROPERTY_TIME_DELTA, 1.0)
+        h.helicsFederateInfoSetIntegerProperty(
+            info, h.HELICS_PROPERTY_INT_LOG_LEVEL, h.HELICS_LOG_LEVEL_NO_PRINT
+        )
+        return info
+
+    def system(self) -> str:
+        """What all must step, as soon as the broker has announced it."""
+        with self._waiting(f"at the start {ENDED}"):
+            while True:
+                answer = self._ask("global_value", SYSTEM)
+                if isinstance(answer, str) and not answer.startswith("#"):  # as #disconnected
+                    return answer
+                if isinstance(answer, str) or answer["error"]["code"] != NOT_FOUND:
+                    raise UserError(f"at the start {ENDED}")
+                time.sleep(PAUSE)
+
+    def has_broker(self) -> bool:
+        """Whether the broker answers."""
+        ask = partial(self._ask, about="federates")
+        return self._federate is None or bool(_Questions().answers(ask, ["root"]))
+
+    def _ask(self, target: str, about: str) -> Any:
+        query = self._h.helicsCreateQuery(target, about)
+        return self._h.helicsQueryExecute(query, self._federate)
+
+    def publish(self, values: np.ndarray) -> None:
+        """Publish the values that others read after the next exchange, (values,)."""
+        vector = [float(self.exchanges), *values.tolist()]
+        self._h.helicsPublicationPublishVector(self._publication, vector)
+
+    def read(self) -> Mapping[str, Sequence[float]]:
+        """What the sources published before the last exchange.
+
+        UserError if HELICS has not passed it on.
+        """
+        values = {}
+        for source, place in self._subscriptions.items():
+            count, *values[source] = self._h.helicsInputGetVector(place)
+            if count != self.exchanges - 1:
+                raise UserError(
+                    f"after exchange {self.exchanges} {ENDED}: HELICS has not passed on to "
+                    f"{self._name} what {source} published"
+                )
+        return values
+
+    def enter_initialization(self) -> None:
+        """Wait for all others; what is published before is read after the first `exchange`."""
+        with self._waiting(f"at the start {ENDED}"):
+            self._h.helicsFederateEnterInitializingMode(self._federate)
+        self.all_here = True
+
+    def exchange(self) -> None:
+        """Give and take values in initialization."""
+        h = self._h
+        with self._waiting(f"in initialization {ENDED}"):
+            result = h.helicsFederateEnterExecutingModeIterative(
+                self._federate, h.HELICS_ITERATION_REQUEST_FORCE_ITERATION
+            )
+        if result != h.HELICS_ITERATION_RESULT_ITERATING:
+            raise UserError(f"in initialization {ENDED}")
+        self.exchanges += 1
+
+    def begin(self) -> None:
+        """To the first communication point."""
+        with self._waiting(f"in initialization {ENDED}"):
+            self._h.helicsFederateEnterExecutingMode(self._federate)
+        self.exchanges += 1
+
+    def go_to(self, point: int) -> None:
+        """Wait until all others have published the values of communication point `point`."""
+        with self._waiting(f"before communication point {point} {ENDED}"):
+            granted = self._h.helicsFederateRequestTime(self._federate, float(point))
+        if granted != point:
+            raise UserError(f"before communication point {point} {ENDED}")
+        self.exchanges += 1
+
+    def leave(self) -> None:
+        """Leave at the end."""
+        self._h.helicsFederateDisconnect(self._federate)
+
+    def fail(self, text: str) -> None:
+        """End the federation, because this process cannot go on."""
+        if self._federate is not None:
+            with suppress(self._h.HelicsException):  # it has ended already
+                self._h.helicsFederateGlobalError(self._federate, 1, text)

@@ -1,0 +1,314 @@
+"""Instances of FMUs for co-simulation: what those of all versions of FMI have in common.
+
+These modules, a class per version beside this one, are the only ones that call functions of an FMU.
+Functions that are called in long loops raise fmpy's FMICallException, which `failure` turns into
+the user's error; those that are called now and then raise the user's error themselves.
+"""
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import chdir, contextmanager
+from ctypes import Array, byref, c_double, c_int, c_uint, c_void_p
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from rparm.errors import UserError, one_line
+from rparm.fmi.model import Model, Value
+
+OK, ERROR, FATAL = 0, 3, 4
+STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")  # the last: FMI 2.0
+MESSAGES_KEPT = 20
+
+Call = Callable[[], object]  # of a function of an FMU; FMICallException if it fails
+
+
+class UnpackedFmu(Protocol):
+    """What instances need to know of their FMU: `rparm.fmi.fmu_file.Fmu`."""
+
+    path: Path  # for messages
+    folder: Path
+    library: Path  # the shared object
+    identifier: str  # its name
+    guid: str  # in FMI 3.0, the instantiationToken
+    log_categories: Sequence[str]
+    model: Model
+
+
+@dataclass(frozen=True, eq=False)
+class Reals:
+    """Some Real variables of an instance; `get` and `set` move their values from and to `view`.
+
+    Both raise FMICallException if that fails.
+    """
+
+    names: list[str]
+    view: np.ndarray  # (len(names),) in the variables' units
+    get: Call
+    set: Call
+
+
+@dataclass(frozen=True, eq=False)
+class OutputDerivatives:
+    """Derivatives of some Real outputs with respect to time; FMICallException if `get` fails."""
+
+    view: np.ndarray  # (outputs,) in the outputs' units per power of s
+    get: Call
+
+
+@dataclass(frozen=True, eq=False)
+class InputPolynomials:
+    """Polynomials in time for some Real inputs over the next step.
+
+    `set` gives them to the instance; FMICallException if that fails.
+    """
+
+    view: np.ndarray  # (order + 1, inputs): values at the beginning of the step, then derivatives
+    set: Call
+
+
+class SavedState:
+    """The state of an instance at some time; its functions raise FMICallException if they fail."""
+
+    def __init__(
+        self,
+        component: c_void_p,
+        get: Callable[..., object],
+        put: Callable[..., object],
+        free: Callable[..., object],
+    ) -> None:
+        self._component, self._get, self._put, self._free = component, get, put, free
+        self._state = c_void_p()
+
+    def take(self) -> None:
+        """Keep the present state, in place of the one kept before."""
+        self._get(self._component, byref(self._state))
+
+    def restore(self) -> None:
+        """Bring the instance back to the state kept, as often as wanted."""
+        self._put(self._component, self._state)
+
+    def free(self) -> None:
+        """Free the state, if one is kept."""
+        if self._state.value is not None:
+            self._free(self._component, byref(self._state))
+
+
+class Instance(ABC):
+    """One instance of an FMU: a context manager that instantiates, terminates and frees it.
+
+    Parameters
+    ----------
+    fmu : UnpackedFmu
+        Stays open as long as the instance.
+    name : str
+        Of the instance, for messages.
+    smooth_inputs : sequence of str, optional
+        All inputs that `input_polynomials` will be used for.
+    """
+
+    # of the version of FMI
+    PLATFORMS: ClassVar[Sequence[str]]  # names of this platform's folder of binaries, best first
+    LIBRARY: ClassVar[type]  # fmpy's class for co-simulation
+    INSTANTIATE: ClassVar[str]  # name of the function
+    SETTERS: ClassVar[Mapping[str, str]]  # methods of LIBRARY, by type of the variable
+
+    def __init__(self, fmu: UnpackedFmu, name: str, smooth_inputs: Sequence[str] = ()) -> None:
+        self.fmu = fmu
+        self.name = name
+        self.smooth_inputs = list(smooth_inputs)
+        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)  # of the FMU, the last ones
+        self._status = OK  # of the call that failed
+        self._initialized = False
+        self.fmi = self._load()
+
+    def _load(self) -> Any:
+        try:
+            with chdir("."):  # fmpy leaves the folder changed if it cannot load the library
+                return self.LIBRARY(
+                    guid=self.fmu.guid,
+                    modelIdentifier=self.fmu.identifier,
+                    unzipDirectory=str(self.fmu.folder),
+                    instanceName=self.name,
+                    libraryPath=str(self.fmu.library),
+                )
+        except Exception as error:  # fmpy raises bare exceptions
+            raise UserError(f"{self.fmu.path}: cannot be loaded: {one_line(error)}") from error
+
+    def __enter__(self) -> Self:
+        try:
+            self._instantiate()
+        except Exception as error:  # fmpy raises a bare exception for NULL
+            self.fmi.freeLibrary()
+            said = self._last_message()
+            raise UserError(f"{self.fmu.path}: {self.INSTANTIATE} failed{said}") from error
+        return self
+
+    @abstractmethod
+    def _instantiate(self) -> None:
+        """Instantiate; any exception if that fails."""
+
+    def __exit__(self, kind: type | None, *_: object) -> None:
+        if self._status == FATAL:
+            return  # nothing may be called any more, not even to free the instance
+        try:
+            if self._initialized and self._status < ERROR:
+                self.fmi.terminate()
+        except FMICallException as error:
+            if kind is None:
+                raise self.failure(error, "at the end") from error
+        finally:
+            if self._status != FATAL:
+                self.fmi.freeInstance()
+
+    # ---- Messages --------------------------------------------------------------------------------
+
+    def _keep_unless_ok(self, status: int, message: bytes | None) -> None:
+        """Keep a message of the FMU as one line in `messages`, but none of status OK."""
+        if status != OK:
+            self.messages.append(one_line((message or b"").decode("utf-8", errors="replace")))
+
+    def _last_message(self) -> str:
+        return f": {self.messages[-1]}" if self.messages else " and gave no message"
+
+    def failure(self, error: FMICallException, when: str) -> UserError:
+        """What to raise after a function of the FMU failed."""
+        self._status = error.status
+        known = error.status in range(len(STATUS_NAMES))
+        name = STATUS_NAMES[error.status] if known else str(error.status)
+        return UserError(
+            f"{self.name}: {error.function} {when} failed ({name}){self._last_message()}"
+        )
+
+    @contextmanager
+    def explained(self, when: str) -> Iterator[None]:
+        """Turn a call that fails inside into the user's error."""
+        try:
+            yield
+        except FMICallException as error:
+            raise self.failure(error, when) from error
+
+    @contextmanager
+    def explained_early(self) -> Iterator[None]:
+        """The same in initialization mode, at whose end FMUs explain which parameters are wrong."""
+        try:
+            yield
+        except FMICallException as error:
+            self.exit_initialization()
+            raise self.failure(error, "in initialization") from error
+
+    # ---- Initialization --------------------------------------------------------------------------
+
+    @abstractmethod
+    def set_up(self, start: float, stop: float | None, tolerance: float | None = None) -> None:
+        """Give start and stop time (s) and the relative tolerance of the experiment."""
+
+    @abstractmethod
+    def enter_initialization(self) -> None:
+        """Into initialization mode; parameters and start values are set before."""
+
+    def exit_initialization(self) -> None:
+        """To the first communication point; inputs are set before."""
+        with self.explained("in initialization"):
+            self.fmi.exitInitializationMode()
+        self._initialized = True
+
+    def reset(self) -> None:
+        """Back to what it was when instantiated; its messages are forgotten."""
+        self.messages.clear()
+        with self.explained("before the next run"):
+            self.fmi.reset()
+        self._initialized = False
+
+    # ---- Values ----------------------------------------------------------------------------------
+
+    def set(self, name: str, value: Value) -> None:
+        """Set one variable."""
+        variable = self.fmu.model.variables[name]
+        try:
+            getattr(self.fmi, self.SETTERS[variable.type])([variable.reference], [value])
+        except FMICallException as error:
+            raise self.failure(error, f"({name} = {value!r})") from error
+
+    def integer(self, name: str) -> int | None:
+        """Value of an Integer variable; None if the FMU has none of that name."""
+        variable = self.fmu.model.variables.get(name)
+        if variable is None or variable.type != "Integer":
+            return None
+        with self.explained(f"({name})"):
+            return self._integer(variable.reference)
+
+    @abstractmethod
+    def _integer(self, reference: int) -> int: ...
+
+    def boolean(self, name: str) -> bool:
+        """Value of a Boolean variable."""
+        with self.explained(f"({name})"):
+            return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
+
+    def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
+        """The Real variables `names`, to get or set at once, many times.
+
+        Parameters
+        ----------
+        memory : ctypes array of double, optional
+            Memory for their values; made if it is not given.
+        """
+        values = (c_double * len(names))() if memory is None else memory
+        calls = self._real_calls(self._references(names), values) if names else (no_call, no_call)
+        return Reals(list(names), view(values), *calls)
+
+    @abstractmethod
+    def _real_calls(self, references: Array, values: Array) -> tuple[Call, Call]:
+        """Calls that get and set Real variables."""
+
+    def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
+        """The derivatives of one order of the Real outputs `names`, to get at once, many times."""
+        values, numbers = doubles(len(names))
+        references, orders = self._references(names), (c_int * len(names))(*[order] * len(names))
+        call = self._derivative_call(references, orders, values) if names else no_call
+        return OutputDerivatives(numbers, call)
+
+    @abstractmethod
+    def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
+        """Call that gets derivatives of Real outputs."""
+
+    @abstractmethod
+    def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
+        """Polynomials up to `order` for the Real inputs `names`, to set at once, many times."""
+
+    def _references(self, names: Sequence[str]) -> Array:
+        variables = self.fmu.model.variables
+        return (c_uint * len(names))(*(variables[name].reference for name in names))
+
+    # ---- Steps -----------------------------------------------------------------------------------
+
+    @abstractmethod
+    def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
+        """Make a step from `start` (s); `goes_back`: it may be undone by a saved state.
+
+        Raises FMICallException.
+        """
+
+    @abstractmethod
+    def saved_state(self) -> SavedState:
+        """An empty place for a state to go back to."""
+
+
+def no_call() -> None:
+    """In place of a call for no variables."""
+
+
+def doubles(count: int) -> tuple[Array, np.ndarray]:
+    """Memory for `count` numbers, and a view of it."""
+    memory = (c_double * count)()
+    return memory, view(memory)
+
+
+def view(memory: Array) -> np.ndarray:
+    """View of memory for numbers, (numbers,)."""
+    return np.frombuffer(memory) if len(memory) else np.empty(0)

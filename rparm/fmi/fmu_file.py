@@ -1,0 +1,155 @@
+"""FMUs as files: checked, read and unpacked once, for any number of runs."""
+
+import re
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import fmpy
+from fmpy.model_description import ModelDescription, ValidationError
+from lxml import etree
+
+from rparm.archives import check_library, read_xml, unpack
+from rparm.errors import UserError, one_line, placed, reason
+from rparm.fmi.fmi2_instance import Fmi2Instance
+from rparm.fmi.fmi3_instance import Fmi3Instance
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.model import Model, described
+from rparm.input_files import UnreadableError, show
+from rparm.interruption import temporary_folder
+from rparm.project import VERSIONS
+
+DESCRIPTION = "modelDescription.xml"
+LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
+INSTANCES: dict[str, type[Instance]] = {"2.0": Fmi2Instance, "3.0": Fmi3Instance}
+BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
+
+
+class Fmu:
+    """An FMU that is unpacked; a context manager that removes the unpacked copy.
+
+    Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs
+    on this platform. The copy is made in the folder `within`, or where temporary files are.
+    Messages name the FMU by `shown`, where it lies in another archive.
+    """
+
+    def __init__(self, path: Path, within: Path | None = None, shown: Path | None = None) -> None:
+        self.path = Path(shown or path)  # for messages
+        found, platform = _for_this_platform(Path(path), self.path)
+        description, self.model = found.description, found.model
+        self.guid = description.guid  # in FMI 3.0, the instantiationToken
+        self.log_categories = [category.name for category in description.logCategories]
+        self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
+        with ExitStack() as unpacked:
+            self.folder = unpacked.enter_context(temporary_folder(within))
+            library = f"{self.identifier}{LIBRARY_SUFFIX}"
+            self.library = self.folder / "binaries" / platform / library
+            with placed(self.path):
+                unpack(Path(path), self.folder, "FMU")
+            try:
+                check_library(self.library)
+            except (OSError, UnreadableError) as error:
+                raise UserError(f"{self.path}: {library}: {reason(error)}") from error
+            self._unpacked = unpacked.pop_all()
+
+    def __enter__(self) -> "Fmu":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Remove the unpacked copy."""
+        self._unpacked.close()
+
+    def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
+        """A new instance, of the class for the FMU's version of FMI; `name` is in its messages.
+
+        What `smooth_inputs` are: `Instance`.
+        """
+        return INSTANCES[self.model.fmi_version](self, name, smooth_inputs)
+
+
+def read_model(path: Path) -> Model:
+    """What the FMU at `path` declares; UserError if it cannot be run here."""
+    return _for_this_platform(Path(path), Path(path))[0].model
+
+
+@dataclass(frozen=True)
+class Described:
+    """What is known of an FMU for co-simulation without its binary."""
+
+    description: ModelDescription
+    model: Model
+    sizes: dict[str, int]  # of the files inside in bytes, by name
+
+
+def describe(path: Path) -> Described:
+    """Read what an FMU of a known version of FMI, for co-simulation, declares.
+
+    Raises UnreadableError.
+    """
+    with temporary_folder() as folder:
+        sizes = unpack(path, folder, "FMU", DESCRIPTION)
+        if DESCRIPTION not in sizes:
+            raise UnreadableError(f"not an FMU, it has no {DESCRIPTION}")
+        try:
+            description = _read(folder)
+            return Described(description, described(description), sizes)
+        except _WrongKindError:
+            raise
+        except (UnreadableError, ValidationError, ValueError) as error:
+            raise UnreadableError(f"wrong {DESCRIPTION}: {one_line(error)}") from error
+        except Exception as error:  # fmpy raises bare exceptions, and others where it is surprised
+            kind = "" if type(error) is Exception else f"fmpy fails with {type(error).__name__}: "
+            raise UnreadableError(f"wrong {DESCRIPTION}: {kind}{one_line(error)}") from error
+
+
+class _WrongKindError(UnreadableError):
+    """An FMU of another version of FMI, or for other uses than co-simulation."""
+
+    def __init__(self, root: etree._Element) -> None:
+        found = f"FMI {root.get('fmiVersion')}"
+        found += " for model exchange" if root.find("ModelExchange") is not None else ""
+        super().__init__(
+            f"expected an FMU of FMI {' or '.join(VERSIONS)} for co-simulation, found {found}"
+        )
+
+
+def _read(folder: Path) -> ModelDescription:
+    """Model description in a folder, which fmpy reads once it is known to be one."""
+    root = read_xml(folder / DESCRIPTION).getroot()
+    if root.tag != "fmiModelDescription" or "fmiVersion" not in root.attrib:
+        expected = "expected fmiModelDescription with an fmiVersion"
+        raise UnreadableError(f"line {root.sourceline}: {expected}, found {show(root.tag)}")
+    if root.get("fmiVersion") not in VERSIONS:
+        raise _WrongKindError(root)
+    description = fmpy.read_model_description(folder)
+    if description.coSimulation is None:
+        raise _WrongKindError(root)
+    if description.fmiVersion == "3.0":  # fmpy does not read it
+        given = root.find("CoSimulation").get("providesDirectionalDerivatives")
+        description.coSimulation.providesDirectionalDerivative = given in ("true", "1")
+    return description
+
+
+def _for_this_platform(path: Path, shown: Path) -> tuple[Described, str]:
+    """What an FMU declares that can be run here, and the folder of its binary."""
+    with placed(shown):
+        found = describe(path)
+    identifier = found.description.coSimulation.modelIdentifier
+    if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
+        raise UserError(
+            f"{shown}: expected a C identifier as modelIdentifier, found {show(identifier)}"
+        )
+    platforms = sorted({name.split("/")[1] for name in found.sizes if BINARY.fullmatch(name)})
+    wanted = INSTANCES[found.model.fmi_version].PLATFORMS
+    here = [platform for platform in wanted if platform in platforms]
+    if not here:
+        way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, found.sizes)) else ""
+        raise UserError(
+            f"{shown}: has no binary for {' or '.join(wanted)} "
+            f"(has: {', '.join(platforms) or 'none'}){way_out}"
+        )
+    return found, here[0]

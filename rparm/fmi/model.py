@@ -1,0 +1,248 @@
+"""A model as its FMU describes it: which variables there are, and which values they take."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from fmpy.model_description import ModelDescription, ModelVariable, SimpleType
+
+from rparm.errors import WrongValueError, did_you_mean, hint
+from rparm.input_files import show
+from rparm.texts import number as short_number
+from rparm.texts import short
+from rparm.units import ANGLE, Displays, Units, display_unit, finite_number, quantity, units_of
+
+Value = float | int | bool | str
+TURN = 2 * math.pi
+
+INTEGER = (-(2**31), 2**31 - 1)  # what an Integer of FMI 2.0 and an Int32 of FMI 3.0 hold
+
+# what a scenario may set, by the name of its section
+PARAMETERS, INITIAL, INPUTS = "parameters", "initial", "inputs"
+KINDS = {PARAMETERS: "a parameter", INITIAL: "a state", INPUTS: "an input"}
+
+# parameters of FMUs that bring their own integrator as those of this project do
+METHOD, TOLERANCE = "solver_method", "relative_tolerance"
+# smallest relative tolerance of each method: below it, FMUs integrate as at this one
+SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "taylor": 1e-13}
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of a model."""
+
+    name: str
+    reference: int  # value reference
+    type: str  # Real, Integer, Boolean, String, Enumeration, or one that is neither read nor set
+    causality: str
+    initial: str | None  # exact, approx or calculated
+    unit: str | None
+    start: Value | None
+    least: float  # -inf: no limit
+    greatest: float  # inf: no limit
+    items: Mapping[str, int] = field(default_factory=dict)  # numbers of an Enumeration, by name
+    units: Units = field(default_factory=dict)  # in which a Real may be given; empty: has none
+    description: str = ""
+
+    def is_a(self, kind: str) -> bool:
+        """Whether it is one of `KINDS`."""
+        if kind == INITIAL:
+            return self.causality == "output" and self.initial == "exact"
+        return self.causality == {PARAMETERS: "parameter", INPUTS: "input"}[kind]
+
+    def checked(self, given: Any) -> Value:
+        """Value to set, from what a user gives.
+
+        That is a number, a text with a number and its unit, or the name of an Enumeration's item.
+
+        WrongValueError if it is not of the variable's type or out of range.
+        """
+        if self.type not in TYPES.values():
+            raise WrongValueError(f"is of type {self.type}, which cannot be set here")
+        if self.type == "Enumeration":
+            return self.item(given)
+        if self.type == "Boolean":
+            if not isinstance(given, bool):
+                raise WrongValueError(f"expected true or false, got {show(given)}")
+            return given
+        if self.type == "Real":
+            number = quantity(given, self.units)
+        else:
+            number = finite_number(given)
+            if not number.is_integer():
+                raise WrongValueError(f"expected a whole number, got {show(given)}")
+            number = int(number)
+        self.check_range(number, number)
+        return number
+
+    def question(self, given: Any) -> str:
+        """What to ask about a start value in rad without a unit: one beyond a turn; or nothing."""
+        is_number = isinstance(given, int | float) and not isinstance(given, bool)
+        if self.unit != ANGLE or self.initial != "exact" or not is_number or abs(given) <= TURN:
+            return ""
+        way_out = f' In degrees it is "{short_number(given)} deg".' if "deg" in self.units else ""
+        turns = f"{short_number(given)} rad is {given / TURN:.3g} turns"
+        return f"{turns}, is that meant?{way_out}"
+
+    def written(self, value: Value) -> Value:
+        """A value as a user gives it: an Enumeration's item by its name."""
+        return next((name for name, item in self.items.items() if item == value), value)
+
+    def item(self, name: Any) -> int:
+        """Number of an Enumeration's item."""
+        if not isinstance(name, str) or name not in self.items:
+            guess = did_you_mean(name, self.items) if isinstance(name, str) else ""
+            known = ", ".join(f'"{item}"' for item in self.items)
+            raise WrongValueError(f"expected one of {known}, got {show(name)}{guess}")
+        return self.items[name]
+
+    def check_range(self, low: float, high: float) -> None:
+        """Check the smallest and the largest of the values to set."""
+        unit = f" {self.unit}" if self.unit else ""
+        if low < self.least:
+            raise WrongValueError(f"expected at least {self.least!r}{unit}, got {low!r}")
+        if high > self.greatest:
+            raise WrongValueError(f"expected at most {self.greatest!r}{unit}, got {high!r}")
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an FMU declares."""
+
+    name: str
+    fmi_version: str  # one of `project.VERSIONS`
+    variables: Mapping[str, Variable]  # by name, in the order of the model description
+    states: tuple[str, ...]  # names of the continuous states, in that order
+    interpolates_inputs: bool  # takes inputs that are polynomials over a step
+    gives_output_derivatives: bool
+    saves_states: bool  # so that an instance can go back to an earlier point
+    gives_directional_derivatives: bool
+
+    @property
+    def asks_for_inputs(self) -> bool:
+        """Whether it asks for the inputs at times within a step: intermediate update."""
+        return self.interpolates_inputs and self.fmi_version == "3.0"
+
+    @property
+    def real_outputs(self) -> list[str]:
+        """Names of all outputs of type Real."""
+        found = (v for v in self.variables.values() if v.causality == "output")
+        return [variable.name for variable in found if variable.type == "Real"]
+
+    @property
+    def start_values(self) -> dict[str, Value]:
+        """Start values of all variables that have one."""
+        return {v.name: v.start for v in self.variables.values() if v.start is not None}
+
+    def method(self, values: Mapping[str, Value]) -> str:
+        """Method of integration by its name, with `values` for start values; "" if unknown."""
+        variable = self.variables.get(METHOD)
+        if variable is None or variable.start is None:
+            return ""
+        return str(variable.written(values.get(METHOD, variable.start)))
+
+    def smallest_tolerance(self, values: Mapping[str, Value]) -> float:
+        """Smallest relative tolerance that makes a difference; 0 if none is known."""
+        return SMALLEST_TOLERANCES.get(self.method(values), 0.0)
+
+    def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
+        """Check a relative tolerance to run at, with `values` for start values.
+
+        WrongValueError if the method that integrates cannot be so exact.
+        """
+        smallest = self.smallest_tolerance(values)
+        if tolerance < smallest:
+            method = self.method(values)
+            raise WrongValueError(
+                f"expected at least {short(smallest)}, the smallest of {method}, got {tolerance!r}"
+            )
+
+    def find(self, name: str, kind: str) -> Variable:
+        """Variable called `name`.
+
+        WrongValueError if it is not of the kind, one of `KINDS`; lists those that are.
+        """
+        variable = self.variables.get(name)
+        if variable is not None and variable.is_a(kind):
+            return variable
+        meant = [other.name for other in self.variables.values() if other.is_a(kind)]
+        if variable is None:
+            raise WrongValueError(f"the model has no variable {name!r}{hint(name, meant)}")
+        known = ", ".join(meant) or "none"
+        raise WrongValueError(f"{name!r} is not {KINDS[kind]} of the model (known: {known})")
+
+
+def described(description: ModelDescription) -> Model:
+    """Model that a description of FMI 2.0 or 3.0, for co-simulation, declares.
+
+    ValueError if a start value or a limit is not a number.
+    """
+    capabilities = description.coSimulation
+    displays = {
+        unit.name: {x.name: display_unit(x.factor, x.offset) for x in unit.displayUnits}
+        for unit in description.unitDefinitions
+    }
+    derivatives = (unknown.variable.derivative for unknown in description.derivatives)
+    return Model(
+        name=description.modelName,
+        fmi_version=description.fmiVersion,
+        variables={v.name: _variable(v, displays) for v in description.modelVariables},
+        states=tuple(dict.fromkeys(state.name for state in derivatives if state is not None)),
+        interpolates_inputs=bool(
+            capabilities.canInterpolateInputs or capabilities.providesIntermediateUpdate
+        ),
+        gives_output_derivatives=(capabilities.maxOutputDerivativeOrder or 0) >= 1,
+        saves_states=bool(capabilities.canGetAndSetFMUstate),
+        gives_directional_derivatives=bool(capabilities.providesDirectionalDerivative),
+    )
+
+
+# names of FMI 2.0 and FMI 3.0 -> that of `Variable`
+TYPES = {
+    "Real": "Real",
+    "Integer": "Integer",
+    "Float64": "Real",
+    "Int32": "Integer",
+    "Boolean": "Boolean",
+    "String": "String",
+    "Enumeration": "Enumeration",
+}
+# of the texts in a model description
+CONVERT = {
+    "Real": float,
+    "Integer": int,
+    "Enumeration": int,
+    "Boolean": lambda text: text in ("true", "1"),
+    "String": str,
+}
+NUMBERS = ("Real", "Integer", "Enumeration")
+
+
+def _variable(variable: ModelVariable, displays: Displays) -> Variable:
+    kind = TYPES.get(variable.type, variable.type)
+    if variable.dimensions:
+        kind = f"array of {variable.type}"
+    declared = variable.declaredType or SimpleType()
+    low, high = (x or y for x, y in ((variable.min, declared.min), (variable.max, declared.max)))
+    least, greatest = INTEGER if kind == "Integer" else (-math.inf, math.inf)
+    convert = CONVERT.get(kind, lambda _: None)
+    unit = variable.unit or declared.unit
+    units = units_of(unit, displays) if kind == "Real" else {}
+    if variable.relativeQuantity or declared.relativeQuantity:  # a difference
+        units = {name: replace(other, offset=Fraction(0)) for name, other in units.items()}
+    return Variable(
+        name=variable.name,
+        reference=variable.valueReference,
+        type=kind,
+        causality=variable.causality,
+        initial=variable.initial,
+        unit=unit,
+        start=None if variable.start is None else convert(variable.start),
+        least=convert(low) if low and kind in NUMBERS else least,
+        greatest=convert(high) if high and kind in NUMBERS else greatest,
+        items={item.name: int(item.value) for item in declared.items},
+        units=units,
+        description=variable.description or "",
+    )

@@ -1,0 +1,95 @@
+"""Files that users give, read with care: they may be damaged, endless or no files at all."""
+
+import codecs
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from rparm.errors import UnplacedError, UserError, placed, reason
+
+LARGEST_TOML = 10_000_000  # bytes: some seconds of parsing
+# the parser's time grows with the square of a key's parts: a.b.c
+LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){32}""")
+
+
+class UnreadableError(UnplacedError):
+    """Why a file cannot be read, in a few words without its name."""
+
+
+def check_regular(path: Path) -> None:
+    """Refuse what may never end when it is read: devices, pipes, sockets; not a folder.
+
+    Raises UnreadableError.
+    """
+    try:
+        mode = Path(path).stat().st_mode
+    except FileNotFoundError:
+        raise UnreadableError("no such file") from None
+    except (OSError, ValueError) as error:  # ValueError: a name with a null character
+        raise UnreadableError(f"cannot be read: {reason(error)}") from None
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise UnreadableError("cannot be read: is a device or a pipe, expected a file")
+
+
+def is_file(path: Path) -> bool:
+    """Whether it is a file; False for a name that no file can have."""
+    try:
+        return Path(path).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def read_bytes(path: Path, largest: int) -> bytes:
+    """Content of a file of at most `largest` bytes; UnreadableError if it cannot be read."""
+    check_regular(path)
+    try:
+        with Path(path).open("rb") as file:
+            content = file.read(largest + 1)
+    except OSError as error:
+        raise UnreadableError(f"cannot be read: {reason(error)}") from None
+    if len(content) > largest:
+        raise UnreadableError(f"is larger than {largest / 1e6:g} MB")
+    return content
+
+
+def read_text(path: Path, largest: int) -> str:
+    """Text of a file of at most `largest` bytes in UTF-8, without a byte order mark.
+
+    UnreadableError, or UnicodeDecodeError with the position in the file.
+    """
+    return decoded(read_bytes(path, largest))
+
+
+def decoded(content: bytes) -> str:
+    """Text of what is in UTF-8, without a byte order mark; or else UnicodeDecodeError."""
+    return content.decode("utf-8").removeprefix(codecs.BOM_UTF8.decode("utf-8"))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Parse a TOML file.
+
+    UserError for whatever keeps the file from being read.
+    """
+    try:
+        with placed(path):
+            text = read_text(path, LARGEST_TOML)
+        long = LONG_KEY.search(text)
+        if long:
+            line = text.count("\n", 0, long.start()) + 1
+            raise UserError(f"{path}, line {line}: a key of more than 32 parts")
+        return tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: not UTF-8 text, at byte {error.start}") from None
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError is a ValueError
+        raise UserError(f"{path}: not valid TOML: {error}") from None
+
+
+def show(value: Any, longest: int = 40) -> str:
+    """Short, one-line form of a value from a file, of at most `longest` characters."""
+    try:
+        text = str(value).lower() if isinstance(value, bool) else repr(value)
+    except ValueError:  # an integer of more digits than Python writes
+        text = "a very large number"
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."

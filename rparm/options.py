@@ -1,0 +1,107 @@
+"""Options that several commands have, and the values that they take."""
+
+import argparse
+from contextlib import suppress
+from pathlib import Path
+
+from rparm import project
+from rparm.errors import WrongValueError
+from rparm.project import VERSIONS
+from rparm.units import SECONDS, typed_quantity
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    """Options of all commands."""
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help="print one JSON document on standard output, and all else on standard error",
+    )
+    parser.add_argument(
+        "--quiet", action="store_true", help="print the last line only, and what is wrong"
+    )
+
+
+def add_system(
+    parser: argparse.ArgumentParser,
+    ssp: str = "the system (default: all in build/)",
+    fmi: str = "systems in build/ with FMUs of this version of FMI (default: 2)",
+) -> None:
+    """Which system: a file, or one of a version of FMI."""
+    choice = parser.add_mutually_exclusive_group()
+    choice.add_argument("--ssp", type=Path, metavar="PATH", help=ssp)
+    add_fmi(choice, VERSIONS[0], fmi)
+
+
+def add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) -> None:
+    """Which version of FMI, as one of `VERSIONS`."""
+    parser.add_argument("--fmi", type=_version, metavar="{2,3}", default=default, help=text)
+
+
+def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
+    """Where pages and results go."""
+    folder = project.report_folder(part)
+    parser.add_argument(
+        "--report",
+        type=Path,
+        metavar="DIR",
+        default=folder,
+        help=f"folder for pages and results (default: {folder.relative_to(project.ROOT)})",
+    )
+
+
+def add_open(parser: argparse.ArgumentParser) -> None:
+    """Whether a browser shows the report."""
+    parser.add_argument("--open", action="store_true", help="then open the report in a browser")
+
+
+def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:
+    """How long something may be silent."""
+    parser.add_argument(
+        "--silence",
+        type=_seconds,
+        metavar="TIME",
+        default=default,
+        help=f"{text} (default: {default:g} s)",
+    )
+
+
+def number(text: str) -> int:
+    """Number of a run, from 0."""
+    if not text.isdecimal() or len(text) > 12:
+        raise argparse.ArgumentTypeError(f"expected the number of a run, got {text!r}")
+    return int(text)
+
+
+def count(text: str) -> int:
+    """How many, from 1."""
+    if not text.isdecimal() or not 1 <= int(text) <= 10_000:
+        raise argparse.ArgumentTypeError(f"expected a number from 1 to 10000, got {text!r}")
+    return int(text)
+
+
+def relative_tolerance(text: str) -> float:
+    """A relative tolerance."""
+    with suppress(ValueError):
+        if 0 < float(text) < 1:
+            return float(text)
+    raise argparse.ArgumentTypeError(f"expected a number between 0 and 1, got {text!r}")
+
+
+def _seconds(text: str) -> float:
+    with suppress(WrongValueError):
+        seconds = typed_quantity(text, SECONDS)
+        if seconds >= 1:
+            return seconds
+    raise argparse.ArgumentTypeError(
+        f"expected 1 s or more: a number, or one with s, ms, cs or ks, got {text!r}"
+    )
+
+
+def _version(text: str) -> str:
+    """Version of FMI from its first digit or in full."""
+    for version in VERSIONS:
+        if text in (version, version[0]):
+            return version
+    known = " or ".join(version[0] for version in VERSIONS)
+    raise argparse.ArgumentTypeError(f"expected {known}, got {text!r}")

@@ -1,0 +1,105 @@
+"""What commands print: stages, tables of at most 80 columns, the last line."""
+
+import shutil
+import sys
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence, Sized
+
+from rparm.output import streams
+from rparm.texts import counted, shortened
+
+WIDTH = 80  # columns that a terminal has, if it has no fewer
+NARROWEST = 8  # a column of names
+INDENT = "  "
+NAMED = 5  # failed things in the last line
+
+
+def width() -> int:
+    """Columns of a line."""
+    return min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
+
+
+def stage(text: str) -> None:
+    """Say what begins, on a terminal."""
+    if sys.stderr is not None and sys.stderr.isatty() and not streams.is_quiet():
+        print(f"{text} ...", file=sys.stderr, flush=True)
+
+
+def messages(label: str, texts: Iterable[str]) -> None:
+    """Print what an FMU or an engine has to say, to standard error."""
+    for text in dict.fromkeys(texts):
+        print(f"{label}: {text}", file=sys.stderr)
+
+
+def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
+    """How many things have passed, or which have failed: the last line of a command."""
+    names = list(dict.fromkeys(failed))
+    if not names:
+        return f"passed: {counted(done, name)}"
+    some = [*names[:NAMED], f"{len(names) - NAMED} more"] if len(names) > NAMED + 1 else names
+    text = f"failed: {counted(names, name)}"
+    return textwrap.shorten(
+        f"{text}: {', '.join(some)}", max(width(), len(text)), placeholder=" ..."
+    )
+
+
+class Table:
+    """Rows under a head, each printed when it is known.
+
+    Parameters
+    ----------
+    title : str
+        Of the column of names.
+    names : iterable of str
+        All names that rows will have; the column is cut where there is no room.
+    columns : mapping of str to int
+        Titles, of one or several words, with the width of the column.
+    gap : int, optional
+        Blanks in front of each column.
+    result : int, optional
+        Width of the last column, which is set to the left; 0: there is none.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        names: Iterable[str],
+        columns: Mapping[str, int],
+        gap: int = 2,
+        result: int = 6,
+    ) -> None:
+        self._gap, self._columns = " " * gap, list(columns.values())
+        taken = sum(self._columns) + gap * len(columns) + (len(INDENT) + result if result else 0)
+        wanted = max(map(len, (title, *names)))
+        self._width = min(wanted, max(width() - taken, NARROWEST))
+        titles = [textwrap.wrap(text, columns[text]) or [""] for text in columns]
+        height = max(map(len, titles), default=1)
+        for i in range(height):
+            last = i == height - 1
+            cells = [([""] * height + lines)[len(lines) + i] for lines in titles]
+            result_title = "result" if last and result else ""
+            print(self._line(title if last else "", cells, result_title))
+        print("-" * (self._width + taken), flush=True)
+
+    def _line(self, name: str, cells: Sequence[str], result: str) -> str:
+        name = shortened(name, self._width)
+        padded = zip(cells, self._columns, strict=True)
+        numbers = "".join(f"{self._gap}{cell:>{wide}}" for cell, wide in padded)
+        return f"{name:<{self._width}}{numbers}{INDENT}{result}".rstrip()
+
+    def row(self, name: str, cells: Sequence[str], result: str = "") -> None:
+        """Print a row."""
+        print(self._line(name, cells, result), flush=True)
+
+    @staticmethod
+    def remark(text: str) -> None:
+        """Print what is to be said of the row above."""
+        remark(text)
+
+
+def remark(text: str) -> None:
+    """Print a text in lines that are set in."""
+    wrapped = textwrap.wrap(
+        text, width(), initial_indent=INDENT, subsequent_indent=2 * INDENT, break_on_hyphens=False
+    )
+    print(*wrapped, sep="\n", flush=True)

@@ -1,0 +1,49 @@
+"""Files that appear complete or not at all."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+
+from rparm.errors import UserError, reason
+from rparm.interruption import uninterrupted
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Temporary path to write to, which becomes `path` at the end and is removed on failure."""
+    path = Path(path)
+    # the suffix stays the last: matplotlib takes the format of a picture from it
+    temporary = path.with_name(f".{os.getpid()}.{path.name}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Turn a failure of the system inside into the user's error: `path` cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{path}: the report cannot be written: {reason(error)}") from error
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder for the report that cannot be made or written, before anything runs."""
+    with written(folder):
+        existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+        with uninterrupted(), TemporaryFile(dir=existing, prefix="rparm-"):
+            pass
+
+
+def from_here(path: Path) -> Path:
+    """`path` as short as it can be given from the current folder."""
+    try:
+        here = Path.cwd()
+    except OSError:  # it has been removed
+        return path
+    return path.relative_to(here) if path.is_relative_to(here) else path

@@ -1,0 +1,166 @@
+"""Where everything is: no other module of rparm knows the project's folders and file names.
+
+models/MODEL/scenarios/NAME.toml        a scenario
+models/MODEL/convergence/NAME.toml      a problem for the order of convergence, of that format
+models/MODEL/references/NAME/           MODEL_ref.csv of a scenario, exact.json of a problem
+models/MODEL/references/scales.toml     sums that errors are divided by, instead of maxima
+models/SYSTEM/SystemStructure.ssd       connects models to a system
+models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
+models/SYSTEM/study.py                  what to measure, draw and study there
+models/SYSTEM/system.svg                its components and the signals between them
+models/*/animation.py                   what of a run the report animates
+build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
+                                        to case and underscores; of FMI 2.0
+build/fmi3/                             the same of FMI 3.0
+build/report/                           what the commands write: index.html, folders of its parts
+"""
+
+from pathlib import Path
+
+from rparm.errors import UserError, did_you_mean, hint
+
+ROOT = Path(__file__).resolve().parents[1]
+
+STRUCTURE = "SystemStructure.ssd"
+DIAGRAM = "system.svg"
+STUDY = "study"  # the module of a system's folder that rparm.system.study describes
+ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
+SCENARIO_FOLDERS = ("scenarios", "convergence")
+BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
+VERSIONS = tuple(BUILD_FOLDERS)
+
+
+def scenario_files() -> dict[str, Path]:
+    """All scenarios by name; UserError if two scenarios have the same name."""
+    found: dict[str, Path] = {}
+    for path in sorted(ROOT.glob("models/*/scenarios/*.toml")):
+        if path.stem in found:
+            raise UserError(f"{path}: the name {path.stem!r} is taken by {found[path.stem]}")
+        found[path.stem] = path
+    return dict(sorted(found.items()))
+
+
+def scenario_file(name: str) -> Path:
+    """The scenario called `name`; UserError if there is none."""
+    found = scenario_files()
+    if name not in found:
+        guess = did_you_mean(name, found)
+        raise UserError(f"no scenario {name!r}{guess} (./run.sh --list names them)")
+    return found[name]
+
+
+def models() -> dict[str, Path]:
+    """Folders of all models that have scenarios, by name."""
+    folders = sorted({path.parents[1] for path in ROOT.glob("models/*/scenarios/*.toml")})
+    return {folder.name: folder for folder in folders}
+
+
+def model(name: str) -> Path:
+    """Folder of a model, by its own name or that of its FMU; a UserError lists the known ones."""
+    known = models()
+    for folder in known.values():
+        if name == folder.name or is_built_from(name, folder):
+            return folder
+    raise UserError(f"no model {name!r}{hint(name, known)}")
+
+
+def is_in_model(file: Path) -> bool:
+    """Whether a file lies where a model has its scenarios and problems."""
+    return Path(file).absolute().parent.name in SCENARIO_FOLDERS
+
+
+def is_ours(file: Path) -> bool:
+    """Whether a file is one of the project's scenarios, or lies where they do."""
+    file = Path(file).resolve()
+    return is_in_model(file) and file.parents[2] == (ROOT / "models").resolve()
+
+
+def convergence_files() -> list[Path]:
+    """All problems for the order of convergence."""
+    return sorted(ROOT.glob("models/*/convergence/*.toml"))
+
+
+def model_folder(scenario: Path) -> Path:
+    """Folder of the model that a scenario or problem belongs to.
+
+    UserError if the file is in no such folder.
+    """
+    folder = scenario.absolute().parent
+    if folder.name not in SCENARIO_FOLDERS:
+        raise UserError(f"{scenario}: expected in models/MODEL/scenarios/")
+    return folder.parent
+
+
+def references(folder: Path) -> Path:
+    """Folder of all references of a model or system."""
+    return folder / "references"
+
+
+def reference_folder(scenario: Path) -> Path:
+    """Folder of the reference of a scenario or problem."""
+    return references(model_folder(scenario)) / scenario.stem
+
+
+def reference_file(scenario: Path, model: str) -> Path:
+    """Reference of a scenario, of a model whose FMU has the name `model`."""
+    return reference_folder(scenario) / f"{model}_ref.csv"
+
+
+def scales_file(folder: Path) -> Path:
+    """Sums that errors of a model or system are divided by."""
+    return references(folder) / "scales.toml"
+
+
+def exact_state_file(problem: Path) -> Path:
+    """Exact final state of a problem for the order of convergence."""
+    return reference_folder(problem) / "exact.json"
+
+
+def variant_reference_file(system: Path, variant: str) -> Path:
+    """Reference of a system's variant: Jacobi stepping, read after inputs are set, as in Ecos."""
+    return references(system) / variant / "ecos.csv"
+
+
+def making_references(folder: Path, name: str) -> str:
+    """How to make the reference called `name` of a model or system again, for messages."""
+    # relative to the project's folder, in which its documentation gives all commands
+    script = f"models/{folder.name}/references/make_references.py {name}"
+    return f"to make it again: build/venv/bin/python {script}"
+
+
+def systems() -> dict[str, Path]:
+    """Folders of all systems by name."""
+    found = sorted(path.parent for path in ROOT.glob(f"models/*/{STRUCTURE}"))
+    if not found:
+        raise UserError(f"{ROOT / 'models'}: has no folder with {STRUCTURE}")
+    return {folder.name: folder for folder in found}
+
+
+def is_built_from(name: str, folder: Path) -> bool:
+    """Whether an FMU or SSP called `name` is that of the folder of a model or system."""
+    return name.lower() == folder.name.replace("_", "").lower()
+
+
+def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0]) -> Path:
+    """What has been built from the folder of a model (.fmu) or system (.ssp), of a version of FMI.
+
+    UserError if it is not there; names `option`, which takes another file, if it is given.
+    """
+    build = ROOT / BUILD_FOLDERS[version]
+    for path in sorted(build.glob(f"*{suffix}")):
+        if is_built_from(path.stem, folder):
+            return path
+    kind = suffix.removeprefix(".").upper()
+    way_out = "./run.sh builds it" + (f", {option} PATH takes another one" if option else "")
+    raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
+
+
+def from_root(path: Path) -> Path:
+    """`path` as it is given in commands that run in the project's folder."""
+    path = path.absolute()
+    return path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
+
+
+def report_folder(part: str = "") -> Path:
+    """Where the commands write if no other folder is given."""
+    return ROOT / "build" / "report" / part

@@ -1,0 +1,45 @@
+"""What the page of a scenario shows of its measurements: curves beside the simulated, a table."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from rparm.fmi.model import Model
+from rparm.report.pages import Table
+from rparm.report.run_data import Curve, Plot, without_rounding
+from rparm.runs.measured import Comparison
+from rparm.texts import unit
+
+
+def with_measured(
+    plots: Sequence[Plot], comparisons: Sequence[Comparison], model: Model
+) -> list[Plot]:
+    """`plots` with what was measured beside what was simulated, in new plots if need be."""
+    result = list(plots)
+    for compared in comparisons:
+        name = compared.name
+        drawn = (i for i, plot in enumerate(result) if name in [x.name for x in plot.curves])
+        index = next(drawn, len(result))
+        if index == len(result):
+            simulated = Curve(name, without_rounding(compared.simulated))
+            result.append(Plot(name, unit(model.variables[name].unit), [simulated]))
+        curve = Curve(f"{name} measured", without_rounding(compared.measured))
+        result[index] = replace(result[index], curves=[*result[index].curves, curve])
+    return result
+
+
+def measured_tables(comparisons: Sequence[Comparison], model: Model) -> list[Table]:
+    """A table of how far the simulation is from what was measured; none without measurements."""
+    if not comparisons:
+        return []
+    rows = [
+        (c.name, unit(model.variables[c.name].unit), f"{c.rms:.4g}", f"{c.largest:.4g}", c.source)
+        for c in comparisons
+    ]
+    return [
+        Table(
+            "Difference from what was measured",
+            ("output", "unit", "RMS", "largest", "log"),
+            rows,
+            note="Simulated less measured, over the rows of the values that the log covers.",
+        )
+    ]

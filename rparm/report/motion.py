@@ -1,0 +1,142 @@
+"""What the player on a page animates of a run: a mechanism's motion and its geometry.
+
+Which variables these are is known to the folder of the model or system. Its module animation.py has
+a function `animation` from `Recorded` to `Animation`; a folder without one has nothing to animate.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, cast
+
+import numpy as np
+
+from rparm import project
+from rparm.fmi.model import Value
+from rparm.runs.comparison import Run
+from rparm.runs.simulation import Result
+from rparm.scenarios.scenario import Scenario
+from rparm.system.comparison import Outcome
+from rparm.system.ssp import Ssp
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A run as `animation` reads it; all columns have the shape (rows,)."""
+
+    times: np.ndarray  # (rows,) s
+    columns: Mapping[str, np.ndarray]  # outputs and inputs, by name
+    references: Mapping[str, np.ndarray]  # outputs in the reference of a scenario, by name
+    values: Mapping[str, Value]  # of parameters, by name
+
+    def component(self, name: str) -> "Recorded":
+        """The same of one component of a system, without its name in front."""
+        return Recorded(
+            self.times,
+            _within(name, self.columns),
+            _within(name, self.references),
+            _within(name, self.values),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Animation:
+    """Motion and geometry under the names that the drawing gives them (assets/arm.js)."""
+
+    columns: Mapping[str, np.ndarray | None]  # (rows,), or None: not there
+    reference: Mapping[str, np.ndarray] | None  # (rows,): the motion that is drawn as a ghost
+    arm: Mapping[str, Any]  # lengths in m, limits, what surrounds it
+
+
+def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> dict | None:
+    """Data of the player for a scenario's run; None: nothing to animate.
+
+    Parameters
+    ----------
+    rows : sequence of int or slice, optional
+        Those of the recorded rows that the page holds.
+    """
+    references = {name: run.reference.column(name) for name in run.result.names}
+    return of_result(run.scenario, run.result, references, rows)
+
+
+def of_result(
+    scenario: Scenario,
+    result: Result,
+    references: Mapping[str, np.ndarray],
+    rows: Sequence[int] | np.ndarray | slice = slice(None),
+) -> dict | None:
+    """The same of a run that may have stopped early, with the references that there are."""
+    # a row holds the outputs at the end of a step, so the inputs too are those of this step
+    steps = scenario.input_rows[: len(result.times)]
+    inputs = {name: values[steps] for name, values in scenario.inputs.items()}
+    outputs = dict(zip(result.names, result.values.T, strict=True))
+    recorded = Recorded(
+        result.times, inputs | outputs | result.integers, references, scenario.start_values
+    )
+    return of_recorded(scenario.model, recorded, rows)
+
+
+def of_outcome(
+    system: str, ssp: Ssp, outcome: Outcome, rows: Sequence[int] | np.ndarray | slice = slice(None)
+) -> dict | None:
+    """Data of the player for a run of a system's variant; None: nothing to animate.
+
+    Parameters
+    ----------
+    system : str
+        Name of the system's folder.
+    rows : sequence of int or slice, optional
+        Those of the recorded rows that the page holds.
+    """
+    given = ssp.system.parameter_sets[outcome.variant]
+    values = {
+        f"{component}.{name}": value
+        for component, model in ssp.models.items()
+        for name, value in (model.start_values | given.get(component, {})).items()
+    }
+    columns = dict(zip(outcome.run.names, outcome.run.values.T, strict=True))
+    return of_recorded(system, Recorded(outcome.run.times, columns, {}, values), rows)
+
+
+def of_recorded(
+    folder: str, recorded: Recorded, rows: Sequence[int] | np.ndarray | slice = slice(None)
+) -> dict[str, Any] | None:
+    """Data of the player for a folder below models/; None: nothing to animate."""
+    animate = _animate(folder)
+    if animate is None:
+        return None
+    animation = animate(recorded)
+
+    def taken(values: np.ndarray | None) -> list | None:
+        return None if values is None else values[rows].tolist()
+
+    reference = animation.reference
+    return {
+        "time": taken(recorded.times),
+        **{name: taken(values) for name, values in animation.columns.items()},
+        "reference": reference and {name: taken(values) for name, values in reference.items()},
+        "arm": dict(animation.arm),
+    }
+
+
+def _animate(folder: str) -> Callable[[Recorded], Animation] | None:
+    """Function `animation` of a folder below models/."""
+    name = f"rparm.models.{folder}.{project.ANIMATION}"
+    try:
+        found = find_spec(name)
+    except ModuleNotFoundError:  # no such folder
+        found = None
+    if found is None:
+        return None
+    return cast(Callable[[Recorded], Animation], import_module(name).animation)
+
+
+def _within(component: str, named: Mapping[str, Any]) -> dict[str, Any]:
+    prefix = f"{component}."
+    return {
+        name.removeprefix(prefix): content
+        for name, content in named.items()
+        if name.startswith(prefix)
+    }

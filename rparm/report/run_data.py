@@ -1,0 +1,219 @@
+"""Data of a page with plots: what its scripts read, as JSON in the page."""
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from rparm.runs.reference import SMALLEST_SCALE
+
+MOST_ROWS = 800  # of a page, so that a report stays small
+FEWEST_PACKED = 8  # numbers; shorter lists stay as they are
+ROUNDING = 1e-12  # of a variable's scale: what is smaller is rounding of its computation
+SEEN = 1e-6  # of a column's range: extremes that stand out by less are not seen
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A line of a plot."""
+
+    name: str
+    values: np.ndarray  # (rows,)
+    reference: np.ndarray | None = None  # (rows,), drawn below it
+    steps: bool = False  # each row ends an interval of this value
+    limit: bool = False  # is not a result but what results stay below
+
+    def at(self, rows: np.ndarray) -> "Curve":
+        """The same at some of its rows."""
+        reference = None if self.reference is None else self.reference[rows]
+        return replace(self, values=self.values[rows], reference=reference)
+
+
+@dataclass(frozen=True, eq=False)
+class Plot:
+    """Curves of one unit over the abscissa of the page."""
+
+    title: str
+    unit: str
+    curves: Sequence[Curve]
+    log: bool = False
+    levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
+    note: str = ""  # what its numbers stand for
+
+    @property
+    def gaps(self) -> bool:
+        """Whether a value has no place on the axis."""
+        return self.log and any((curve.values == 0).any() for curve in self.curves)
+
+    @property
+    def columns(self) -> list[np.ndarray]:
+        """What is drawn, (rows,) each; logarithms on a logarithmic axis."""
+        drawn = [values for x in self.curves for values in (x.values, x.reference)]
+        found = [values for values in drawn if values is not None]
+        if not self.log:
+            return found
+        tiny = np.finfo(float).tiny
+        return [np.log10(np.maximum(values, tiny)) for values in found]
+
+    def at(self, rows: np.ndarray) -> "Plot":
+        """The same at some of its rows."""
+        return replace(self, curves=[curve.at(rows) for curve in self.curves])
+
+    @property
+    def text(self) -> str:
+        """What it shows, for those who do not see it."""
+        parts = []
+        for curve in self.curves:
+            finite = curve.values[np.isfinite(curve.values)]
+            if not len(finite):
+                parts.append(f"{curve.name} has no finite values")
+                continue
+            ends = f"from {curve.values[0]:.4g} to {curve.values[-1]:.4g}"
+            parts.append(f"{curve.name} {ends}, between {finite.min():.4g} and {finite.max():.4g}")
+        unit = f" in {self.unit}" if self.unit else ""
+        return f"Plot of {self.title}{unit}: {'; '.join(parts)}"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """The abscissa of all plots of a page."""
+
+    title: str = "time"
+    unit: str = "s"
+    log: bool = False
+    reversed: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class RunData:
+    """Everything that the scripts of a page need."""
+
+    name: str
+    title: str
+    x: np.ndarray  # (rows,) abscissa, in order
+    plots: Sequence[Plot]
+    axis: Axis = field(default_factory=Axis)
+    motion: dict[str, Any] | None = None  # of rparm.report.motion
+
+    def json(self) -> str:
+        """Text for a script element: no text in it ends the element."""
+        packer = _Packer()
+        content = {
+            "name": self.name,
+            "title": self.title,
+            "axis": vars(self.axis),
+            "time": packer.packed(self.x),
+            "plots": [_plot(plot, packer) for plot in self.plots],
+            "motion": self._motion(packer),
+            "arrays": packer.arrays,
+        }
+        text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+        return text.replace("<", "\\u003c")
+
+    def _motion(self, packer: "_Packer") -> dict[str, Any] | None:
+        if self.motion is None:
+            return None
+        reference = self.motion["reference"]
+        ghost = reference and {name: narrow(np.array(x)) for name, x in reference.items()}
+        columns = {
+            name: narrow(np.array(column))
+            for name, column in self.motion.items()
+            if name != "time" and isinstance(column, list) and type(column[0]) is float
+        }
+        return packer.packed(self.motion | columns | {"reference": ghost})
+
+
+def without_rounding(values: np.ndarray) -> np.ndarray:
+    """Values of a variable, with 0 for what is rounding beside its scale, 3e-17 say."""
+    scale = max(np.abs(values[np.isfinite(values)]).max(initial=0.0), SMALLEST_SCALE)
+    return np.where(np.abs(values) < ROUNDING * scale, 0.0, values)
+
+
+def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
+    """Rows to show of columns (rows,): at most `most`, unless the columns have more extremes.
+
+    Rows at equal distances, half of `most` at least, and those where a column is smallest and
+    largest in each of many equal intervals: as many intervals as `most` permits, at least one.
+    """
+    table = np.nan_to_num(np.column_stack(columns).astype(float), posinf=1e300, neginf=-1e300)
+    count = len(table)
+    if count <= most:
+        return np.arange(count)
+    every, widest = -(-count // most), -(-2 * count // most)
+    while True:
+        grid = np.arange(0, count, min(every, widest))
+        rows = np.union1d(grid, _extremes(table, every))
+        if len(rows) <= most or every >= count:
+            return rows
+        every *= 2
+
+
+def _extremes(table: np.ndarray, every: int) -> np.ndarray:
+    """The first of every k rows of a table (rows, columns), the last, the extremes in between."""
+    count = len(table)
+    bins = -(-count // every)
+    padded = np.pad(table, ((0, bins * every - count), (0, 0)), mode="edge")
+    padded = padded.reshape(bins, every, -1)
+    ends = np.append(np.arange(0, count, every), count - 1)
+    margin = SEEN * np.ptp(table, axis=0)
+    found = [ends]
+    for sign in (1, -1):
+        row = np.argmax(sign * padded, axis=1) + ends[:-1, None]  # (bins, columns)
+        row = np.minimum(row, count - 1)
+        value = np.take_along_axis(table, row, axis=0)
+        beside = np.maximum(sign * table[ends[:-1]], sign * table[ends[1:]])
+        found.append(row[sign * value > beside + margin])
+        found.append(np.argmax(sign * table, axis=0))  # of the whole run, however little it is
+    return np.unique(np.concatenate(found))
+
+
+def narrow(values: np.ndarray) -> np.ndarray:
+    """Floats for doubles, unless one of them is too large or too small for seven digits."""
+    with np.errstate(over="ignore", under="ignore"):
+        floats = values.astype(np.float32)
+    digits = np.isfinite(floats) & (np.abs(floats) >= np.finfo(np.float32).tiny)
+    return floats if (digits | (values == 0) | ~np.isfinite(values)).all() else values
+
+
+def _plot(plot: Plot, packer: "_Packer") -> dict[str, Any]:
+    content: dict[str, Any] = {"title": plot.title, "unit": plot.unit, "log": plot.log}
+    content["levels"] = [{"name": name, "value": value} for name, value in plot.levels]
+    content["curves"] = curves = []
+    for curve in plot.curves:
+        item = {
+            "name": curve.name,
+            "values": packer.packed(narrow(curve.values)),
+            "steps": curve.steps,
+        }
+        item["limit"] = curve.limit
+        if curve.reference is not None:
+            item["reference"] = packer.packed(narrow(curve.reference))
+        curves.append(item)
+    return content
+
+
+class _Packer:
+    """Arrays in base64, each once however often a page uses it."""
+
+    def __init__(self) -> None:
+        self.arrays: list[dict[str, str]] = []
+        self._known: dict[tuple[str, bytes], int] = {}
+
+    def packed(self, content: Any) -> Any:
+        """`content` with arrays, and lists of floats, replaced by their indices in `arrays`."""
+        if isinstance(content, dict):
+            return {name: self.packed(value) for name, value in content.items()}
+        long = isinstance(content, list) and len(content) >= FEWEST_PACKED
+        if long and all(type(value) is float for value in content):
+            content = np.array(content)
+        if not isinstance(content, np.ndarray):
+            return content
+        kind = "f4" if content.dtype == np.float32 else "f8"
+        data = content.astype(f"<{kind}").tobytes()
+        if (kind, data) not in self._known:
+            self._known[kind, data] = len(self.arrays)
+            self.arrays.append({kind: base64.b64encode(data).decode("ascii")})
+        return {"array": self._known[kind, data]}

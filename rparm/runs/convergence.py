@@ -1,0 +1,264 @@
+"""Order of convergence in the communication step, with inputs that are smooth functions of time.
+
+A master knows its inputs at the communication points. With zero-order hold of them, an FMU is off
+by the first power of the step; with their derivatives up to order k it is off by power
+k + 1. An FMU of FMI 3.0 that asks for the inputs at four times of a step (intermediate update) is
+off by power 4. The problems are models/<model>/convergence/<name>.toml, in the format of a
+scenario; the exact final state of each is models/<model>/references/<name>/exact.json.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.fmi.fmi3_instance import Fmi3Instance
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Model
+from rparm.runs import simulation
+from rparm.scenarios import scenario as scenarios
+from rparm.scenarios.scenario import Scenario
+from rparm.scenarios.signals import Sines
+
+FACTORS = (64, 32, 16, 8, 4, 2, 1)  # communication steps, in shortest steps of the problem
+ORDERS = (0, 1, 2, 3)  # of the highest input derivative that is set; 0: zero-order hold
+INTERMEDIATE_UPDATE = len(ORDERS)  # the case after those of the orders
+NAMES = (
+    "inputs held",
+    "1st derivatives",
+    "2nd derivatives",
+    "3rd derivatives",
+    "intermediate update",
+)  # of the cases
+POWERS = (1, 2, 3, 4, 4)  # of the step, which the error follows in each case
+LARGEST_DEVIATION = 0.2  # of a slope from the order expected
+CLEAR_OF_INTEGRATION = 100.0  # an error counts from this many times the integration's own
+FEWEST_FITTED = 4  # errors that a slope needs: three halvings of the step
+ALL_FITTED = 3  # up to this power, the slope is that over all steps
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A motion with smooth inputs and its exact final state."""
+
+    scenario: Scenario
+    inputs: dict[str, Sines]
+    exact: dict[str, float]  # final states
+    largest: dict[str, float]  # largest absolute value of each state on the way, its scale
+
+    @property
+    def steps(self) -> np.ndarray:
+        """Communication steps that are run, s, longest first."""
+        return self.scenario.steps[0] * np.array(FACTORS)
+
+    def final_error(self, states: dict[str, float]) -> float:
+        """Largest difference of final `states`, each relative to its largest value on the way."""
+        return max(abs(states[name] - self.exact[name]) / self.largest[name] for name in self.exact)
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was found in one case."""
+
+    name: str
+    errors: tuple[float, ...]  # relative, one per step
+    slope: float
+    holds: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Convergence:
+    """Errors of the final state over the communication step, in the first cases of `NAMES`."""
+
+    problem: Problem
+    errors: np.ndarray  # (cases, steps) relative
+
+    @property
+    def scenario(self) -> Scenario:
+        """Scenario of the problem."""
+        return self.problem.scenario
+
+    @property
+    def integration_error(self) -> float:
+        """Estimate of what the integrator itself leaves: the error with the best known inputs.
+
+        With the highest derivatives and the shortest step the inputs are all but exact, and the
+        integrator restarts most often: what is left there bounds its error in the other runs.
+        With intermediate update, the error of the inputs is as small as the integrator's there, and
+        the two may cancel: the second shortest step counts, too.
+        """
+        shortest = 2 if len(self.errors) > INTERMEDIATE_UPDATE else 1
+        return float(self.errors[-1, -shortest:].max())
+
+    @property
+    def fitted(self) -> np.ndarray:
+        """Which errors the slopes are fitted to, (cases, steps): those clear of integration's."""
+        return self.errors >= CLEAR_OF_INTEGRATION * self.integration_error
+
+    @cached_property
+    def slopes(self) -> tuple[float, ...]:
+        """Slope of log error over log step, one per case; NaN if too few errors count."""
+        return tuple(
+            slope(self.problem.steps[use], errors[use]) if use.sum() >= FEWEST_FITTED else math.nan
+            for errors, use in zip(self.errors, self.fitted, strict=True)
+        )
+
+    def holds(self, i: int) -> bool:
+        """Whether the slope of case i is the one expected, from as many errors as it takes."""
+        enough = bool(self.fitted[i].all()) or POWERS[i] > ALL_FITTED
+        return enough and abs(self.slopes[i] - POWERS[i]) <= LARGEST_DEVIATION
+
+    @property
+    def rows(self) -> list[Row]:
+        """A row per case, as tables show them."""
+        return [
+            Row(NAMES[i], tuple(errors.tolist()), self.slopes[i], self.holds(i))
+            for i, errors in enumerate(self.errors)
+        ]
+
+    @property
+    def violations(self) -> list[str]:
+        """What is not as it should be, one sentence each."""
+        return [
+            f"{NAMES[i]}: slope {self.slopes[i]:.2f} over {self.fitted[i].sum()} steps whose "
+            f"error is {CLEAR_OF_INTEGRATION:g} times that of the integration, expected {POWERS[i]}"
+            for i in range(len(self.errors))
+            if not self.holds(i)
+        ]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every slope is the one expected."""
+        return not self.violations
+
+
+def slope(steps: np.ndarray, errors: np.ndarray) -> float:
+    """Slope of the straight line through log `errors` over log `steps`, by least squares."""
+    return float(np.polynomial.Polynomial.fit(np.log(steps), np.log(errors), 1).convert().coef[1])
+
+
+def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
+    """Inputs of `scenario` as smooth functions of time.
+
+    UserError if one of them is no sum of sines.
+    """
+    for name, signal in scenario.signals.items():
+        if not isinstance(signal, Sines):
+            raise UserError(f"{scenario.path}: [inputs.{name}]: expected sines, which are smooth")
+    return scenario.signals
+
+
+def load(path: Path, model: Model) -> Problem:
+    """Read the problem at `path` and its exact final state.
+
+    UserError if one of the two files is missing or wrong.
+    """
+    scenario = scenarios.load(path, model)
+    if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
+        raise UserError(f"{path}: [time] step: {FACTORS[0]} of it do not divide the duration")
+    inputs = smooth_inputs(scenario)
+    file = project.exact_state_file(path)
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        exact, largest = content["final"], content["largest"]
+        usable = content["time"] == scenario.stop and exact.keys() == largest.keys()
+        usable = usable and exact.keys() <= model.variables.keys()
+        usable = usable and all(math.isfinite(x) for x in exact.values())
+        usable = usable and all(x > 0 for x in largest.values())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UserError(f"{file}: cannot be used: {error!r}") from error
+    if not usable:
+        raise UserError(f"{file}: does not belong to {path}")
+    return Problem(scenario, inputs, exact, largest)
+
+
+def steps_ahead(problem: Problem, with_updates: bool) -> int:
+    """Communication steps that `study` makes, with intermediate update or without."""
+    cases = len(ORDERS) + with_updates
+    shortest = len(problem.scenario.times) - 1
+    return cases * sum(shortest // factor for factor in FACTORS)
+
+
+def study(
+    fmu: Fmu,
+    problem: Problem,
+    progress: Callable[[int], object] = lambda _: None,
+    updated: Fmu | None = None,
+) -> Convergence:
+    """Run `problem` in every case and with every communication step.
+
+    UserError if a function of an FMU fails.
+
+    Parameters
+    ----------
+    fmu : Fmu
+        For all orders of input derivatives.
+    progress : callable, optional
+        Called with the number of steps that each run has made.
+    updated : Fmu, optional
+        For intermediate update; without it, this case is left out.
+    """
+    fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
+    errors = np.empty((len(fmus), len(FACTORS)))
+    for i, of_case in enumerate(fmus):
+        for j, factor in enumerate(FACTORS):
+            errors[i, j] = problem.final_error(final_state(of_case, problem, i, factor))
+            progress((len(problem.scenario.times) - 1) // factor)
+    return Convergence(problem, errors)
+
+
+def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
+    """States at the end of a run.
+
+    Parameters
+    ----------
+    case : int
+        Highest derivative of the inputs that is set, along with all lower ones, 0: none; or
+        INTERMEDIATE_UPDATE.
+    factor : int
+        Communication step, in shortest steps of the problem.
+    """
+    scenario = problem.scenario
+    step_through = _with_updates if case == INTERMEDIATE_UPDATE else _with_derivatives
+    with fmu.instance(scenario.name, list(problem.inputs) if case else ()) as instance:
+        simulation.initialize(instance, scenario, scenario.tolerance)
+        states = instance.reals(list(problem.exact))
+        try:
+            step_through(instance, problem, case, scenario.times[::factor])
+            states.get()
+        except FMICallException as error:
+            raise instance.failure(error, f"with steps of {factor} times the shortest") from error
+        return dict(zip(states.names, states.view.tolist(), strict=True))
+
+
+def _with_derivatives(instance: Instance, problem: Problem, order: int, times: np.ndarray) -> None:
+    """All steps, with the inputs' values and derivatives at the beginning of each."""
+    elapsed = (times - problem.scenario.start)[:-1]
+    sines, names = list(problem.inputs.values()), list(problem.inputs)
+
+    # (steps, orders, inputs)
+    known = np.array([[s.derivative(elapsed, i) for s in sines] for i in range(order + 1)])
+    known = known.reshape(order + 1, len(names), -1).transpose(2, 0, 1)
+    inputs = instance.input_polynomials(names, order)
+    for t, h, rows in zip(times, np.diff(times), known, strict=False):
+        inputs.view[:] = rows
+        inputs.set()
+        instance.do_step(t, h)
+
+
+def _with_updates(instance: Fmi3Instance, problem: Problem, _: int, times: np.ndarray) -> None:
+    """All steps, with the inputs' values at the times that the FMU asks for."""
+    start, sines = problem.scenario.start, list(problem.inputs.values())
+    instance.input_functions(
+        list(problem.inputs), lambda time: [s.derivative(time - start, 0) for s in sines]
+    )
+    for t, h in zip(times, np.diff(times), strict=False):
+        instance.do_step(t, h)

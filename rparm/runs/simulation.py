@@ -1,0 +1,157 @@
+"""Runs scenarios on FMUs."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+
+from rparm.errors import StoppedError, UserError
+from rparm.fmi.fmi_instance import Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.scenarios.scenario import Scenario
+
+PROGRESS_EVERY = 0.1  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Recorded outputs of one run: row i is what an importer reads after the step to times[i]."""
+
+    tolerance: float  # relative, as given to the FMU
+    times: np.ndarray  # (rows,) s
+    names: tuple[str, ...]  # all Real outputs of the FMU
+    values: np.ndarray  # (rows, len(names)) in the variables' units
+    steps: int  # communication steps
+    wall_time: float  # s, of the stepping loop
+    solver_steps: int | None  # None: the FMU has no such variable
+    solver_rhs_evaluations: int | None
+    messages: tuple[str, ...]  # warnings from the FMU, the last ones
+    integers: dict[str, np.ndarray] = field(default_factory=dict)  # (rows,): those to be drawn
+
+
+def simulate(
+    fmu: Fmu,
+    scenario: Scenario,
+    tolerance: float | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Result:
+    """Run `scenario` on `fmu` and record its Real outputs.
+
+    UserError if the FMU has no Real outputs, or if one of its functions fails; the text holds the
+    FMU's own message. In a step it is a `StoppedError`.
+
+    Parameters
+    ----------
+    fmu : Fmu
+        The one that the scenario was checked against.
+    tolerance : float, optional
+        Relative tolerance; None: that of the scenario.
+    progress : callable, optional
+        Called now and then with the number of steps done since the last call.
+    """
+    tolerance = scenario.tolerance if tolerance is None else tolerance
+    if not fmu.model.real_outputs:
+        raise UserError(f"{fmu.path}: has no Real outputs, nothing can be recorded")
+    with fmu.instance(scenario.name) as instance:
+        initialize(instance, scenario, tolerance)
+        drawn = [
+            name
+            for name in dict.fromkeys(chain.from_iterable(scenario.panels))
+            if fmu.model.variables[name].type == "Integer"
+        ]
+        values, integers, wall_time, failure = _step_through(instance, scenario, drawn, progress)
+        ended = failure is None
+        result = Result(
+            tolerance=tolerance,
+            times=scenario.times[scenario.reference_rows][: len(values)],
+            names=tuple(fmu.model.real_outputs),
+            values=values,
+            steps=len(scenario.times) - 1,
+            wall_time=wall_time,
+            solver_steps=instance.integer("solver_steps") if ended else None,
+            solver_rhs_evaluations=instance.integer("solver_rhs_evaluations") if ended else None,
+            messages=tuple(instance.messages),
+            integers=dict(zip(drawn, integers.T, strict=True)),
+        )
+        if failure is not None:
+            raise StoppedError(str(failure), result) from failure
+        return result
+
+
+def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None:
+    """From instantiated to the first communication point of `scenario`."""
+    instance.set_up(scenario.start, scenario.stop, tolerance)
+    for name, value in (scenario.parameters | scenario.initial).items():
+        instance.set(name, value)
+    instance.enter_initialization()
+    for name, values in scenario.inputs.items():
+        instance.set(name, values[0].item())
+    instance.exit_initialization()
+
+
+def _step_through(
+    instance: Instance,
+    scenario: Scenario,
+    drawn: Sequence[str],
+    progress: Callable[[int], object] | None,
+) -> tuple[np.ndarray, np.ndarray, float, UserError | None]:
+    """All steps, or those before one that fails.
+
+    Recorded outputs (rows, outputs), Integers (rows, drawn), seconds of the loop, and the failure.
+    """
+    switches = {name: values for name, values in scenario.inputs.items() if values.dtype == bool}
+    inputs = instance.reals([name for name in scenario.inputs if name not in switches])
+    outputs = instance.reals(instance.fmu.model.real_outputs)
+    columns = [scenario.inputs[name] for name in inputs.names]
+    reals = np.column_stack(columns) if columns else None
+    switching = _switching(switches)
+
+    times, lengths = scenario.times, np.diff(scenario.times)
+    rows = scenario.reference_rows
+    values = np.empty((len(rows), len(outputs.names)))
+    integers = np.empty((len(rows), len(drawn)), int)
+    recorded, reported, i = -1, 0, -1
+    begin = time.perf_counter()
+    due = begin + PROGRESS_EVERY
+    try:
+        outputs.get()
+        values[0] = outputs.view
+        integers[0] = [instance.integer(name) for name in drawn]
+        recorded = 0
+        for i, length in enumerate(lengths):
+            if reals is not None:
+                inputs.view[:] = reals[i]
+                inputs.set()
+            for name in switching.get(i, ()):
+                instance.set(name, bool(switches[name][i]))
+            instance.do_step(times[i], length)
+            if rows[recorded + 1] == i + 1:
+                outputs.get()
+                recorded += 1
+                values[recorded] = outputs.view
+                integers[recorded] = [instance.integer(name) for name in drawn]
+            if progress is not None and time.perf_counter() >= due:
+                progress(i + 1 - reported)
+                reported = i + 1
+                due = time.perf_counter() + PROGRESS_EVERY
+    except FMICallException as error:
+        when = f"in the step from t = {float(times[max(i, 0)])!r} s"
+        failure = instance.failure(error, when)
+        rows_before = slice(recorded + 1)
+        return values[rows_before], integers[rows_before], time.perf_counter() - begin, failure
+    wall_time = time.perf_counter() - begin
+    if progress is not None:
+        progress(len(lengths) - reported)
+    return values, integers, wall_time, None
+
+
+def _switching(switches: dict[str, np.ndarray]) -> dict[int, list[str]]:
+    """Boolean inputs whose value is another one at a communication point, by its index."""
+    found: dict[int, list[str]] = {}
+    for name, values in switches.items():
+        for i in np.flatnonzero(values[1:] != values[:-1]) + 1:
+            found.setdefault(int(i), []).append(name)
+    return found

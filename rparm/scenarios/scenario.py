@@ -1,0 +1,280 @@
+"""Scenarios: what to simulate, read from models/<model>/scenarios/<name>.toml.
+
+The README.md next to the scenarios documents the format. What a scenario says of its model is
+checked against the description of the model's FMU.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rparm import project
+from rparm.errors import UserError, did_you_mean
+from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
+from rparm.input_files import read_toml, show
+from rparm.scenarios.inputs import MEASURED, InputReader
+from rparm.scenarios.reader import Reader
+from rparm.scenarios.signals import Logged, Signal
+from rparm.units import SECONDS
+
+MODEL = "model"  # key of a file that is in no model's folder
+MAX_STEPS = 10_000_000
+MAX_PATTERN = 1000  # step lengths in a pattern
+SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A run of one model: parameters, initial state, communication points and inputs (SI units).
+
+    Only what the file gives is in `parameters`, `initial` and `inputs`; everything else has its
+    start value. Arrays are read-only; those of Boolean inputs hold Booleans.
+    """
+
+    name: str
+    model: str  # folder name below models/
+    path: Path
+    title: str
+    description: str
+    parameters: dict[str, Value]  # an Enumeration's item as its number
+    initial: dict[str, Value]
+    start: float  # s
+    stop: float  # s
+    steps: tuple[float, ...]  # s, pattern of step lengths; one element: a constant step
+    tolerance: float  # relative
+    times: np.ndarray  # (n + 1,) communication points in s, from start to stop
+    signals: dict[str, Signal]  # inputs as functions of time
+    inputs: dict[str, np.ndarray]  # (n + 1,) each, zero-order hold: over the step from times[i]
+    reference_every: int  # every k-th communication point is in the reference
+    defaults: dict[str, Value]  # start values in the FMU
+    panels: tuple[tuple[str, ...], ...] = ()  # variables to draw beside the states, by diagram
+    measured: dict[str, Logged] = field(default_factory=dict)  # outputs to compare with logs
+    logs: dict[str, str] = field(
+        default_factory=dict
+    )  # SHA-256 of logs of inputs, by file as given
+    questions: tuple[str, ...] = ()  # to ask the user: values that are hardly meant so
+    smallest_tolerance: float = 0.0  # relative; a smaller one makes no difference
+
+    @property
+    def start_values(self) -> dict[str, Value]:
+        """Start values of all variables: those that the file gives, else those in the FMU."""
+        return self.defaults | self.parameters | self.initial
+
+    def input(self, name: str) -> np.ndarray:
+        """Values of an input, (n + 1,): its start value throughout if the file gives none."""
+        if name in self.inputs:
+            return self.inputs[name]
+        return np.full(len(self.times), self.defaults[name])
+
+    @property
+    def reference_folder(self) -> Path:
+        """models/<model>/references/<name>."""
+        return project.reference_folder(self.path)
+
+    @property
+    def reference_rows(self) -> np.ndarray:
+        """Indices (rows,) of the communication points in the reference: every k-th and the last."""
+        last = len(self.times) - 1
+        return np.append(np.arange(0, last, self.reference_every), last)
+
+    @property
+    def input_rows(self) -> np.ndarray:
+        """Indices (rows,) into the inputs of the step that ends at each point in the reference."""
+        return np.maximum(self.reference_rows - 1, 0)
+
+
+def title(path: Path) -> str:
+    """Title of the scenario at `path`; the rest of the file is not checked."""
+    content = read_toml(path)
+    reader = Reader(path)
+    if "title" not in content:
+        reader.fail("missing key 'title'")
+    return reader.text(content["title"], "title")
+
+
+def folder_of(path: Path) -> Path:
+    """Folder of the model of a scenario: that its key `model` names, or else the one it lies in.
+
+    UserError if the file cannot be read, or names no model.
+    """
+    content, reader = read_toml(path), Reader(path)
+    if MODEL not in content:
+        if project.is_in_model(path):
+            return project.model_folder(path)
+        known = ", ".join(project.models())
+        reader.fail(f"missing key {MODEL!r}: the name of what the scenario is of (known: {known})")
+    name = reader.text(content[MODEL], MODEL)
+    try:
+        return project.model(name)
+    except UserError as error:
+        reader.fail(f"{MODEL}: {error}")
+
+
+def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
+    """Read and check the scenario at `path`, of the project or of a user.
+
+    UserError if the file cannot be read, or if anything in it is wrong.
+
+    Parameters
+    ----------
+    model : Model
+        What the model's FMU declares.
+    times : mapping, optional
+        Values that replace those of section [time].
+    """
+    path = Path(path)
+    content = read_toml(path)
+    folder = folder_of(path)
+    reader = _Reader(path)
+    reader.keys(
+        content,
+        "",
+        required=("title", "description", "tolerance", "time"),
+        optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED),
+    )
+    tolerance = reader.number(content["tolerance"], "tolerance")
+    if not 0 < tolerance < 1:
+        reader.fail(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
+    every = content.get("reference_every", 1)
+    if type(every) is not int or every < 1:
+        reader.fail(f"reference_every: expected a whole number from 1 on, got {show(every)}")
+
+    start, stop, steps = reader.time(reader.table(content["time"], "[time]") | dict(times or {}))
+    times = reader.communication_points(start, stop, steps)
+    parameters = reader.values(content, PARAMETERS, model)
+    reader.tolerances(tolerance, parameters, model)
+    initial = reader.values(content, INITIAL, model)
+    inputs = InputReader(reader, model, times)
+    signals = inputs.inputs(content)
+    logs = inputs.hashes  # without those of measurements, which no run follows from
+    return Scenario(
+        name=path.stem,
+        model=folder.name,
+        path=path.absolute(),
+        title=reader.text(content["title"], "title"),
+        description=reader.text(content["description"], "description"),
+        parameters=parameters,
+        initial=initial,
+        start=start,
+        stop=stop,
+        steps=steps,
+        tolerance=tolerance,
+        times=times,
+        signals=signals,
+        inputs=inputs.sampled(signals),
+        reference_every=min(every, MAX_STEPS),
+        defaults=model.start_values,
+        panels=reader.panels(content, model),
+        measured=inputs.measured(content),
+        logs=logs,
+        questions=tuple(reader.questions),
+        smallest_tolerance=model.smallest_tolerance(parameters),
+    )
+
+
+class _Reader(Reader):
+    """Takes the sections of a scenario but its inputs."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.questions: list[str] = []
+
+    # parameters and initial states
+
+    def values(self, content: dict[str, Any], section: str, model: Model) -> dict[str, Value]:
+        """Section [parameters] or [initial]: name = value, as `Variable.checked` takes it."""
+        result = {}
+        for name, given in self.table(content.get(section, {}), f"[{section}]").items():
+            with self.placed(f"[{section}]"):
+                variable = model.find(name, section)
+            with self.placed(f"[{section}] {name}"):
+                result[name] = variable.checked(given)
+            if question := variable.question(given):
+                self.questions.append(f"[{section}] {name}: {question}")
+        return result
+
+    def tolerances(self, tolerance: float, parameters: dict[str, Value], model: Model) -> None:
+        """Refuse what the method of integration cannot reach."""
+        given = [("tolerance", tolerance)]
+        if parameters.get(TOLERANCE):  # 0: that of the scenario
+            given.append((f"[{PARAMETERS}] {TOLERANCE}", parameters[TOLERANCE]))
+        for key, value in given:
+            with self.placed(key):
+                model.check_tolerance(value, parameters)
+
+    # pictures
+
+    def panels(self, content: dict[str, Any], model: Model) -> tuple[tuple[str, ...], ...]:
+        """Key panels: lists of variables that are drawn into one diagram, of one unit."""
+        if "panels" not in content:
+            return ()
+        drawn = [
+            v.name
+            for v in model.variables.values()
+            if (v.causality == "output" and v.type in ("Real", "Integer"))
+            or (v.causality == "input" and v.type == "Real")
+        ]
+        result = []
+        for i, names in enumerate(self.array(content["panels"], "panels", "lists of variables")):
+            key = f"panels[{i}]"
+            for name in self.array(names, key, "variables"):
+                if name not in drawn:
+                    guess = did_you_mean(name, drawn) if isinstance(name, str) else ""
+                    self.fail(f"{key}: {show(name)} cannot be drawn{guess}")
+            variables = [model.variables[name] for name in names]
+            if len({(variable.type, variable.unit) for variable in variables}) > 1:
+                self.fail(f"{key}: expected variables of one type and unit")
+            result.append(tuple(names))
+        return tuple(result)
+
+    # time
+
+    def time(self, content: Any) -> tuple[float, float, tuple[float, ...]]:
+        table = self.table(content, "[time]")
+        self.keys(table, "[time]", required=("start", "stop", "step"))
+        start = self.quantity(table["start"], "[time] start", SECONDS)
+        stop = self.quantity(table["stop"], "[time] stop", SECONDS)
+        if stop <= start or not math.isfinite(stop - start):
+            self.fail(f"[time] stop: expected a time after start = {start!r}, got {stop!r}")
+        given = table["step"]
+        if isinstance(given, list):
+            self.array(given, "[time] step", "numbers")
+            if len(given) > MAX_PATTERN:
+                count = len(given)
+                self.fail(f"[time] step: has {count} lengths, expected at most {MAX_PATTERN}")
+        else:
+            given = [given]
+        steps = tuple(self.quantity(step, "[time] step", SECONDS) for step in given)
+        for step in steps:
+            if step <= 0:
+                self.fail(f"[time] step: expected more than 0 s, got {step!r}")
+            if start + step == start or stop - step == stop:
+                self.fail(f"[time] step: {step!r} s is lost in rounding between start and stop")
+        try:
+            count = (stop - start) / math.fsum(steps) * len(steps)
+        except OverflowError:
+            self.fail("[time] step: the sum of the pattern overflows")
+        if count > MAX_STEPS:
+            self.fail(f"[time] step: makes {count:.3g} steps, expected at most {MAX_STEPS}")
+        return start, stop, steps
+
+    def communication_points(
+        self, start: float, stop: float, steps: tuple[float, ...]
+    ) -> np.ndarray:
+        """Times from start to stop in s, each computed from its index: nothing accumulates."""
+        period = math.fsum(steps)
+        cycles = math.ceil((stop - start) / period) + 1
+        within = np.array([math.fsum(steps[:i]) for i in range(len(steps))])
+        with np.errstate(over="ignore"):  # beyond stop
+            times = start + (np.arange(cycles)[:, None] * period + within).ravel()
+        remainder = np.maximum(SLIVER * np.array(steps), 4 * np.spacing(max(abs(start), abs(stop))))
+        times = times[stop - times >= np.tile(remainder, cycles)]
+        times = np.concatenate(([start], times[times > start], [stop]))
+        if not np.all(np.diff(times) > 0):
+            self.fail("[time] step: too short, communication points coincide")
+        times.setflags(write=False)
+        return times

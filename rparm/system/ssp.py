@@ -1,0 +1,53 @@
+"""SSP archives: unpacked, read and checked, once."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rparm.archives import unpack
+from rparm.errors import placed
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Model, Variable
+from rparm.interruption import temporary_folder
+from rparm.system import ssp_checks
+from rparm.system.ssp_reader import SspReader
+from rparm.system.structure import System
+
+
+@dataclass(frozen=True)
+class Ssp:
+    """An SSP that is unpacked and can be run."""
+
+    path: Path
+    folder: Path  # where it is unpacked
+    system: System
+    models: Mapping[str, Model]  # what the FMU of each component declares
+
+    def fmu(self, component: str) -> Path:
+        """FMU of a component, as a file."""
+        return self.folder / self.system.component(component).source
+
+    def unpacked_fmu(self, component: str) -> Fmu:
+        """FMU of a component, unpacked; messages name the SSP."""
+        return Fmu(self.fmu(component), shown=self.path / self.system.component(component).source)
+
+    def variable(self, name: str) -> Variable:
+        """What the FMU declares of ``component.variable``."""
+        component, _, variable = name.partition(".")
+        return self.models[component].variables[variable]
+
+
+@contextmanager
+def unpacked(path: Path) -> Iterator[Ssp]:
+    """Unpack an SSP to a temporary folder, which is removed at the end, and read it.
+
+    UserError if it is damaged, or no system that can be run (what that is:
+    `rparm.system.ssp_checks`).
+    """
+    path = Path(path)
+    with temporary_folder() as folder:
+        with placed(path):
+            unpack(path, folder, "SSP")
+        system = SspReader(path, folder).system()
+        yield Ssp(path, folder, system, ssp_checks.checked_models(path, folder, system))

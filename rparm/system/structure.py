@@ -1,0 +1,85 @@
+"""A system of connected FMUs: components, connections, and the variants of its parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from rparm.fmi.model import Value
+
+
+@dataclass(frozen=True)
+class Connector:
+    """A variable of a component that the system sees."""
+
+    name: str
+    kind: str  # input, output, parameter or calculatedParameter
+    type: str  # Real, Integer, Boolean, String or Enumeration
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class Component:
+    """One FMU in the system."""
+
+    name: str
+    source: str  # path of the FMU inside the SSP
+    connectors: dict[str, Connector]  # by name, in the order of the file
+
+
+@dataclass(frozen=True)
+class Connection:
+    """An output that feeds an input."""
+
+    start_component: str
+    start_connector: str
+    end_component: str
+    end_connector: str
+
+    def __str__(self) -> str:
+        return (
+            f"{self.start_component}.{self.start_connector} -> "
+            f"{self.end_component}.{self.end_connector}"
+        )
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A value that a parameter set gives to a variable."""
+
+    type: str  # Real, Integer, Boolean or String
+    value: Value
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class System:
+    """Structure of a system, and the variants of its parameters."""
+
+    name: str
+    components: tuple[Component, ...]  # in the order of the file
+    connections: tuple[Connection, ...]
+    start: float  # s
+    stop: float  # s
+    step: float  # s, communication step
+    # variant -> component -> variable; a component without a binding has no values
+    parameters: dict[str, dict[str, dict[str, Parameter]]]
+    descriptions: Mapping[str, str] = field(default_factory=dict)  # of variants that have one
+
+    @property
+    def parameter_sets(self) -> dict[str, dict[str, dict[str, Value]]]:
+        """Only the values: variant -> component -> variable -> value, variants in file order."""
+        return {
+            variant: {
+                component: {name: parameter.value for name, parameter in values.items()}
+                for component, values in components.items()
+            }
+            for variant, components in self.parameters.items()
+        }
+
+    @property
+    def steps(self) -> int:
+        """Number of communication steps from start to stop."""
+        return round((self.stop - self.start) / self.step)
+
+    def component(self, name: str) -> Component:
+        """Component called `name`."""
+        return next(component for component in self.components if component.name == name)

@@ -1,0 +1,82 @@
+"""Loads what is specific to a system: its measures, its picture, the study of its coupling.
+
+The folder has a module study.py with the names of `Study`; `load` gives it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Protocol, cast
+
+from matplotlib.figure import Figure
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.input_files import is_file
+from rparm.system.comparison import Outcome
+from rparm.system.ssp import Ssp
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number that a run is measured by, for the tables."""
+
+    name: str
+    unit: str
+    meaning: str  # explains it on the page, after its name and a colon
+    value: Callable[[Outcome], float]
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Variables of one unit to draw together, each ``component.variable``."""
+
+    title: str
+    curves: Sequence[str]
+    references: Mapping[str, str] = field(default_factory=dict)  # what a curve should follow
+
+
+class Study(Protocol):
+    """The module study.py of a system's folder."""
+
+    EXPERIMENT: tuple[float, float, float]  # start, stop and step in s that the references are for
+    MEASURES: Sequence[Measure]
+    DIAGRAMS: Sequence[Diagram]  # of the page of a variant
+
+    def figure(self, ssp: Ssp, outcome: Outcome) -> Figure:
+        """Picture of a run of one variant, for READMEs."""
+        ...
+
+
+class CouplingStudy(Study, Protocol):
+    """The module of a system that has a study of what the coupling costs."""
+
+    def study_coupling(self, ssp: Path, report: Path) -> dict[str, dict[str, object]]:
+        """Study what the coupling costs, print tables, write pictures.
+
+        Numbers of each part of the study by its name; whether all is well is ``passed``.
+        """
+        ...
+
+
+def load(folder: Path) -> Study:
+    """The module of a system's folder; UserError if there is none."""
+    file = folder / f"{project.STUDY}.py"
+    if not is_file(file):
+        raise UserError(f"{file}: no such file, rparm/system/study.py says what belongs in it")
+    return cast(Study, import_module(f"rparm.models.{folder.name}.{project.STUDY}"))
+
+
+def of_coupling() -> tuple[Path, CouplingStudy]:
+    """Folder and module of the system that has a study of its coupling.
+
+    UserError if there is not exactly one.
+    """
+    loaded = {folder: load(folder) for folder in project.systems().values()}
+    found = {folder: known for folder, known in loaded.items() if hasattr(known, "study_coupling")}
+    if len(found) != 1:
+        names = ", ".join(folder.name for folder in found) or "none"
+        raise UserError(f"expected one system with a study of its coupling, found {names}")
+    (folder, known), *_ = found.items()
+    return folder, cast(CouplingStudy, known)

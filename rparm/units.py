@@ -1,0 +1,166 @@
+"""Values that users give with a unit, as "90 deg", "300 mm" or "2kN": what they are in SI.
+
+What is known for a variable: its own unit, the display units that its FMU declares for it, and both
+with one factor exchanged: m, s and N take the prefixes m, c and k, and each factor the display
+units of its own. Conversions are exact and rounded once; degrees are those of `math.radians`.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from rparm.errors import WrongValueError, did_you_mean
+from rparm.input_files import show
+
+PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
+PREFIXED = ("m", "s", "N")
+NONE = (None, "", "1")  # what variables without a unit have
+ANGLE = "rad"
+DEGREE = Fraction(180 / math.pi)  # degrees of a radian
+SAME = Fraction(1, 10**12)  # FMUs write as many digits of it as they like
+LONGEST = 100  # characters of a value with its unit
+MOST_SHOWN = 20  # units in a message
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+QUANTITY = re.compile(rf"({NUMBER})[ \t]*([^\s\d.,+-].*|1/.*)?", re.ASCII)
+FACTOR = re.compile(r"([A-Za-z]+)(-?\d)?", re.ASCII)
+PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
+TYPED = str.maketrans({"·": ".", "²": "2", "³": "3"})  # as pages write units
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a value is given in: number = factor * value + offset, as FMI defines display units."""
+
+    factor: Fraction = Fraction(1)
+    offset: Fraction = Fraction(0)
+
+    def value(self, number: str, is_difference: bool = False) -> float:
+        """The value of a `number`, a finite literal; a difference of two has no offset."""
+        if not self.offset and abs(self.factor - DEGREE) <= SAME * DEGREE:
+            return math.radians(float(number))
+        # an exponent of any size is that of 0 here: others have been refused
+        exact = Fraction(number) if float(number) else Fraction(0)
+        exact = (exact if is_difference else exact - self.offset) / self.factor
+        return float(exact) if exact else math.copysign(0.0, float(number))
+
+
+Units = Mapping[str, Unit]  # by name, the variable's own first
+Displays = Mapping[str, Units]  # display units, by the unit that they belong to
+
+
+def display_unit(factor: object, offset: object) -> Unit:
+    """Unit that an FMU declares; ValueError if its numbers are of no use."""
+    numbers = [float(str(number)) for number in (factor, offset)]
+    if not all(map(math.isfinite, numbers)) or not numbers[0]:
+        raise ValueError(f"display unit with factor {factor} and offset {offset}")
+    return Unit(*(Fraction(repr(number)) for number in numbers))
+
+
+def units_of(name: str | None, displays: Displays) -> Units:
+    """All units in which a value may be given whose own is `name`; empty if it has none."""
+    if name in NONE:
+        return {}
+    known = {name: Unit()} | dict(displays.get(name, {}))
+    for other, unit in _exchanged(name, displays):
+        known.setdefault(other, unit)
+    return known
+
+
+def _exchanged(name: str, displays: Displays) -> Iterator[tuple[str, Unit]]:
+    """Units that differ from `name` in one factor."""
+    product = PRODUCT.fullmatch(name)
+    if not product:
+        return
+    for part in (1, 2, 3):
+        begin = product.start(part)
+        for factor in (product[part] or "").split("."):
+            found = FACTOR.fullmatch(factor)
+            if found:
+                power = int(found[2] or 1) * (1 if part == 1 else -1)
+                rest = name[begin + len(found[1]) :]
+                for other, unit in _alternatives(found[1], displays).items():
+                    yield f"{name[:begin]}{other}{rest}", Unit(unit.factor**power)
+            begin += len(factor) + 1
+
+
+def _alternatives(symbol: str, displays: Displays) -> dict[str, Unit]:
+    """What may stand for a factor of a unit."""
+    found = {name: unit for name, unit in displays.get(symbol, {}).items() if not unit.offset}
+    if symbol in PREFIXED:
+        found |= {f"{prefix}{symbol}": Unit(factor) for prefix, factor in PREFIXES.items()}
+    return found
+
+
+# of what scenarios and campaigns have besides the variables of models
+SECONDS = units_of("s", {})
+HERTZ = units_of("Hz", {})
+RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
+
+
+def finite_number(given: Any) -> float:
+    """`given` as a float; WrongValueError if it is not a finite number."""
+    if isinstance(given, bool) or not isinstance(given, int | float):
+        raise WrongValueError(f"expected a number, got {show(given)}")
+    try:
+        number = float(given)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise WrongValueError(f"expected a finite number, got {show(given)}")
+    return number
+
+
+def quantity(given: Any, known: Units, is_difference: bool = False) -> float:
+    """Value of a number, or of a text with a number and one of the `known` units.
+
+    WrongValueError if it is neither, or not finite; names the known units.
+    """
+    if not isinstance(given, str):
+        return finite_number(given)
+    number, unit = _parts(given, known)
+    if not unit:
+        raise WrongValueError(
+            f"expected a unit after the number, or no quotation marks{_known(known)}, "
+            f"got {show(given)}"
+        )
+    return _value(given, number, unit, known, is_difference)
+
+
+def typed_quantity(text: str, known: Units) -> float:
+    """Value of a text of the command line: a number, with a unit or without one.
+
+    WrongValueError: as `quantity`.
+    """
+    number, unit = _parts(text, known)
+    return _value(text, number, unit or next(iter(known), ""), known)
+
+
+def _parts(text: str, known: Units) -> tuple[str, str]:
+    """Number and unit of a text."""
+    found = QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST else None
+    if not found:
+        form = f"a number, or a number and its unit{_known(known)}" if known else "a number"
+        raise WrongValueError(f"expected {form}, got {show(text)}")
+    if found[2] and not known:
+        raise WrongValueError(f"expected a number without a unit, got {show(text)}")
+    return found[1], found[2] or ""
+
+
+def _value(given: str, number: str, name: str, known: Units, is_difference: bool = False) -> float:
+    unit = known.get(name) or known.get(name.translate(TYPED)) if name else Unit()
+    if unit is None:
+        guess = did_you_mean(name, known)
+        raise WrongValueError(f"unknown unit {show(name)}{guess}{_known(known)}")
+    with suppress(OverflowError):
+        if math.isfinite(float(number)):
+            return unit.value(number, is_difference)
+    raise WrongValueError(f"expected a finite number, got {show(given)}")
+
+
+def _known(known: Units) -> str:
+    names = [*list(known)[:MOST_SHOWN], *(["..."] if len(known) > MOST_SHOWN else [])]
+    return f" (known: {', '.join(names)})" if names else ""

@@ -1,0 +1,191 @@
+"""Errors against the references, their bounds, and the report that shows them."""
+
+import math
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rparm.fmi.fmu_file import Fmu
+from rparm.report import scenario_page
+from rparm.report.writer import ReportWriter
+from rparm.runs import comparison, reference, simulation, tolerance_sweep
+from rparm.runs.comparison import Runs
+from rparm.runs.reference import Reference
+from rparm.runs.tolerance_sweep import Sweep
+from tests.report.sizes import OF_SCENARIOS
+from tests.support.paths import FOLDERS
+from tests.support.rparm_project import (
+    LONG,
+    NAMES,
+    SHORT,
+    load,
+)
+
+
+@pytest.fixture(scope="module")
+def runs(opened: Fmu) -> Iterator[Runs]:
+    """Of all models, whose FMUs lie in one folder."""
+    with ExitStack() as stack:
+        fmus = {
+            folder: stack.enter_context(Fmu(opened.path.with_name(f"{name}.fmu")))
+            for name, folder in FOLDERS.items()
+            if name != opened.path.stem
+        }
+        yield Runs({FOLDERS[opened.path.stem]: opened, **fmus})
+
+
+@pytest.fixture(scope="module")
+def sweeps(runs: Runs) -> dict[str, Sweep]:
+    return {name: tolerance_sweep.sweep(runs, load(name)) for name in NAMES}
+
+
+# ---- error measure and bounds
+
+
+ENERGIES = ("kinetic_energy", "potential_energy")
+SUMMED = {"potential_energy": ENERGIES, "total_energy": ENERGIES}
+
+
+def measured(expected: dict[str, list[float]], got: dict[str, list[float]]) -> dict[str, float]:
+    values = np.array([*expected.values()]).T
+    table = Reference(Path("ref.csv"), np.arange(2.0), tuple(expected), values, SUMMED)
+    result = SimpleNamespace(names=tuple(got), values=np.array([*got.values()]).T)
+    return reference.errors(result, table)
+
+
+def test_error_is_relative_to_the_largest_reference() -> None:
+    errors = measured({"q1": [1.0, -4.0]}, {"q1": [1.5, -4.0]})
+    assert errors == {"q1": 0.5 / 4.0}
+
+
+def test_small_references_count_as_a_thousandth() -> None:
+    errors = measured({"q1": [0.0, 1e-5], "q2": [0.0, 0.0]}, {"q1": [0.0, 3e-5], "q2": [0.0, 2e-6]})
+    assert errors == pytest.approx({"q1": 2e-5 / 1e-3, "q2": 2e-6 / 1e-3})
+
+
+def test_energies_are_relative_to_what_is_exchanged() -> None:
+    expected = {
+        "kinetic_energy": [0.0, 6.0],
+        "potential_energy": [5.0, -1.0],  # |K| + |P| = 5, 7
+        "total_energy": [0.0, 0.0],
+    }
+    got = {
+        "kinetic_energy": [0.0, 6.6],
+        "potential_energy": [5.7, -1.0],
+        "total_energy": [0.0, 1.4],
+    }
+    errors = measured(expected, got)
+    wanted = {"kinetic_energy": 0.1, "potential_energy": 0.1, "total_energy": 0.2}
+    assert errors == pytest.approx(wanted)
+
+
+def test_the_arms_energies_have_that_scale(runs: Runs) -> None:
+    assert runs.run(load(SHORT), 1e-8).reference.summed == SUMMED
+
+
+def test_energy_scale_needs_both_energies() -> None:
+    assert measured({"total_energy": [2.0, 2.0]}, {"total_energy": [2.0, 3.0]}) == {
+        "total_energy": 0.5
+    }
+
+
+def test_values_that_are_not_finite_fail(runs: Runs) -> None:
+    run = runs.run(load(SHORT), 1e-8)
+    errors = {**run.errors, "q2": math.nan}
+    broken = comparison.Run(run.scenario, run.fmu, run.result, run.reference, errors)
+    assert math.isnan(broken.error) and broken.worst == "q2" and not broken.passed
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "expected"),
+    [(1e-4, 1e-1), (1e-7, 1e-4), (1e-8, 1e-6), (5e-9, 1e-6), (1e-9, 1e-6), (1e-10, 1e-7)]
+    + [(1e-11, 1e-8), (1e-12, 1e-9)],
+)
+def test_bound(tolerance: float, expected: float) -> None:
+    assert reference.bound(tolerance) == pytest.approx(expected, rel=1e-12)
+    assert tolerance not in reference.BOUNDS or reference.bound(tolerance) <= expected
+
+
+def test_rules_on_errors_over_tolerances() -> None:
+    tolerances = (1e-4, 1e-5, 1e-6)
+    assert not tolerance_sweep.violations(tolerances, (1e-3, 3e-3, 1e-6))
+    assert not tolerance_sweep.violations(tolerances, (2e-10, 5e-11, 9e-11))
+    assert not tolerance_sweep.violations(tolerances, (0.0, 0.0, 0.0))
+    (above,) = tolerance_sweep.violations(tolerances, (0.2, 1e-5, 1e-6))
+    assert "2.00e-01 at tolerance 0.0001 is above its bound 1e-01" in above
+    (rise,) = tolerance_sweep.violations(tolerances, (1e-2, 1e-6, 3.1e-6))
+    assert "more than 3 times" in rise
+    (gain,) = tolerance_sweep.violations(tolerances, (1e-4, 1e-5, 1.1e-7))
+    assert "above 1/1000" in gain
+    assert len(tolerance_sweep.violations(tolerances, (1e-4, math.nan, 1e-8))) == 3
+
+
+# ---- the built FMU
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_error_at_the_default_tolerance(runs: Runs, name: str) -> None:
+    run = runs.run(load(name), load(name).tolerance)
+    assert run.error <= 1e-6, run.worst
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_error_at_the_tightest_tolerance(runs: Runs, name: str) -> None:
+    run = runs.run(load(name), 1e-11)
+    assert run.error <= 1e-8, run.worst
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_error_follows_the_tolerance(sweeps: dict[str, Sweep], name: str) -> None:
+    swept = sweeps[name]
+    assert swept.tolerances == (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
+    assert swept.violations == []
+    errors = np.array(swept.errors)
+    assert np.all(errors <= 1000 * np.array(swept.tolerances) * (1 + 1e-15))
+    assert np.all(errors[1:] <= 3 * errors[:-1])
+    assert errors[-1] <= errors[0] / 1000 or errors[-1] < 1e-10
+
+
+def test_nothing_runs_twice(
+    runs: Runs, sweeps: dict[str, Sweep], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(simulation, "simulate")
+    again = tolerance_sweep.sweep(runs, load(LONG))
+    assert again.errors == sweeps[LONG].errors
+    assert runs.steps_ahead(load(LONG), tolerance_sweep.TOLERANCES) == 0
+
+
+# ---- report
+
+
+def test_report_shows_every_scenario(runs: Runs, sweeps: dict[str, Sweep], tmp_path: Path) -> None:
+    done = [runs.run(load(name), tolerance) for name in NAMES for tolerance in (1e-8, 1e-11)]
+    writer = ReportWriter(tmp_path / "new" / "report")
+    index = writer.write(writer.grouped(done), list(sweeps.values()))
+    overview = index.read_text(encoding="utf-8")
+    for name in NAMES:
+        assert f'href="scenarios/{name}.html"' in overview
+        page = (index.parent / "scenarios" / f"{name}.html").read_text(encoding="utf-8")
+        assert f'href="{name}.csv"' in page
+    assert 'href="studies/accuracy.html"' in overview
+    assert sum(path.stat().st_size for path in index.parent.rglob("*.*")) < OF_SCENARIOS
+    written = np.loadtxt(index.parent / "scenarios" / f"{LONG}.csv", delimiter=",", skiprows=1)
+    result = runs.run(load(LONG), 1e-8).result
+    digits = 10.0 ** (1 - scenario_page.DIGITS)
+    outputs = written[:, 1 : 1 + len(result.names)]
+    np.testing.assert_allclose(outputs, result.values, rtol=digits, atol=0)
+
+
+def test_report_shows_failures(runs: Runs, tmp_path: Path) -> None:
+    run = runs.run(load(SHORT), 1e-8)
+    failed = comparison.Run(run.scenario, run.fmu, run.result, run.reference, {"q1": 1.0})
+    broken = Sweep(run.scenario, (1e-4, 1e-5), (1e-3, math.nan), ["<broken>"])
+    writer = ReportWriter(tmp_path)
+    overview = writer.write(writer.grouped([failed]), [broken]).read_text(encoding="utf-8")
+    assert overview.count("FAILED") == 2 and "2 of 2 failed" in overview
+    assert "FAILED" in (tmp_path / "scenarios" / f"{SHORT}.html").read_text(encoding="utf-8")
+    assert "&lt;broken&gt;" in (tmp_path / "studies/accuracy.html").read_text(encoding="utf-8")

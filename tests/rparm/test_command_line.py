@@ -1,0 +1,209 @@
+"""The command line: runs, mistakes of the user, interruptions."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rparm import trajectory_csv
+from rparm.commands import run as run_command
+from rparm.runs import simulation
+from tests.support.paths import ROOT
+from tests.support.rparm_project import (
+    LONG,
+    NAMES,
+    SHORT,
+    assert_one_line,
+    call,
+    edit,
+    load,
+    reference_file,
+    repacked,
+)
+
+
+def test_run_passes(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = project / "report"
+    code, out, err = call(capsys, "run", "--fmu", fmu, "--report", folder)
+    assert code == 0 and err == ""
+    rows = [line.split() for line in out.splitlines() if line.endswith("passed")]
+    assert [[*row[:2], row[4]] for row in rows] == [[LONG, "500", "1e-8"], [SHORT, "1", "1e-8"]]
+    for row in rows:  # an error at each tolerance, in rows of one length
+        assert len(row) == len(rows[0]) and float(row[2]) < 1e-6 and float(row[5]) < 1e-8
+    assert "errors follow the tolerance, 1e-4 to 1e-11: 2 scenarios" in out
+    assert out.endswith(f"report: {folder / 'index.html'}\npassed: 2 scenarios\n")
+    for page in (f"scenarios/{SHORT}", "studies/accuracy"):
+        assert (folder / f"{page}.html").is_file()
+
+
+def test_run_of_one_scenario_at_one_tolerance(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = project / "report"
+    arguments = ("run", SHORT, SHORT, "--tolerance", "1e-6", "--fmu", fmu, "--report", folder)
+    code, out, _ = call(capsys, *arguments)
+    assert code == 0 and "passed: 1 scenario\n" in out
+    assert out.count("1e-6") == 1 and "1e-11" not in out
+    assert not (folder / "studies/accuracy.html").exists()
+
+
+def test_slow_scenarios_called_by_name_are_not_swept(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_command, "QUICK", 0.0)
+    code, out, _ = call(capsys, "run", SHORT, "--fmu", fmu, "--report", project / "report")
+    assert code == 0 and f"{SHORT}: no sweep" in out and "error at tolerance" not in out
+
+
+def test_run_with_a_worse_reference_fails(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = reference_file(project, LONG)
+    lines = file.read_text().splitlines()
+    header, row = lines[0].split(","), lines[250].split(",")
+    column = header.index('"ee_vy"')
+    row[column] = repr(float(row[column]) + 1e-3)
+    lines[250] = ",".join(row)
+    file.write_text("\n".join(lines) + "\n")
+    code, out, err = call(capsys, "run", "--fmu", fmu, "--report", project / "report")
+    assert code == 1 and err == ""
+    assert len(re.findall("(?m)^  tolerance 1e-(8|11): error .* of ee_vy, above its", out)) == 2
+    assert "  FAILED: error" in out and out.endswith(f"\nfailed: 1 scenario: {LONG}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (["run", "constant_efort"], "did you mean 'constant_effort'"),
+        (["run", "--fmu", "/nowhere/X.fmu"], "/nowhere/X.fmu: no such file"),
+        (["run", "--fmu", "/"], "is a folder"),
+        (["run"], "build: has no FMU of rp_manipulator: ./run.sh builds it"),
+        (["run", "--tolerance", "0"], "between 0 and 1"),
+        (["run", "--tolerance", "tight"], "between 0 and 1"),
+        (["run", "--fmux", "a"], "--fmux"),
+        (["simulate"], "no scenario or command 'simulate' (./run.sh --list names"),
+    ],
+)
+def test_mistakes_of_the_user(
+    project: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], reason: str
+) -> None:
+    code, out, err = call(capsys, *arguments)
+    assert code == 2 and out == ""
+    assert reason in err
+    assert_one_line(err)
+
+
+def test_file_that_is_no_fmu_or_cut_off(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content, file = fmu.read_bytes(), project / "cut.fmu"
+    cuts = (content[:length] for length in (0, 100, len(content) // 2, len(content) - 10))
+    for wrong in (b"not a zip archive", *cuts):
+        file.write_bytes(wrong)
+        code, _, err = call(capsys, "run", "--fmu", file)
+        assert code == 2 and "cut.fmu: not an FMU" in err
+        assert_one_line(err)
+
+
+def test_fmu_with_another_guid_on_the_command_line(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = repacked(fmu, project / "guid.fmu", lambda xml: xml.replace('guid="', 'guid="x', 1))
+    code, _, err = call(capsys, "run", SHORT, "--fmu", other, "--report", project / "report")
+    assert code == 2 and "guid.fmu: fmi2Instantiate failed: " in err and "guid" in err.lower()
+    assert_one_line(err)
+
+
+def test_report_that_cannot_be_written(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (project / "taken").write_text("")
+    for report in ("taken", "taken/out"):
+        arguments = (
+            "run",
+            SHORT,
+            "--tolerance",
+            "1e-8",
+            "--fmu",
+            fmu,
+            "--report",
+            project / report,
+        )
+        code, out, err = call(capsys, *arguments)
+        assert (code, out) == (2, "") and "the report cannot be written" in err  # nothing has run
+        assert_one_line(err)
+
+
+@pytest.mark.parametrize("command", [("run", SHORT), ("system", "nominal"), ("coupling",)])
+@pytest.mark.parametrize("folder", ["{}/new", "{}"], ids=["in it", "itself"])
+def test_report_in_a_folder_that_takes_no_files(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...], folder: str
+) -> None:
+    """Root may write everywhere but to /proc; systems without it have folders without rights."""
+    closed = Path("/proc")
+    if not closed.is_dir():
+        closed = tmp_path / "closed"
+        closed.mkdir(mode=0o500)
+    code, out, err = call(capsys, *command, "--report", folder.format(closed))
+    assert (code, out) == (2, "") and "the report cannot be written" in err  # nothing has run
+    assert_one_line(err)
+
+
+def test_interruption(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(simulation, "simulate", interrupt)
+    code, _, err = call(capsys, "run", SHORT, "--fmu", fmu)
+    assert code == 130 and err == "interrupted\n"
+
+
+def test_list(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call(capsys, "list")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()] == [LONG, SHORT]
+    assert load(LONG).title in out
+
+
+def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) -> None:
+    path = project / f"models/rp_manipulator/scenarios/{LONG}.toml"
+    edit(path, "step = 0.01", "step = 2e-6")
+    edit(path, "tolerance = 1e-8", "tolerance = 1e-8\nreference_every = 5000")
+    file = reference_file(project, LONG)
+    rows = np.loadtxt(file, delimiter=",", skiprows=1)
+    rows[:, 0] = load(LONG, project).times[load(LONG, project).reference_rows]
+    names = [name.strip('"') for name in file.read_text().splitlines()[0].split(",")]
+    trajectory_csv.write(file, rows[:, 0], names[1:], rows[:, 1:])
+
+    shutil.copytree(ROOT / "rparm", project / "rparm")
+    command = [sys.executable, "-u", "-m", "rparm", "run", LONG, "--fmu", str(fmu)]
+    with subprocess.Popen(
+        command, cwd=project, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.readline()  # the head of the table: everything is imported and read
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=10)
+    assert process.returncode == 130
+    assert err == "interrupted\n" and "Traceback" not in out
+
+
+def test_runs_from_anywhere(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "rparm", "list"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert [line.split()[0] for line in done.stdout.splitlines()] == NAMES

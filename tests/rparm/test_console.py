@@ -1,0 +1,278 @@
+"""What commands print: no line of a table above 80 columns, one document for programs."""
+
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rparm import command_line
+from rparm.command_line import COMMANDS
+from rparm.fmi.fmu_file import Fmu
+from rparm.output import console, result_tables, streams
+from rparm.output.result_tables import RunTable, SweepTable
+from rparm.runs.comparison import Run, Runs
+from rparm.runs.tolerance_sweep import TOLERANCES, Sweep
+from rparm.texts import seconds, short, shortened
+from tests.support.paths import ROOT
+from tests.support.rparm_project import FMUS, LONG, SHORT, assert_one_line, call, load
+from tests.support.ssp_files import SSP
+
+RANDOM = random.Random(5)
+ERRORS = (0.0, 1e-300, 9.96e-10, 0.99999, 1e22, math.inf, math.nan)
+
+
+def names() -> list[str]:
+    """Names of scenarios of all lengths."""
+    lengths = [RANDOM.choice((1, 8, 27, 28, 60, 81, 255)) for _ in range(RANDOM.randint(1, 5))]
+    return [f"{i}{'äx_'[i % 3] * length}" for i, length in enumerate(lengths)]
+
+
+def widest(capsys: pytest.CaptureFixture[str]) -> int:
+    return max(map(len, capsys.readouterr().out.splitlines()))
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    with Fmu(FMUS["rp_manipulator"]) as fmu:
+        return Runs({"rp_manipulator": fmu}).run(load(SHORT), 1e-8)
+
+
+@pytest.mark.parametrize("columns", [200, 80, 60])
+def test_no_table_is_wider_than_the_terminal(
+    run: Run, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever the names, the numbers and what has failed."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    limit = min(columns, 80)
+    for _ in range(20):
+        known = names()
+        tolerances = [RANDOM.choice((1e-8, 2.5e-9, 0.123456789)) for _ in known]
+        for with_tight in (False, True) if limit == 80 else (False,):
+            table = RunTable(known, tolerances, with_tight)
+            for name, tolerance in zip(known, tolerances, strict=True):
+                error, time = RANDOM.choice(ERRORS), 10 ** RANDOM.uniform(-4, 5)
+                steps = RANDOM.choice((1, 999_999, 10_000_000))
+                result = replace(run.result, tolerance=tolerance, steps=steps, wall_time=time)
+                wrong = replace(run, result=result, errors={"a_long_name_of_a_variable": error})
+                table.row(name, tolerance, [wrong], ["tolerance 1e-11: did not run to its end"])
+                table.row(name, tolerance, [], ["did not run"])
+        assert widest(capsys) <= limit
+        if limit == 80:
+            sweeps = SweepTable(known, TOLERANCES)
+            for name in known:
+                errors = tuple(RANDOM.choice(ERRORS) for _ in TOLERANCES)
+                scenario = replace(run.scenario, name=name)
+                sweeps.row(Sweep(scenario, TOLERANCES, errors, ["error " * 30, "x" * 100]))
+            times = [10 ** RANDOM.uniform(0, 6) for _ in range(3)]
+            table = result_tables.FederationTable(known, 1e-12)
+            table.row(known[0], 6000, RANDOM.choice(ERRORS), times, passed=False)
+            assert widest(capsys) <= limit
+        assert len(console.verdict_line(known, known, "scenario")) <= limit or len(known[0]) > 40
+
+
+def test_the_verdict_is_first_on_the_last_line() -> None:
+    assert console.verdict_line([], ["a", "b"], "scenario") == "passed: 2 scenarios"
+    assert console.verdict_line(["b", "b"], ["a", "b"], "scenario") == "failed: 1 scenario: b"
+    line = console.verdict_line([f"scenario_{i}" for i in range(35)], range(35), "scenario")
+    assert line.startswith("failed: 35 scenarios: scenario_0, ") and len(line) <= 80
+
+
+def test_numbers_and_names_in_few_characters() -> None:
+    for value in (*ERRORS, *(10 ** RANDOM.uniform(-90, 5) for _ in range(100))):
+        text = short(value, 1)
+        assert len(text) <= 7
+        if value != 1e-300:
+            assert float(text) == pytest.approx(value, rel=0.05, nan_ok=True)
+        assert len(short(value, 0)) <= 5
+    assert all(len(seconds(10 ** RANDOM.uniform(-6, 5))) <= 7 for _ in range(100))
+    for width in range(4, 30):
+        cut = shortened("constant_effort_single_step", width)
+        assert len(cut) == min(width, 27) and cut[0] == "c" and cut[-1] == "p"
+
+
+# ---- --json and --quiet --------------------------------------------------------------------------
+
+
+def document(out: str) -> dict:
+    """The one document there is, in one line."""
+    assert out.count("\n") == 1 and out.endswith("}\n")
+    return json.loads(out, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
+
+
+def test_a_run_is_a_document(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", "--fmu", fmu, "--report", project / "report", "--json")
+    code, out, err = call(capsys, *arguments)
+    found = document(out)
+    assert code == found["exit_code"] == 0 and found["passed"]
+    assert [s["name"] for s in found["scenarios"]] == [LONG, SHORT]
+    for scenario in found["scenarios"]:
+        assert [run["tolerance"] for run in scenario["runs"]] == [1e-8, 1e-11]
+        assert all(0 < run["error"] <= run["bound"] and run["passed"] for run in scenario["runs"])
+        assert len(scenario["sweep"]["errors"]) == len(TOLERANCES)
+    assert Path(found["report"]).is_file()
+    assert "passed: 2 scenarios\n" in err and f"{LONG}  " in err
+    code, out, err = call(capsys, *arguments, "--quiet")
+    assert code == 0 and document(out)["passed"] and err == ""
+    assert call(capsys, *arguments[:-1], "--quiet") == (0, "passed: 2 scenarios\n", "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "key"),
+    [
+        (["list"], "scenarios"),
+        (["--json", "list"], "scenarios"),
+        (["system", "--list"], "systems"),
+        (["run", "unknown"], "error"),
+        (["run", "--tolerance", "2"], "error"),
+        (["system", "nominall"], "error"),
+        (["coupling", "--ssp", "/nowhere.ssp"], "error"),
+        (["campaign", "/nowhere.toml"], "error"),
+        (["federation", "nominall"], "error"),
+        (["new", ""], "error"),
+        (["federate"], "error"),
+    ],
+)
+def test_every_command_prints_a_document(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], key: str
+) -> None:
+    """Also of a mistake, which is said on standard error as ever."""
+    code, out, err = call(capsys, *arguments, "--json")
+    found = document(out)
+    assert code == found["exit_code"] == (2 if key == "error" else 0) and found[key]
+    if key == "error":
+        assert err == f"error: {found['error']}\n"
+
+
+def test_numbers_that_json_does_not_know_are_null() -> None:
+    content = {"a": [math.nan, np.float64(1.5), np.inf], "b": {"c": (Path("x"), np.int64(3), True)}}
+    assert streams.document(content) == '{"a": [null, 1.5, null], "b": {"c": ["x", 3, true]}}'
+
+
+NOISE = """
+import os, subprocess, sys
+from rparm import __main__ as cli
+from rparm.commands import Ended
+from rparm.commands import list as command
+def run(_):
+    print("by Python")
+    os.write(1, b"by compiled code\\n")
+    subprocess.run([sys.executable, "-c", "print('by a child')"])
+    return Ended(0, "verdict", {"x": 1})
+command.run = run
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.parametrize("option", ["--json", "--quiet", "neither"])
+def test_what_libraries_and_children_print_is_no_result(option: str) -> None:
+    options = [] if option == "neither" else [option]
+    done = subprocess.run(
+        [sys.executable, "-c", NOISE, "list", *options],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    noise = ["by Python", "by a child", "by compiled code"]
+    if option == "--json":
+        assert document(done.stdout) == {"exit_code": 0, "x": 1}
+        assert sorted(done.stderr.splitlines()) == [*noise, "verdict"]
+    elif option == "--quiet":
+        assert (done.stdout, done.stderr) == ("verdict\n", "")
+    else:
+        assert sorted(done.stdout.splitlines()) == [*noise, "verdict"] and done.stderr == ""
+
+
+# ---- Words that miss -----------------------------------------------------------------------------
+
+
+def test_help_fits_and_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["help"], ["--help"], ["-h"], ["--quiet", "help"]):
+        with pytest.raises(SystemExit) as caught:
+            command_line.parsed(arguments)
+        assert caught.value.code == 0
+    text = capsys.readouterr().out
+    assert all(f"  {command} " in text for command in COMMANDS)
+    assert max(map(len, text.splitlines())) <= 80
+    assert {path.stem for path in (ROOT / "rparm/commands").glob("[a-z]*.py")} == set(COMMANDS)
+    for command in COMMANDS:
+        for arguments in (["help", command], [command, "--help"]):
+            with pytest.raises(SystemExit) as caught:
+                command_line.parsed(arguments)
+            text = capsys.readouterr().out
+            assert caught.value.code == 0 and text.startswith(f"usage: ./run.sh {command} ")
+            assert "--json" in text and "--quiet" in text
+            assert ("--tolerance" in text) == (command == "run")
+
+
+def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call(capsys)
+    assert (code, out) == (2, "") and err == f"{command_line.overview()}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "guess"),
+    [
+        (["help", "sytem"], "no command 'sytem', did you mean 'system'?"),
+        (["sytem"], "no scenario or command 'sytem', did you mean 'system'?"),
+        (["sine"], "did you mean 'sine_efforts'?"),
+        (["run", "sine_effort"], "did you mean 'sine_efforts'?"),
+        (["run", "list"], "no scenario 'list': the command list goes first, ./run.sh list"),
+        (["my_scenario"], "no scenario 'my_scenario', did you mean the file 'my_scenario.toml'?"),
+        (["my_scenari"], "did you mean 'my_scenario.toml'?"),
+        (["my_scenari.toml"], "no such file, did you mean 'my_scenario.toml'?"),
+        (["below/other"], "did you mean the file 'below/other.toml'?"),
+        (["nothing like it"], "no scenario or command 'nothing like it' (./run.sh --list"),
+        (["system", "nominl"], "no variant 'nominl', did you mean 'nominal'?"),
+        (["system", "nominal", "pick_and_plaze"], "did you mean 'pick_and_place'?"),
+        (["run", "--tolerence", "1e-8"], "did you mean '--tolerance'?"),
+        (["system", "--jsn"], "did you mean '--json'?"),
+    ],
+)
+def test_guesses(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    guess: str,
+) -> None:
+    """One line, without the names of all scenarios."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "below").mkdir()
+    for name in ("my_scenario", "below/other"):
+        (tmp_path / f"{name}.toml").touch()
+    code, out, err = call(capsys, *arguments)
+    assert (code, out) == (2, "") and guess in err and "stick_slip" not in err
+    assert_one_line(err)
+
+
+def test_stages_are_for_terminals(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for is_terminal in (False, True):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda known=is_terminal: known, raising=False)
+        console.stage("building")
+        assert capsys.readouterr().err == ("building ...\n" if is_terminal else "")
+        with streams.of_results(as_json=False, quiet=True):
+            console.stage("building")
+        assert capsys.readouterr().err == ""
+
+
+def test_systems_fit_into_80_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = call(capsys, "system", "nominal", "--ssp", SSP, "--report", tmp_path / "r")
+    table = out.split("report: ")[0]
+    assert code == 0 and max(map(len, table.splitlines())) <= 80
+    assert out.endswith("passed: 1 variant\n")
+    code, out, err = call(
+        capsys, "system", "nominal", "--ssp", SSP, "--report", tmp_path / "r", "--json"
+    )
+    (variant,) = document(out)["variants"]
+    assert code == 0 and variant["passed"] and 0 < variant["error"] <= variant["bound"]
+    assert err.endswith("passed: 1 variant\n")

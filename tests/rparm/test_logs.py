@@ -1,0 +1,247 @@
+"""Logs as inputs and for comparison: what they give, and one line for each mistake."""
+
+import math
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rparm.errors import UserError
+from rparm.scenarios import logs, scenario
+from rparm.scenarios.scenario import Scenario
+from tests.rparm.test_boolean_inputs import SWITCHED
+from tests.support.rparm_project import FMUS, call
+from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy
+
+LOG = "time,force\n0.5,1\n1.5,3\n2.25,4.5\n"  # 2 t; the run is from 1 to 2
+FORCE = "[inputs.force]\nfile = 'log.csv'\n"
+Write = Callable[..., Path]
+
+
+def loaded(write: Write, log: str | bytes = LOG, more: str = "", head: str = FORCE) -> Scenario:
+    path = write(f"{HEAD}{TIME}{head}{more}")
+    content = log if isinstance(log, bytes) else log.encode()
+    (path.parent / "log.csv").write_bytes(content)
+    return scenario.load(path, SWITCHED if "brake" in head else TOY)
+
+
+# ---- what a right log gives ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+def test_logs_of_all_programs_are_read(write: Write, delimiter: str, end: str, mark: str) -> None:
+    lines = [
+        ["#", '"t [s], of the ""drive"""', " effort ", "text"],
+        ["1", "0.5", " 1.0", f'"a{delimiter}b"'],
+        [],
+        ["2", '"1.5e0"', "+3.", "nan"],
+        ["3", "2.25", "4.5", "ä"],
+    ]
+    rows = [delimiter.join(line) for line in lines]
+    text = mark + end.join(rows)  # without an end of the last line
+    keys = "column = 'effort'\ntime = 't [s], of the \"drive\"'\n"
+    run = loaded(write, text, keys)
+    assert run.inputs["force"].tolist() == [2.0, 2.5, 3.0, 3.5, 4.0]
+    assert not run.inputs["force"].flags.writeable
+
+
+def test_rows_are_held_where_that_is_asked_for(write: Write) -> None:
+    run = loaded(write, "time,force\n1,5\n1.25,6\n1.4,7\n1.6,8\n1.7500000005,9\n", "hold = true\n")
+    assert run.inputs["force"].tolist() == [5.0, 6.0, 7.0, 9.0, 9.0]
+
+
+@pytest.mark.parametrize(("scale", "factor"), [("-2", -2.0), ("'1 kN'", 1e3), ("'2N'", 2.0)])
+def test_a_scale_may_have_a_unit(write: Write, scale: str, factor: float) -> None:
+    path = write(f"{HEAD}{TIME}{FORCE}scale = {scale}\n")
+    (path.parent / "log.csv").write_text("time,force\n1,0.5\n2,0.5\n")
+    newtons = toy(DESCRIPTION.replace('<Real min="-10.0"', '<Real unit="N"'))
+    assert scenario.load(path, newtons).inputs["force"].tolist() == [0.5 * factor] * 5
+
+
+def test_a_boolean_input_is_held(write: Write) -> None:
+    head = "[inputs.brake]\nfile = 'log.csv'\n"
+    values = loaded(write, "time,brake\n1,0\n1.5,1\n1.9,0\n", head=head).inputs["brake"]
+    assert values.dtype == bool and values.tolist() == [False, False, True, True, False]
+    for log, more, message in (
+        ("time,brake\n1,0\n2,0.5\n", "", "expected 0 or 1 in a log, got 0.5"),
+        ("time,brake\n1,0\n2,1\n", "scale = 1\n", "is held and not scaled"),
+        ("time,brake\n1,0\n2,1\n", "hold = false\n", "is held and not scaled"),
+    ):
+        with pytest.raises(UserError, match=f"brake\\]: .*{message}"):
+            loaded(write, log, more, head)
+
+
+def test_a_log_may_lie_elsewhere_and_end_where_the_last_step_begins(write: Write) -> None:
+    path = write(f"{HEAD}{TIME}[inputs.force]\nfile = '../a log/ü.csv'\n")
+    (path.parents[1] / "a log").mkdir()
+    (path.parents[1] / "a log" / "ü.csv").write_text("time,force\n1,1\n1.75,4\n")
+    run = scenario.load(path, TOY)
+    assert run.inputs["force"].tolist() == [1.0, 2.0, 3.0, 4.0, 4.0]
+    assert list(run.logs) == ["../a log/ü.csv"]
+
+
+# ---- mistakes ------------------------------------------------------------------------------------
+
+KNOWN = "(known: time, force)"
+MISTAKES = [
+    # log, further keys, message
+    ("", "", "log.csv: expected names of columns in its first line"),
+    ("\n\n", "", "log.csv: expected names of columns in its first line"),
+    ("time\n1\n", "", "log.csv: expected names of columns in its first line"),
+    ("time,force\n", "", "log.csv: has no rows below the names of its columns"),
+    (LOG, "column = 'forse'\n", f"column 'forse' is not there, did you mean 'force'? {KNOWN}"),
+    (LOG, "time = 't'\n", f"column 't' is not there {KNOWN}"),
+    ("time,force,force\n1,2,3\n", "", "column 'force' is there twice (known: time, force, force)"),
+    ("1,2\n2,3\n", "", "column 'time' is not there (known: 1, 2)"),
+    ("time,force\n1,1\n3,1\n2,1\n", "", "log.csv, line 4: expected a time after 3.0, found 2.0"),
+    ("time,force\n1,1\n1,2\n", "", "log.csv, line 3: expected a time after 1.0, found 1.0"),
+    ("time,force\n1,nan\n2,1\n", "", "line 2: column 'force': expected a finite number, found 'n"),
+    ("time,force\ninf,1\n2,1\n", "", "line 2: column 'time': expected a finite number, found 'i"),
+    ("time,force\n1,1\n2,\n", "", "line 3: column 'force': expected a number with a decimal point"),
+    ("time;force\n1;0,5\n2;1\n", "", "line 2: column 'force': expected a number with a decimal"),
+    ("time,force\n1,1\n2\n", "", "log.csv, line 3: expected 2 values, found 1"),
+    ("time,force\n1,1,5\n", "", "log.csv, line 2: expected 2 values, found 3"),
+    ('time,force\n1,"' + "x" * 200_000, "", "log.csv, line 2: field larger than field limit"),
+    ('time,force\n1,"1\n2,2\n', "", "line 3: column 'force': expected a number with a decimal"),
+    ("time,force\n1,1\n1.5,1\n", "", "log.csv: ends at 1.5 s, the run needs it from 1.0 to 1.75 s"),
+    ("time,force\n1.1,1\n2,1\n", "", "log.csv: begins at 1.1 s, the run needs it from 1.0 to 1."),
+    ("time,force\n1,1\n2,-11\n", "", "[inputs.force]: expected at least -10.0, got -11.0"),
+    (LOG, "scale = 1e308\n", "[inputs.force]: expected finite values, got an overflow"),
+    (LOG, "scale = 'x'\n", "[inputs.force] scale: expected a number, got 'x'"),
+    (LOG, "hold = 1\n", "[inputs.force] hold: expected true or false, got 1"),
+    (LOG, "column = 2\n", "[inputs.force] column: expected a text, got 2"),
+    (LOG, "offset = 2\n", "[inputs.force] offset: goes with sines only"),
+    (LOG, "constant = 2\n", "[inputs.force]: expected exactly one of constant, sines, table, file"),
+    (LOG, "colum = 'x'\n", "[inputs.force]: unknown key 'colum', did you mean 'column'?"),
+    (b"time,force\n1,\xb0\n", "", "log.csv: not UTF-8 text, at byte 13"),
+    (LOG.encode("utf-16"), "", "log.csv: not UTF-8 text, at byte 0"),
+    ("time,force\n1,\0\n", "", "line 2: column 'force': expected a number"),
+    (",".join(["time", *map(str, range(999))]) + "\n", "", "17, 18, ...)"),
+]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("log", "keys", "message"), MISTAKES)
+@pytest.mark.parametrize("section", ["inputs", "measured"])
+def test_a_mistake_is_explained_in_one_line(
+    write: Write, log: str | bytes, keys: str, message: str, section: str
+) -> None:
+    head = FORCE
+    if section == "measured":  # the same log of an output
+        if "goes with" in message or "exactly" in message or "at least" in message:
+            return
+        head = "[measured.power]\nfile = 'log.csv'\n"
+        keys = keys if "column" in keys else f"{keys}column = 'force'\n"
+        message = message.replace("[inputs.force]", "[measured.power]")
+    with pytest.raises(UserError) as caught:
+        loaded(write, log, keys, head)
+    said = str(caught.value)
+    assert message in said and "\n" not in said and len(said) < 1000
+
+
+@pytest.mark.parametrize("section", ["inputs.force", "measured.speed"])
+def test_what_is_no_file(write: Write, section: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write("").parent
+    os.mkfifo(folder / "pipe")
+    (folder / "big").write_bytes(b"time,force\n" + b"0" * 100)
+    monkeypatch.setattr(logs, "LARGEST", 100)
+    for file, message in (
+        ("none.csv", "none.csv: no such file"),
+        (".", "cannot be read: Is a directory"),
+        ("pipe", "is a device or a pipe"),
+        ("/dev/zero", "is a device or a pipe"),
+        ("x\\u0000y", "cannot be read"),
+        ("x" * 5000, "cannot be read: File name too long"),
+        (" ", f"[{section}] file: expected a text"),
+        ("big", "is larger than 0.0001 MB"),
+    ):
+        path = write(f'{HEAD}{TIME}[{section}]\nfile = "{file}"\n')
+        with pytest.raises(UserError) as caught:
+            scenario.load(path, TOY)
+        assert message in str(caught.value) and f"[{section}]" in str(caught.value)
+
+
+def test_only_real_outputs_are_measured(write: Write) -> None:
+    for name, guess in (("sped", ", did you mean 'speed'?"), ("mass", "")):
+        message = (
+            rf"has no Real output '{name}'{guess.replace('?', '[?]')} \(known: speed, power\)$"
+        )
+        with pytest.raises(UserError, match=message):
+            loaded(write, head=f"[measured.{name}]\nfile = 'log.csv'\n")
+
+
+# ---- an example ----------------------------------------------------------------------------------
+
+EXAMPLE = """model = "rp_manipulator"
+title = "A slide that is pushed"
+description = "Force and position come from a log."
+tolerance = 1e-10
+[time]
+start = 0
+stop = "1 s"
+step = "10 ms"
+[parameters]
+g = 0
+a = 0
+[initial]
+q1 = "90 deg"
+q2 = "300 mm"
+[inputs.f2]
+file = "log.csv"
+column = "force"
+scale = "2 N"
+[measured.q2]
+file = "log.csv"
+column = "encoder"
+scale = "1 mm"
+[measured.ee_vy]
+file = "log.csv"
+column = "speed"
+time = "time"
+"""
+
+
+def test_an_example_is_run_and_compared(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """m2 = 1 kg at f2 = 2 t, held over steps h: v_n = h^2 n (n - 1), and q2 its exact sum."""
+    monkeypatch.chdir(tmp_path)
+    h, n = 0.01, np.arange(101)
+    speed = h**2 * n * (n - 1)
+    force = 2 * h * n
+    position = 0.3 + np.concatenate(([0.0], np.cumsum(speed * h + force * h**2 / 2)[:-1]))
+    off = np.where(n % 2, 3.0, -1.0)  # mm
+    rows = zip(h * n, force / 2, 1e3 * position + off, speed, strict=True)
+    text = "".join("{:.17g};{:.17g};{:.17g};{:.17g}\n".format(*row) for row in rows)
+    (tmp_path / "log.csv").write_text(f"time;force;encoder;speed\n{text}", encoding="utf-8")
+    (tmp_path / "pushed.toml").write_text(EXAMPLE, encoding="utf-8")
+    arguments = ("run", "pushed.toml", "--fmu", FMUS["rp_manipulator"], "--report", "out")
+    code, out, err = call(capsys, *arguments)
+    assert (code, err) == (0, "")
+    rms = math.sqrt((50 * 9 + 51 * 1) / 101) * 1e-3
+    assert f"pushed: q2 is {rms:.3g} m RMS from log.csv, column encoder\n" in out
+    exact = re.search(r"pushed: ee_vy is (\S+) m/s RMS from log.csv, column speed\n", out)
+    assert exact and float(exact[1]) < 1e-9
+    page = (tmp_path / "out/files/pushed.html").read_text(encoding="utf-8")
+    assert '"name":"q2 measured"' in page and '"name":"ee_vy measured"' in page
+    assert f"{rms:.4g}" in page and "log.csv, column force, linear in between" in page
+    assert page.index("Difference from what was measured") < page.index("Solver")
+
+
+def test_an_angle_in_degrees_without_their_unit_is_asked_about(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = EXAMPLE[: EXAMPLE.index("[inputs")].replace('"90 deg"', "90")
+    (tmp_path / "turns.toml").write_text(text, encoding="utf-8")
+    arguments = ("run", "turns.toml", "--fmu", FMUS["rp_manipulator"], "--report", "out")
+    code, _, err = call(capsys, *arguments)
+    question = '[initial] q1: 90 rad is 14.3 turns, is that meant? In degrees it is "90 deg".'
+    assert (code, err) == (0, f"warning: turns.toml: {question}\n")
+    page = (tmp_path / "out/files/turns.html").read_text(encoding="utf-8")
+    assert "90 rad is 14.3 turns" in page

@@ -1,0 +1,320 @@
+"""The master and its step-size control, on oscillators x'' = -omega^2 x + gain u."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from rparm.coupling import step_control
+from rparm.coupling.master import Master, Snapshot
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.system.structure import Connection
+from tests.support.rparm_project import BUILD, fmi3_fmu
+
+H, STEPS = 0.05, 40
+OMEGA = {"a": 2.0, "b": 3.0}
+GAIN = {"a": 0.7, "b": -1.3}
+START = {"a": (1.0, 0.0), "b": (0.2, -1.0)}
+RING = [Connection("a", "x", "b", "u"), Connection("b", "x", "a", "u")]
+PARAMETERS = {
+    name: {
+        "omega": OMEGA[name],
+        "gain": GAIN[name],
+        "x": START[name][0],
+        "v": START[name][1],
+        "relative_tolerance": 1e-11,
+    }
+    for name in "ab"
+}
+
+
+@pytest.fixture(scope="module", params=["2.0", "3.0"])
+def oscillator(request: pytest.FixtureRequest) -> Iterator[Fmu]:
+    """The FMU of tests/oscillator, of each version of FMI."""
+    path = BUILD / "tests" / "oscillator" / "Oscillator.fmu"
+    with Fmu(path if request.param == "2.0" else fmi3_fmu(path)) as fmu:
+        yield fmu
+
+
+def exact_step(
+    name: str, state: tuple[float, float], u: float, slope: float, h: float = H
+) -> tuple[float, float]:
+    """x, v after h with the input u + slope t: a straight particular solution plus a vibration."""
+    omega, gain = OMEGA[name], GAIN[name]
+    rest, drift = gain * u / omega**2, gain * slope / omega**2
+    c, s = np.cos(omega * h), np.sin(omega * h)
+    x, v = state[0] - rest, state[1] - drift
+    return (rest + drift * h + x * c + v / omega * s, drift - x * omega * s + v * c)
+
+
+def recurrence(order: str, inputs: str, sequence: str = "ab") -> np.ndarray:
+    """x and v of a and b, (STEPS + 1, 4)."""
+    state, linear = dict(START), inputs == "extrapolated"
+    rows = [[*state["a"], *state["b"]]]
+    for _ in range(STEPS):
+        first, second = sequence
+        # the component in front, and in Jacobi order both, know only the beginning of the step
+        x, v = state[second]
+        ahead = exact_step(first, state[first], x, v * linear)
+        if order == "jacobi":
+            x, v = state[first]
+            behind = exact_step(second, state[second], x, v * linear)
+        else:
+            x, v = ahead
+            behind = exact_step(second, state[second], x - H * v * linear, v * linear)
+        state = {first: ahead, second: behind}
+        rows.append([*state["a"], *state["b"]])
+    return np.array(rows)
+
+
+def ring(fmu: Fmu, sequence: str = "ab", **options: str) -> Master:
+    return Master({name: fmu for name in sequence}, RING, **options)
+
+
+def places(master: Master, *names: str) -> list[int]:
+    return [master.names.index(name) for name in names]
+
+
+@pytest.mark.parametrize("sequence", ["ab", "ba"])
+@pytest.mark.parametrize("inputs", ["held", "extrapolated"])
+@pytest.mark.parametrize("order", ["jacobi", "gauss_seidel"])
+def test_steps_are_those_of_a_recurrence_by_hand(
+    oscillator: Fmu, order: str, inputs: str, sequence: str
+) -> None:
+    with ring(oscillator, sequence, order=order, inputs=inputs) as master:
+        master.initialize(0.0, STEPS * H, PARAMETERS)
+        rows = master.run(np.arange(STEPS + 1) * H)
+        columns = places(master, "a.x", "a.v", "b.x", "b.v")
+        assert master.do_steps == 2 * STEPS
+    expected = recurrence(order, inputs, sequence)
+    np.testing.assert_allclose(rows[:, columns], expected, rtol=0, atol=1e-8)
+    others = [(o, i) for o in ("jacobi", "gauss_seidel") for i in ("held", "extrapolated")]
+    for other in others:
+        if other != (order, inputs):  # so the test distinguishes them
+            assert np.abs(expected - recurrence(*other, sequence)).max() > 1e-4
+
+
+def test_rows_are_read_before_inputs_are_set(oscillator: Fmu) -> None:
+    with ring(oscillator) as master:
+        master.initialize(0.0, None, PARAMETERS)
+        before = master.values.copy()
+        master.advance(H)
+        a, x, other = places(master, "b.a", "b.x", "a.x")
+        expected = GAIN["b"] * before[other] - OMEGA["b"] ** 2 * master.values[x]
+        assert master.values[a] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("sequence", ["abc", "cba", "bca"])
+def test_initialization_follows_direct_feedthrough(oscillator: Fmu, sequence: str) -> None:
+    chain = [
+        Connection("a", "x", "b", "u"),
+        Connection("b", "a", "c", "u"),
+        Connection("c", "x", "a", "u"),
+    ]
+    values = {
+        name: {"omega": omega, "gain": gain, "x": x, "v": v}
+        for name, omega, gain, x, v in (
+            ("a", 2.0, 0.7, 1.0, 0.5),
+            ("b", 3.0, -1.3, 0.2, -1.0),
+            ("c", 1.5, 2.0, -0.4, 0.3),
+        )
+    }
+    fmus = {name: oscillator for name in sequence}
+    with Master(fmus, chain, inputs="extrapolated") as master:
+        master.initialize(0.0, None, values)
+        got = master.values[places(master, "a.a", "b.a", "c.a")]
+        slope = master.slopes[places(master, "b.a")]
+    b = -9.0 * 0.2 - 1.3 * 1.0
+    np.testing.assert_allclose(got, [-4.0 - 0.7 * 0.4, b, 2.25 * 0.4 + 2.0 * b], rtol=1e-14)
+    # before its first step, an FMU of FMI 3.0 knows no slopes of inputs
+    of_input = 0.0 if oscillator.model.fmi_version == "3.0" else 0.5
+    np.testing.assert_allclose(slope, [9.0 * 1.0 - 1.3 * of_input], rtol=1e-14)
+
+
+def test_an_algebraic_loop_is_named(oscillator: Fmu) -> None:
+    loop = [Connection("a", "a", "b", "u"), Connection("b", "a", "a", "u")]
+    with (
+        Master({"a": oscillator, "b": oscillator}, loop) as master,
+        pytest.raises(UserError, match=r"algebraic loop: .*a\.a, .*b\.a"),
+    ):
+        master.initialize(0.0, None, PARAMETERS)
+
+
+@pytest.mark.parametrize("inputs", ["held", "extrapolated"])
+def test_going_back_repeats_bit_for_bit(oscillator: Fmu, inputs: str) -> None:
+    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
+        master.initialize(0.0, None, PARAMETERS)
+        master.advance(0.1)
+        with Snapshot(master) as snapshot:
+            snapshot.take()
+            first = master.run([0.1, 0.15, 0.3])
+            for _ in range(2):
+                snapshot.restore()
+                assert master.time == 0.1
+                np.testing.assert_array_equal(master.run([0.1, 0.15, 0.3]), first)
+            snapshot.take()  # at 0.3, in place of the first
+            master.advance(0.4)
+            snapshot.restore()
+            assert master.time == 0.3
+            np.testing.assert_array_equal(master.values, first[-1])
+
+
+def test_every_snapshot_is_freed(oscillator: Fmu, monkeypatch: pytest.MonkeyPatch) -> None:
+    with ring(oscillator) as master:
+        master.initialize(0.0, None, PARAMETERS)
+        freed = []
+        name = {"2.0": "fmi2FreeFMUstate", "3.0": "fmi3FreeFMUState"}[oscillator.model.fmi_version]
+        for component in master.components.values():
+            fmi = component.instance.fmi
+            free = getattr(fmi, name)
+            monkeypatch.setattr(
+                fmi, name, lambda *arguments, free=free: (freed.append(arguments), free(*arguments))
+            )
+        with pytest.raises(RuntimeError), Snapshot(master) as snapshot:
+            snapshot.take()
+            snapshot.take()
+            raise RuntimeError
+        assert len(freed) == 2
+        assert all(state._state.value is None for state in snapshot._states)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_value_that_is_not_finite_is_named(
+    oscillator: Fmu, monkeypatch: pytest.MonkeyPatch, value: float
+) -> None:
+    with ring(oscillator) as master:
+        master.initialize(0.0, None, PARAMETERS)
+        component = master.components["b"]
+        read = component.read
+
+        def spoil() -> None:
+            read()
+            if master.time >= 0.1:
+                outputs = component.outputs
+                outputs.view[outputs.names.index("energy")] = value
+
+        monkeypatch.setattr(component, "read", spoil)
+        with pytest.raises(UserError, match=rf"b\.energy is {value} at t = 0\.15000"):
+            master.run(np.arange(10) * H)
+
+
+def test_a_failing_step_is_explained_with_the_message_of_the_fmu(oscillator: Fmu) -> None:
+    parameters = {**PARAMETERS, "b": {**PARAMETERS["b"], "max_internal_steps": 1}}
+    with ring(oscillator) as master:
+        master.initialize(0.0, None, parameters)
+        with pytest.raises(
+            UserError, match=r"^b: fmi[23]DoStep in the step from t = 0\.0 s .*ended"
+        ):
+            master.advance(1.0)
+
+
+@pytest.mark.parametrize(
+    ("connections", "message"),
+    [
+        (RING[:1], r"a\.u: the input is not connected"),
+        ([*RING, Connection("a", "v", "b", "u")], r"b\.u: is connected more than once"),
+        ([*RING, Connection("c", "x", "b", "u")], r"c: no such component .*a, b"),
+        ([*RING, Connection("a", "y", "b", "u")], r"a: .* has no Real output 'y'"),
+        ([*RING, Connection("a", "x", "b", "v")], r"b: .* has no Real input 'v'"),
+        ([*RING, Connection("a", "solver_steps", "b", "u")], r"a: .* no Real output 'solver_"),
+    ],
+)
+def test_wrong_connections_are_named(
+    oscillator: Fmu, connections: list[Connection], message: str
+) -> None:
+    with pytest.raises(UserError, match=message):
+        Master({"a": oscillator, "b": oscillator}, connections)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"a": {"mass": 1.0}}, r"a: .* has no parameter 'mass'"),
+        ({"c": {"omega": 1.0}}, r"c: no such component"),
+        (
+            {"a": {"omega": 1e6}},
+            r"a: fmi(2SetReal|3SetFloat64) \(omega = 1000000\.0\) failed .*omega",
+        ),
+        ({"a": {"u": 1.0}}, r"a: .* has no parameter 'u'"),
+    ],
+)
+def test_wrong_parameters_are_named(oscillator: Fmu, parameters: dict, message: str) -> None:
+    with ring(oscillator) as master, pytest.raises(UserError, match=message):
+        master.initialize(0.0, None, parameters)
+
+
+def test_unknown_orders_are_refused(oscillator: Fmu) -> None:
+    with pytest.raises(UserError, match="jacobi"):
+        ring(oscillator, order="random")
+
+
+# ---- Step-size control --------------------------------------------------------------------------
+
+
+def control(**changes: object) -> step_control.Control:
+    settings = {
+        "tolerance": 1e-6,
+        "scales": dict.fromkeys(("a.x", "a.v", "b.x", "b.v"), 1.0),
+        "first": 1.0,
+        "shortest": 1e-6,
+        "longest": 2.0,
+    }
+    return step_control.Control(**settings | changes)
+
+
+@pytest.mark.parametrize(("inputs", "tolerance"), [("held", 1e-4), ("extrapolated", 1e-6)])
+def test_a_controlled_run_is_one_of_half_steps(
+    oscillator: Fmu, inputs: str, tolerance: float
+) -> None:
+    """What was tried and rolled back leaves no trace."""
+    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
+        master.initialize(0.0, 3.0, PARAMETERS)
+        run = step_control.run(master, 3.0, control(tolerance=tolerance, corners=(1.25,)))
+    assert run.rejected >= 1
+    assert run.do_steps == 6 * (run.accepted + run.rejected)
+    assert run.times[-1] == 3.0
+    assert 1.25 in run.times
+    assert run.estimates.max() <= tolerance
+    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
+        master.initialize(0.0, 3.0, PARAMETERS)
+        for i, (begin, end) in enumerate(zip(run.times[:-1], run.times[1:], strict=True)):
+            master.advance(begin + (end - begin) / 2)
+            master.advance(end)
+            np.testing.assert_array_equal(master.values, run.values[i + 1])
+
+
+@pytest.mark.parametrize(("inputs", "tolerance"), [("held", 1e-4), ("extrapolated", 1e-6)])
+def test_the_local_error_is_what_is_asked_for(
+    oscillator: Fmu, inputs: str, tolerance: float
+) -> None:
+    """Against the matrix exponential of the coupled system, from each accepted state on."""
+    with ring(oscillator, order="gauss_seidel", inputs=inputs) as master:
+        master.initialize(0.0, 3.0, PARAMETERS)
+        run = step_control.run(master, 3.0, control(tolerance=tolerance))
+        columns = places(master, "a.x", "a.v", "b.x", "b.v")
+    (a, b), (ga, gb) = OMEGA.values(), GAIN.values()
+    system = np.array([[0, 1, 0, 0], [-a * a, 0, ga, 0], [0, 0, 0, 1], [gb, 0, -b * b, 0]])
+    values, vectors = np.linalg.eig(system)
+    states = run.values[:, columns]
+    errors = []
+    for i, h in enumerate(np.diff(run.times)):
+        propagator = (vectors * np.exp(values * h)) @ np.linalg.inv(vectors)
+        errors.append(np.abs(states[i + 1] - (propagator @ states[i]).real).max())
+    errors = np.array(errors) / tolerance
+    assert errors.max() <= 3.0
+    assert np.median(errors[~run.limited]) >= 1 / 3
+
+
+def test_a_step_that_would_be_too_short_is_refused(oscillator: Fmu) -> None:
+    with ring(oscillator, order="gauss_seidel") as master:
+        master.initialize(0.0, 3.0, PARAMETERS)
+        with pytest.raises(UserError, match=r"from t = 0\.0 s would have to be below 0\.5 s"):
+            step_control.run(master, 3.0, control(shortest=0.5))
+
+
+def test_an_unknown_signal_is_refused(oscillator: Fmu) -> None:
+    with ring(oscillator) as master:
+        master.initialize(0.0, 3.0, PARAMETERS)
+        with pytest.raises(UserError, match=r"a\.y: the system has no such value"):
+            step_control.run(master, 3.0, control(scales={"a.y": 1.0}))

@@ -1,0 +1,363 @@
+"""rparm is not for Linux only: what other systems lack, or do in another way, is not used.
+
+No test here runs on another system. Those that change this one change it to what is documented of
+the other.
+"""
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rparm.errors import UserError
+from rparm.fmi import fmu_file
+from rparm.fmi.fmi2_instance import Fmi2Instance
+from rparm.fmi.fmu_file import Fmu
+from rparm.runs import reference, simulation
+from rparm.scenarios import scenario as scenarios
+from tests.support.paths import ROOT, SYSTEMS
+from tests.support.rparm_project import (
+    BUILD,
+    FMUS,
+    SHORT,
+    assert_one_line,
+    call,
+    declared,
+    load,
+    names_of,
+    reference_file,
+    repacked,
+)
+
+SOURCES = sorted(path for top in ("rparm", "models") for path in (ROOT / top).rglob("*.py"))
+
+# ---- What the sources use ------------------------------------------------------------------------
+
+# modules, attributes of modules and arguments of calls that Python has not got on Windows
+MODULES = {"crypt", "curses", "fcntl", "grp", "posix", "pty", "pwd", "readline", "resource"}
+MODULES |= {"syslog", "termios", "tty"}
+ATTRIBUTES = {
+    "os": r"(fork|forkpty|killpg|get(e?[ug]id|pgid|pgrp|sid|loadavg|groups)|set(e?[ug]id|pgid|sid)"
+    r"|sched_\w+|mkfifo|mknod|l?chown|uname|f?statvfs|nice|wait|wait3|wait4|waitid|W[A-Z]+|openpty"
+    r"|sysconf|pread|pwrite|O_(NOFOLLOW|DIRECTORY|NONBLOCK|CLOEXEC)|confstr|sendfile|chroot)",
+    "signal": r"(SIG(KILL|HUP|ALRM|USR[12]|PIPE|CHLD|QUIT|STOP|CONT|TSTP)|alarm|[gs]etitimer|pause"
+    r"|sigwait\w*|pthread_\w+|siginterrupt)",
+    "time": r"(clock|tzset|clock_\w+|pthread_\w+)",
+}
+ARGUMENTS = {"preexec_fn", "pass_fds", "process_group", "start_new_session"}
+# a branch is not looked into whose condition asks what there is
+ASKS = re.compile(r"hasattr\(|sys\.platform|os\.name")
+
+
+def not_portable(tree: ast.AST) -> Iterator[str]:
+    """What a module of Python uses that not every system has, or has with another default."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in MODULES)
+        elif isinstance(node, ast.ImportFrom) and node.module in MODULES:
+            yield node.module
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            pattern = ATTRIBUTES.get(node.value.id)
+            if pattern and re.fullmatch(pattern, node.attr):
+                yield f"{node.value.id}.{node.attr}"
+        elif isinstance(node, ast.Call):
+            yield from _not_portable_call(node)
+        if not (isinstance(node, ast.If) and ASKS.search(ast.unparse(node.test))):
+            yield from not_portable(node)
+
+
+def _not_portable_call(call: ast.Call) -> Iterator[str]:
+    """Texts in the encoding or with the line ends of the system, and arguments of POSIX."""
+    name = ast.unparse(call.func)
+    given = {keyword.arg: keyword.value for keyword in call.keywords}
+    for argument in sorted(ARGUMENTS & set(given)):
+        if not ASKS.search(ast.unparse(given[argument])):
+            yield f"{name}({argument}=)"
+    if name.endswith("CDLL") and [ast.unparse(x) for x in call.args] == ["None"]:
+        yield f"{name}(None)"
+    if given.keys() & {"text", "universal_newlines"} and "encoding" not in given:
+        yield f"{name} without encoding"
+    if name == "os.open" or not re.search(r"(^|\.)(open|read_text|write_text)$", name):
+        return
+    if name == "read_text":  # rparm.input_files
+        return
+    mode = ""
+    if name.endswith("open"):
+        place = 0 if "." in name else 1
+        mode = given.get("mode", call.args[place] if len(call.args) > place else None)
+        mode = ast.literal_eval(mode) if mode is not None else "r"
+    if "b" not in mode and "encoding" not in given:
+        yield f"{name} without encoding"
+    writes = name.endswith("write_text") or set(mode) & set("wax")
+    if writes and "b" not in mode and "newline" not in given:
+        yield f"{name} without newline"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_sources_use_what_every_system_has(path: Path) -> None:
+    assert list(not_portable(ast.parse(path.read_text(encoding="utf-8")))) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("import fcntl", "fcntl"),
+        ("from resource import getrusage", "resource"),
+        ("os.killpg(1, 2)", "os.killpg"),
+        ("x = signal.SIGHUP", "signal.SIGHUP"),
+        ("run(preexec_fn=f)", "run(preexec_fn=)"),
+        ("run(process_group=0)", "run(process_group=)"),
+        ("run(x, text=True)", "run without encoding"),
+        ("ctypes.CDLL(None)", "ctypes.CDLL(None)"),
+        ("open(x)", "open without encoding"),
+        ("x.open()", "x.open without encoding"),
+        ("x.read_text()", "x.read_text without encoding"),
+        ("x.write_text(y, encoding=z)", "x.write_text without newline"),
+        ("x.open('w', encoding=z)", "x.open without newline"),
+        ("open(x, 'a', encoding=z)", "open without newline"),
+        ("if x:\n    os.fork()", "os.fork"),
+    ],
+)
+def test_what_not_every_system_has_is_noticed(line: str, found: str) -> None:
+    assert list(not_portable(ast.parse(line))) == [found]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "os.open(x, os.O_WRONLY)",
+        "x.open('rb')",
+        "open(x, 'wb')",
+        "x.open('w', encoding=y, newline=z)",
+        "read_text(x, 1)",
+        "signal.SIGINT",
+        "run(process_group=0 if os.name == 'posix' else None)",
+        "if hasattr(os, 'killpg'):\n    os.killpg(1, 2)",
+        "ctypes.CDLL('x' if sys.platform == 'win32' else None)",
+    ],
+)
+def test_what_every_system_has_is_not(line: str) -> None:
+    assert list(not_portable(ast.parse(line))) == []
+
+
+# ---- Names of files ------------------------------------------------------------------------------
+
+# characters and names that Windows keeps for itself
+RESERVED = re.compile(r'[<>:"\\|?*\x00-\x1f]|[. ]$|^(con|prn|aux|nul|com\d|lpt\d)(\.|$)', re.I)
+
+
+def unusable(names: list[str]) -> list[str]:
+    """Paths that Windows cannot have, or that it takes for the same as another one."""
+    bad = [name for name in names if any(map(RESERVED.search, name.split("/")))]
+    folded = [name.casefold() for name in names]
+    return bad + [name for name in names if folded.count(name.casefold()) > 1]
+
+
+def test_names_in_the_archives_suit_every_system() -> None:
+    for path in (*FMUS.values(), *(BUILD / f"{name}.ssp" for name in SYSTEMS)):
+        with zipfile.ZipFile(path) as archive:
+            assert unusable(archive.namelist()) == []
+
+
+@pytest.mark.parametrize("top", ["rparm", "fmu", "models", "src", "tests"])
+def test_names_in_the_project_suit_every_system(top: str) -> None:
+    assert unusable([path.relative_to(ROOT).as_posix() for path in (ROOT / top).rglob("*")]) == []
+
+
+@pytest.mark.parametrize("names", [["a:b"], ["x/con.c"], ["x./y"], ["x/a?"], ["x/A.c", "x/a.c"]])
+def test_names_that_do_not_are_noticed(names: list[str]) -> None:
+    assert unusable(names) == names
+
+
+# ---- Runs ----------------------------------------------------------------------------------------
+
+WITHOUT_POSIX = """
+import os, signal, sys
+for module in {"fcntl", "grp", "pwd", "resource", "termios"}:
+    sys.modules[module] = None  # cannot be imported
+for name in ("SIGALRM", "SIGCHLD", "SIGHUP", "SIGKILL", "SIGPIPE", "SIGQUIT", "SIGUSR1"):
+    delattr(signal, name)
+for name in ("fork", "getuid", "getgid", "killpg", "setsid", "sched_getaffinity"):
+    delattr(os, name)
+from rparm.__main__ import _as_program
+sys.argv[:1] = ["rparm"]
+sys.exit(_as_program())
+"""
+
+
+def test_run_without_what_windows_lacks(fmu: Path, tmp_path: Path) -> None:
+    arguments = ("run", SHORT, "--tolerance", "1e-8", "--fmu", fmu, "--report", tmp_path / "report")
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_POSIX, *map(str, arguments)],
+        cwd=tmp_path,
+        # the encoding of a console in western Europe
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "cp1252"},
+        capture_output=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"passed: 1 scenario" in done.stdout
+    assert (tmp_path / "report" / "index.html").is_file()
+
+
+def test_files_with_the_line_ends_of_windows_are_read(project: Path, fmu: Path) -> None:
+    expected = load(SHORT, project)
+    before = reference.load(expected, declared("rp_manipulator"))
+    for path in (expected.path, reference_file(project, SHORT)):
+        path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    scenario = scenarios.load(expected.path, declared("rp_manipulator"))
+    assert scenario.description == expected.description
+    after = reference.load(scenario, declared("rp_manipulator"))
+    assert after.names == before.names and np.array_equal(after.values, before.values)
+
+
+def test_the_scenarios_are_those_of_the_given_fmus_model(
+    project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Though its file is somewhere and nothing is built."""
+    other = load(names_of("rp_trajectory")[0])
+    model = project / "models" / other.model
+    (model / "scenarios").mkdir(parents=True)
+    shutil.copy(other.path, model / "scenarios")
+    shutil.copytree(other.reference_folder, model / "references" / other.name)
+    fmu = shutil.copy(FMUS[other.model], project / "downloaded.fmu")
+    arguments = ("run", "--tolerance", "1e-8", "--fmu", fmu, "--report", project / "report")
+    code, out, err = call(capsys, *arguments)
+    assert (code, err) == (0, "")
+    rows = [line.split()[0] for line in out.splitlines() if line.endswith("passed")]
+    assert rows == [other.name] and "passed: 1 scenario\n" in out
+
+
+def test_fmu_of_a_model_without_scenarios(
+    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = repacked(
+        fmu, project / "x.fmu", lambda xml: re.sub(r'modelName="\w+"', 'modelName="Other"', xml)
+    )
+    code, _, err = call(capsys, "run", "--fmu", other)
+    assert code == 2 and f"has no scenarios of Other, the model of {other}" in err
+    assert_one_line(err)
+
+
+def test_what_is_not_built_can_be_given(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, _, err = call(capsys, "run", SHORT)
+    assert "has no FMU of rp_manipulator: ./run.sh builds it, --fmu PATH takes another one" in err
+    assert_one_line(err)
+
+
+# ---- Binaries ------------------------------------------------------------------------------------
+
+
+def with_binaries(
+    source: Path, target: Path, binaries: dict[str, Callable[[bytes], bytes]]
+) -> Path:
+    """Copy of an FMU with its binary of this platform, changed, in other folders."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            if not name.startswith("binaries/"):
+                new.writestr(name, old.read(name))
+            elif name.endswith(fmu_file.LIBRARY_SUFFIX):
+                for folder, change in binaries.items():
+                    new.writestr(f"binaries/{folder}/{Path(name).name}", change(old.read(name)))
+    return target
+
+
+def same(content: bytes) -> bytes:
+    return content
+
+
+def test_on_arm_the_binary_has_the_folder_of_fmi_3(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """linux64, in which fmpy looks there too, holds the binary for x86-64."""
+    monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
+    binaries = {"aarch64-linux": same, "linux64": lambda _: b"for another machine"}
+    with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", binaries)) as opened:
+        simulation.simulate(opened, load(SHORT))
+
+
+def test_compiled_on_arm_by_fmpy_it_has_that_of_fmi_2(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
+    with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", {"linux64": same})) as opened:
+        simulation.simulate(opened, load(SHORT))
+
+
+@pytest.mark.parametrize("sources", [False, True])
+def test_fmu_for_other_platforms(fmu: Path, tmp_path: Path, sources: bool) -> None:
+    path = with_binaries(fmu, tmp_path / "other.fmu", {"plan9": same, "amiga": same})
+    with zipfile.ZipFile(path, "a") as archive:
+        if sources:
+            archive.writestr("sources/all.c", "")
+    with pytest.raises(UserError, match=r"has no binary for .* \(has: amiga, plan9\)") as caught:
+        Fmu(path)
+    assert ("`fmpy compile` makes one" in str(caught.value)) == sources
+
+
+def test_a_loaded_library_that_windows_keeps_hides_no_error(
+    fmu: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remove = os.unlink
+
+    def keep_libraries(path: str, *arguments: object, **options: object) -> None:
+        if str(path).endswith(fmu_file.LIBRARY_SUFFIX):
+            raise PermissionError(13, "in use by another process", path)
+        remove(path, *arguments, **options)
+
+    monkeypatch.setattr(os, "unlink", keep_libraries)
+    with pytest.raises(UserError, match="the real reason"), Fmu(fmu) as opened:
+        folder = opened.folder
+        raise UserError("the real reason")
+    monkeypatch.undo()
+    assert folder.is_dir()
+    shutil.rmtree(folder)
+
+
+# ---- The co-simulation engine --------------------------------------------------------------------
+
+
+def test_without_ecos_the_system_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its package installs everywhere, and loads only where it has libraries."""
+    (tmp_path / "ecospy.py").write_text("raise OSError('libecosc.so:\\nwrong machine')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    ssp = BUILD / "ClosedLoop.ssp"
+    code, _, err = call(capsys, "system", "nominal", "--ssp", ssp, "--report", tmp_path / "report")
+    assert code == 2
+    assert "ecospy, which only `system` needs, cannot be loaded: libecosc.so: wrong machine" in err
+    assert_one_line(err)
+
+
+KILLED = """
+import os, signal, subprocess, sys
+from rparm.system import ecos
+del os.killpg
+child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+ecos._kill(child)
+assert child.wait(10) == -signal.SIGKILL
+"""
+
+
+def test_the_child_is_killed_where_there_are_no_process_groups() -> None:
+    subprocess.run([sys.executable, "-c", KILLED], cwd=ROOT, check=True)
+
+
+def test_components_are_found_by_paths_of_windows() -> None:
+    from rparm.system import ecos
+    from rparm.system import ssp as ssp_archives
+
+    with ssp_archives.unpacked(BUILD / "ClosedLoop.ssp") as opened:
+        component = opened.system.components[0]
+        path = "C:\\Temp\\x\\" + component.source.replace("/", "\\")
+        assert ecos._components(opened, path) == repr(component.name)
+        assert ecos._components(opened, "C:\\Temp\\other.fmu") == "'other.fmu'"

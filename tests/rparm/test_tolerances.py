@@ -1,0 +1,159 @@
+"""Tolerances that a method of integration cannot reach are refused, wherever they are given."""
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
+from rparm.runs.comparison import Runs
+from rparm.scenarios import scenario as scenarios
+from rparm.scenarios.scenario import Scenario
+from tests.support.rparm_project import FMUS, SHORT, assert_one_line, call, declared, fmi3_fmu
+from tests.support.ssp_files import SSP, edited, replace
+
+CONTENT = """\
+model = "rp_manipulator"
+title = "T"
+description = "D"
+tolerance = {tolerance}
+time = {{ start = 0.0, stop = 1.0, step = 0.1 }}
+[parameters]
+solver_method = "{method}"
+relative_tolerance = {parameter}
+[initial]
+q1 = 0.3
+"""
+
+
+def loaded(folder: Path, method: str, tolerance: float, parameter: float = 0.0) -> Scenario:
+    text = CONTENT.format(tolerance=tolerance, method=method, parameter=parameter)
+    path = folder / "x.toml"
+    path.write_text(text, encoding="utf-8")
+    return scenarios.load(path, declared("rp_manipulator"))
+
+
+def effective(fmu: Fmu, method: str, tolerance: float) -> float:
+    """What the FMU integrates at."""
+    with fmu.instance("x") as instance:
+        instance.set_up(0.0, 1.0)
+        instance.set(METHOD, fmu.model.variables[METHOD].items[method])
+        instance.set(TOLERANCE, tolerance)
+        instance.enter_initialization()
+        instance.exit_initialization()
+        value = instance.reals(["effective_relative_tolerance"])
+        value.get()
+        return float(value.view[0])
+
+
+def test_the_smallest_tolerances_are_those_of_the_fmus() -> None:
+    """Above it a tolerance makes a difference, below it none, in both versions of FMI."""
+    for folder in FMUS:
+        methods = declared(folder).variables.get(METHOD)
+        assert methods is None or set(methods.items) == set(SMALLEST_TOLERANCES)
+    for path in (FMUS["rp_manipulator"], fmi3_fmu(FMUS["rp_manipulator"])):
+        with Fmu(path) as fmu:
+            for method, smallest in SMALLEST_TOLERANCES.items():
+                least = effective(fmu, method, smallest)
+                assert effective(fmu, method, 2 * smallest) == pytest.approx(2 * least, rel=1e-9)
+                for factor in (0.5, 1e-3, 1e-18):
+                    assert effective(fmu, method, factor * smallest) == pytest.approx(
+                        least, rel=1e-9
+                    )
+
+
+@pytest.mark.parametrize("method", SMALLEST_TOLERANCES)
+def test_what_a_method_cannot_reach_is_refused(tmp_path: Path, method: str) -> None:
+    smallest = SMALLEST_TOLERANCES[method]
+    for good in (smallest, math.nextafter(smallest, 1), 1e-4):
+        assert loaded(tmp_path, method, good).smallest_tolerance == smallest
+        loaded(tmp_path, method, 1e-8, good)
+    for bad in (math.nextafter(smallest, 0), smallest / 2, 1e-30, 5e-324):
+        for arguments, key in (((bad,), "tolerance"), ((1e-8, bad), "[parameters] relative_")):
+            with pytest.raises(UserError, match=re.escape(f"x.toml: {key}")) as caught:
+                loaded(tmp_path, method, *arguments)
+            assert f"the smallest of {method}, got {bad!r}" in str(caught.value)
+
+
+def test_errors_are_estimated_down_to_the_smallest_tolerance(tmp_path: Path) -> None:
+    """From a run that is another one."""
+    with Fmu(FMUS["rp_manipulator"]) as fmu:
+        runs = Runs({"rp_manipulator": fmu})
+        for method, smallest in SMALLEST_TOLERANCES.items():
+            scenario = loaded(tmp_path, method, smallest)
+            assert 0 < runs.estimated(scenario, smallest).error < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "code"), [("1e-30", 2), ("4.9999e-12", 2), ("5e-12", 0), ("1e-4", 0)]
+)
+def test_the_option_of_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], tolerance: str, code: int
+) -> None:
+    arguments = ("run", SHORT, "--fmi", "2", "--tolerance", tolerance, "--report", tmp_path / "r")
+    found, out, err = call(capsys, *arguments)
+    assert found == code
+    if code:
+        assert out == "" and not (tmp_path / "r").exists()
+        assert f"--tolerance: {SHORT}: expected at least 5e-12, the smallest of cvode_adams" in err
+        assert_one_line(err)
+
+
+def test_systems_and_campaigns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = "resources/arm_nominal.ssv"
+    fine = edited(SSP, tmp_path / "fine.ssp", {place: replace('"1e-11"', '"5e-12"')})
+    assert call(capsys, "system", "--list", "--ssp", fine)[0] == 0
+    path = edited(SSP, tmp_path / "bad.ssp", {place: replace('"1e-11"', '"4.9e-12"')})
+    code, out, err = call(capsys, "system", "--list", "--ssp", path)
+    assert (code, out) == (2, "") and "component 'arm': 'relative_tolerance': expected at" in err
+    assert_one_line(err)
+
+
+CAMPAIGN = """\
+title = "Test"
+description = "Of a test."
+scenario = "hanging_swing"
+sampling = "random"
+runs = 2
+[parameters.m2]
+uniform = [1.0, 3.0]
+[keep]
+final = ["q1"]
+"""
+M2 = "[parameters.m2]\nuniform = [1.0, 3.0]\n"
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ([(M2, M2 + "[set]\nrelative_tolerance = 1e-12\n")], "hanging_swing: relative_tolerance: "),
+        ([(M2, M2 + '[set]\nrelative_tolerance = 1e-12\nsolver_method = "erk"\n')], None),
+        ([(M2, M2 + "[set]\nrelative_tolerance = 5e-12\n")], None),
+        ([(M2, "[parameters.relative_tolerance]\nlog_uniform = [1e-13, 1e-6]\n")], "[parameters."),
+        ([(M2, "[parameters.relative_tolerance]\nvalues = [1e-6, 1e-12]\n")], "[parameters."),
+        ([(M2, "[parameters.relative_tolerance]\nvalues = [1e-6, 0.0]\n")], None),
+    ],
+)
+def test_of_campaigns(
+    tmp_path: Path, changes: Sequence[tuple[str, str]], expected: str | None
+) -> None:
+    planning = pytest.importorskip("rparm.campaign.planning")
+    from rparm.campaign import bases, campaign_file
+
+    text = CAMPAIGN
+    for old, new in changes:
+        text = text.replace(old, new)
+    path = tmp_path / "test.toml"
+    path.write_text(text, encoding="utf-8")
+    given = campaign_file.read(path)
+    with bases.opened(given, None, path) as base:
+        if expected is None:
+            planning.plan(given, base, path)
+            return
+        with pytest.raises(UserError, match=re.escape(f"test.toml: {expected}")) as caught:
+            planning.plan(given, base, path)
+    assert "expected at least 5e-12, the smallest of cvode_adams, got 1e-1" in str(caught.value)

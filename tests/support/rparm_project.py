@@ -1,0 +1,104 @@
+"""A copy of the project with few scenarios, and changed files, for the tests of the Python side."""
+
+import functools
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rparm import __main__ as cli
+from rparm import project
+from rparm.fmi.fmu_file import read_model
+from rparm.fmi.model import Model
+from rparm.scenarios import scenario as scenarios
+from rparm.scenarios.scenario import Scenario
+from tests.support.paths import FOLDERS, ROOT
+
+BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).absolute().parent
+FMUS = {folder: BUILD / f"{name}.fmu" for name, folder in FOLDERS.items()}
+FILES = project.scenario_files()
+NAMES = list(FILES)
+SHORT, LONG = "constant_effort_single_step", "constant_effort"  # the same motion
+
+
+def fmi3_fmu(path: Path) -> Path:
+    """The FMU of FMI 3.0 beside one of FMI 2.0."""
+    return path.parent / "fmi3" / path.name
+
+
+def names_of(model: str) -> list[str]:
+    """Scenarios of one model, by its folder."""
+    return [name for name, path in FILES.items() if project.model_folder(path).name == model]
+
+
+@functools.cache
+def declared(model: str) -> Model:
+    """What the built FMU of a model declares, by the model's folder."""
+    return read_model(FMUS[model])
+
+
+def load(name: str, root: Path = ROOT) -> Scenario:
+    """A scenario of the project, or of a copy of it."""
+    path = root / FILES[name].relative_to(ROOT)
+    return scenarios.load(path, declared(project.model_folder(path).name))
+
+
+def copy_project(folder: Path) -> None:
+    """A project with two scenarios."""
+    model = folder / "models" / "rp_manipulator"
+    (model / "scenarios").mkdir(parents=True)
+    (model / "references").mkdir()
+    shutil.copy(ROOT / "models/rp_manipulator/references/scales.toml", model / "references")
+    for name in (SHORT, LONG):
+        original = load(name)
+        shutil.copy(original.path, model / "scenarios")
+        shutil.copytree(original.reference_folder, model / "references" / name)
+
+
+def assert_made_again(model: str, folder: Path) -> None:
+    """The references of a model are what its script writes into an empty folder, byte for byte."""
+    kept = ROOT / "models" / model / "references"
+    script = kept / "make_references.py"
+    subprocess.run([sys.executable, script, "--output", folder], check=True, cwd=folder)
+    names = {path.name for path in folder.iterdir()}
+    assert names == set(names_of(model)) == {path.parent.name for path in kept.glob("*/*_ref.csv")}
+    for made in folder.glob("*/*"):
+        assert made.read_bytes() == (kept / made.relative_to(folder)).read_bytes(), made
+
+
+def reference_file(project: Path, name: str) -> Path:
+    return project / f"models/rp_manipulator/references/{name}/RPManipulator_ref.csv"
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def repacked(source: Path, target: Path, change: Callable[[str], str], drop: str = "-") -> Path:
+    """Copy of an FMU with a changed modelDescription.xml and without files under `drop`."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "modelDescription.xml":
+                content = change(content.decode()).encode()
+            if not name.startswith(drop):
+                new.writestr(name, content)
+    return target
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error."""
+    code = cli.main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def assert_one_line(error: str) -> None:
+    assert error.startswith("error: ") and error.count("\n") == 1 and "Traceback" not in error
