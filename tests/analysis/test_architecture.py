@@ -33,7 +33,8 @@ BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).par
 # folder, as a regular expression: folders and libraries whose headers it includes
 MAY_INCLUDE = {
     r"src/model": (),
-    r"src/integrator": ("src/model",),
+    r"src/integrator/roots": ("src/model",),
+    r"src/integrator": ("src/integrator/roots", "src/model"),
     r"src/instance/state": ("src/integrator", "src/model"),
     r"src/instance/events": ("src/instance/state",),
     r"src/instance/values": ("src/instance/state", "src/instance/events"),
