@@ -17,8 +17,8 @@ import posixpath
 import re
 import shutil
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 PROJECT = Path(__file__).parents[1]
@@ -37,6 +37,7 @@ OF_IMPORTERS = {"fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"}
 NOT_REACHED = {"caliper/cali.h", "mpi.h", "sundials/sundials_context.hpp"}
 
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+WORD = re.compile(r"\w+(?=\s*\(|\.h\")")  # called, or in a header's name: log_data.h
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
 
 
@@ -211,13 +212,27 @@ def load(path: Path) -> Manifest:
 def collect(manifest: Manifest) -> SourceFolder:
     """Read all files."""
     folder = SourceFolder(manifest.roots)
-    for library in manifest.libraries:
-        folder.add_library(library)
-        if library.name == ELEMENTARY:
-            folder.add_renames(library.sources)
-    if RENAMES not in folder.texts:
+    elementary = [library for library in manifest.libraries if library.name == ELEMENTARY]
+    if not elementary:
         raise SourceCodeError(f"the manifest has no library {ELEMENTARY}")
+    for library in manifest.libraries:
+        if library.name != ELEMENTARY:
+            folder.add_library(library)
+    for library in elementary:
+        sources = named_in(folder.texts.values(), library.sources)
+        folder.add_library(replace(library, sources=sources))
+        folder.add_renames(sources)
     return folder
+
+
+def named_in(texts: Iterable[str], sources: list[Path]) -> list[Path]:
+    """Those of the sources that the texts need, by the names of functions and of data."""
+    left = {source.stem: source for source in sources}
+    todo = list(texts)
+    while todo:
+        words = set(WORD.findall(COMMENT.sub("", todo.pop())))
+        todo += [read(left.pop(name)) for name in words & left.keys()]
+    return [source for source in sources if source.stem not in left]
 
 
 def write(texts: dict[str, str], output: Path) -> None:

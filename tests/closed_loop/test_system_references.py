@@ -50,7 +50,7 @@ def test_controller_knows_the_dynamics_of_the_notes() -> None:
         "gravity1": g * (m1 * lc1 * sp.cos(q1) + m2 * (length * sp.cos(q1) - a * sp.sin(q1))),
         "gravity2": g * m2 * sp.sin(q1),
     }
-    derived = terms_of_the_motion(equations.ARM.outputs)
+    derived = terms_of_the_motion()
     assert all(sp.simplify(notes[name] - derived[name]) == 0 for name in TERMS)
 
     Kp, Kd, reference, measured, integral, inertia = (

@@ -13,15 +13,19 @@ from tests.support.generator import VARIABLES, generate
 from tests.support.paths import ROOT
 
 PROGRAM = ROOT / "fmu" / "source_code.py"
-SINE = "#include <features.h>\n#include <math.h>\n\ndouble sin(double x)\n{\n\treturn x;\n}\n"
+SINE = "double sin(double x)\n{\n\treturn __sin(x);\n}\n"
+SINE = f'#include <features.h>\n#include <math.h>\n#include "sin_data.h"\n\n{SINE}'
 FILES = {
-    "toy/src/toy.c": '/* #include "nowhere.h" */\n#include "deep/toy.h"\n#include <stdio.h>\n',
+    "toy/src/toy.c": '/* #include "nowhere.h" */\n#include "deep/toy.h"\n#include <stdio.h>\n'
+    "/* cos(x) */ double cos, y = sin (1.0);\n",
     "toy/include/deep/toy.h": '#  include "../plain.h" // twice\n#include <plain.h>\n',
     "toy/include/plain.h": '#include "deep/toy.h"\nint caf\udce9;\n',
     "toy/include/unused.h": "",
     "math/sin.c": SINE,
     "math/__sin.c": "",
     "math/sin_data.c": "",
+    "math/sin_data.h": "",
+    "math/cos.c": "",
     "math/front.h": "",
 }
 
@@ -38,7 +42,7 @@ class Toy:
             self.library("toy", ["toy/src/toy.c"], include=["toy/include"]),
             self.library(
                 "elementary_functions",
-                ["math/sin.c", "math/__sin.c", "math/sin_data.c"],
+                ["math/sin.c", "math/__sin.c", "math/sin_data.c", "math/cos.c"],
                 prelude=str(folder / "math/front.h"),
             ),
         ]
@@ -89,19 +93,22 @@ def toy(tmp_path: Path) -> Toy:
     return Toy(tmp_path)
 
 
-def test_only_includes_are_changed(toy: Toy) -> None:
+def test_only_includes_are_changed_and_what_is_not_called_is_left_out(toy: Toy) -> None:
     result = toy.run()
     assert result.returncode == 0, result.stderr
     front = '#include "project/fmu/source_code.h"\n#include "generated/elementary_functions.h"\n'
     math_front = front + '#include "math/front.h"\n'
     assert toy.contents() == {
         "toy_toy.c": front
-        + '/* #include "nowhere.h" */\n#include "toy/include/deep/toy.h"\n#include <stdio.h>\n',
+        + '/* #include "nowhere.h" */\n#include "toy/include/deep/toy.h"\n#include <stdio.h>\n'
+        "/* cos(x) */ double cos, y = sin (1.0);\n",
         "toy/include/deep/toy.h": '#include "../plain.h" // twice\n#include "../plain.h"\n',
         "toy/include/plain.h": '#include "deep/toy.h"\nint caf\udce9;\n',
-        "math_sin.c": math_front + SINE.replace("#include <features.h>", ""),
+        "math_sin.c": math_front
+        + SINE.replace("#include <features.h>", "").replace('"sin_data', '"math/sin_data'),
         "math___sin.c": math_front,
         "math_sin_data.c": math_front,
+        "math/sin_data.h": "",
         "math/front.h": "",
         "generated/elementary_functions.h": (
             "/* Functions of musl, by other names than the standard ones. */\n"
@@ -141,7 +148,8 @@ def test_make_is_given_all_that_was_read(tmp_path: Path) -> None:
     target, _, files = rule.read_text().replace("\\\n", "").partition(":")
     assert target == "description.xml"
     read = set(files.replace("\\ ", "?").split())
-    own = {str(tmp_path / "a?folder" / name) for name in FILES if name != "toy/include/unused.h"}
+    unused = {"toy/include/unused.h", "math/cos.c"}
+    own = {str(tmp_path / "a?folder" / name) for name in FILES.keys() - unused}
     prelude = {str(ROOT / "fmu" / "source_code.h"), str(ROOT / "src" / "model" / "platform.h")}
     assert read == own | prelude
 
