@@ -84,10 +84,10 @@ def _refuse(text: str) -> int:
     return 2
 
 
-def _drop_output() -> None:
+def _drop_output(stream: TextIO | None = None) -> None:
     """Discard what is still buffered, or the interpreter would fail to write it at exit."""
     with suppress(OSError, ValueError, AttributeError):  # closed, or not of the system
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), (stream or sys.stdout).fileno())
 
 
 def _as_program() -> int:
@@ -111,10 +111,12 @@ def _as_program() -> int:
 
 def _end(code: int) -> NoReturn:
     """End the process, but not HELICS, which may wait for ever for a process that is gone."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError, AttributeError):  # closed, full, or not there
+            _drop_output(stream)
     if "helics" in sys.modules:
-        for stream in (sys.stdout, sys.stderr):
-            with suppress(OSError, ValueError, AttributeError):  # closed, full, or not there
-                stream.flush()
         os._exit(code or 0)
     sys.exit(code)
 

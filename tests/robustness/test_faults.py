@@ -179,9 +179,12 @@ def test_no_room_for_the_output(place: Place) -> None:
     place.assert_clean()
 
 
-def test_no_room_for_errors(place: Place) -> None:
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_no_room_for_errors(place: Place, unbuffered: str) -> None:
+    """What is left in a buffer must not change the exit code either."""
     with Path("/dev/full").open("w") as full:
-        code, out, _ = place.call(("run", "unknown"), stderr=full)
+        environment = {"PYTHONUNBUFFERED": unbuffered}
+        code, out, _ = place.call(("run", "unknown"), stderr=full, env=environment)
     assert code == 2 and out == ""
 
 
