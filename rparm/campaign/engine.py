@@ -23,7 +23,7 @@ from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.cluster import WAIT
 from rparm.campaign.job import Job
 from rparm.campaign.points import Points
-from rparm.campaign.results import GOES_ON, Results
+from rparm.campaign.results import RESUMES, Results
 from rparm.campaign.runs import Rows
 from rparm.campaign.worker import Plugin, run_block
 from rparm.errors import UserError, one_line
@@ -85,7 +85,7 @@ class Engine:
                 if not _is_of_connection(error):
                     text = one_line(error) or type(error).__name__
                     raise UserError(f"{self._address}: a worker cannot run this: {text}") from None
-        raise UserError(f"{self._address}: {GONE}, or a worker cannot be reached; {GOES_ON}")
+        raise UserError(f"{self._address}: {GONE}, or a worker cannot be reached; {RESUMES}")
 
     def _end(self) -> None:
         """Take the plugin from all workers, if they can be reached."""
@@ -109,7 +109,7 @@ class Engine:
         except CONNECTION as error:
             if not _is_of_connection(error):
                 raise
-            raise UserError(f"{self._lost}; {GOES_ON}") from None
+            raise UserError(f"{self._lost}; {RESUMES}") from None
         finally:
             self._client.loop.add_callback(watch.stop)
             self._end()
@@ -162,7 +162,7 @@ class Engine:
             return future.result()
         error = self._error(future)
         if not isinstance(error, KilledWorker):
-            raise UserError(f"block {block.number}: {one_line(error)}; {GOES_ON}")
+            raise UserError(f"block {block.number}: {one_line(error)}; {RESUMES}")
         pairs = zip(block.runs, block.points, strict=True)
         return _joined([self._alone(run, point[None]) for run, point in pairs])
 
@@ -176,7 +176,7 @@ class Engine:
 
     def _error(self, future: Future) -> BaseException:
         if future.status == "cancelled" or self._client.status != "running":
-            raise UserError(f"{self._lost}; {GOES_ON}")
+            raise UserError(f"{self._lost}; {RESUMES}")
         return future.exception()
 
 

@@ -33,7 +33,7 @@ PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib",
 WORKERS = ".{}.workers"  # with the number of the process
 DIGITS = len(str(MAX_RUNS))  # of numbers in names: the order of names is that of runs
 CAMPAIGN, PART, SHA256 = b"campaign", b"part", b"sha256"  # keys of metadata
-GOES_ON = "the same command goes on from what is there"
+RESUMES = "the same command resumes it"
 ROOM = 1.1  # of the room that is needed: what Parquet adds
 FILE, COLUMN = 4000, 400  # bytes of a file, and of each of its columns, besides the rows
 ROW_TEXT = 8  # bytes of a row besides its numbers
@@ -215,7 +215,7 @@ class Results:
             self._write(self.block_path(block), table, f"block {block}")
         except (OSError, pa.ArrowException) as error:
             raise UserError(
-                f"{self.folder}: the results cannot be written: {reason(error)}; {GOES_ON}"
+                f"{self.folder}: the results cannot be written: {reason(error)}; {RESUMES}"
             ) from error
 
     def _write_trajectory(self, run: int, record: np.ndarray) -> None:
@@ -240,7 +240,7 @@ class Results:
         """One block; UserError if it is missing or damaged."""
         table = self._block(block)
         if table is None:
-            raise UserError(f"{self.block_path(block)}: is missing or damaged; {GOES_ON}")
+            raise UserError(f"{self.block_path(block)}: is missing or damaged; {RESUMES}")
         return table
 
     def table(self, columns: Sequence[str]) -> dict[str, np.ndarray]:

@@ -183,7 +183,7 @@ def _run_missing(
     ahead = sum(len(campaign.block_range(block)) for block in blocks)
     console.stage("starting workers" if options.scheduler is None else "calling the scheduler")
     if ahead < count:
-        print(f"goes on: {count - ahead} of {count} runs are there")
+        print(f"resumes: {count - ahead} of {count} runs are there")
     try:
         with (
             results.workers_folder() as files,
@@ -200,6 +200,6 @@ def _run_missing(
             seconds = time.perf_counter() - begin
     except BaseException:  # Dask may turn that of a signal into another one
         if arrived():
-            print(f"stopped; {engine.GOES_ON}", file=sys.stderr)
+            print(f"stopped; {engine.RESUMES}", file=sys.stderr)
         raise
     print(f"{ahead} runs in {seconds:.1f} s: {ahead / seconds:.1f} runs/s")

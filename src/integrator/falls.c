@@ -59,8 +59,8 @@ static double first_fall_from_zero(const struct roots_polynomial *p, double nois
     return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
 }
 
-/* Where a restart finds the indicator below its noise it has not fallen yet, as the modes have just
- * been found valid; otherwise an event could come again and again. */
+/* An indicator that is below 0 at a restart has not fallen: the modes have just been found valid,
+ * and one event would come again and again. */
 double fall_first(const struct roots_polynomial *p, double error, bool *is_armed, double *noise) {
     if (!*is_armed) {
         double within = fmax(error, *noise);

@@ -12,7 +12,7 @@ struct integrator {
     struct workspace workspace;  /* for the memory of the method */
     const struct method *method; /* NULL: there is none */
     void *memory;                /* of the method */
-    double internal;             /* s since the restart: end of the last internal step */
+    double internal_end;         /* s since the restart: end of the last internal step */
     struct integrator_statistics statistics;
 
     /* one value per state each, parts of values */
@@ -141,7 +141,7 @@ enum status integrator_restart(struct integrator *integrator, const double x[],
                                const struct integrator_start *start) {
     struct problem *problem = &integrator->problem;
     integrator->statistics.restarts++;
-    integrator->internal = -INFINITY;
+    integrator->internal_end = -INFINITY;
     problem->horizon = start->horizon;
     problem->first_step = start->first_step;
     problem->continues = start->continues;
@@ -160,7 +160,7 @@ double integrator_next_step(const struct integrator *integrator) {
 }
 
 double integrator_passed_time(const struct integrator *integrator) {
-    return integrator->internal;
+    return integrator->internal_end;
 }
 
 static void add_work(struct integrator *integrator, const struct method_work *work) {
@@ -173,13 +173,13 @@ static void add_work(struct integrator *integrator, const struct method_work *wo
         totals->last_step = work->last_step;
         totals->last_order = work->last_order;
     }
-    integrator->internal = work->internal;
+    integrator->internal_end = work->internal;
 }
 
 /* A point that an internal step has passed already takes no more than a polynomial. */
 static bool can_interpolate(struct integrator *integrator, double t) {
     const struct method *method = integrator->method;
-    return integrator->internal >= t && method->interpolate != NULL &&
+    return integrator->internal_end >= t && method->interpolate != NULL &&
            method->interpolate(integrator->memory, t, integrator->x) &&
            problem_are_finite(integrator->x, integrator->problem.ode.state_count);
 }
@@ -189,7 +189,7 @@ static bool can_interpolate(struct integrator *integrator, double t) {
 static bool has_reached(const struct integrator *integrator, double t) {
     // at a stop time the solver may be short of it by its own rounding
     return problem_are_finite(integrator->x, integrator->problem.ode.state_count) &&
-           integrator->internal >= t * (1.0 - 1e-12);
+           integrator->internal_end >= t * (1.0 - 1e-12);
 }
 
 /* x becomes the state reached. */
@@ -256,7 +256,7 @@ enum status integrator_rest(struct integrator *integrator, const double x[],
     if (status == STATUS_OK && start->indicators != NULL) {
         status = location_search_at_rest(&problem->location, x, t);
     }
-    integrator->internal = -INFINITY;
+    integrator->internal_end = -INFINITY;
     problem->reached = status == STATUS_OK ? fmin(t, problem->location.time) : 0.0;
     *reached = problem->reached;
     return status;

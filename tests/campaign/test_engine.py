@@ -63,7 +63,7 @@ def test_a_killed_campaign_goes_on(file: Path, undisturbed: str, tmp_path: Path)
     assert 3 <= there < RUNS // BLOCK
     code, out, err = finish(start(file, tmp_path, "--workers", 2))
     assert code == 0, err
-    assert f"goes on: {there * BLOCK} of {RUNS} runs are there" in out
+    assert f"resumes: {there * BLOCK} of {RUNS} runs are there" in out
     assert table(out) == undisturbed
     assert files(tmp_path) == files(file.parent / "undisturbed")
     assert not list(tmp_path.glob(".*"))  # what the killed one has left is removed
@@ -75,7 +75,7 @@ def test_a_stopped_campaign_says_so(file: Path, tmp_path: Path) -> None:
     os.kill(process.pid, signal.SIGINT)
     code, _, err = finish(process)
     assert code == 128 + signal.SIGINT
-    assert "stopped; the same command goes on from what is there" in err
+    assert "stopped; the same command resumes it" in err
     assert "Traceback" not in err
     assert not list(tmp_path.glob(".*"))
 
@@ -92,7 +92,7 @@ def test_a_campaign_whose_workers_are_gone_ends(
         registered(arms[0])
         with (
             engine_of(client, file, tmp_path) as (made, _),
-            pytest.raises(UserError, match="has no workers any more; the same command goes on"),
+            pytest.raises(UserError, match="has no workers any more; the same command resumes"),
         ):
             made.run(range(RUNS // BLOCK), lambda _: kill_group(arms[0]))
 
@@ -204,7 +204,7 @@ def test_a_campaign_that_is_stopped_as_it_starts_says_only_so(
     (os.kill if ending == signal.SIGTERM else os.killpg)(process.pid, ending)
     code, _, err = finish(process)
     assert code == 128 + ending
-    assert err.splitlines()[0] == "stopped; the same command goes on from what is there"
+    assert err.splitlines()[0] == "stopped; the same command resumes it"
     assert err.splitlines()[1:] == (["interrupted"] if ending == signal.SIGINT else [])
     assert not list(tmp_path.glob(".*"))
 

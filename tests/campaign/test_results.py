@@ -203,7 +203,7 @@ def test_a_folder_that_cannot_be_written_is_said_as_it_is(
     results = Results(tmp_path / place, folder.given, folder.job, "text")
     with pytest.raises(UserError, match="cannot be written: (Not a dir|No such file)") as caught:
         results.begin()
-    assert "goes on" not in str(caught.value)
+    assert "resumes" not in str(caught.value)
 
 
 def test_names_are_in_the_order_of_the_runs(folder: Folder) -> None:
@@ -277,7 +277,7 @@ def test_a_full_disk_leaves_no_part_of_a_file(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(pq, "write_table", fill)
-    with pytest.raises(UserError, match="No space left on device; the same command goes on"):
+    with pytest.raises(UserError, match="No space left on device; the same command resumes"):
         folder.write(1)
     there = [path.name for path in (folder.results.folder / "blocks").iterdir()]
     assert there == ["block_0000000000.parquet"]

@@ -58,7 +58,7 @@ enum fuzz_outcome fuzz_exchange_step(struct fuzz_exchange *run, double length) {
     for (size_t i = 0; i < model_description.indicator_count; i++) {
         crosses |= (z[i] > 0.0) != (run->z[i] > 0.0);
     }
-    return crosses ? FUZZ_MEETS_EVENT : FUZZ_GOES_ON;
+    return crosses ? FUZZ_MEETS_EVENT : FUZZ_RESUMES;
 }
 
 void fuzz_exchange_repeat(const struct fuzz_exchange *run, double length) {

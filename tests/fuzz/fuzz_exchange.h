@@ -17,7 +17,7 @@ struct fuzz_exchange {
 /* Reads states and indicators; false: they cannot be computed. */
 bool fuzz_exchange_read(struct fuzz_exchange *run);
 
-enum fuzz_outcome { FUZZ_GOES_ON, FUZZ_MEETS_EVENT, FUZZ_IS_OVER };
+enum fuzz_outcome { FUZZ_RESUMES, FUZZ_MEETS_EVENT, FUZZ_IS_OVER };
 
 /* Forward Euler to the next time event at most. */
 enum fuzz_outcome fuzz_exchange_step(struct fuzz_exchange *run, double length);

@@ -25,8 +25,8 @@ int64_t instance_longest_history(const struct instance *instance) {
     return integrator_longest_history(instance->configured.method, instance_is_searched(instance));
 }
 
-/* Beyond what the internal steps have passed, one more would make the history too long. */
-static bool is_at_end(const struct instance *instance, double target) {
+/* The target needs one more internal step than a history may have. */
+static bool history_is_full(const struct instance *instance, double target) {
     const struct instance_state *state = &instance->state;
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     return target > state->passed_time && steps >= instance_longest_history(instance);
@@ -38,7 +38,7 @@ enum continuation instance_continuation(const struct instance *instance, double 
                    ? CONTINUE_AFTER_EVENT
                    : CONTINUE_AFTER_CHANGE;
     }
-    if (is_at_end(instance, target)) {
+    if (history_is_full(instance, target)) {
         return CONTINUE_AFTER_RESTART;
     }
     return instance->history_is_lost ? CONTINUE_AFTER_REPLAY : CONTINUE_NOW;

@@ -127,9 +127,8 @@ static enum status derive_by_time(struct instance *instance) {
     return propagate(instance, 1.0, instance->second_derivatives);
 }
 
-/* From a structure of derivatives. Discrete values are constant between events: those of the
- * instance are in no structure; those of the model are 0 there, unless their reading depends on
- * parameters. */
+/* The derivative of a variable, from a value structure of derivatives. It is 0 for variables of the
+ * instance, such as counters, which are constant between events. */
 static double derivative_in(const char *structure, const struct variable *variable) {
     return variable->owner == VARIABLE_OF_MODEL
                ? *(const double *)(const void *)(structure + variable->offset)

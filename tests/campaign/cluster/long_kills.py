@@ -128,12 +128,12 @@ def _lose_links(file: Path, output: Path, undisturbed: str, apart: Network) -> N
         assert table(out) == undisturbed
     with cluster(here, [there, there]) as (address, *_):
         code, _, err = cut_in(output / "all", address)
-        assert code == 2 and "has no workers any more; the same command goes on" in err, err
+        assert code == 2 and "has no workers any more; the same command resumes" in err, err
     with cluster(there, [there, there]) as (address, *_):
         options = ("--scheduler", address)
         assert completed(file, output / "all", *options, host=here) == undisturbed
         code, _, err = cut_in(output / "scheduler", address)
-        assert code == 2 and "the scheduler is gone; the same command goes on" in err, err
+        assert code == 2 and "the scheduler is gone; the same command resumes" in err, err
         assert completed(file, output / "scheduler", *options, host=here) == undisturbed
 
 
@@ -152,13 +152,13 @@ def fill_disk(file: Path, output: Path, undisturbed: str) -> None:
             while True:
                 other.write(bytes(4096))
         code, _, err = finish(process)
-        assert code == 2 and "No space left on device; the same command goes on" in err, err
+        assert code == 2 and "No space left on device; the same command resumes" in err, err
         there = blocks(output)
         assert 0 < there < RUNS // 6
         filler.unlink()
         code, out, err = finish(start(file, output, "--workers", 2))
         assert code == 0, err
-        assert f"goes on: {there * 6} of {RUNS} runs" in out
+        assert f"resumes: {there * 6} of {RUNS} runs" in out
         assert table(out) == undisturbed
     finally:
         subprocess.run(["umount", "-l", str(output)], check=False)

@@ -66,7 +66,7 @@ void fuzz_plant_exchange(struct fuzz_input *input, struct fuzz_instance *instanc
             fuzz_exchange_repeat(&run, length);
         }
         const enum fuzz_outcome outcome = fuzz_exchange_step(&run, length);
-        if (outcome == FUZZ_MEETS_EVENT || (outcome == FUZZ_GOES_ON && selector == 1)) {
+        if (outcome == FUZZ_MEETS_EVENT || (outcome == FUZZ_RESUMES && selector == 1)) {
             handle_event(input, &run);
         }
         for (int k = 0; k < STATES; k++) {
