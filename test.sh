@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Sets up, builds and runs the tests, all by ctest.
 #
-#   ./test.sh               optimized, and with gcc's sanitizers; C and Python
-#   ./test.sh --all         then clang, fuzzing, analysers, mutants, other platforms, other importers, browsers
+#   ./test.sh               optimized, C and Python, and C with gcc's sanitizers
+#   ./test.sh --all         then what takes long, clang, threads, fuzzing, analysers, mutants, other platforms, other importers, browsers
 #   ./test.sh --long        all, then the long campaigns, an hour and a half, with a table of their figures
 #   ./test.sh ARGUMENTS     optimized only; of all tests those that ctest chooses by ARGUMENTS: ./test.sh -R instance
 #
@@ -24,10 +24,6 @@ short() {
   build asan
   ctest --preset asan --progress -j 2
 
-  step "ThreadSanitizer; the test with many threads"
-  build tsan
-  ctest --preset tsan --progress
-
   step "gcc, optimized; all tests but those that --all adds"
   build default
   ctest --preset default -j 2 -LE '^more$'
@@ -39,6 +35,10 @@ more() {
   step "clang, all warnings are errors; C tests"
   build clang
   ctest --preset clang --progress -j 2
+
+  step "ThreadSanitizer; the test with many threads"
+  build tsan
+  ctest --preset tsan --progress
 
   step "libFuzzer, ten seconds a target"
   build fuzz
