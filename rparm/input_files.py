@@ -93,3 +93,13 @@ def show(value: Any, longest: int = 40) -> str:
     except ValueError:  # an integer of more digits than Python writes
         text = "a very large number"
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
+
+
+def number_in(text: str) -> float:
+    """The number that a file has in digits; ValueError if it is none.
+
+    1_000 is none: only Python would read it so.
+    """
+    if "_" in text:
+        raise ValueError(f"could not convert string to float: {text!r}")
+    return float(text)

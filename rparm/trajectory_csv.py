@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm.input_files import UnreadableError, read_text
+from rparm.input_files import UnreadableError, number_in, read_text
 from rparm.output_files import whole
 
 LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
@@ -94,7 +94,7 @@ def _numbers(row: list[str], columns: int, line: int, failure: Failure) -> list[
     if len(row) != columns:
         raise failure(f"expected {columns} values, found {len(row)}", line)
     try:
-        values = [float(literal) for literal in row]
+        values = [number_in(literal) for literal in row]
     except ValueError as error:
         raise failure(f"expected numbers, {error}", line) from None
     if not all(map(math.isfinite, values)):

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm.errors import UserError, did_you_mean, placed
-from rparm.input_files import decoded, read_bytes, show
+from rparm.input_files import decoded, number_in, read_bytes, show
 
 LARGEST = 50_000_000  # bytes
 DELIMITERS = ",;\t"
@@ -41,8 +41,8 @@ class Log:
             if len(row) != len(self.names):
                 raise self._wrong(f"expected {len(self.names)} values, found {len(row)}", line)
             try:
-                found.append(float(row[first]))
-                found.append(float(row[second]))
+                found.append(number_in(row[first]))
+                found.append(number_in(row[second]))
             except ValueError:
                 raise self._no_number(row, (first, second), line) from None
         if not found:
@@ -82,7 +82,7 @@ class Log:
         for column in columns:
             expected = "a finite number"
             try:
-                if math.isfinite(float(row[column])):
+                if math.isfinite(number_in(row[column])):
                     continue
             except ValueError:
                 expected = "a number with a decimal point"

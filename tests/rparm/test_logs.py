@@ -103,6 +103,7 @@ MISTAKES = [
     ("time,force\n1,nan\n2,1\n", "", "line 2: column 'force': expected a finite number, found 'n"),
     ("time,force\ninf,1\n2,1\n", "", "line 2: column 'time': expected a finite number, found 'i"),
     ("time,force\n1,1\n2,\n", "", "line 3: column 'force': expected a number with a decimal point"),
+    ("time,force\n1,1_0\n", "", "line 2: column 'force': expected a number with a decimal point"),
     ("time;force\n1;0,5\n2;1\n", "", "line 2: column 'force': expected a number with a decimal"),
     ("time,force\n1,1\n2\n", "", "log.csv, line 3: expected 2 values, found 1"),
     ("time,force\n1,1,5\n", "", "log.csv, line 2: expected 2 values, found 3"),
