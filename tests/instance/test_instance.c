@@ -76,7 +76,7 @@ static void test_a_wrong_field_in_the_first_row_is_refused(void) {
 static void test_nominal_values_of_states_in_the_first_rows(void) {
     struct variable rows[2];
     struct model_description states_only = oscillator_description;
-    struct instance *created = NULL;
+    struct instance *made = NULL;
     double nominals[2] = {0.0, 0.0};
     for (size_t i = 0, row = 0; i < oscillator_description.variable_count; i++) {
         const struct variable *variable = &oscillator_description.variables[i];
@@ -88,11 +88,11 @@ static void test_nominal_values_of_states_in_the_first_rows(void) {
     }
     states_only.variables = rows;
     states_only.variable_count = 2;
-    ASSERT_OK(instance_create(&states_only, &last_text_sink, &created));
-    ASSERT_OK(instance_get_nominals(created, nominals, 2));
+    ASSERT_OK(instance_create(&states_only, &last_text_sink, &made));
+    ASSERT_OK(instance_get_nominals(made, nominals, 2));
     TEST_ASSERT_EQUAL_DOUBLE(5.0, nominals[0]);
     TEST_ASSERT_EQUAL_DOUBLE(6.0, nominals[1]);
-    instance_destroy(created);
+    instance_destroy(made);
 }
 
 /* What was calculated before a reset does not show after it. */
