@@ -217,7 +217,7 @@ def test_imports_follow_the_architecture() -> None:
     assert list(wrong_imports(ROOT)) == []
 
 
-def test_no_circle_of_folders_and_modules_of_cosim() -> None:
+def test_no_circle_of_folders_and_modules_of_rparm() -> None:
     assert circles(package_graph(ROOT / "rparm")) == []
 
 
