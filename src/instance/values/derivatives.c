@@ -97,33 +97,32 @@ static enum status propagate(struct instance *instance, double dt, char *second)
     return status;
 }
 
+/* What is known of the derivatives of this order by time: those of the inputs, and of the states,
+ * which a value structure of the order below has calculated. */
+static void begin_by_time(const struct instance *instance, int order, char *below,
+                          char *derivatives) {
+    const struct model *model = instance->model;
+    memset(derivatives, 0, model->values_size);
+    memcpy(doubles_of(derivatives, model->states), doubles_of(below, model->derivatives),
+           model->states.size);
+    for (size_t i = 0; i < count_of(model->inputs); i++) {
+        doubles_of(derivatives, model->inputs)[i] = instance->memory.current_inputs[i].d[order];
+    }
+}
+
 /* Derivatives along the motion, twice: those of the states are calculated values, whose own
  * derivatives are the states' next ones. */
 static enum status derive_by_time(struct instance *instance) {
-    const struct model *model = instance->model;
-    const struct instance_memory *memory = &instance->memory;
     enum status status = instance_update_outputs(instance);
     if (status != STATUS_OK) {
         return status;
     }
-
-    memset(instance->first_derivatives, 0, model->values_size);
-    memcpy(doubles_of(instance->first_derivatives, model->states),
-           doubles_of(memory->values, model->derivatives), model->states.size);
-    for (size_t i = 0; i < count_of(model->inputs); i++) {
-        doubles_of(instance->first_derivatives, model->inputs)[i] = memory->current_inputs[i].d[1];
-    }
+    begin_by_time(instance, 1, instance->memory.values, instance->first_derivatives);
     status = propagate(instance, 1.0, NULL);
     if (status != STATUS_OK) {
         return status;
     }
-
-    memset(instance->second_derivatives, 0, model->values_size);
-    memcpy(doubles_of(instance->second_derivatives, model->states),
-           doubles_of(instance->first_derivatives, model->derivatives), model->states.size);
-    for (size_t i = 0; i < count_of(model->inputs); i++) {
-        doubles_of(instance->second_derivatives, model->inputs)[i] = memory->current_inputs[i].d[2];
-    }
+    begin_by_time(instance, 2, instance->first_derivatives, instance->second_derivatives);
     return propagate(instance, 1.0, instance->second_derivatives);
 }
 
