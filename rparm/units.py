@@ -1,8 +1,8 @@
 """Values that users give with a unit, as "90 deg", "300 mm" or "2kN": what they are in SI.
 
 What is known for a variable: its own unit, the display units that its FMU declares for it, and both
-with one factor exchanged: m, s and N take the prefixes m, c and k, and each factor the display
-units of its own. Conversions are exact and rounded once; degrees are those of `math.radians`.
+with one factor exchanged: m, s and N take the prefixes m, c and k, and each factor its own
+display units. Conversions are exact and rounded once; degrees are those of `math.radians`.
 """
 
 import math

@@ -104,7 +104,7 @@ def c_graph(
     """Graph of C files and headers, by their paths.
 
     A C file needs those that define its symbols, and all files the headers that they include. A
-    header with inline functions needs what these call, but not the C file of its own name.
+    header with inline functions needs what these call, but not the C file that it declares.
     """
     graph: Graph = {}
     owners: dict[str, set[str]] = {}
