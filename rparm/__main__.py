@@ -25,8 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     if isinstance(sys.stdout, TextIOWrapper):  # names that it cannot encode are no reason to stop
         sys.stdout.reconfigure(errors="backslashreplace")
-    # keeps matplotlib's font cache in the project
-    os.environ.setdefault("MPLCONFIGDIR", str(project.ROOT / "build" / "matplotlib"))
+    project.set_library_caches()
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = given[: given.index("--")] if "--" in given else given
     as_json = "--json" in options  # a mistake in the arguments is a document, too

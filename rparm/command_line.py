@@ -7,8 +7,8 @@ from typing import NoReturn
 
 from rparm.errors import UserError, did_you_mean
 from rparm.options import add_common
+from rparm.project import PROGRAM
 
-PROGRAM = "./run.sh"
 DEFAULT = "run"  # what names and options without a command are for
 
 COMMANDS = {

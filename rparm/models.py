@@ -1,5 +1,5 @@
 """The folder of the models: modules of their studies and references are `rparm.models.NAME`."""
 
-from pathlib import Path
+from rparm import project
 
-__path__ = [str(Path(__file__).resolve().parents[1] / "models")]
+__path__ = [str(project.MODELS)]

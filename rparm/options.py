@@ -24,8 +24,8 @@ def add_common(parser: argparse.ArgumentParser) -> None:
 
 def add_system(
     parser: argparse.ArgumentParser,
-    ssp: str = "the system (default: all in build/)",
-    fmi: str = "systems in build/ with FMUs of this version of FMI (default: 2)",
+    ssp: str = "the system (default: all)",
+    fmi: str = "systems with FMUs of this version of FMI (default: 2)",
 ) -> None:
     """Which system: a file, or one of a version of FMI."""
     choice = parser.add_mutually_exclusive_group()
@@ -46,7 +46,7 @@ def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
         type=Path,
         metavar="DIR",
         default=folder,
-        help=f"folder for pages and results (default: {folder.relative_to(project.ROOT)})",
+        help=f"folder for pages and results (default: {project.from_root(folder)})",
     )
 
 

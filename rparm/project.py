@@ -13,13 +13,26 @@ build/*.fmu, build/*.ssp                built from the folder of the same name, 
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
 build/report/                           what the commands write: index.html, folders of its parts
+
+An installed package has models/ in its folder share/, FMUs and SSPs as `rparm.shipped` says, and
+writes to rparm-output/ in the current folder.
 """
 
+import os
+from importlib.util import find_spec
 from pathlib import Path
 
+import platformdirs
+
+from rparm import shipped
 from rparm.errors import UserError, did_you_mean, hint
 
-ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).resolve().parent
+INSTALLED = shipped.SHARE.is_dir()  # else the package is that of a checkout
+ROOT = shipped.SHARE if INSTALLED else PACKAGE.parent
+MODELS = ROOT / "models"
+PROGRAM = "rparm" if INSTALLED else "./run.sh"
+OUTPUT = Path("rparm-output") if INSTALLED else ROOT / "build"
 
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
@@ -33,7 +46,7 @@ VERSIONS = tuple(BUILD_FOLDERS)
 def scenario_files() -> dict[str, Path]:
     """All scenarios by name; UserError if two scenarios have the same name."""
     found: dict[str, Path] = {}
-    for path in sorted(ROOT.glob("models/*/scenarios/*.toml")):
+    for path in sorted(MODELS.glob("*/scenarios/*.toml")):
         if path.stem in found:
             raise UserError(f"{path}: the name {path.stem!r} is taken by {found[path.stem]}")
         found[path.stem] = path
@@ -45,13 +58,13 @@ def scenario_file(name: str) -> Path:
     found = scenario_files()
     if name not in found:
         guess = did_you_mean(name, found)
-        raise UserError(f"no scenario {name!r}{guess} (./run.sh --list names them)")
+        raise UserError(f"no scenario {name!r}{guess} ({PROGRAM} list names them)")
     return found[name]
 
 
 def models() -> dict[str, Path]:
     """Folders of all models that have scenarios, by name."""
-    folders = sorted({path.parents[1] for path in ROOT.glob("models/*/scenarios/*.toml")})
+    folders = sorted({path.parents[1] for path in MODELS.glob("*/scenarios/*.toml")})
     return {folder.name: folder for folder in folders}
 
 
@@ -72,12 +85,12 @@ def is_in_model(file: Path) -> bool:
 def is_ours(file: Path) -> bool:
     """Whether a file is one of the project's scenarios, or lies where they do."""
     file = Path(file).resolve()
-    return is_in_model(file) and file.parents[2] == (ROOT / "models").resolve()
+    return is_in_model(file) and file.parents[2] == MODELS.resolve()
 
 
 def convergence_files() -> list[Path]:
     """All problems for the order of convergence."""
-    return sorted(ROOT.glob("models/*/convergence/*.toml"))
+    return sorted(MODELS.glob("*/convergence/*.toml"))
 
 
 def model_folder(scenario: Path) -> Path:
@@ -123,6 +136,8 @@ def variant_reference_file(system: Path, variant: str) -> Path:
 
 def making_references(folder: Path, name: str) -> str:
     """How to make the reference called `name` of a model or system again, for messages."""
+    if INSTALLED:
+        return "it comes with rparm, install that again"
     # relative to the project's folder, in which its documentation gives all commands
     script = f"models/{folder.name}/references/make_references.py {name}"
     return f"to make it again: build/venv/bin/python {script}"
@@ -130,9 +145,9 @@ def making_references(folder: Path, name: str) -> str:
 
 def systems() -> dict[str, Path]:
     """Folders of all systems by name."""
-    found = sorted(path.parent for path in ROOT.glob(f"models/*/{STRUCTURE}"))
+    found = sorted(path.parent for path in MODELS.glob(f"*/{STRUCTURE}"))
     if not found:
-        raise UserError(f"{ROOT / 'models'}: has no folder with {STRUCTURE}")
+        raise UserError(f"{MODELS}: has no folder with {STRUCTURE}")
     return {folder.name: folder for folder in found}
 
 
@@ -146,21 +161,74 @@ def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0
 
     UserError if it is not there; names `option`, which takes another file, if it is given.
     """
+    kind = suffix.removeprefix(".").upper()
+    if INSTALLED:
+        for name in shipped.names():
+            of_version = name.startswith(version) and name.endswith(suffix)
+            if of_version and is_built_from(Path(name).stem, folder):
+                return shipped.file(name, cache_folder("files"))
+        raise UserError(f"rparm comes with no {kind} of {folder.name}")
     build = ROOT / BUILD_FOLDERS[version]
     for path in sorted(build.glob(f"*{suffix}")):
         if is_built_from(path.stem, folder):
             return path
-    kind = suffix.removeprefix(".").upper()
-    way_out = "./run.sh builds it" + (f", {option} PATH takes another one" if option else "")
+    way_out = f"{PROGRAM} builds it" + (f", {option} PATH takes another one" if option else "")
     raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
 
 
 def from_root(path: Path) -> Path:
-    """`path` as it is given in commands that run in the project's folder."""
+    """`path` as it is given in commands that run in the project's folder, if it has one."""
     path = path.absolute()
-    return path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
+    return path.relative_to(ROOT) if path.is_relative_to(ROOT) and not INSTALLED else path
 
 
 def report_folder(part: str = "") -> Path:
     """Where the commands write if no other folder is given."""
-    return ROOT / "build" / "report" / part
+    return (OUTPUT if INSTALLED else OUTPUT / "report") / part
+
+
+def campaign_folder(name: str) -> Path:
+    """Where a campaign's results are if no other folder is given."""
+    return OUTPUT / "campaigns" / name
+
+
+def playground_page() -> Path:
+    """The plant for a browser; UserError if it has not been built."""
+    page = ROOT / ("" if INSTALLED else "build") / "playground" / "index.html"
+    if not page.is_file():
+        raise UserError(f"{page}: not there, {PROGRAM} playground builds it")
+    return page
+
+
+def plotly_script() -> Path:
+    """The library that draws the plots of pages: of the package plotly, or shipped without it."""
+    if INSTALLED:
+        return ROOT / "plotly" / "plotly.min.js"
+    found = find_spec("plotly")
+    assert found is not None and found.origin is not None  # requirements/run.in has it
+    return Path(found.origin).parent / "package_data" / "plotly.min.js"
+
+
+def how_to_install(extra: str) -> str:
+    """The command that installs what an extra of the distribution needs."""
+    return f'pip install "rparm[{extra}]"' if INSTALLED else f"./setup.sh --{extra}"
+
+
+def cache_folder(part: str) -> Path:
+    """Where `part` of what can be made again is kept; the user's own for an installed package."""
+    if not INSTALLED:
+        return ROOT / "build" / part
+    given = os.environ.get("RPARM_CACHE")
+    return Path(given or platformdirs.user_cache_path("rparm", appauthor=False)).absolute() / part
+
+
+def set_library_caches() -> None:
+    """Lead the caches of libraries to folders that can be written, for child processes too."""
+    os.environ.setdefault("MPLCONFIGDIR", str(cache_folder("matplotlib")))
+    if INSTALLED:  # in a checkout numba keeps its files beside the modules
+        os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder("numba")))
+
+
+def child_environment() -> dict[str, str]:
+    """Variables for a Python process of this package, started with -P."""
+    return dict(os.environ) if INSTALLED else os.environ | {"PYTHONPATH": str(ROOT)}

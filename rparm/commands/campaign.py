@@ -82,7 +82,9 @@ def run(options: argparse.Namespace) -> Ended:
     """Run what is missing of the campaign; 0 when all runs are there, failed ones among them."""
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
-        raise UserError(f"{', '.join(missing)}: not installed, ./setup.sh --campaign does it")
+        raise UserError(
+            f"{', '.join(missing)}: not installed, {project.how_to_install('campaign')} does it"
+        )
     # imported here: what a campaign needs may not be installed
     from rparm.campaign import bases, campaign_file, page, planning, quantities, replay, runs
     from rparm.campaign.points import Points
@@ -149,7 +151,7 @@ def _security(options: argparse.Namespace) -> "Security | None":
 
 def _command(options: argparse.Namespace) -> str:
     """What to type for the campaign, in the project's folder."""
-    parts = ["./run.sh", "campaign", str(project.from_root(options.file))]
+    parts = [project.PROGRAM, "campaign", str(project.from_root(options.file))]
     for name in ("fmu", "output"):
         value = getattr(options, name)
         parts += [] if value is None else [f"--{name}", str(project.from_root(value))]
@@ -161,7 +163,7 @@ def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:
         return options.output
     if campaign.output is not None:
         return options.file.parent / campaign.output
-    return project.ROOT / "build" / "campaigns" / options.file.stem
+    return project.campaign_folder(options.file.stem)
 
 
 def _run_missing(

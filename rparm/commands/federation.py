@@ -38,8 +38,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
     add_system(
         parser,
-        "the system (default: the closed loop in build/)",
-        "the system in build/ with FMUs of this version of FMI",
+        "the system (default: the closed loop)",
+        "the system with FMUs of this version of FMI",
     )
     parser.add_argument(
         "--listen",
@@ -103,7 +103,7 @@ def _command(path: Path, variant: str, component: str, address: str) -> str:
     """What steps a component on another machine, in the folder of the project there."""
     place = project.from_root(path)
     arguments = federation.arguments(place, variant, component, address)
-    return f"{KEY}={key()} ./run.sh {shlex.join(arguments)}"
+    return f"{KEY}={key()} {project.PROGRAM} {shlex.join(arguments)}"
 
 
 def _check_names(system: Ssp, options: argparse.Namespace) -> None:

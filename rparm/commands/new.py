@@ -11,8 +11,8 @@ from rparm.output_files import whole
 from rparm.scenarios import template
 
 DESCRIPTION = (
-    "Writes NAME.toml, a scenario with comments that runs as it is: ./run.sh NAME.toml. Exit code: "
-    "0 written, 2 the file exists or cannot be written."
+    f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} NAME.toml. "
+    "Exit code: 0 written, 2 the file exists or cannot be written."
 )
 SUFFIX = ".toml"
 # what no file can be called on Windows, with any suffix
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> Ended:
     except OSError as error:
         path.unlink(missing_ok=True)
         raise UserError(f"{path}: cannot be written: {reason(error)}") from error
-    verdict = f"{path}: written; run it by ./run.sh '{path}'"
+    verdict = f"{path}: written; run it by {project.PROGRAM} '{path}'"
     return Ended(0, verdict, {"file": path.absolute(), "model": folder.name})
 
 
@@ -59,7 +59,7 @@ def _path(name: str) -> Path:
     if any(not character.isprintable() for character in name):
         raise UserError(f"{name!r}: a name has printable characters only")
     if path.name.startswith("-"):
-        raise UserError(f"{name!r}: a name begins with no hyphen, or run.sh takes it for an option")
+        raise UserError(f"{name!r}: a name with a hyphen first would be taken for an option")
     if path.name.partition(".")[0].rstrip().upper() in RESERVED:
         raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
     return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
@@ -69,5 +69,5 @@ def _usual_model() -> Path:
     """Folder of the model that has the most scenarios."""
     folders = list(project.models().values())
     if not folders:
-        raise UserError(f"{project.ROOT / 'models'}: has no scenarios")
+        raise UserError(f"{project.MODELS}: has no scenarios")
     return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))

@@ -59,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--fmu",
         type=Path,
         metavar="PATH",
-        help="the FMU, for the scenarios of its model (default: that of each model, in build/)",
+        help="the FMU, for the scenarios of its model (default: that of each model)",
     )
     add_fmi(parser, None, "run only FMUs of this version of FMI")
     add_report(parser)
@@ -169,7 +169,7 @@ def _open(
         ]
     if not files and not own:
         which = f" of {given.model.name}, the model of {options.fmu}" if given else ""
-        raise UserError(f"{project.ROOT / 'models'}: has no scenarios{which}")
+        raise UserError(f"{project.MODELS}: has no scenarios{which}")
     folders = {file: scenarios.folder_of(file) for file in (*files, *own)}
     models = {folder.name: folder for folder in folders.values()}
     compared = {folders[file].name: folders[file] for file in files}

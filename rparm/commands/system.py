@@ -8,6 +8,7 @@ from pathlib import Path
 from rparm import project
 from rparm.command_line import PROGRAM
 from rparm.commands import Ended
+from rparm.coupling import in_process
 from rparm.errors import UserError, did_you_mean, hint, together
 from rparm.options import add_open, add_report, add_system
 from rparm.output import console
@@ -17,7 +18,7 @@ from rparm.report import overview, system_page
 from rparm.report.browser import show
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
-from rparm.system import comparison, ssp
+from rparm.system import comparison, ecos, ssp
 from rparm.system.comparison import Outcome, Reference
 from rparm.texts import counted
 
@@ -139,12 +140,16 @@ def _run(
     failures: dict[str, UserError] = {}
     entries: list[Entry] = []
     rows: list[dict[str, object]] = []
+    absent = ecos.absent()
+    engine, where = (in_process.run, "this process") if absent else (ecos.run, "Ecos")
+    if absent:
+        print(f"{absent}: the master of rparm steps the systems, in the same order as Ecos")
     for section, references in plans:
-        console.stage(f"simulating {counted(references, 'variant')} of {section.name} in Ecos")
+        console.stage(f"simulating {counted(references, 'variant')} of {section.name} in {where}")
         table = VariantTable(references, section.study.MEASURES)
         for name, reference in references.items():
             try:
-                outcome = comparison.simulate(section.ssp, name, reference)
+                outcome = comparison.simulate(section.ssp, name, reference, engine)
             except UserError as error:
                 failures[name] = error
                 table.failed(name)

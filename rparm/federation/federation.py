@@ -1,7 +1,6 @@
 """A federation: the broker, a process for each component, and the one that records."""
 
 import itertools
-import os
 import subprocess
 import sys
 import time
@@ -179,7 +178,7 @@ def _processes(
     Their texts and temporary files are in `folder`.
     """
     places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
-    environment = os.environ | places | {"PYTHONPATH": str(project.ROOT)}
+    environment = project.child_environment() | places
     processes: dict[str, subprocess.Popen] = {}
     try:
         for component, command in commands.items():

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from rparm import project
 from rparm.errors import UserError, one_line
 
 ENDED = "the federation ended"  # in what processes say that others have stopped
@@ -42,7 +43,7 @@ def helics() -> Any:
     except (ImportError, OSError) as error:
         raise UserError(
             f"helics, which only federations need, cannot be loaded: {one_line(error)} "
-            "(./setup.sh --federation installs it)"
+            f"({project.how_to_install('federation')} installs it)"
         ) from error
     warnings.filterwarnings("ignore", "This function will return a JSON", UserWarning)
     return package

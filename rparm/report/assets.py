@@ -5,9 +5,9 @@ import functools
 import gzip
 import re
 from contextlib import suppress
-from importlib.util import find_spec
 from pathlib import Path
 
+from rparm import project
 from rparm.output_files import whole
 
 FOLDER = "assets"  # in the report
@@ -44,10 +44,8 @@ def write(report: Path) -> None:
 
 @functools.cache
 def _plotly() -> bytes:
-    """The library from the installed package, compressed, in a script that unpacks it."""
-    found = find_spec("plotly")
-    assert found is not None and found.origin is not None  # requirements/run.in has it
-    bundle = (Path(found.origin).parent / "package_data" / "plotly.min.js").read_bytes()
+    """The library, compressed, in a script that unpacks it."""
+    bundle = project.plotly_script().read_bytes()
     version = re.search(rb"plotly\.js v(\S+)", bundle[:200])
     assert version is not None
     packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")

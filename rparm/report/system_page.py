@@ -144,7 +144,7 @@ def _texts(section: Section, variant: str) -> dict[str, Any]:
         "title": f"{stem}: {variant}",
         "description": _description(section.ssp.system, variant),
         "diagram": (f"{section.name}.svg", f"Components of {stem} and the signals between them"),
-        "again": f"./run.sh system {variant}",
+        "again": f"{project.PROGRAM} system {variant}",
     }
 
 

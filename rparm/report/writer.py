@@ -67,7 +67,8 @@ class ReportWriter:
             scenario = (group or others)[0].scenario
             ours = group[0].compared if group else project.is_ours(path)
             section, entries = (SCENARIOS, scenarios) if ours else (FILES, files)
-            again = f"./run.sh {scenario.name}" if ours else f"./run.sh '{from_here(path)}'"
+            shown = scenario.name if ours else f"'{from_here(path)}'"
+            again = f"{project.PROGRAM} {shown}"
             folder = self.folder / section
             name = scenario.name if ours else self._free_name(path)
             if group:

@@ -6,11 +6,12 @@ import textwrap
 from collections.abc import Iterator
 
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
+from rparm.project import PROGRAM
 
 WIDTH = 100
 
 HEAD = """\
-# A scenario. Run it by ./run.sh FILE.toml. Numbers are in SI units; in quotation marks a value may
+# A scenario. Run it by {program} FILE.toml. Numbers are in SI units; in quotation marks a value may
 # have another one: "90 deg", "300 mm", "2kN".
 # "# name = value" is a start value as it is: remove the "# " to change it.
 model = {model}
@@ -53,7 +54,7 @@ def text(name: str, folder: str, model: Model) -> str:
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"
     panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
-    parts = [HEAD.format(model=quoted(folder), title=quoted(name), panels=panels)]
+    parts = [HEAD.format(program=PROGRAM, model=quoted(folder), title=quoted(name), panels=panels)]
     parts += _values(PARAMETERS, "Parameters.", model)
     parts += _values(INITIAL, "State at the start.", model)
     inputs = [variable for variable in model.variables.values() if variable.is_a(INPUTS)]

@@ -1,5 +1,6 @@
 """Runs of a system's variants in Ecos, compared with their references."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,9 +68,14 @@ def discrete(ssp: Ssp) -> list[str]:
     ]
 
 
-def simulate(ssp: Ssp, variant: str, expected: Reference) -> Outcome:
-    """Run a variant and compare it; UserError if a component or Ecos fails."""
-    run = ecos.run(ssp, variant, [*recorded(ssp), *discrete(ssp)])
+def simulate(
+    ssp: Ssp,
+    variant: str,
+    expected: Reference,
+    engine: Callable[[Ssp, str, Sequence[str]], ecos.Run] = ecos.run,
+) -> Outcome:
+    """Run a variant and compare it; UserError if a component or the engine fails."""
+    run = engine(ssp, variant, [*recorded(ssp), *discrete(ssp)])
     errors = {}
     for name, values in expected.columns.items():
         actual = run.values[expected.steps, run.names.index(name)]

@@ -8,7 +8,10 @@ is removed: `python -m rparm.system.ecos FOLDER` is that child.
 import ctypes
 import json
 import os
+import platform
 import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +19,8 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from importlib.metadata import PackageNotFoundError, files
+from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
@@ -59,6 +64,16 @@ class Run:
     statistics: Mapping[str, float] = field(default_factory=dict)
 
 
+def absent() -> str:
+    """Why Ecos cannot run here, or nothing."""
+    if find_spec("ecospy") is None:
+        return "ecospy is not installed"
+    here = sys.platform, platform.machine().lower()
+    if here not in (("linux", "x86_64"), ("win32", "amd64")):
+        return "ecospy has libraries for Linux and Windows on x86-64 only"
+    return ""
+
+
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     """Run a system from its start to its stop time with one of its parameter sets.
 
@@ -76,12 +91,7 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     if variant not in system.parameters:
         raise UserError(f"{ssp.path}: has no parameter set {variant!r}")
     _check_parameters(ssp, variant)
-    statistics = [
-        f"{component}.{name}"
-        for component, model in ssp.models.items()
-        for name in STATISTICS
-        if name in model.variables
-    ]
+    statistics = said_at_end(ssp)
     with temporary_folder() as folder:
         plan = {
             "ssp": str(ssp.path.resolve()),
@@ -120,6 +130,16 @@ def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     return result
 
 
+def said_at_end(ssp: "Ssp") -> list[str]:
+    """What the components have of STATISTICS, as ``component.variable``."""
+    return [
+        f"{component}.{name}"
+        for component, model in ssp.models.items()
+        for name in STATISTICS
+        if name in model.variables
+    ]
+
+
 def _check_messages(
     ssp: "Ssp", variant: str, times: np.ndarray, messages: Sequence[re.Match[str]]
 ) -> None:
@@ -153,16 +173,17 @@ def _check_parameters(ssp: "Ssp", variant: str) -> None:
 def _start(folder: Path) -> int:
     """Run the child; its exit code."""
     temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))  # the last two: on Windows
-    environment = os.environ | temporary | {"PYTHONUNBUFFERED": "1"}
+    environment = project.child_environment() | temporary | {"PYTHONUNBUFFERED": "1"}
+    if os.name == "posix" and shutil.which("unzip") is None:
+        environment["PATH"] = f"{_unzip(folder)}:{environment.get('PATH', os.defpath)}"
     child = None
     try:
         with (folder / LOG).open("wb") as log, uninterrupted():
             child = subprocess.Popen(
-                [sys.executable, "-m", "rparm.system.ecos", str(folder)],
+                [sys.executable, "-P", "-m", "rparm.system.ecos", str(folder)],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
-                cwd=project.ROOT,
                 env=environment,
                 # Ecos starts further programs, which write to the folder too
                 process_group=0 if os.name == "posix" else None,
@@ -174,6 +195,17 @@ def _start(folder: Path) -> int:
                 _kill(child)
                 child.wait()
         raise
+
+
+def _unzip(folder: Path) -> Path:
+    """A folder with a command that does what Ecos wants of unzip: unzip -o ARCHIVE -d FOLDER."""
+    command = folder / "programs" / "unzip"
+    command.parent.mkdir()
+    python, extract = shlex.quote(sys.executable), "import sys, zipfile as z; "
+    extract += "z.ZipFile(sys.argv[1]).extractall(sys.argv[2])"
+    command.write_text(f'#!/bin/sh\nexec {python} -I -c "{extract}" "$2" "$4"\n', encoding="utf-8")
+    command.chmod(0o755)
+    return command.parent
 
 
 def _kill(child: subprocess.Popen) -> None:
@@ -226,13 +258,11 @@ def _check_values(
 
 def _child(folder: Path) -> None:
     """Run the plan of the folder, until a value is not finite or a component has complained."""
+    _load_tbb()
     try:
         from ecospy import EcosLib, EcosSimulation
     except (ImportError, OSError) as error:
-        sys.exit(
-            f"ecospy, which only `system` needs, cannot be loaded: {one_line(error)} "
-            "(it has libraries for Linux and Windows on x86-64)"
-        )
+        sys.exit(f"ecospy cannot be loaded: {one_line(error)}")
 
     plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
     steps = plan["steps"]
@@ -266,6 +296,14 @@ def _child(folder: Path) -> None:
     np.save(folder / ROWS, rows[: row + 1])
     done = json.dumps({"wall_time": wall_time, "statistics": statistics})
     (folder / DONE).write_text(done, encoding="utf-8", newline="\n")
+
+
+def _load_tbb() -> None:
+    """Load the library that Ecos links, where it is a package of Python and not of the system."""
+    with suppress(PackageNotFoundError):
+        for file in files("tbb") or ():
+            if file.name in ("libtbb.so.12", "tbb12.dll"):
+                ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,76 @@
+"""FMUs and systems of an installed package, put together when they are first used.
+
+The package has their bytes in pieces, each once: FMUs share most of their sources, and systems
+contain FMUs. The files keep every byte of those of the release.
+
+share/pieces     all pieces
+share/files.json  by the name of a file, VERSION OF FMI/NAME: its SHA-256, and its pieces as
+                 [first byte, number of bytes]
+"""
+
+import functools
+import hashlib
+import json
+from pathlib import Path, PurePosixPath
+
+from rparm.errors import UserError, reason
+from rparm.output_files import whole
+
+SHARE = Path(__file__).resolve().parent / "share"
+PIECES = SHARE / "pieces"
+FILES = SHARE / "files.json"
+
+
+def names() -> list[str]:
+    """All files, as VERSION OF FMI/NAME."""
+    return list(_files())
+
+
+def file(name: str, cache: Path) -> Path:
+    """The file called `name` in the folder `cache`, written if it is not there or damaged.
+
+    UserError if it cannot be written, or if the package is damaged.
+    """
+    entry = _files()[name]
+    path = cache / entry["sha256"][:16] / PurePosixPath(name).name
+    try:
+        if path.is_file() and _digest(path.read_bytes()) == entry["sha256"]:
+            return path
+    except OSError:
+        pass  # writing it says what is wrong
+    content = _joined(entry["pieces"])
+    if _digest(content) != entry["sha256"]:
+        raise UserError(f"{PIECES}: damaged, install rparm again")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole(path) as temporary:
+            temporary.write_bytes(content)
+    except OSError as error:
+        raise UserError(
+            f"{path}: cannot be written: {reason(error)}; RPARM_CACHE names another folder"
+        ) from error
+    return path
+
+
+@functools.cache
+def _files() -> dict[str, dict]:
+    try:
+        return json.loads(FILES.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise UserError(f"{FILES}: damaged, install rparm again: {error}") from error
+
+
+def _joined(pieces: list[list[int]]) -> bytes:
+    content = bytearray()
+    try:
+        with PIECES.open("rb") as file:
+            for first, length in pieces:
+                file.seek(first)
+                content += file.read(length)
+    except OSError as error:
+        raise UserError(f"{PIECES}: cannot be read: {reason(error)}") from error
+    return bytes(content)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
