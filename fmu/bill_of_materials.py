@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import re
 import sys
+import tomllib
 import uuid
+from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from atomic_write import atomic_write
@@ -16,6 +20,7 @@ from cyclonedx.model.license import DisjunctiveLicense
 from cyclonedx.output.json import JsonV1Dot6
 from cyclonedx.spdx import is_supported_id
 from cyclonedx.validation.json import JsonStrictValidator
+from packageurl import PackageURL
 from provenance import ProvenanceError, license_texts
 
 CHECKSUMS = "SHA256SUMS"
@@ -42,11 +47,48 @@ def part(text: str) -> Component:
     )
 
 
+def packages(project: Path, locks: Path) -> list[Component]:
+    """What the wheel requires, with the versions that are locked: those it was tested with."""
+    wanted = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
+    lines = [*wanted["dependencies"], *chain(*wanted["optional-dependencies"].values())]
+    names = {re.match(r"[\w.-]+", line)[0].lower() for line in lines}
+    locked = {}
+    for lock in sorted(locks.glob("*.txt")):
+        for name, version in re.findall(
+            r"^([\w.-]+)==(\S+)", lock.read_text("utf-8"), re.MULTILINE
+        ):
+            locked[name.lower()] = version
+    return [
+        Component(
+            type=ComponentType.LIBRARY,
+            name=name,
+            version=locked.get(name),
+            bom_ref=f"package {name}",
+            purl=PackageURL("pypi", name=name, version=locked.get(name)),
+        )
+        for name in sorted(names - {wanted["name"]})
+    ]
+
+
 def bill_of_materials(
-    checksums: dict[str, str], version: str, license_id: str, parts: list[Component]
+    checksums: dict[str, str],
+    version: str,
+    license_id: str,
+    parts: list[Component],
+    required: Sequence[Component] = (),
 ) -> str:
-    """Text in JSON; it depends only on the arguments: checksums of files by their names."""
-    bom = Bom(components=parts)
+    """Text in JSON; it depends only on the arguments.
+
+    Parameters
+    ----------
+    checksums : dict
+        Of the files, by their names.
+    parts : list of Component
+        What is compiled into the FMUs.
+    required : sequence of Component
+        What the wheel requires.
+    """
+    bom = Bom(components=[*parts, *required])
     for name, checksum in checksums.items():
         component = Component(
             type=ComponentType.FILE,
@@ -57,7 +99,7 @@ def bill_of_materials(
             hashes=[HashType(alg=HashAlgorithm.SHA_256, content=checksum)],
         )
         bom.components.add(component)
-        bom.register_dependency(component, parts)
+        bom.register_dependency(component, [*parts, *(required if name.endswith(".whl") else ())])
     # no date and no random number, so that two builds give the same bytes
     bom.serial_number = uuid.uuid5(uuid.NAMESPACE_OID, "".join(checksums.values()))
     bom.metadata.timestamp = None
@@ -81,6 +123,8 @@ def main() -> int:
         "--part", action="append", default=[], metavar="NAME,VERSION,LICENSE,ADDRESS",
         help="what is compiled into all of them",
     )  # fmt: skip
+    parser.add_argument("--project", type=Path, help="pyproject.toml, if there is a wheel")
+    parser.add_argument("--requirements", type=Path, help="folder of the lock files, for the same")
     arguments = parser.parse_args()
     try:
         folder = arguments.output
@@ -90,9 +134,10 @@ def main() -> int:
         }
         license_id = license_texts(arguments.license)["license"]
         parts = [part(text) for text in arguments.part]
+        required = packages(arguments.project, arguments.requirements) if arguments.project else []
         texts = {
             CHECKSUMS: "".join(f"{text}  {name}\n" for name, text in checksums.items()),
-            BILL: bill_of_materials(checksums, arguments.version, license_id, parts),
+            BILL: bill_of_materials(checksums, arguments.version, license_id, parts, required),
         }
         for name, text in texts.items():
             with atomic_write(folder / name) as temporary:

@@ -39,7 +39,9 @@ def pack(archive: Path, files: dict[str, Path]) -> None:
         for name in sorted(files):
             info = zipfile.ZipInfo(name, FIXED_DATE)
             info.create_system = UNIX
-            info.compress_type = zipfile.ZIP_DEFLATED
+            # an FMU is compressed already, and can so be shared with the file beside the system
+            stored = name.endswith(".fmu")
+            info.compress_type = zipfile.ZIP_STORED if stored else zipfile.ZIP_DEFLATED
             executable = name.startswith("binaries/")
             info.external_attr = (0o100755 if executable else 0o100644) << 16
             # the level of the archive would not hold for a ZipInfo

@@ -1,5 +1,5 @@
-# Target release: build/release/NAME.fmu and fmi3/NAME.fmu with the binaries of all platforms and the sources, checksums and a
-# bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
+# Target release: build/release/NAME.fmu and fmi3/NAME.fmu with the binaries of all platforms and the sources, the wheel,
+# checksums and a bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
 
 set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin aarch64-linux)
 set(RELEASE_FOLDER ${PROJECT_BINARY_DIR}/release)
@@ -127,11 +127,28 @@ function(add_release)
       --part musl,${MUSL_VERSION},MIT,https://musl.libc.org
       --part zig,${zig_version},MIT,https://ziglang.org
       --part mingw-w64,${mingw_version},ZPL-2.1,https://www.mingw-w64.org)
+  add_custom_target(release_files DEPENDS ${targets} ${files})
+
+  set(wheel ${RELEASE_FOLDER}/rparm-${PROJECT_VERSION}-py3-none-any.whl)
+  file(GLOB_RECURSE packaged CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/* ${PROJECT_SOURCE_DIR}/models/*)
+  list(FILTER packaged EXCLUDE REGEX __pycache__)
+  add_custom_command(
+    OUTPUT ${wheel}
+    COMMAND ${CMAKE_COMMAND} -E env RPARM_RELEASE=${RELEASE_FOLDER}
+            ${Python3_EXECUTABLE} -m hatchling build -t wheel -d ${RELEASE_FOLDER}
+    WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
+    DEPENDS ${targets} ${files} ${packaged} playground ${FMU_SOURCE_DIR}/wheel.py ${PROJECT_SOURCE_DIR}/pyproject.toml
+            ${PROJECT_SOURCE_DIR}/README.md
+    COMMENT "Packing the wheel"
+    VERBATIM)
+  list(APPEND files ${wheel})
+
   set(bill ${RELEASE_FOLDER}/sbom.cdx.json)
   add_custom_command(
     OUTPUT ${bill} ${RELEASE_FOLDER}/SHA256SUMS
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/bill_of_materials.py ${files} --output ${RELEASE_FOLDER}
             --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE ${parts}
+            --requirements ${PROJECT_SOURCE_DIR}/requirements --project ${PROJECT_SOURCE_DIR}/pyproject.toml
     DEPENDS ${targets} ${files} ${FMU_SOURCE_DIR}/bill_of_materials.py
     COMMENT "Writing checksums and the bill of materials"
     VERBATIM)

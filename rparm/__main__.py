@@ -56,6 +56,9 @@ def _ended(arguments: Sequence[str]) -> Ended:
         return import_module(f"rparm.commands.{options.command}").run(options)
     except UserError as error:
         return Ended(2, "", error=error)
+    except ModuleNotFoundError as error:
+        way_out = project.how_to_install(command_line.NEEDS.get(options.command, "all"))
+        return Ended(2, "", error=UserError(f"{error.name}: not installed, {way_out} does it"))
 
 
 def _say(ended: Ended, as_json: bool, results: TextIO | None) -> int:

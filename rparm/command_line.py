@@ -21,6 +21,14 @@ COMMANDS = {
     "federation": "run a system with each FMU in its own process, coupled by HELICS",
     "federate": "step one component in a federation of another machine",
 }
+# the extra of the distribution that has what a command needs
+NEEDS = {
+    "system": "system",
+    "coupling": "system",
+    "campaign": "campaign",
+    "federation": "federation",
+    "federate": "federation",
+}
 COMMON = ("--json", "--quiet")
 HELP = ("help", "--help", "-h")
 

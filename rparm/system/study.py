@@ -7,15 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol, cast
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Protocol, cast
 
 from rparm import project
 from rparm.errors import UserError
 from rparm.input_files import is_file
 from rparm.system.comparison import Outcome
 from rparm.system.ssp import Ssp
+
+if TYPE_CHECKING:  # only pictures need it
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Study(Protocol):
     MEASURES: Sequence[Measure]
     DIAGRAMS: Sequence[Diagram]  # of the page of a variant
 
-    def figure(self, ssp: Ssp, outcome: Outcome) -> Figure:
+    def figure(self, ssp: Ssp, outcome: Outcome) -> "Figure":
         """Picture of a run of one variant, for READMEs."""
         ...
 
