@@ -9,21 +9,21 @@ RPARM_RELEASE names the folder of a release that is there; without it, one is bu
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
-import zipfile
 from importlib.util import find_spec
 from pathlib import Path
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from pieces import write_pieces  # noqa: E402
+
 SHARE = "rparm/share"
 OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
-VERSIONS = {"2.0": "", "3.0": "fmi3"}  # of FMI, with the folder of the release
 
 
 class CustomBuildHook(BuildHookInterface):
@@ -51,48 +51,6 @@ class CustomBuildHook(BuildHookInterface):
         """Remove what was only made for the wheel."""
         if self.target_name == "wheel":
             shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def write_pieces(release: Path, folder: Path) -> None:
-    """Write `pieces` and `files.json`: the bytes of all FMUs and systems, each piece once."""
-    places: dict[bytes, tuple[int, int]] = {}
-    files: dict[str, dict[str, object]] = {}
-    with (folder / "pieces").open("wb") as stored:
-        for version, below in VERSIONS.items():
-            for path in sorted((release / below).glob("*.fmu")) + sorted(
-                (release / below).glob("*.ssp")
-            ):
-                content = path.read_bytes()
-                pieces = []
-                for piece in _pieces(path, content):
-                    if piece not in places:
-                        places[piece] = (stored.tell(), len(piece))
-                        stored.write(piece)
-                    pieces.append(places[piece])
-                digest = hashlib.sha256(content).hexdigest()
-                files[f"{version}/{path.name}"] = {"sha256": digest, "pieces": pieces}
-    (folder / "files.json").write_text(json.dumps(files), encoding="utf-8")
-    if not files:
-        raise FileNotFoundError(f"{release}: has no FMU")
-
-
-def _pieces(path: Path, content: bytes) -> list[bytes]:
-    """An archive, cut where its files begin, and where those of stored archives in it do."""
-    cuts = sorted({0, *_beginnings(path, 0, content), len(content)})
-    return [content[first:last] for first, last in zip(cuts, cuts[1:], strict=False)]
-
-
-def _beginnings(archive: object, offset: int, content: bytes) -> list[int]:
-    cuts = []
-    with zipfile.ZipFile(archive) as opened:
-        for entry in opened.infolist():
-            cuts.append(offset + entry.header_offset)
-            if entry.compress_type == zipfile.ZIP_STORED and entry.filename.endswith(".fmu"):
-                first = content.index(b"PK\x03\x04", offset + entry.header_offset + 4)
-                with opened.open(entry) as inner:
-                    cuts += _beginnings(inner, first, content)
-        cuts.append(offset + opened.start_dir)
-    return cuts
 
 
 def _built(root: Path) -> Path:

@@ -57,6 +57,8 @@ def _ended(arguments: Sequence[str]) -> Ended:
     except UserError as error:
         return Ended(2, "", error=error)
     except ModuleNotFoundError as error:
+        if (error.name or "").startswith("rparm"):
+            raise
         way_out = project.how_to_install(command_line.NEEDS.get(options.command, "all"))
         return Ended(2, "", error=UserError(f"{error.name}: not installed, {way_out} does it"))
 
@@ -123,5 +125,10 @@ def _end(code: int) -> NoReturn:
     sys.exit(code)
 
 
-if __name__ == "__main__":
+def script() -> NoReturn:
+    """The command rparm of an installed package."""
     _end(_as_program())
+
+
+if __name__ == "__main__":
+    script()

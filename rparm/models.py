@@ -1,5 +1,5 @@
 """The folder of the models: modules of their studies and references are `rparm.models.NAME`."""
 
-from rparm import project
+from rparm.shipped import SHARE
 
-__path__ = [str(project.MODELS)]
+__path__ = [str((SHARE if SHARE.is_dir() else SHARE.parents[1]) / "models")]

@@ -30,9 +30,7 @@ from rparm.errors import UserError, did_you_mean, hint
 PACKAGE = Path(__file__).resolve().parent
 INSTALLED = shipped.SHARE.is_dir()  # else the package is that of a checkout
 ROOT = shipped.SHARE if INSTALLED else PACKAGE.parent
-MODELS = ROOT / "models"
 PROGRAM = "rparm" if INSTALLED else "./run.sh"
-OUTPUT = Path("rparm-output") if INSTALLED else ROOT / "build"
 
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
@@ -43,10 +41,15 @@ BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
 
 
+def models_folder() -> Path:
+    """Folder of all models and systems."""
+    return ROOT / "models"
+
+
 def scenario_files() -> dict[str, Path]:
     """All scenarios by name; UserError if two scenarios have the same name."""
     found: dict[str, Path] = {}
-    for path in sorted(MODELS.glob("*/scenarios/*.toml")):
+    for path in sorted(models_folder().glob("*/scenarios/*.toml")):
         if path.stem in found:
             raise UserError(f"{path}: the name {path.stem!r} is taken by {found[path.stem]}")
         found[path.stem] = path
@@ -64,7 +67,7 @@ def scenario_file(name: str) -> Path:
 
 def models() -> dict[str, Path]:
     """Folders of all models that have scenarios, by name."""
-    folders = sorted({path.parents[1] for path in MODELS.glob("*/scenarios/*.toml")})
+    folders = sorted({path.parents[1] for path in models_folder().glob("*/scenarios/*.toml")})
     return {folder.name: folder for folder in folders}
 
 
@@ -85,12 +88,12 @@ def is_in_model(file: Path) -> bool:
 def is_ours(file: Path) -> bool:
     """Whether a file is one of the project's scenarios, or lies where they do."""
     file = Path(file).resolve()
-    return is_in_model(file) and file.parents[2] == MODELS.resolve()
+    return is_in_model(file) and file.parents[2] == models_folder().resolve()
 
 
 def convergence_files() -> list[Path]:
     """All problems for the order of convergence."""
-    return sorted(MODELS.glob("*/convergence/*.toml"))
+    return sorted(models_folder().glob("*/convergence/*.toml"))
 
 
 def model_folder(scenario: Path) -> Path:
@@ -145,9 +148,9 @@ def making_references(folder: Path, name: str) -> str:
 
 def systems() -> dict[str, Path]:
     """Folders of all systems by name."""
-    found = sorted(path.parent for path in MODELS.glob(f"*/{STRUCTURE}"))
+    found = sorted(path.parent for path in models_folder().glob(f"*/{STRUCTURE}"))
     if not found:
-        raise UserError(f"{MODELS}: has no folder with {STRUCTURE}")
+        raise UserError(f"{models_folder()}: has no folder with {STRUCTURE}")
     return {folder.name: folder for folder in found}
 
 
@@ -184,12 +187,12 @@ def from_root(path: Path) -> Path:
 
 def report_folder(part: str = "") -> Path:
     """Where the commands write if no other folder is given."""
-    return (OUTPUT if INSTALLED else OUTPUT / "report") / part
+    return (Path("rparm-output") if INSTALLED else ROOT / "build" / "report") / part
 
 
 def campaign_folder(name: str) -> Path:
     """Where a campaign's results are if no other folder is given."""
-    return OUTPUT / "campaigns" / name
+    return (Path("rparm-output") if INSTALLED else ROOT / "build") / "campaigns" / name
 
 
 def playground_page() -> Path:
@@ -211,7 +214,9 @@ def plotly_script() -> Path:
 
 def how_to_install(extra: str) -> str:
     """The command that installs what an extra of the distribution needs."""
-    return f'pip install "rparm[{extra}]"' if INSTALLED else f"./setup.sh --{extra}"
+    if INSTALLED:
+        return f'pip install "rparm[{extra}]"'
+    return f"./setup.sh --{extra}" if extra in ("campaign", "federation") else "./setup.sh"
 
 
 def cache_folder(part: str) -> Path:
@@ -231,4 +236,7 @@ def set_library_caches() -> None:
 
 def child_environment() -> dict[str, str]:
     """Variables for a Python process of this package, started with -P."""
-    return dict(os.environ) if INSTALLED else os.environ | {"PYTHONPATH": str(ROOT)}
+    if INSTALLED:
+        return dict(os.environ)
+    folders = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return os.environ | {"PYTHONPATH": os.pathsep.join(folders)}

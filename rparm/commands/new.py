@@ -59,7 +59,7 @@ def _path(name: str) -> Path:
     if any(not character.isprintable() for character in name):
         raise UserError(f"{name!r}: a name has printable characters only")
     if path.name.startswith("-"):
-        raise UserError(f"{name!r}: a name with a hyphen first would be taken for an option")
+        raise UserError(f"{name!r}: a name begins with no hyphen, it would be an option")
     if path.name.partition(".")[0].rstrip().upper() in RESERVED:
         raise UserError(f"{name!r}: Windows keeps this name for a device, choose another one")
     return path if path.suffix.lower() == SUFFIX else path.with_name(path.name + SUFFIX)
@@ -69,5 +69,5 @@ def _usual_model() -> Path:
     """Folder of the model that has the most scenarios."""
     folders = list(project.models().values())
     if not folders:
-        raise UserError(f"{project.MODELS}: has no scenarios")
+        raise UserError(f"{project.models_folder()}: has no scenarios")
     return max(folders, key=lambda folder: len(list(folder.glob("scenarios/*.toml"))))

@@ -169,7 +169,7 @@ def _open(
         ]
     if not files and not own:
         which = f" of {given.model.name}, the model of {options.fmu}" if given else ""
-        raise UserError(f"{project.MODELS}: has no scenarios{which}")
+        raise UserError(f"{project.models_folder()}: has no scenarios{which}")
     folders = {file: scenarios.folder_of(file) for file in (*files, *own)}
     models = {folder.name: folder for folder in folders.values()}
     compared = {folders[file].name: folders[file] for file in files}

@@ -203,7 +203,9 @@ def _unzip(folder: Path) -> Path:
     command.parent.mkdir()
     python, extract = shlex.quote(sys.executable), "import sys, zipfile as z; "
     extract += "z.ZipFile(sys.argv[1]).extractall(sys.argv[2])"
-    command.write_text(f'#!/bin/sh\nexec {python} -I -c "{extract}" "$2" "$4"\n', encoding="utf-8")
+    command.write_text(
+        f'#!/bin/sh\nexec {python} -I -c "{extract}" "$2" "$4"\n', encoding="utf-8", newline="\n"
+    )
     command.chmod(0o755)
     return command.parent
 

@@ -34,8 +34,8 @@ COMMANDS = {
     ),
     "campaign": ("rparm/commands/campaign.py", "rparm/campaign/*.py"),
     "federation": ("rparm/commands/fed*.py", "rparm/federation/*.py"),
-    "release": ("fmu/bill_of_materials.py", "playground/build.py"),
-    "dev": ("rparm/report/recording.py", "fmu/*.py", "models/**/*.py", "tests/**/*.py"),
+    "release": ("fmu/bill_of_materials.py", "fmu/wheel.py", "playground/build.py"),
+    "dev": ("rparm/report/recording.py", "fmu/[!w]*.py", "models/**/*.py", "tests/**/*.py"),
 }  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]

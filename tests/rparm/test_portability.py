@@ -325,16 +325,15 @@ def test_a_loaded_library_that_windows_keeps_hides_no_error(
 # ---- The co-simulation engine --------------------------------------------------------------------
 
 
-def test_without_ecos_the_system_says_so(
+def test_a_broken_ecos_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its package installs everywhere, and loads only where it has libraries."""
     (tmp_path / "ecospy.py").write_text("raise OSError('libecosc.so:\\nwrong machine')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     ssp = BUILD / "ClosedLoop.ssp"
     code, _, err = call(capsys, "system", "nominal", "--ssp", ssp, "--report", tmp_path / "report")
     assert code == 2
-    assert "ecospy, which only `system` needs, cannot be loaded: libecosc.so: wrong machine" in err
+    assert "ecospy cannot be loaded: libecosc.so: wrong machine" in err
     assert_one_line(err)
 
 

@@ -174,7 +174,7 @@ def test_find_by_name(write, root: Path) -> None:
 def test_find_suggests_a_name(write, root: Path) -> None:
     write("", "swing")
     write("", "fall")
-    message = re.escape("no scenario 'swinf', did you mean 'swing'? (./run.sh --list names them)")
+    message = re.escape("no scenario 'swinf', did you mean 'swing'? (./run.sh list names them)")
     with pytest.raises(UserError, match=f"^{message}$"):
         project.scenario_file("swinf")
     with pytest.raises(UserError, match=re.escape("no scenario 'x' (./run.sh")):

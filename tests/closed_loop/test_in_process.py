@@ -1,0 +1,80 @@
+"""Systems without Ecos: the project's own master gives what the references say."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from rparm import project
+from rparm.__main__ import main
+from rparm.coupling import in_process
+from rparm.system import comparison, ecos, ssp, study
+
+ABSENT = "ecospy is not installed"
+ROUNDING = 1e-9  # two engines with the same order, whose times differ by rounding
+
+
+def compared(name: str, variants: Sequence[str] | None = None) -> list[comparison.Outcome]:
+    """Variants of a system, or all, stepped in this process."""
+    folder = project.systems()[name]
+    with ssp.unpacked(project.built(folder, ".ssp")) as opened:
+        experiment = study.load(folder).EXPERIMENT
+        return [
+            comparison.simulate(
+                opened,
+                variant,
+                comparison.load_reference(opened, variant, folder, experiment),
+                in_process.run,
+            )
+            for variant in variants or opened.system.parameters
+        ]
+
+
+@pytest.mark.parametrize("name", ["closed_loop", "machine"])
+def test_all_variants_are_within_the_bound(name: str) -> None:
+    outcomes = compared(name)
+    assert len(outcomes) == 5
+    assert [outcome.variant for outcome in outcomes if not outcome.passed] == []
+
+
+def test_it_reads_what_ecos_reads() -> None:
+    """Direct feedthrough included, which a read before the inputs are set would miss."""
+    path = project.built(project.systems()["machine"], ".ssp")
+    with ssp.unpacked(path) as opened:
+        names = [*comparison.recorded(opened), *comparison.discrete(opened)]
+        ours, theirs = (run(opened, "pick_and_place", names) for run in (in_process.run, ecos.run))
+    assert ours.names == theirs.names and ours.values.shape == theirs.values.shape
+    scale = np.maximum(np.abs(theirs.values).max(axis=0), 1e-3)
+    difference = np.abs(ours.values - theirs.values) / scale
+    changing = {f"{c.start_component}.{c.start_connector}" for c in opened.system.connections}
+    smooth = [i for i, name in enumerate(names) if name in changing and "ddq" not in name]
+    assert np.median(difference[:, smooth]) < ROUNDING
+    assert ours.statistics.keys() == theirs.statistics.keys()
+
+
+def test_the_command_says_who_steps(
+    tmp_path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ecos, "absent", lambda: ABSENT)
+    monkeypatch.setattr(ecos, "run", None)  # nobody may call it
+    assert main(["system", "nominal", "--report", str(tmp_path)]) == 0
+    out = capsys.readouterr().out
+    assert f"{ABSENT}: the master of rparm steps the systems" in out
+    assert "passed: 1 variant" in out
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "words"),
+    [
+        ("linux", "x86_64", ""),
+        ("win32", "AMD64", ""),
+        ("linux", "aarch64", "x86-64 only"),
+        ("darwin", "x86_64", "x86-64 only"),
+    ],
+)
+def test_where_ecos_has_no_library(
+    monkeypatch: pytest.MonkeyPatch, system: str, machine: str, words: str
+) -> None:
+    monkeypatch.setattr("sys.platform", system)
+    monkeypatch.setattr("platform.machine", lambda: machine)
+    assert words in ecos.absent() and bool(words) == bool(ecos.absent())

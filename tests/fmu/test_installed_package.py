@@ -1,0 +1,153 @@
+"""The wheel of ./release.sh: installed, it does what the checkout does, with the same bytes."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.support.missing import missing
+from tests.support.paths import NAMES, ROOT, SYSTEMS
+
+RELEASE = ROOT / "build" / "release"
+LARGEST = 25_000_000  # bytes
+OF_CHECKOUT = ("./run.sh", "./setup.sh", "build/venv", "build/report")
+
+
+@pytest.fixture(scope="module")
+def wheel() -> Path:
+    found = sorted(RELEASE.glob("rparm-*-py3-none-any.whl"))
+    if not found:
+        missing(f"{RELEASE} has no wheel: ./release.sh builds it")
+    return found[0]
+
+
+class Installed:
+    """An environment with the wheel in a folder with a blank in its name.
+
+    What the wheel needs comes from the environment of the tests.
+    """
+
+    def __init__(self, wheel: Path, folder: Path) -> None:
+        self.folder = folder / "an environment"
+        self.work = folder / "somewhere else"
+        self.cache = folder / "cache"
+        self.work.mkdir()
+        venv.create(self.folder, symlinks=True, with_pip=False)
+        self.packages = Path(sysconfig.get_path("purelib", vars={"base": str(self.folder)}))
+        with zipfile.ZipFile(wheel) as archive:  # what pip does with a wheel of this kind
+            archive.extractall(self.packages)
+        others = sysconfig.get_path("purelib")
+        (self.packages / "others.pth").write_text(f"{others}\n")
+
+    def run(self, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
+        """Run `rparm ...` in another folder."""
+        python = self.folder / "bin" / "python"
+        environment = {"HOME": str(self.work), "RPARM_CACHE": str(self.cache), "PATH": "/nowhere"}
+        return subprocess.run(
+            [python, "-P", "-m", "rparm", *map(str, arguments)],
+            cwd=self.work, env=environment | variables, text=True, capture_output=True, check=False,
+        )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    return Installed(wheel, tmp_path_factory.mktemp("installed"))
+
+
+def checkout(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "rparm", *map(str, arguments)],
+        cwd=ROOT, env=os.environ | {"PYTHONPATH": str(ROOT)}, text=True, capture_output=True,
+        check=True,
+    )  # fmt: skip
+
+
+def test_it_is_small_and_for_every_platform(wheel: Path) -> None:
+    assert wheel.stat().st_size < LARGEST
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        (metadata,) = [name for name in names if name.endswith(".dist-info/WHEEL")]
+        assert "Root-Is-Purelib: true" in archive.read(metadata).decode()
+    assert {name.partition("/")[0] for name in names} == {"rparm", Path(metadata).parent.name}
+    assert "rparm/share/plotly/LICENSE.txt" in names
+    assert [name for name in names if name.endswith((".pyc", ".c", ".h"))] == []
+
+
+def test_all_files_of_the_release_are_in_it(installed: Installed) -> None:
+    """Put together by the package, against the checksums of the release."""
+    script = (
+        "from pathlib import Path; from rparm import shipped; import json\n"
+        "print(json.dumps({n: str(shipped.file(n, Path('files'))) for n in shipped.names()}))"
+    )
+    made = subprocess.run(
+        [installed.folder / "bin" / "python", "-P", "-c", script],
+        cwd=installed.work, text=True, capture_output=True, check=True,
+    )  # fmt: skip
+    lines = (line.split("  ") for line in (RELEASE / "SHA256SUMS").read_text().splitlines())
+    expected = {name: checksum for checksum, name in lines if not name.endswith(".whl")}
+    found = {
+        name.replace("2.0/", "").replace("3.0/", "fmi3/"): hashlib.sha256(
+            (installed.work / path).read_bytes()
+        ).hexdigest()
+        for name, path in json.loads(made.stdout).items()
+    }
+    assert found == expected
+    assert len(found) == 2 * (len(NAMES) + len(SYSTEMS))
+
+
+def test_results_have_the_bytes_of_the_checkout(installed: Installed, tmp_path: Path) -> None:
+    names = ("sine_efforts", "stick_slip", "controller_pd_gravity")
+    ran = installed.run("run", *names)
+    assert ran.returncode == 0, ran.stderr
+    checkout("run", *names, "--report", tmp_path)
+    for name in names:
+        made = installed.work / "rparm-output" / "scenarios" / f"{name}.csv"
+        assert made.read_bytes() == (tmp_path / "scenarios" / f"{name}.csv").read_bytes()
+
+
+def test_systems_have_the_values_of_the_checkout(installed: Installed, tmp_path: Path) -> None:
+    ran = installed.run("system", "nominal")  # by Ecos: there is no unzip on this PATH
+    assert ran.returncode == 0, ran.stderr
+    checkout("system", "nominal", "--report", tmp_path)
+    (made,) = (installed.work / "rparm-output").rglob("nominal.csv")
+    (expected,) = tmp_path.rglob("nominal.csv")
+    assert made.read_bytes() == expected.read_bytes()
+
+
+def test_a_file_of_ones_own_runs_from_anywhere(installed: Installed) -> None:
+    assert installed.run("new", "mine").returncode == 0
+    ran = installed.run("mine.toml")
+    assert (ran.returncode, ran.stdout.splitlines()[-1]) == (0, "ran: 1 scenario, errors estimated")
+
+
+@pytest.mark.parametrize("command", ["run", "new", "list", "system", "campaign", "federation"])
+def test_no_help_names_what_only_a_checkout_has(installed: Installed, command: str) -> None:
+    ran = installed.run("help", command)
+    assert ran.returncode == 0 and f"usage: rparm {command}" in ran.stdout
+    assert [text for text in OF_CHECKOUT if text in ran.stdout] == []
+
+
+def test_no_page_names_what_only_a_checkout_has(installed: Installed) -> None:
+    assert installed.run("run", "free_fall", "--report", "pages").returncode == 0
+    pages = list((installed.work / "pages").rglob("*.html"))
+    assert pages
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        assert [word for word in OF_CHECKOUT if word in text] == [], page.name
+
+
+@pytest.mark.parametrize("arguments", [("run", "free_fall"), ("system", "nominal")])
+def test_a_cache_that_cannot_be_written_is_one_line(
+    installed: Installed, arguments: tuple[str, ...]
+) -> None:
+    ran = installed.run(*arguments, RPARM_CACHE="/dev/null/cache")
+    assert (ran.returncode, ran.stdout) == (2, "")
+    (line,) = ran.stderr.splitlines()
+    assert line.startswith("error: /dev/null/cache/files/") and "RPARM_CACHE" in line
