@@ -1,1 +1,19 @@
-"""Drives FMUs through fmpy: compares them with references, plots, couples, runs systems."""
+"""Drives FMUs through fmpy: compares them with references, plots, couples, runs systems.
+
+For programs: `fmu`, `simulate`, `Scenario`, `System`, `Table`; docs/python-api.md is their page.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rparm.api import Scenario, System, Table, fmu, simulate
+
+__all__ = ["Scenario", "System", "Table", "fmu", "simulate"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what programs use when they use it: the command line does without."""
+    if name in __all__:
+        return getattr(import_module("rparm.api"), name)
+    raise AttributeError(f"module 'rparm' has no attribute {name!r}")

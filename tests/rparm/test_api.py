@@ -1,0 +1,193 @@
+"""rparm for programs: runs are those of the commands and of physics, its page is up to date."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rparm
+from docs import python_api
+from rparm import project, trajectory_csv
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.scenarios import scenario as scenarios
+from tests.support.paths import ROOT
+
+RUN = {"stop_time": 1.0, "step": 0.01}
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def arm() -> Path:
+    return rparm.fmu("RPManipulator")
+
+
+# ---- runs
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_free_motion_keeps_its_energy(fmi: int) -> None:
+    start = {"q1": 0.5, "dq1": 2.0, "q2": 0.1, "dq2": -0.3}
+    table = rparm.simulate(
+        rparm.fmu("rp_manipulator", fmi=fmi), **RUN, start_values=start, tolerance=1e-11
+    )
+    energy = table["total_energy"]
+    assert np.ptp(energy) < 1e-9 * np.abs(table["kinetic_energy"]).max()
+    assert len(table["time"]) == 101 and table["time"][-1] == 1.0
+    assert [table[name][0] for name in start] == list(start.values())
+
+
+def test_without_gravity_a_force_on_the_slide_at_rest_moves_it_as_newton_says(arm: Path) -> None:
+    """With a = 0 and q1 at rest, m2 ddq2 = f2: a parabola."""
+    values = {"g": 0.0, "a": 0.0, "m2": 2.0}
+    table = rparm.simulate(arm, **RUN, start_values=values, inputs={"f2": 3.0})
+    expected = 0.5 * 1.5 * table["time"] ** 2
+    assert table["q2"] == pytest.approx(expected, abs=1e-9)
+    assert np.abs(table["q1"]).max() < 1e-12
+
+
+def test_a_run_has_the_bits_of_the_scenario(arm: Path) -> None:
+    with Fmu(arm) as opened:
+        loaded = scenarios.load(project.scenario_file("sine_efforts"), opened.model)
+    table = rparm.simulate(
+        arm,
+        stop_time=loaded.stop,
+        step=loaded.steps[0],
+        start_values=loaded.parameters | loaded.initial,
+        inputs=loaded.inputs,
+        tolerance=loaded.tolerance,
+    )
+    by_scenario = rparm.Scenario("sine_efforts").run()
+    assert set(by_scenario) == set(table)
+    for name, column in by_scenario.items():
+        assert np.array_equal(table[name][loaded.reference_rows], column), name
+
+
+def test_inputs_may_be_given_in_four_ways(arm: Path) -> None:
+    times = np.linspace(0.0, 1.0, 101)
+    ways = (2.0 * times, lambda t: 2.0 * t, ((0.0, 1.0), (0.0, 2.0)), list(2.0 * times))
+    runs = [rparm.simulate(arm, **RUN, inputs={"tau1": way}, outputs=["q1"]) for way in ways]
+    for other in runs[1:]:
+        assert other["q1"] == pytest.approx(runs[0]["q1"], abs=1e-13)
+    held = rparm.simulate(arm, **RUN, inputs={"tau1": 2.0}, outputs=["q1"])
+    assert np.array_equal(
+        held["q1"], rparm.simulate(arm, **RUN, inputs={"tau1": np.full(101, 2.0)})["q1"]
+    )
+
+
+def test_a_table_is_a_mapping_with_units(arm: Path, tmp_path: Path) -> None:
+    table = rparm.simulate(arm, **RUN, outputs=["q2", "q1"])
+    assert list(table) == ["time", "q2", "q1"] and len(table) == 3
+    assert table.units == {"time": "s", "q2": "m", "q1": "rad"}
+    assert repr(table) == "Table of 101 rows: time, q2, q1"
+    with pytest.raises(KeyError, match="did you mean 'q1'"):
+        table["q11"]
+    table.to_csv(tmp_path / "run.csv")
+    names, values = trajectory_csv.read(tmp_path / "run.csv", lambda text, _: ValueError(text))
+    assert names == tuple(table)
+    assert np.array_equal(values, np.column_stack(list(table.values())))
+    with pytest.raises(UserError, match="cannot be written"):
+        table.to_csv(tmp_path / "none" / "run.csv")
+
+
+def test_a_scenario_is_within_its_bound() -> None:
+    scenario = rparm.Scenario("free_fall")
+    errors = scenario.errors(scenario.run(fmi=3))
+    assert 0 < max(errors.values()) < 1e-7
+    exact = scenario.errors(scenario.run(tolerance=1e-11))
+    assert max(exact.values()) < 1e-2 * max(errors.values())
+
+
+def test_a_system_runs_by_both_engines() -> None:
+    loop = rparm.System("closed_loop")
+    assert "nominal" in loop.variants
+    ours, theirs = (loop.run("nominal", engine=engine) for engine in ("master", "ecos"))
+    assert ours.units["arm.q1"] == "rad"
+    assert ours["arm.q1"] == pytest.approx(theirs["arm.q1"], abs=1e-9)
+
+
+# ---- what is wrong
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"step": 0.3}, "whole number of steps"),
+        ({"step": 0.0}, "step > 0"),
+        ({"step": 3.0}, "expected 1 to"),
+        ({"step": 1e-9}, "expected 1 to"),
+        ({"stop_time": -1.0}, "stop_time"),
+        ({"stop_time": 0.0}, "start_time < stop_time"),
+        ({"stop_time": float("nan")}, "stop_time: expected a finite number"),
+        ({"stop_time": "1"}, "stop_time: expected a finite number"),
+        ({"start_time": -1.0}, "0 <= start_time"),
+        ({"tolerance": 0.0}, "tolerance: expected a number between"),
+        ({"tolerance": "1e-8"}, "tolerance: expected a number between"),
+        ({"outputs": ["q3"]}, "has no Real output 'q3' \\(known: q1"),
+        ({"inputs": {"tau": 1.0}}, "inputs: tau: the model has no variable 'tau', did you mean"),
+        ({"inputs": {"q1": 1.0}}, "inputs: q1: 'q1' is not an input"),
+        ({"inputs": {"tau1": [1.0, 2.0]}}, "tau1: expected 101 values"),
+        ({"inputs": {"tau1": np.nan}}, r"tau1: is nan at t = 0\.0 s"),
+        ({"inputs": {"tau1": lambda t: np.inf if t > 0.5 else 0.0}}, "tau1: is inf at t = 0.51"),
+        ({"inputs": {"tau1": "1.0"}}, "tau1: expected numbers: got the text"),
+        ({"inputs": {"tau1": ((0.0, 0.0), (1.0, 2.0))}}, "times of a table increase"),
+        ({"inputs": {"tau1": ((0.0,), (1.0, 2.0))}}, "have the same length"),
+        ({"start_values": {"m2": -1.0}}, "start_values: m2: expected at least"),
+        ({"start_values": {"q1": "30 degg"}}, "start_values: q1"),
+        ({"start_values": {"m3": 1.0}}, "start_values: m3: the model has no variable 'm3'"),
+        ({"start_values": {"tau1": 1.0}}, "start_values: tau1: 'tau1' is not a parameter"),
+    ],
+)
+def test_a_mistake_is_one_line(arm: Path, change: dict[str, object], words: str) -> None:
+    with pytest.raises(UserError, match=words) as raised:
+        rparm.simulate(arm, **(RUN | change))
+    assert "\n" not in str(raised.value)
+
+
+def test_what_is_not_there_is_named(tmp_path: Path) -> None:
+    (tmp_path / "no.fmu").write_bytes(b"no archive")
+    for wrong, words in (
+        (lambda: rparm.fmu("RPPlnt"), "no model 'RPPlnt' \\(known: rp_actuator"),
+        (lambda: rparm.fmu("RPPlant", fmi=1), "fmi: expected 2 or 3, got 1"),
+        (lambda: rparm.simulate(tmp_path / "no.fmu", **RUN), "not an FMU"),
+        (lambda: rparm.simulate(tmp_path / "none.fmu", **RUN), "none.fmu"),
+        (lambda: rparm.Scenario("sine_effort"), "did you mean 'sine_efforts'"),
+        (lambda: rparm.System("closed"), "no system 'closed'"),
+        (lambda: rparm.System("machine").run("nominl"), "has no variant 'nominl'"),
+        (lambda: rparm.System("machine").run("pick_and_place", engine="x"), "engine: expected"),
+    ):
+        with pytest.raises(UserError, match=words):
+            wrong()
+    with pytest.raises(AttributeError, match="no attribute 'fmus'"):
+        rparm.fmus  # noqa: B018
+
+
+# ---- its page
+
+
+def test_the_page_is_made_from_the_docstrings() -> None:
+    assert python_api.PAGE.read_text(encoding="utf-8") == python_api.page()
+    assert len(python_api.page().split()) < 1500
+
+
+def test_what_stands_on_the_page_runs(tmp_path: Path) -> None:
+    blocks = BLOCK.findall(python_api.page())
+    assert len(blocks) == 3
+    made = subprocess.run(
+        [sys.executable, "-c", "\n".join(blocks)],
+        cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, text=True, capture_output=True, check=True,
+    )  # fmt: skip
+    lines = made.stdout.splitlines()
+    assert lines[0].endswith(" rad") and lines[-1].startswith("no model 'RPPlnt' (known: ")
+    assert (tmp_path / "fall.csv").is_file()
+
+
+def test_importing_it_is_light() -> None:
+    script = "import sys, rparm; print(sorted({'fmpy', 'numpy', 'matplotlib'} & set(sys.modules)))"
+    made = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, text=True, capture_output=True, check=True
+    )
+    assert made.stdout.strip() == "[]"
