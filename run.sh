@@ -116,7 +116,7 @@ case "$command" in
 esac
 log="$root/build/build.log"
 case "$command" in
-  help | list | --list | federate) ;;
+  help | list | --list | --version | federate) ;;
   *) [ "$help" = yes ] || is_unknown "$command" || build "the FMUs" --parallel 2 ;;
 esac
 [ -n "$command" ] || set -- run "$@"

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import NoReturn
 
+from rparm import project
 from rparm.errors import UserError, did_you_mean
 from rparm.options import add_common
 from rparm.project import PROGRAM
@@ -20,6 +21,7 @@ COMMANDS = {
     "campaign": "run a scenario or a system many times, over parameters",
     "federation": "run a system with each FMU in its own process, coupled by HELICS",
     "federate": "step one component in a federation of another machine",
+    "playground": "say where the page with the plant is, for a browser",
 }
 # the extra of the distribution that has what a command needs
 NEEDS = {
@@ -31,6 +33,7 @@ NEEDS = {
 }
 COMMON = ("--json", "--quiet")
 HELP = ("help", "--help", "-h")
+VERSION = "--version"
 
 EPILOG = """With --json, standard output has one JSON document and nothing else. "exit_code" is in
 it, and "error" with the message if there is one. A command that is interrupted prints none."""
@@ -55,6 +58,7 @@ def overview() -> str:
             "  --json   print one JSON document, and all else on standard error",
             "  --quiet  print the last line only, and what is wrong",
             "",
+            f"{PROGRAM} {VERSION} prints the version.",
             EXIT_CODES,
         ]
     )
@@ -71,6 +75,9 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     first, *rest = arguments
     while first in COMMON and rest:  # may stand in front of the command
         first, *rest = [*rest, first]
+    if first == VERSION:
+        print(project.version())
+        raise SystemExit(0)
     if first in HELP:
         if not set(rest) - set(COMMON):
             print(overview())

@@ -41,8 +41,11 @@ def add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) 
 def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     """Where pages and results go."""
     folder = project.report_folder(part)
+    # its name until version 0.1
+    parser.add_argument("--report", type=Path, default=folder, help=argparse.SUPPRESS)
     parser.add_argument(
-        "--report",
+        "--output",
+        dest="report",
         type=Path,
         metavar="DIR",
         default=folder,

@@ -19,6 +19,8 @@ writes to rparm-output/ in the current folder.
 """
 
 import os
+import re
+from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -210,6 +212,16 @@ def plotly_script() -> Path:
     found = find_spec("plotly")
     assert found is not None and found.origin is not None  # requirements/run.in has it
     return Path(found.origin).parent / "package_data" / "plotly.min.js"
+
+
+def version() -> str:
+    """Version of the project."""
+    if INSTALLED:
+        return metadata.version("rparm")
+    text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")
+    found = re.search(r"^project\(\w+ VERSION (\S+)", text, re.MULTILINE)
+    assert found is not None
+    return found[1]
 
 
 def how_to_install(extra: str) -> str:

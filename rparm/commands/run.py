@@ -219,7 +219,7 @@ def _named(name: str) -> Path:
     file = own.get(f"{Path(name).name}{SUFFIX}")
     if file is not None:
         raise UserError(f"no scenario {name!r}, did you mean the file {str(file)!r}?")
-    guess = did_you_mean(name, [*known, *COMMANDS, *map(str, own.values())])
+    guess = did_you_mean(name, [*known, *COMMANDS, "help", *map(str, own.values())])
     raise UserError(
         f"no scenario or command {name!r}{guess} ({PROGRAM} --list names all scenarios)"
     )

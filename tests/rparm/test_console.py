@@ -1,5 +1,6 @@
 """What commands print: no line of a table above 80 columns, one document for programs."""
 
+import argparse
 import json
 import math
 import os
@@ -7,12 +8,14 @@ import random
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rparm import command_line
+from rparm import project as project_folders
 from rparm.command_line import COMMANDS
 from rparm.fmi.fmu_file import Fmu
 from rparm.output import console, result_tables, streams
@@ -212,6 +215,43 @@ def test_help_fits_and_names_every_command(capsys: pytest.CaptureFixture[str]) -
             assert ("--tolerance" in text) == (command == "run")
 
 
+def test_the_version_is_that_of_the_build(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        call(capsys, "--version")
+    assert ended.value.code == 0
+    built = (ROOT / "CMakeLists.txt").read_text()
+    assert f"project(RPManipulator VERSION {capsys.readouterr().out.strip()} " in built
+
+
+def test_the_playground_is_where_it_is_said_to_be(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rparm.project.ROOT", tmp_path)
+    page = tmp_path / "build" / "playground" / "index.html"
+    code, out, err = call(capsys, "playground")
+    assert (code, out) == (2, "")
+    assert_one_line(err)
+    assert str(page) in err
+    page.parent.mkdir(parents=True)
+    page.touch()
+    shown: list[str] = []
+    monkeypatch.setattr("webbrowser.open_new_tab", lambda url: bool(shown.append(url)) or True)
+    assert call(capsys, "playground", "--open")[:2] == (0, f"{page}\n")
+    assert shown == [page.as_uri()]
+
+
+def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]) -> None:
+    """--report is what --output was called: it works, and no help shows it."""
+    for name in ("run", "system"):
+        module = import_module(f"rparm.commands.{name}")
+        for option in ("--output", "--report"):
+            parser = argparse.ArgumentParser()
+            module.add_options(parser)
+            assert parser.parse_args([option, "here"]).report == Path("here")
+        assert parser.parse_args([]).report == project_folders.report_folder()
+        assert "--output DIR" in parser.format_help() and "--report" not in parser.format_help()
+
+
 def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = call(capsys)
     assert (code, out) == (2, "") and err == f"{command_line.overview()}\n"
@@ -234,6 +274,7 @@ def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> 
         (["system", "nominal", "pick_and_plaze"], "did you mean 'pick_and_place'?"),
         (["run", "--tolerence", "1e-8"], "did you mean '--tolerance'?"),
         (["system", "--jsn"], "did you mean '--json'?"),
+        (["hlep"], "did you mean 'help'?"),
     ],
 )
 def test_guesses(
