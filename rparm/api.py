@@ -26,7 +26,7 @@ WHOLE = 1e-9  # of a step: by so much the stop time may miss a communication poi
 
 
 class Table(Mapping[str, np.ndarray]):
-    """Columns of a run, by name: `table["q1"]`; "time" is the first.
+    """Columns of a run, by the names of variables; "time" is the first.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def fmu(name: str, fmi: int = 2) -> Path:
     Parameters
     ----------
     name : str
-        As "RPPlant", or the folder of its model, "rp_plant".
+        Of the FMU without its suffix, or of the folder of its model.
     fmi : int
         Version of FMI: 2 or 3.
     """
@@ -153,7 +153,7 @@ class Scenario:
     Parameters
     ----------
     name : str or path
-        As "sine_efforts", or a path that ends with .toml.
+        Of a scenario, or a path that ends with .toml.
     """
 
     def __init__(self, name: str | Path) -> None:
@@ -194,7 +194,7 @@ class Scenario:
 
 
 class System:
-    """A system of connected FMUs: "closed_loop", "machine", or the path of an SSP.
+    """A system of connected FMUs, by its name or the path of its SSP.
 
     Attributes
     ----------

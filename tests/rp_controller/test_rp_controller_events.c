@@ -71,6 +71,27 @@ static void test_without_delay_a_sample_takes_effect_at_once(void) {
     }
 }
 
+/* With the arm level and nothing else to do, the torque of the payload is its weight at L. */
+static void test_a_sample_knows_the_payload(void) {
+    double torque[2];
+    for (int attached = 0; attached < 2; attached++) {
+        setUp();
+        struct rp_controller_parameters *p = &v.parameters;
+        p->mode = RP_CONTROLLER_PD_GRAVITY;
+        p->arm = (struct rp_parameters){.m1 = 2.0, .m2 = 1.0, .l1 = 0.5, .lc1 = 0.25, .g = 9.81};
+        p->payload_mass = 1.5;
+        p->sample_time = 0.25;
+        p->Ki[0] = p->Ki[1] = v.inputs.q_ref[0] = 0.0;
+        v.inputs.q_ref[1] = v.inputs.q[1] = 0.2;
+        v.payload_attached = attached;
+        ASSERT_OK(begin(0.0));
+        pass_event();
+        torque[attached] = effort();
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14 * torque[0], 2.0 * 9.81 * 0.25 + 1.0 * 9.81 * 0.7, torque[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14 * torque[1], 1.5 * 9.81 * 0.7, torque[1] - torque[0]);
+}
+
 /* After each sample k at 0.3 s + 0.1 s k the events until the next one, of which there may be none;
  * returns how often rounding has brought the sum of both times behind that. */
 static int count_late_sums(double delay, int most_between) {
