@@ -26,7 +26,7 @@ static void send_text(const struct component *component, enum component_status s
     }
 }
 
-/* With logging off errors are sent all the same, and nothing else. */
+/* With logging off, errors alone are sent. */
 #define ERRORS (1u << LOG_STATUS_ERROR | 1u << LOG_STATUS_FATAL)
 
 static const struct adapter adapter = {
@@ -228,8 +228,8 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return fmi3_status(mode_enter_event(instance, CALL_fmi3EnterEventMode));
 }
 
-/* One update brings all modes to their end. Another one is needed only where the importer has gone
- * past several time events. */
+/* One update settles all modes. Another one is needed only if the importer has passed several time
+ * events. */
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation,
                                     fmi3Boolean *nominalsOfContinuousStatesChanged,

@@ -30,7 +30,7 @@ struct answer {
     fmi3Float64 early_time;
 };
 
-/* Calls the importer back, in intermediate update mode; an error in it ends the step. */
+/* Calls the importer in intermediate update mode; an error there ends the step. */
 static enum status update(struct fmi3_component *component, double time, bool can_return_early,
                           struct answer *answer) {
     struct component *base = &component->base;
@@ -87,7 +87,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                       fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
                       fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
-    // importers say true and roll back all the same
+    // importers say true, and roll back nevertheless
     const enum fmi3_call call = CALL_fmi3DoStep;
     struct component *base = instance;
     if (!component_enter(base, call) ||

@@ -39,17 +39,17 @@ static inline fmi3Status fmi3_status(enum component_status status) {
 /* A call of the table that this FMU does not support: an error that says why. */
 fmi3Status fmi3_unsupported(fmi3Instance instance, enum fmi3_call call, const char *reason);
 
-/* The number of values is the one expected; otherwise it fails as component_fail. */
+/* Whether the number of values is the one expected; if not, fails as component_fail. */
 bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t count,
                     size_t expected);
 
-/* In intermediate update mode the variables may be read or set; otherwise it fails as
- * component_fail. In other modes nothing is checked here. */
+/* Whether the variables may be read or set in intermediate update mode; if not, fails as
+ * component_fail. Other modes are not checked here. */
 bool fmi3_may_access(struct component *component, enum fmi3_call call, bool setting,
                      const fmi3ValueReference references[], size_t count);
 
-/* Prepares steps with the rest of what stands above; the memory of a step that has to be undone is
- * there before the first one. */
+/* Prepares steps with these settings. Allocates what undoing a step needs, since steps allocate
+ * nothing. */
 MUST_CHECK enum status fmi3_prepare_steps(struct fmi3_component *component);
 
 /* Intermediate update mode knows no discard (section 4.2.2). */

@@ -18,6 +18,20 @@ static size_t aligned(size_t size) {
     return (size + alignment - 1) / alignment * alignment;
 }
 
+/* Bytes of the value structure up to the last field that is not calculated from others. */
+static size_t written_size(const struct model *model) {
+    const struct model_events events = events_of(model);
+    const struct range ranges[] = {model->parameters,      model->inputs,
+                                   model->states,          events.modes,
+                                   events.discrete_states, events.discrete_inputs};
+    size_t size = 0;
+    for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
+        const size_t end = ranges[i].offset + ranges[i].size;
+        size = ranges[i].size > 0 && end > size ? end : size;
+    }
+    return size;
+}
+
 static bool lies_in(struct range range, const struct variable *variable) {
     return variable->offset >= range.offset && variable->offset - range.offset < range.size;
 }
@@ -118,10 +132,12 @@ static enum status setup(struct instance *instance) {
     const struct model *model = instance->model;
     const size_t values_size = aligned(model->values_size);
     const size_t input_count = count_of(model->inputs);
+    const size_t inputs_size = 3 * input_count * sizeof(struct polynomial);
+    const size_t before_values = aligned(inputs_size + instance_event_size(model));
     struct instance_memory *memory = &instance->memory;
 
-    memory->size =
-        2 * values_size + 3 * input_count * sizeof(struct polynomial) + instance_event_size(model);
+    memory->size = before_values + 2 * values_size;
+    memory->written = written_size(model);
     memory->block = calloc(1, memory->size);
     instance->first_derivatives = calloc(2, values_size);
     instance->u =
@@ -135,12 +151,12 @@ static enum status setup(struct instance *instance) {
     instance->nodes = instance->u + input_count;
     instance->input_series =
         (double(*)[SERIES_INPUT_LENGTH])(instance->nodes + POLYNOMIAL_NODES * input_count);
-    memory->values = memory->block;
-    memory->restart_values = memory->values + values_size;
-    memory->next_inputs = (struct polynomial *)(void *)(memory->restart_values + values_size);
+    memory->next_inputs = (struct polynomial *)(void *)memory->block;
     memory->current_inputs = memory->next_inputs + input_count;
     memory->active_inputs = memory->current_inputs + input_count;
     memory->unhandled = (bool *)(void *)(memory->active_inputs + input_count);
+    memory->restart_values = memory->block + before_values;
+    memory->values = memory->restart_values + values_size;
     locate_reals(instance);
     if (model->events != NULL && !setup_events(instance)) {
         return STATUS_OUT_OF_MEMORY;

@@ -81,6 +81,7 @@ static void test_variables_of_intermediate_updates(void) {
         TEST_ASSERT_EQUAL_UINT(1, importer.count[fmi3Error]);
     }
     options = (struct fmu3_options){.required = NULL, .required_count = 2};
+    fmu3_clear_messages(&importer);
     TEST_ASSERT_NULL(fmu3_try_co_simulation(&importer, &options));
     fmu3_assert_logged(&importer, "NULL");
 }

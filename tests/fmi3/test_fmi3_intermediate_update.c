@@ -463,7 +463,7 @@ static fmi3Status free_after_error(fmi3Instance instance, fmi3ValueReference ref
 }
 
 /* The step then returns an error, whatever was called (each function: test_fmi3_states.c); the
- * instance can be reset and goes on. */
+ * instance can be reset and used again. */
 static void test_what_is_not_allowed_makes_the_step_fail(void) {
     static const fmi3ValueReference both[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_q1,
                                               RP_MANIPULATOR_ddq1};

@@ -99,13 +99,25 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
+/* What a step writes of the memory, but values that are calculated from it. */
+static void copy_written(const struct instance *instance, char *to, const char *from) {
+    const struct instance_memory *memory = &instance->memory;
+    const size_t restart = (size_t)(memory->restart_values - memory->block);
+    const size_t values = (size_t)(memory->values - memory->block);
+    memcpy(to, from, restart + memory->written); // inputs are in front of the value structures
+    memcpy(to + values, from + values, memory->written);
+}
+
 void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {
-    copy_from(instance, 0, snapshot);
+    snapshot->state = instance->state;
+    copy_written(instance, (char *)snapshot->memory, instance->memory.block);
     snapshot->history_is_lost = instance->history_is_lost;
 }
 
 enum status instance_undo(struct instance *instance, const struct instance_snapshot *snapshot) {
-    const enum status status = instance_restore(instance, snapshot);
+    instance->state = snapshot->state;
+    copy_written(instance, instance->memory.block, (const char *)snapshot->memory);
+    const enum status status = resume(instance);
     // next_step, which instance_keep has not brought up to date, follows from the integrator
     return status == STATUS_OK && snapshot->state.has_history && !snapshot->history_is_lost
                ? instance_replay_history(instance)

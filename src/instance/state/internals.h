@@ -50,18 +50,21 @@ struct instance_state {
     struct clock_time cut_end; /* where the step would have ended without that event */
 };
 
-/* Parts of one block of memory, of which a snapshot is a copy. */
+/* Parts of one block of memory, of which a snapshot is a copy, in this order. */
 struct instance_memory {
     char *block;
-    size_t size;          /* bytes */
-    char *values;         /* the model's value structure, as set and read from outside; its
-                             inputs are those at the current time */
-    char *restart_values; /* the value structure at the last restart: what the integrator runs
-                   with */
+    size_t size;    /* bytes */
+    size_t written; /* bytes of a value structure, from its beginning, in which a step writes more
+                       than what it calculates from the rest */
+
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
     struct polynomial *active_inputs;  /* inputs since the last restart */
-    bool *unhandled; /* causes of the unhandled event, as triggered of struct instance */
+    bool *unhandled;      /* causes of the unhandled event, as triggered of struct instance */
+    char *restart_values; /* the value structure at the last restart: what the integrator runs
+                             with */
+    char *values;         /* the model's value structure, as set and read from outside; its
+                             inputs are those at the current time */
 };
 
 /* Of each value reference. */
