@@ -21,6 +21,7 @@ set(MUSL_LICENSE ${MUSL_SOURCE_DIR}/COPYRIGHT)
 set(files
   sin cos sincos __sin __cos __rem_pio2 __rem_pio2_large scalbn
   atan2 atan
+  tan __tan asin acos sinh cosh tanh __expo2 expm1
   pow pow_data exp exp_data log log_data
   __math_divzero __math_invalid __math_oflow __math_uflow __math_xflow
   sqrt sqrt_data

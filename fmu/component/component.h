@@ -86,7 +86,7 @@ MUST_CHECK bool component_enter(struct component *component, unsigned call);
  * instance is in the middle of another call. A message says so after that of the logger. */
 MUST_CHECK NONNULL bool component_is_logging(struct component *component, const char *call);
 
-/* Fails as component_fail, for the reason that component_has_arrays finds; false. */
+/* Reports what is wrong with the arrays as component_fail does; always false. */
 NONNULL bool component_refuse_arrays(struct component *component, unsigned call, size_t count);
 
 /* True if count values may be accessed: neither array is NULL, unless count is 0. Otherwise it
@@ -99,7 +99,7 @@ MUST_CHECK NONNULL_ARGUMENTS(1) static inline bool component_has_arrays(struct c
            component_refuse_arrays(component, call, count);
 }
 
-/* Of a status other than STATUS_OK, as component_result. */
+/* As component_result, for a status other than STATUS_OK. */
 NONNULL enum component_status component_failure(struct component *component, enum status status);
 
 /* Converts a status of the instance, which has sent its message. An error leads to the state after

@@ -21,7 +21,7 @@ enum component_status fmu_state_size(struct component *component, unsigned call,
 enum component_status fmu_state_serialize(struct component *component, unsigned call,
                                           void *fmu_state, unsigned char bytes[], size_t size);
 
-/* Always a new one. */
+/* *fmu_state becomes a new one. */
 enum component_status fmu_state_deserialize(struct component *component, unsigned call,
                                             const unsigned char bytes[], size_t size,
                                             void **fmu_state);

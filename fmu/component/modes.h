@@ -13,7 +13,7 @@ enum component_status mode_setup_experiment(struct component *component, unsigne
 enum component_status mode_enter_initialization(struct component *component, unsigned call,
                                                 const struct instance_experiment *experiment);
 
-/* To event mode, or between steps where the importer handles no events. */
+/* Into event mode; into step mode if the importer does not handle events. */
 enum component_status mode_exit_initialization(struct component *component, unsigned call);
 
 enum component_status mode_enter_event(struct component *component, unsigned call);

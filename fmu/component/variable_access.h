@@ -19,7 +19,7 @@
 VALUE_TYPE_LIST(ACCESS)
 #undef ACCESS
 
-/* Of a type that no variable has: succeeds for no values only. */
+/* For a type that no variable has: succeeds only if no value is asked for. */
 enum component_status access_none(struct component *component, unsigned call, const char *type,
                                   const unsigned references[], size_t count, const void *values);
 

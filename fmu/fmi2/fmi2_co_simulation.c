@@ -22,7 +22,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
-    // importers say true and roll back all the same
+    // importers say true, and roll back nevertheless
     struct component *component = c;
     if (!component_enter(component, CALL_fmi2DoStep)) {
         return fmi2Error;

@@ -14,7 +14,7 @@
 
 /* ---- Refused bytes -------------------------------------------------------------------------- */
 
-/* The bytes are refused, and the instance goes on as if they had not been given. */
+/* The bytes are refused, and the instance continues as if they had not been given. */
 static void assert_refused(fmi2Component c, fmi2FMUstate good, const struct fmu_bytes *bytes,
                            const char *message) {
     static struct fmu_values before;
@@ -241,7 +241,7 @@ EACH_METHOD static void test_forged_states_do_no_harm(void) {
         forge(fmu_used(method, &messages));
     }
     const fmi2Component held =
-        fmu_initialized_with(method, &messages, 0.0); // the integrator goes on
+        fmu_initialized_with(method, &messages, 0.0); // the integrator continues
     ASSERT_OK(fmu.DoStep(held, 0.0, 0.125, fmi2True));
     ASSERT_OK(fmu.DoStep(held, 0.125, 0.125, fmi2True));
     forge(held);

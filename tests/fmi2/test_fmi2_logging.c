@@ -201,7 +201,9 @@ static void test_messages_carry_the_name_of_the_instance(void) {
                                                 NULL, &callbacks, fmi2False, fmi2True);
         ASSERT_ERROR(fmu.Terminate(c));
         TEST_ASSERT_EQUAL_STRING(names[i], messages.instance_name);
+        fmu_log_clear(&messages);
         fmu.FreeInstance(c);
+        fmu_assert_logged(&messages, "fmi2FreeInstance");
     }
 }
 

@@ -62,7 +62,7 @@ static void test_tunable_parameters_keep_the_states(void) {
     TEST_ASSERT_TRUE(energy != fmu_get(c, RP_MANIPULATOR_total_energy));
     fmu_assert_motion(c, 0.0, 0.0, 1e-11);
 
-    // goes on like an instance that starts here with these parameters
+    // continues like an instance that starts here with these parameters
     const fmi2Component other = fmu_instantiate(&messages, false);
     ASSERT_OK(fmu.SetReal(other, references, 3, values));
     ASSERT_OK(fmu.SetReal(other, fmu_state_references, 4, before));

@@ -294,7 +294,7 @@ fmi2Status fmu_run_start(fmi2Type type, fmi2Component component, unsigned varian
     return worse(status, fmu.ExitInitializationMode(component));
 }
 
-/* The inputs change at every third step: the integrator both goes on and restarts. */
+/* The inputs change at every third step: the integrator both continues and restarts. */
 fmi2Status fmu_run_step(fmi2Type type, fmi2Component component, unsigned step,
                         struct fmu_run *run) {
     const fmi2ValueReference references[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};

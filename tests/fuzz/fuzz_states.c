@@ -1,4 +1,4 @@
-/* Deserialization of mutated states, and what an instance does that goes on from one that was
+/* Deserialization of mutated states, and what an instance does that continues from one that was
  * taken. README.md says how an input is decoded. */
 #include "fuzz_bytes.h"
 #include "value_references.h"

@@ -155,7 +155,7 @@ static void test_instantiate(void) {
     fail_in_turn(try_instantiate, 5);
 }
 
-/* After the error the instance goes on from the state before it, and after a reset from the start.
+/* After the error the instance continues from the state before; after a reset, from the start.
  */
 static bool try_save(const struct subject *subject, long number, enum allocator_fault fault) {
     const fmi2Component c = running(subject);

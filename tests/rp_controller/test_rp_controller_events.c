@@ -175,6 +175,17 @@ static void test_a_sample_that_is_not_finite_is_refused(void) {
     TEST_ASSERT_TRUE(v.integral[0] == before.integral[0]);
 }
 
+/* Also where only the rate of the integral part is. */
+static void test_an_integral_that_is_not_finite_is_refused(void) {
+    v.parameters.sample_time = 0.25;
+    ASSERT_OK(begin(0.0));
+    v.parameters.Ki[0] = 10.0;
+    v.inputs.q_ref[0] = 1e308;
+    const struct event event = {.t = 0.25, .is_timed = true};
+    TEST_ASSERT_EQUAL_INT(STATUS_NOT_FINITE, rp_controller_events.update(&v, &event));
+    TEST_ASSERT_TRUE(v.integral[0] == 0.0);
+}
+
 static void test_saved_states_that_cannot_be_are_refused(void) {
     v.parameters.sample_time = 0.25;
     TEST_ASSERT_FALSE(rp_controller_events.modes_are_possible(&v, true));

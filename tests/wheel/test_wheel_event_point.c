@@ -1,4 +1,4 @@
-/* Steps of the core that end at an event, and how the next one goes on from there. */
+/* Steps of the core that end at an event, and how the next one continues from there. */
 #include "wheel_instance.h"
 
 #include "continuous_states.h"
@@ -34,7 +34,7 @@ static void update(void) {
     ASSERT_OK(instance_update_discrete_states(instance, &update));
 }
 
-/* The times of importers are rounded; that of the instance goes on as if the step had not ended. */
+/* Importers' times are rounded; the instance's own continues as if the step had not ended. */
 static void test_the_end_of_a_step_cut_short_is_kept(void) {
     static const enum event_handling ways[] = {EVENTS_END, EVENTS_LEFT};
     start();
@@ -62,7 +62,7 @@ static void test_another_end_is_taken_as_it_is(void) {
     TEST_ASSERT_TRUE(instance->state.time.rest == 0.0);
 }
 
-/* The step after an event goes on from it, unless something has changed there. */
+/* The step after an event continues from it, unless something has changed there. */
 static void test_a_change_at_the_event_is_noticed(void) {
     for (int changes = 0; changes < 2; changes++) {
         start();

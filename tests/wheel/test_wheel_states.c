@@ -151,7 +151,7 @@ static void test_no_mode_is_decided_before_the_initialization_ends(void) {
     assert_accepted();
 }
 
-/* While the integrator goes on, the modes are those of its restart and fit its parameters. */
+/* While the integrator continues, the modes are those of its restart and fit its parameters. */
 static void test_forged_modes_since_the_restart_are_refused(void) {
     set(WHEEL_stop, 1.0);
     ASSERT_OK(instance_exit_initialization(instance));
