@@ -92,14 +92,14 @@ class Campaign:
         verdict, test = workshop.judge(self.mutants[index].mutant, kind)
         with self.lock:
             self.verdicts[index] = (verdict, test, time.monotonic() - started)
-            self.tell(index)
+            self.note(index)
             self.lock.notify_all()
 
-    def tell(self, index: int) -> None:
+    def note(self, index: int) -> None:
         """Print a verdict; write all verdicts to the file."""
         verdict, test, _ = self.verdicts[index]
         by = f" by {test}" if test else ""
-        print(f"{index}: {self.mutants[index].mutant.told()}: {verdict}{by}", flush=True)
+        print(f"{index}: {self.mutants[index].mutant.description()}: {verdict}{by}", flush=True)
         if self.results is None:
             return
         lines = [
@@ -165,11 +165,11 @@ def report(campaign: Campaign, gone: list[str], seconds: float) -> float:
     living = [chosen for chosen, verdict in judged if verdict not in DEAD]
     unequal = sum(verdict in DEAD or not chosen.equivalent for chosen, verdict in judged)
     died = len(judged) - len(living)
-    for told in gone:
-        print(f"gone: {told}")
+    for line in gone:
+        print(f"gone: {line}")
     for chosen in living:
         reason = f"equivalent, {chosen.equivalent}" if chosen.equivalent else chosen.lives
-        print(f"lives: {chosen.mutant.told()}{': ' if reason else ''}{reason}")
+        print(f"lives: {chosen.mutant.description()}{': ' if reason else ''}{reason}")
     print("; ".join(f"{verdict} {count}" for verdict, count in sorted(counts.items())))
     unknown = sum(not chosen.equivalent and not chosen.lives for chosen in living)
     print(
@@ -192,7 +192,7 @@ def chosen_mutants(arguments: argparse.Namespace) -> tuple[list[Chosen], list[st
         found = places.find(chosen.mutant)
         if found is None:
             nearest = places.nearest(chosen.mutant)
-            gone.append(f"{chosen.mutant.told()}; most like it: {nearest}")
+            gone.append(f"{chosen.mutant.description()}; most like it: {nearest}")
         else:
             here.append(Chosen(found, chosen.equivalent, chosen.lives))
     return here, gone
