@@ -21,8 +21,8 @@ from pydantic import (
     model_validator,
 )
 
-from rparm.campaign.expressions import Expression, parsed
 from rparm.errors import UserError, WrongValueError, hint
+from rparm.expressions.evaluation import Expression, parsed
 from rparm.input_files import read_toml, show
 from rparm.units import SECONDS, quantity
 

@@ -58,7 +58,7 @@ class Sampler:
 
     @cached_property
     def _sobol(self) -> qmc.Sobol:
-        """The sequence, which goes on from the last point: blocks are asked for in their order."""
+        """The next points of the sequence: blocks are asked for in their order."""
         size = len(self._distributions)
         return qmc.Sobol(size, scramble=True, rng=self._campaign.seed)
 

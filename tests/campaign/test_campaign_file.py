@@ -81,8 +81,14 @@ MISTAKES = {
     "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
     "unknown column": ([("seed = 3", 'worst = ["final(q3)"]')], "worst: no column 'final(q3)'"),
     "unknown name": ([("[keep]", '[derived]\ndq1 = "2 * q9"\n[keep]')], "unknown name 'q9'"),
-    "no expression": ([("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')], "[derived] dq1: is not an"),
-    "forbidden": ([("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')], "'open(1)': expected"),
+    "no expression": (
+        [("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')],
+        "[derived] dq1: column 4: expected a number",
+    ),
+    "forbidden": (
+        [("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')],
+        "column 1: no function 'open'",
+    ),
     "run": (
         [("[keep]", '[parameters.run]\nuniform = [0.0, 1.0]\n[derived]\ndq1 = "run"\n[keep]')],
         "[parameters.run]: every table has a column of that name",

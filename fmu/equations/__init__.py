@@ -1,0 +1,15 @@
+"""Makes a model in C of one file with its equations.
+
+A module each; a module imports only from lines above its own:
+
+    graph         operations on values and conditions, and their derivatives
+    model_file    reads and checks the file; what it says as a graph
+    lock          value references that stay
+    c_code        a graph as statements in C
+    guards        when a relation matters
+    c_series      the Taylor series of the states
+    c_events      modes and events; c_events_text: what those of all models have in common
+    c_model       equations.h and equations.c: a struct model (src/model/model.h)
+    declaration   variables.toml and the page
+    building      FMUs
+"""

@@ -1,0 +1,158 @@
+"""Units of expressions: every sum, comparison and argument of a function has to fit.
+
+A unit is the exponents of the SI base units; rad counts as 1. A number without a name takes the
+unit of what it is added to, compared with or assigned to; in products it is 1.
+"""
+
+import re
+from collections.abc import Mapping
+from fractions import Fraction
+
+from rparm.expressions.tree import RELATIONS, ExpressionError, Node, in_order
+
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
+ANGLE = "rad"
+
+Unit = tuple[Fraction, ...]  # exponents, in the order of BASE
+ONE: Unit = (Fraction(0),) * len(BASE)
+
+
+def unit_of_exponents(exponents: Mapping[str, int]) -> Unit:
+    """Unit with these exponents, by base unit."""
+    return tuple(Fraction(exponents.get(base, 0)) for base in BASE)
+
+
+def times(a: Unit, b: Unit, power: Fraction = Fraction(1)) -> Unit:
+    """The product a b^power."""
+    return tuple(x + power * y for x, y in zip(a, b, strict=True))
+
+
+# units with a symbol, as products of those before
+DERIVED = {
+    "Hz": "1/s", "N": "kg.m/s2", "Pa": "N/(m.m)", "J": "N.m", "W": "J/s", "C": "A.s", "V": "W/A",
+    "F": "C/V", "ohm": "V/A", "S": "A/V", "Wb": "V.s", "T": "Wb/(m.m)", "H": "Wb/A", "lm": "cd",
+    "lx": "lm/(m.m)", "Bq": "1/s", "Gy": "J/kg", "Sv": "J/kg", "kat": "mol/s",
+}  # fmt: skip
+SYMBOLS: dict[str, dict[str, int]] = {base: {base: 1} for base in (*BASE, ANGLE)}
+FACTOR = re.compile(r"([A-Za-z]+)(-?[1-9])?", re.ASCII)
+PRODUCT = re.compile(r"([^/()]+)(?:/(?:([^./()]+)|\(([^/()]+)\)))?")  # a.b, a/b or a/(b.c)
+
+
+def exponents(text: str) -> dict[str, int]:
+    """Exponents of the base units and rad in a product of symbols, as FMI writes it.
+
+    ValueError if it is none.
+    """
+    product = PRODUCT.fullmatch(text)
+    if product is None or (text.startswith("1") and text != "1" and not text.startswith("1/")):
+        raise ValueError(f"unit {text!r} is no product of SI symbols such as kg.m/s2")
+    found: dict[str, int] = {}
+    for part, sign in ((product[1], 1), (product[2] or product[3], -1)):
+        for factor in part.split(".") if part and part != "1" else ():
+            symbol = FACTOR.fullmatch(factor)
+            if symbol is None or symbol[1] not in SYMBOLS:
+                raise ValueError(f"unit {text!r}: {factor!r} is no SI symbol with an exponent")
+            power = sign * int(symbol[2] or 1)
+            for base, exponent in SYMBOLS[symbol[1]].items():
+                found[base] = found.get(base, 0) + power * exponent
+    return {base: exponent for base, exponent in found.items() if exponent}
+
+
+for _symbol, _product in DERIVED.items():
+    SYMBOLS[_symbol] = exponents(_product)
+
+
+def shown(unit: Unit) -> str:
+    """A unit as a message names it: kg.m/s2."""
+    above = [f"{b}{e if e != 1 else ''}" for b, e in zip(BASE, unit, strict=True) if e > 0]
+    below = [f"{b}{-e if e != -1 else ''}" for b, e in zip(BASE, unit, strict=True) if e < 0]
+    text = ".".join(above) or "1"
+    if not below:
+        return text
+    return f"{text}/{below[0]}" if len(below) == 1 else f"{text}/({'.'.join(below)})"
+
+
+def unit_of(root: Node, units: Mapping[str, Unit], expected: Unit | None = None) -> Unit:
+    """Unit of an expression whose kinds are right; 1 for a condition and for a number.
+
+    Parameters
+    ----------
+    units : mapping of str to Unit
+        Of all names that are numbers, `time` among them.
+    expected : Unit, optional
+        What the expression is assigned to.
+
+    Raises
+    ------
+    ExpressionError
+        where units do not fit.
+    """
+    found: dict[Node, Unit | None] = {}  # None: a number, which takes any unit
+    for node in in_order([root]):
+        found[node] = _unit(node, [found[argument] for argument in node.arguments], units)
+    unit = found[root]
+    if expected is not None and unit is not None and unit != expected:
+        raise ExpressionError(root.column, f"expected unit {shown(expected)}, got {shown(unit)}")
+    return unit if unit is not None else expected or ONE
+
+
+def _unit(node: Node, given: list[Unit | None], units: Mapping[str, Unit]) -> Unit | None:
+    if node.op == "number":
+        return None
+    if node.op == "name":
+        return units.get(node.name, ONE)
+    if node.op == "negative":
+        return given[0]
+    if node.op in ("*", "/"):
+        power = Fraction(1 if node.op == "*" else -1)
+        if given == [None, None]:
+            return None
+        return times(given[0] or ONE, given[1] or ONE, power)
+    if node.op in ("+", "-", "min", "max"):
+        return _same(node, given)
+    if node.op in RELATIONS:
+        _same(node, given)
+        return ONE
+    if node.op == "if":
+        return _same(node, given[1:])
+    if node.op == "**":
+        return _power(node, given)
+    if node.op == "sqrt":
+        return times(ONE, given[0], Fraction(1, 2)) if given[0] is not None else None
+    if node.op == "abs":
+        return given[0]
+    for unit in given:  # conditions have unit 1
+        if unit not in (None, ONE):
+            what = f"{node.op} takes a number of unit 1"
+            raise ExpressionError(node.column, f"{what}, got {shown(unit)}")
+    return ONE
+
+
+def _same(node: Node, given: list[Unit | None]) -> Unit | None:
+    known = [unit for unit in given if unit is not None]
+    if len(set(known)) > 1:
+        units = " and ".join(shown(unit) for unit in known)
+        raise ExpressionError(node.column, f"{node.op!r}: units {units} do not fit")
+    return known[0] if known else None
+
+
+def _power(node: Node, given: list[Unit | None]) -> Unit | None:
+    base, exponent = given
+    if exponent not in (None, ONE):
+        raise ExpressionError(node.column, f"'**': exponent has unit {shown(exponent)}")
+    if base in (None, ONE):
+        return base
+    value = _literal(node.arguments[1])
+    if value is None:
+        raise ExpressionError(
+            node.column, f"'**': expected a number as exponent of what has unit {shown(base)}"
+        )
+    return times(ONE, base, value)
+
+
+def _literal(node: Node) -> Fraction | None:
+    """A number that stands in the text, perhaps with a sign."""
+    sign = 1
+    while node.op == "negative":
+        node, sign = node.arguments[0], -sign
+    return sign * Fraction(node.value) if node.op == "number" else None

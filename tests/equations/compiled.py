@@ -1,0 +1,124 @@
+"""The C of a file with equations, called directly: a struct model (src/model/model.h) by ctypes."""
+
+import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tests.support.paths import ROOT
+
+sys.path.insert(0, str(ROOT / "fmu"))
+from equations import c_model, declaration, lock  # noqa: E402
+from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
+
+__all__ = ["Model", "ModelFileError", "c_model", "declaration", "declared", "lock", "read_text"]
+
+BUILD = Path(os.environ.get("RP_FMU", ROOT / "build" / "RPManipulator.fmu")).parent
+RUNTIME = BUILD / "runtime" / "runtime.json"
+LENGTH = 32  # SERIES_LENGTH
+WORDS = ["size"] + [f"{part}_{key}" for part in "puxd" for key in ("offset", "size")]
+WORDS += ["right_hand_side", "jacobian", "series", "outputs", "propagate", "check", "events"]
+
+
+class Words(ctypes.Structure):
+    """struct model: words of 64 bits."""
+
+    _fields_ = [(name, ctypes.c_size_t) for name in WORDS]
+
+
+class Origin(ctypes.Structure):
+    """struct series_origin."""
+
+    _fields_ = [
+        ("values", ctypes.c_void_p),
+        ("t", ctypes.c_double),
+        ("time_scale", ctypes.c_double),
+        ("inputs", ctypes.c_void_p),
+    ]
+
+
+def read_text(folder: Path, text: str) -> ModelFile:
+    """What a file with this text says."""
+    path = folder / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    return read(path, declaration.solver_names())
+
+
+class Model:
+    """The compiled model of a text; fields by name, `d_` in front of a state: its derivative."""
+
+    def __init__(self, folder: Path, text: str) -> None:
+        self.file = read_text(folder, text)
+        (folder / "equations.h").write_text(c_model.header(self.file))
+        (folder / "equations.c").write_text(c_model.source(self.file))
+        library = folder / "model.so"
+        warnings = ["-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-parameter"]
+        command = ["cc", "-std=c17", "-O1", "-ffp-contract=off", "-shared", "-fPIC", *warnings]
+        include = f"-I{ROOT / 'src' / 'model'}"
+        subprocess.run(
+            [*command, include, folder / "equations.c", "-o", library, "-lm"], check=True
+        )
+        self.library = ctypes.CDLL(str(library))
+        self.words = Words.in_dll(self.library, "equations_model")
+        text = (folder / "equations.h").read_text()
+        names = [line.split()[1].rstrip(";") for line in text.splitlines() if "double" in line]
+        self.names = [name.removeprefix("v_") for name in names]
+
+    def values(self, **given: float) -> np.ndarray:
+        """A value structure as an array."""
+        return np.array([given.get(name, 0.0) for name in self.names])
+
+    def _call(self, name: str, *arguments: object) -> None:
+        function = ctypes.CFUNCTYPE(ctypes.c_int)(getattr(self.words, name))
+        converted = [
+            ctypes.c_void_p(a.ctypes.data) if isinstance(a, np.ndarray) else a for a in arguments
+        ]
+        function.argtypes = [type(a) for a in converted]
+        assert function(*converted) == 0
+
+    def outputs(self, values: np.ndarray, t: float) -> None:
+        """Write the calculated fields."""
+        self._call("outputs", values, ctypes.c_double(t))
+
+    def propagate(
+        self, values: np.ndarray, t: float, dt: float, first: np.ndarray, second: np.ndarray
+    ) -> None:
+        """Write the calculated fields of first and second derivatives."""
+        self._call("propagate", values, ctypes.c_double(t), ctypes.c_double(dt), first, second)
+
+    def jacobian(self, values: np.ndarray, t: float) -> np.ndarray:
+        """Derivatives of the states' derivatives by the states."""
+        states = [v.name for v in self.file.of("states")]
+        inputs = [v.name for v in self.file.of("inputs")]
+        x = np.array([values[self.names.index(name)] for name in states])
+        u = np.array([values[self.names.index(name)] for name in inputs])
+        J = np.zeros((len(states), len(states)), order="F")
+        self._call("jacobian", values, ctypes.c_double(t), x, u, J)
+        return J
+
+    def series(
+        self, values: np.ndarray, t: float, scale: float, inputs: np.ndarray, last: int
+    ) -> np.ndarray:
+        """Coefficients of the states (states, last + 1)."""
+        count, extend = ctypes.c_size_t * 3, self.words.series
+        row_count, _, function = count.from_address(extend)
+        states = [v.name for v in self.file.of("states")]
+        rows = np.full((row_count, LENGTH), np.nan)
+        rows[: len(states), 0] = [values[self.names.index(name)] for name in states]
+        origin = Origin(values.ctypes.data, t, scale, inputs.ctypes.data)
+        call = ctypes.CFUNCTYPE(
+            ctypes.c_int, ctypes.c_void_p, ctypes.c_int, ctypes.c_int, ctypes.c_void_p
+        )(function)
+        middle = last // 2
+        for first, end in ((0, middle), (middle + 1, last)):
+            assert call(ctypes.addressof(origin), first, end, rows.ctypes.data) == 0
+        return rows[: len(states), : last + 1]
+
+
+def declared(file: ModelFile) -> str:
+    """variables.toml of a file without a lock file."""
+    references = lock.references(Path("no-such-file"), declaration.keys(file))
+    return declaration.variables_toml(file, references)

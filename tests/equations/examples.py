@@ -1,0 +1,56 @@
+"""FMUs of the examples, built once by the command `build`."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from shutil import copy
+
+import fmpy
+import numpy as np
+
+from tests.support.paths import ROOT
+
+FOLDER = ROOT / "examples" / "models"
+METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
+
+
+def build(path: Path, output: Path) -> Path:
+    """The FMU of FMI 2.0 of a file."""
+    command = [sys.executable, "-P", "-m", "rparm", "build", path, "--output", output, "--json"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    ended = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False, env=environment
+    )
+    assert ended.returncode == 0, ended.stderr
+    (fmu,) = output.glob("*.fmu")
+    return fmu
+
+
+@cache
+def example(name: str, folder: Path) -> Path:
+    """The FMU of an example."""
+    output = folder / name
+    output.mkdir(exist_ok=True)
+    for suffix in (".toml", ".lock.toml"):
+        copy(FOLDER / f"{name}{suffix}", output)
+    return build(output / f"{name}.toml", output)
+
+
+def simulated(
+    fmu: Path, stop: float, step: float, start: Mapping[str, float], **options: object
+) -> np.ndarray:
+    """All outputs of a run, and the time."""
+    description = fmpy.read_model_description(fmu)
+    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    return fmpy.simulate_fmu(
+        str(fmu),
+        fmi_type=options.pop("fmi_type", "CoSimulation"),
+        stop_time=stop,
+        output_interval=step,
+        start_values=dict(start),
+        output=[*outputs, *options.pop("also", [])],
+        **options,
+    )

@@ -1,0 +1,75 @@
+"""The arm from a file with equations against the one that is written by hand, bit for bit."""
+
+from pathlib import Path
+from shutil import copy
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+
+from tests.equations.examples import METHODS, build, simulated
+from tests.support.paths import ROOT
+
+POINTS = 500
+STATES = ["q1", "q2", "dq1", "dq2"]
+GIVEN = ["m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g", *STATES, "tau1", "f2"]
+FOUND = ["ddq1", "ddq2", "ee_x", "ee_y", "ee_vx", "ee_vy", "kinetic_energy", "potential_energy"]
+FOUND += ["total_energy", "actuator_power", "D11", "coriolis1", "coriolis2", "gravity1", "gravity2"]
+
+
+class Opened:
+    """An FMU in its initialization."""
+
+    def __init__(self, path: Path, folder: Path) -> None:
+        description = fmpy.read_model_description(path)
+        self.references = {v.name: v.valueReference for v in description.modelVariables}
+        self.slave = FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=fmpy.extract(str(path), str(folder)),
+            modelIdentifier=description.coSimulation.modelIdentifier,
+        )
+        self.slave.instantiate()
+        self.slave.setupExperiment()
+        self.slave.enterInitializationMode()
+
+    def of(self, names: list[str]) -> list[int]:
+        return [self.references[name] for name in names]
+
+    def values(self, point: np.ndarray) -> list[float]:
+        self.slave.setReal(self.of(GIVEN), point)
+        return self.slave.getReal(self.of(FOUND))
+
+    def directional(self, direction: np.ndarray) -> list[float]:
+        return self.slave.getDirectionalDerivative(
+            self.of(FOUND), self.of([*STATES, "tau1", "f2"]), direction
+        )
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("arm")
+    return build(copy(ROOT / "tests" / "equations" / "arm.toml", folder), folder)
+
+
+def test_values_and_directional_derivatives_have_the_same_bits(
+    arm: Path, fmu: Path, tmp_path: Path
+) -> None:
+    own, by_hand = Opened(arm, tmp_path / "own"), Opened(fmu, tmp_path / "hand")
+    chance = np.random.default_rng(5)
+    for _ in range(POINTS):
+        point = np.concatenate([chance.uniform(0.1, 3, 8), chance.uniform(-3, 3, 6)])
+        assert own.values(point) == by_hand.values(point)
+        direction = chance.uniform(-1, 1, 6)
+        assert own.directional(direction) == by_hand.directional(direction)
+    for one in (own, by_hand):
+        one.slave.freeInstance()
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_motions_are_the_same(arm: Path, fmu: Path, method: int) -> None:
+    start = {"q1": 0.5, "q2": 0.2, "dq1": -1.0, "tau1": 3.0, "f2": 8.0, "solver_method": method}
+    runs = [simulated(path, 2.0, 0.01, start, also=[]) for path in (arm, fmu)]
+    bound = 0.0 if method == METHODS["erk"] else 1e-11 if method == METHODS["taylor"] else 1e-8
+    for name in STATES:
+        assert np.max(np.abs(runs[0][name] - runs[1][name])) <= bound

@@ -1,0 +1,122 @@
+"""Random equations against mpmath: values, Jacobians, derivatives along a curve, Taylor series."""
+
+import random
+from collections.abc import Callable
+
+import mpmath
+import numpy as np
+import pytest
+
+from tests.equations.compiled import LENGTH, Model
+
+BOUND = 1e-13
+NAMES = ("p", "u", "x", "y")
+PYTHON = {name: getattr(mpmath, name) for name in dir(mpmath) if not name.startswith("_")}
+PYTHON |= {"abs": abs, "min": min, "max": max}
+# functions of e that are well conditioned for any e
+FORMS = [
+    "sin({})", "cos({})", "tan(tanh({}))", "atan({})", "tanh({})", "asin(0.5 * tanh({}))",
+    "acos(0.5 * sin({}))", "sinh(sin({}))", "cosh(tanh({}))", "exp(sin({}))", "log(2.0 + sin({}))",
+    "sqrt(2.0 + tanh({}))", "(1.5 + cos({}))**2.5", "(1.5 + sin({}))**-1", "sin({})**3",
+    "cos({})**12",
+    "-{}", "{0} / (2.0 + sin({0}))", "(1.5 + sin({0}))**(0.5 * cos({0}))", "({})",
+    "atan2(sin({0}), 1.5 + cos({0}))", "(p + 1 if p < 2 else p - 1) * {}", "max(p, 0.25) * {}",
+]  # fmt: skip
+
+
+def expression(chance: random.Random, depth: int) -> str:
+    """Text that means the same in Python, between about -10 and 10."""
+    if depth == 0:
+        return chance.choice([*NAMES, "time", "0.5", "2.0", "pi"])
+    inner = expression(chance, depth - 1)
+    if chance.random() < 0.5:
+        return chance.choice(FORMS).format(inner)
+    other = expression(chance, chance.randrange(depth))
+    return f"({inner} {chance.choice('+-*')} {other}) / 3"
+
+
+def reference(text: str) -> Callable[..., mpmath.mpf]:
+    return eval(f"lambda p, u, x, y, time: {text}", {**PYTHON, "__builtins__": {}})
+
+
+@pytest.fixture(scope="module", params=range(6))
+def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple:
+    """A model, texts of its equations, and a point."""
+    chance = random.Random(request.param)
+    texts = {name: expression(chance, 5) for name in ("x", "y", *(f"z{i}" for i in range(20)))}
+    outputs = "".join(f'{n} = {{ value = "{t}" }}\n' for n, t in texts.items() if n[0] == "z")
+    model = Model(
+        tmp_path_factory.mktemp("model"),
+        'name = "Random"\n[parameters]\np = { start = 1 }\n[inputs]\nu = {}\n[states]\n'
+        f'x = {{ derivative = "{texts["x"]}" }}\ny = {{ derivative = "{texts["y"]}" }}\n'
+        f"[outputs]\n{outputs}",
+    )
+    point = {name: chance.uniform(-1.5, 1.5) for name in (*NAMES, "time")}
+    return model, texts, point, chance
+
+
+def field(name: str) -> str:
+    return f"d_{name}" if name in "xy" else name
+
+
+def close(found: float, expected: mpmath.mpf, scale: float = 1.0) -> None:
+    assert abs(found - expected) <= BOUND * max(scale, abs(expected)), (found, expected)
+
+
+def test_values_and_derivatives_along_a_curve(case: tuple) -> None:
+    model, texts, point, chance = case
+    values = model.values(**point)
+    first, second = (
+        model.values(**{name: chance.uniform(-1, 1) for name in NAMES}) for _ in range(2)
+    )
+    dt = chance.uniform(0.5, 1)
+    model.outputs(values, point["time"])
+    curves = {n: [v[model.names.index(n)] for v in (values, first, second)] for n in NAMES}
+    curves["time"] = [point["time"], dt, 0.0]
+    model.propagate(values, point["time"], dt, first, second)
+    for name, text in texts.items():
+        function = reference(text)
+
+        def along(s: mpmath.mpf, function: Callable[..., mpmath.mpf] = function) -> mpmath.mpf:
+            return function(**{n: a + b * s + c * s**2 / 2 for n, (a, b, c) in curves.items()})
+
+        with mpmath.workdps(40):
+            coefficients = mpmath.taylor(along, 0, 2)
+        at = model.names.index(field(name))
+        for order, found in enumerate((values[at], first[at], second[at])):
+            close(found, coefficients[order] * (order or 1), scale=10.0**order)
+
+
+def test_jacobian(case: tuple) -> None:
+    model, texts, point, _ = case
+    J = model.jacobian(model.values(**point), point["time"])
+    for i, of in enumerate("xy"):
+        for k, by in enumerate("xy"):
+            with mpmath.workdps(40):
+                others = {name: mpmath.mpf(value) for name, value in point.items()}
+                slope = mpmath.diff(
+                    lambda s, of=of, by=by, o=others: reference(texts[of])(**{**o, by: s}),
+                    others[by],
+                )
+            close(J[i, k], slope, scale=10.0)
+
+
+def test_series_fits_the_equations(case: tuple) -> None:
+    """Of the polynomials of the states: the derivative has the coefficients of the right side."""
+    model, texts, point, chance = case
+    scale, order = 0.2, 12
+    inputs = np.array([[point["u"], 0.3, -0.2, 0.1]])
+    rows = model.series(model.values(**point), point["time"], scale, inputs, order)
+    assert not model.words.events and rows.shape[1] < LENGTH
+    with mpmath.workdps(80):
+        polynomials = {"x": list(rows[0]), "y": list(rows[1]), "u": list(inputs[0])}
+        polynomials["time"] = [point["time"], scale]
+        for name in "xy":
+
+            def side(s: mpmath.mpf, text: str = texts[name]) -> mpmath.mpf:
+                at = {n: mpmath.polyval(c[::-1], s) for n, c in polynomials.items()}
+                return scale * reference(text)(p=point["p"], **at)
+
+            expected = mpmath.taylor(side, 0, order - 1)
+            for k in range(order):
+                close((k + 1) * polynomials[name][k + 1], expected[k])

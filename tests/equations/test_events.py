@@ -1,0 +1,279 @@
+"""Events of files with equations: the ball, the thermostat, relations that switch, the wall."""
+
+from pathlib import Path
+from shutil import copy
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Slave
+
+from tests.equations.examples import METHODS, build, example, simulated
+from tests.support.paths import ROOT
+
+EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+G, E, V_MIN = 9.81, 0.7, 0.1
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("events")
+
+
+def flights(height: float) -> list[tuple[float, float, float]]:
+    """Time, height and speed at which each flight begins; then those at rest."""
+    found, t, h, v = [], 0.0, height, 0.0
+    while h > 0 or v > V_MIN:
+        found.append((t, h, v))
+        speed = np.sqrt(v * v + 2 * G * h)
+        t, h, v = t + (v + speed) / G, 0.0, E * speed
+    return [*found, (t, 0.0, 0.0)]
+
+
+def ball(times: np.ndarray) -> np.ndarray:
+    """Height of the ball (times,)."""
+    parts = flights(1.0)
+    last = parts[-1][0]
+    begun = [next(part for part in reversed(parts) if part[0] <= t) for t in times]
+    return np.array(
+        [
+            0.0 if t >= last else h + v * (t - begin) - G * (t - begin) ** 2 / 2
+            for t, (begin, h, v) in zip(times, begun, strict=True)
+        ]
+    )
+
+
+@EACH_METHOD
+def test_the_ball_bounces_eleven_times_and_rests(folder: Path, method: int) -> None:
+    run = simulated(
+        example("bouncing_ball", folder), 3.0, 0.013, {"solver_method": method},
+        relative_tolerance=1e-10, also=["resting", "event_count", "last_event_time"],
+    )  # fmt: skip
+    assert run["event_count"][-1] == 11 == len(flights(1.0)) - 1
+    assert run["resting"][-1] and not run["resting"][0] and run["v"][-1] == 0.0
+    bound = 1e-14 if method in (METHODS["erk"], METHODS["taylor"]) else 1e-11
+    assert np.max(np.abs(run["h"] - ball(run["time"]))) <= bound
+    assert run["last_event_time"][-1] == pytest.approx(flights(1.0)[-1][0], abs=1e-11)
+
+
+def test_the_ball_in_model_exchange(folder: Path) -> None:
+    run = simulated(
+        example("bouncing_ball", folder), 3.0, 0.013, {}, fmi_type="ModelExchange",
+        relative_tolerance=1e-10, also=["resting"],
+    )  # fmt: skip
+    assert np.max(np.abs(run["h"] - ball(run["time"]))) < 1e-7 and run["resting"][-1]
+
+
+@EACH_METHOD
+def test_the_thermostat_switches_when_its_exponentials_do(folder: Path, method: int) -> None:
+    run = simulated(
+        example("thermostat", folder), 7200.0, 10.0, {"solver_method": method},
+        relative_tolerance=1e-10, also=["event_count", "last_event_time"],
+    )  # fmt: skip
+    rate, warm, cold = 80 / 4e5, 278 + 2000 / 80, 278.0
+    t, room, goal, limit, times = 0.0, 293.0, warm, 294.0, []
+    while t < 7200:
+        t += np.log((room - goal) / (limit - goal)) / rate
+        room = limit
+        times.append(t)
+        goal, limit = (cold, 292.0) if goal == warm else (warm, 294.0)
+    assert run["event_count"][-1] == len(times) - 1
+    assert run["last_event_time"][-1] == pytest.approx(times[-2], abs=1e-4)
+
+
+def made(folder: Path, text: str) -> Path:
+    """The FMU of a text."""
+    folder.mkdir(exist_ok=True)
+    (folder / "model.toml").write_text('name = "Made"\n' + text)
+    return build(folder / "model.toml", folder)
+
+
+SPRING = """
+[states]
+x = { start = 1, derivative = "v" }
+v = { derivative = "-max(0, 100 * x) - x" }
+[outputs]
+size = { value = "abs(x)" }
+"""
+
+
+@pytest.fixture(scope="module")
+def spring(folder: Path) -> Path:
+    return made(folder / "spring", SPRING)
+
+
+@EACH_METHOD
+def test_a_one_sided_spring_swings_in_two_halves(spring: Path, method: int) -> None:
+    """On one side with sqrt(101) rad/s, on the other with 1 rad/s."""
+    run = simulated(
+        spring, 12.0, 0.05, {"solver_method": method}, relative_tolerance=1e-12,
+        also=["event_count"],
+    )  # fmt: skip
+    stiff = np.sqrt(101.0)
+    halves = np.array([np.pi / stiff, np.pi])
+    phase = np.mod(run["time"] + halves[0] / 2, halves.sum())
+    above = np.sin(stiff * phase)
+    below = -stiff * np.sin(phase - halves[0])
+    expected = np.where(phase < halves[0], above, below)
+    assert np.max(np.abs(run["x"] - expected)) < 1e-9 * stiff
+    np.testing.assert_array_equal(run["size"], np.abs(run["x"]))
+    crossings = 2 * int((12.0 + halves[0] / 2) // halves.sum()) + int(phase[-1] > halves[0])
+    assert run["event_count"][-1] == crossings
+
+
+PULSE = """
+[parameters]
+T = { start = 0.73 }
+[inputs]
+u = {}
+[states]
+x = { derivative = "1 if time >= T and not time > 2 * T else 0" }
+y = { derivative = "2 if u > 0.5 else sin(time)" }
+[outputs]
+above = { value = "1 if u > 0.5 else 0" }
+"""
+
+
+@EACH_METHOD
+def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> None:
+    fmu = made(folder / f"pulse{method}", PULSE)
+    run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
+    expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
+    np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
+
+
+def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path: Path) -> None:
+    fmu = made(folder / "inputs", PULSE)
+    unit = opened(fmu, tmp_path)
+    unit.exitInitializationMode()
+    u, above, y = (reference(fmu, name) for name in ("u", "above", "y"))
+    for value, expected in ((0.5, 0.0), (0.5 + 1e-15, 1.0), (0.5, 0.0), (3.0, 1.0)):
+        unit.setReal([u], [value])
+        assert unit.getReal([above]) == [expected]
+    unit.doStep(0.0, 0.25)
+    assert unit.getReal([y]) == pytest.approx([0.5], abs=1e-14)
+    unit.freeInstance()
+
+
+def opened(fmu: Path, folder: Path) -> FMU2Slave:
+    description = fmpy.read_model_description(fmu)
+    unit = FMU2Slave(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(str(fmu), str(folder)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
+    unit.instantiate()
+    unit.setupExperiment()
+    unit.enterInitializationMode()
+    return unit
+
+
+def reference(fmu: Path, name: str) -> int:
+    variables = fmpy.read_model_description(fmu).modelVariables
+    return next(v.valueReference for v in variables if v.name == name)
+
+
+CHAIN = """
+modes = ["a", "b"]
+[parameters]
+limit = { start = 0 }
+[states]
+x = { start = 1, derivative = "-1" }
+n = { derivative = "0" }
+[events.first]
+when = "x <= limit"
+reinit = { n = "10 * n + 1" }
+set = { a = "not a" }
+[events.second]
+when = "x <= limit"
+while = "a"
+reinit = { n = "10 * n + 2", x = "x + 1" }
+set = { b = "a" }
+"""
+
+
+@EACH_METHOD
+def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
+    folder: Path, method: int
+) -> None:
+    fmu = made(folder / f"chain{method}", CHAIN)
+    run = simulated(fmu, 2.4, 0.3, {"solver_method": method}, also=["a", "b"])
+    # at 1 both; at 2 the first clears a, so that the second does not run
+    np.testing.assert_array_equal(run["n"], [0, 0, 0, 0, 12, 12, 12, 121, 121])
+    np.testing.assert_array_equal(run["a"], [0, 0, 0, 0, 1, 1, 1, 0, 0])
+    expected = [1, 0.7, 0.4, 0.1, 0.8, 0.5, 0.2, -0.1, -0.4]
+    np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-12)
+    at_once = simulated(fmu, 0.5, 0.5, {"limit": 1.0, "solver_method": method})
+    assert at_once["n"][0] == 12
+
+
+def test_events_without_end_are_an_error(folder: Path) -> None:
+    text = '[states]\nx = { start = 1, derivative = "0" }\n[events.e]\nwhen = "x > 0"\n'
+    text += 'reinit = { x = "-x" }\n[events.f]\nwhen = "x < 0"\nreinit = { x = "-x" }\n'
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        simulated(made(folder / "endless", text), 1.0, 0.1, {})
+
+
+def test_a_state_that_is_restored_bounces_the_same(folder: Path, tmp_path: Path) -> None:
+    """FMU states and serialized ones, taken between and after impacts."""
+    fmu = example("bouncing_ball", folder)
+    unit = opened(fmu, tmp_path)
+    unit.exitInitializationMode()
+    outputs = [reference(fmu, name) for name in ("h", "v", "energy")]
+
+    def run(begin: int) -> list[list[float]]:
+        rows = []
+        for step in range(begin, 60):
+            unit.doStep(step * 0.05, 0.05)
+            rows.append(unit.getReal(outputs))
+        return rows
+
+    states = []
+    for step in range(60):
+        states.append(unit.getFMUState())
+        unit.doStep(step * 0.05, 0.05)
+    unit.setFMUState(states[0])
+    expected = run(0)
+    for begin in (7, 9, 30, 49, 50, 55, 3):
+        unit.setFMUState(unit.deSerializeFMUstate(unit.serializeFMUstate(states[begin])))
+        assert run(begin) == expected[begin:]
+    unit.freeInstance()
+
+
+def test_the_wall_has_the_bits_of_that_by_hand(fmu: Path, tmp_path: Path) -> None:
+    own = build(copy(ROOT / "tests" / "equations" / "wall.toml", tmp_path), tmp_path)
+    hand = fmu.with_name("RPEnvironment.fmu")
+    given = ["stiffness", "damping", "position", "angle", "tip_x", "tip_z"]
+    given += ["ee_x", "ee_y", "ee_vx", "ee_vy", "ee_angle", "ee_rate"]
+    found = ["ee_fx", "ee_fy", "ee_mz", "penetration", "wall_force"]
+    units = [opened(path, tmp_path / str(i)) for i, path in enumerate((own, hand))]
+    names = [{n: reference(path, n) for n in (*given, *found)} for path in (own, hand)]
+    chance = np.random.default_rng(3)
+    touching = 0
+    for _ in range(500):
+        point = np.concatenate([chance.uniform(0.1, 2, 6), chance.uniform(-2, 2, 6)])
+        point[0] *= 1000
+        rows = []
+        for unit, references in zip(units, names, strict=True):
+            unit.setReal([references[n] for n in given], point)
+            rows.append(unit.getReal([references[n] for n in found]))
+        assert rows[0] == rows[1]
+        touching += rows[0][4] > 0
+    assert 100 < touching < 450
+    for unit in units:
+        unit.freeInstance()
+
+
+def test_a_model_without_states_has_modes(folder: Path, tmp_path: Path) -> None:
+    text = 'modes = ["on"]\n[inputs]\nu = {}\n[outputs]\ny = { value = "2 * u if on else 0" }\n'
+    text += '[events.latch]\nwhen = "u > 1"\nset = { on = "not on" }\n'
+    fmu = made(folder / "latch", text)
+    unit = opened(fmu, tmp_path)
+    unit.exitInitializationMode()
+    found = []
+    for step, value in enumerate((0.0, 2.0, 3.0, 1.0, 2.0, 0.5)):
+        unit.setReal([reference(fmu, "u")], [value])
+        unit.doStep(step * 0.1, 0.1)
+        found += unit.getReal([reference(fmu, "y")])
+    assert found == [0.0, 4.0, 6.0, 2.0, 0.0, 0.0]
+    unit.freeInstance()

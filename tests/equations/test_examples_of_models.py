@@ -1,0 +1,125 @@
+"""The examples with equations: against closed forms, conservation laws and heyoka."""
+
+from pathlib import Path
+
+import heyoka
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from tests.equations.examples import FOLDER, METHODS, example, simulated
+
+EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("examples")
+
+
+@pytest.mark.parametrize(
+    "path",
+    sorted(set(FOLDER.glob("*.toml")) - set(FOLDER.glob("*.lock.toml"))),
+    ids=lambda p: p.stem,
+)
+def test_importers_find_no_problem(path: Path, folder: Path) -> None:
+    fmu = example(path.stem, folder)
+    assert validate_fmu(str(fmu)) == []
+    assert validate_fmu(str(fmu.parent / "fmi3" / fmu.name)) == []
+    assert len(path.read_text().splitlines()) <= 30
+    assert (
+        path.with_suffix(".lock.toml").read_text()
+        == (fmu.parent / f"{path.stem}.lock.toml").read_text()
+    )
+
+
+@EACH_METHOD
+def test_dahlquist_decays(folder: Path, method: int) -> None:
+    start = {"k": 2.5, "x": 3.0, "solver_method": method}
+    run = simulated(example("dahlquist", folder), 4.0, 0.5, start, relative_tolerance=1e-10)
+    np.testing.assert_allclose(run["x"], 3.0 * np.exp(-2.5 * run["time"]), rtol=1e-8, atol=1e-11)
+
+
+def by_heyoka(equations: list, start: list[float], times: np.ndarray) -> np.ndarray:
+    """States (times, states) of an autonomous system in long double."""
+    taylor = heyoka.taylor_adaptive(
+        equations, np.array(start, np.longdouble), fp_type=np.longdouble
+    )
+    return np.array(taylor.propagate_grid(times.astype(np.longdouble))[-1], float)
+
+
+@EACH_METHOD
+def test_van_der_pol_is_that_of_heyoka(folder: Path, method: int) -> None:
+    x, v = heyoka.make_vars("x", "v")
+    exact = by_heyoka(
+        [(x, v), (v, 5.0 * (1.0 - x * x) * v - x)], [2.0, 0.0], np.arange(0, 20.5, 0.5)
+    )
+    start = {"mu": 5.0, "solver_method": method}
+    run = simulated(example("van_der_pol", folder), 20.0, 0.5, start, relative_tolerance=1e-10)
+    np.testing.assert_allclose(run["x"], exact[:, 0], rtol=0, atol=1e-6)
+
+
+def test_lorenz_is_that_of_heyoka(folder: Path) -> None:
+    x, y, z = heyoka.make_vars("x", "y", "z")
+    equations = [(x, 10.0 * (y - x)), (y, x * (28.0 - z) - y), (z, x * y - 2.6666666666666665 * z)]
+    exact = by_heyoka(equations, [1.0, 1.0, 1.0], np.arange(0, 10.1, 0.1))
+    start = {"solver_method": METHODS["taylor"]}
+    run = simulated(example("lorenz", folder), 10.0, 0.1, start, relative_tolerance=1e-13)
+    for name, column in zip("xyz", exact.T, strict=True):
+        np.testing.assert_allclose(run[name], column, rtol=0, atol=1e-9)
+
+
+@EACH_METHOD
+def test_the_cart_and_its_pole_take_the_work_of_the_force(folder: Path, method: int) -> None:
+    force = 0.7
+    start = {"force": force, "phi": 2.0, "omega": 0.3, "solver_method": method}
+    run = simulated(example("cart_and_pole", folder), 10.0, 0.1, start, relative_tolerance=1e-11)
+    kept = run["energy"] - force * run["x"]
+    np.testing.assert_allclose(kept, kept[0], rtol=0, atol=1e-8)
+    assert np.ptp(run["energy"]) > 1
+
+
+@EACH_METHOD
+def test_the_motor_follows_its_matrix_exponential(folder: Path, method: int) -> None:
+    R, L, k, J, d, ratio = 1.2, 2e-3, 0.05, 2e-5 + 0.02 / 400, 1e-5, 20.0
+    A = np.array([[-R / L, -k / L, 0], [k / J, -d / J, 0], [0, 1 / ratio, 0]])
+    rest = np.linalg.solve(A[:2, :2], [-12.0 / L, 0.5 / ratio / J])
+    start = {"torque": 0.5, "solver_method": method}
+    run = simulated(example("dc_motor", folder), 0.5, 0.05, start, relative_tolerance=1e-10)
+    for row in run:
+        i, speed = rest + expm(A[:2, :2] * row["time"]) @ -rest
+        assert row["i"] == pytest.approx(i, rel=1e-7, abs=1e-8)
+        assert row["speed"] == pytest.approx(speed, rel=1e-7, abs=1e-8)
+
+
+MU, R0, V0 = 3.986004418e14, 7e6, 9e3
+MAJOR = 1 / (2 / R0 - V0**2 / MU)
+PERIOD = 2 * np.pi * np.sqrt(MAJOR**3 / MU)
+
+
+@EACH_METHOD
+def test_the_orbit_is_kepler_s(folder: Path, method: int) -> None:
+    start = {"solver_method": method}
+    run = simulated(
+        example("two_body_orbit", folder), 2 * PERIOD, PERIOD / 8, start, relative_tolerance=1e-11
+    )
+    eccentricity = 1 - R0 / MAJOR
+    for row in run:
+        mean = 2 * np.pi * row["time"] / PERIOD
+        anomaly = brentq(
+            lambda e, m=mean: e - eccentricity * np.sin(e) - m, mean - 1, mean + 1, xtol=1e-14
+        )
+        assert row["x"] == pytest.approx(MAJOR * (np.cos(anomaly) - eccentricity), abs=0.1)
+        minor = MAJOR * np.sqrt(1 - eccentricity**2)
+        assert row["y"] == pytest.approx(minor * np.sin(anomaly), abs=0.1)
+
+
+def test_a_thousand_turns_keep_energy_and_momentum(folder: Path) -> None:
+    start = {"solver_method": METHODS["taylor"], "max_internal_steps": 10**6}
+    run = simulated(
+        example("two_body_orbit", folder), 1000 * PERIOD, PERIOD, start, relative_tolerance=1e-15
+    )
+    for name in ("energy", "momentum"):
+        assert np.max(np.abs(run[name] / run[name][0] - 1)) < 1e-12

@@ -1,0 +1,200 @@
+"""Files with equations: what is refused and how, value references, units."""
+
+import random
+import time
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from tests.equations.compiled import (
+    Model,
+    ModelFileError,
+    c_model,
+    declaration,
+    declared,
+    lock,
+    read_text,
+)
+from tests.support.paths import ROOT
+
+EXAMPLES = [
+    path
+    for path in sorted((ROOT / "examples" / "models").glob("*.toml"))
+    if not path.name.endswith(".lock.toml")
+]
+HEAD = 'name = "M"\n'
+STATE = HEAD + '[states]\nx = { derivative = "-x" }\n'
+
+MISTAKES = {
+    "no TOML": ("name = ", "is not valid TOML"),
+    "no name": ('[states]\nx = { derivative = "1" }', "name: expected a letter"),
+    "bad name": ('name = "a b"', "name: expected a letter"),
+    "nothing": (HEAD, "has no variables"),
+    "section": (HEAD + "[state]\n", "unknown section 'state'"),
+    "key": (HEAD + "[parameters]\np = { start = 1, units = 'm' }", "[parameters]: p: unknown key"),
+    "no start": (HEAD + "[parameters]\np = { unit = 'm' }", "[parameters]: p: start is missing"),
+    "no derivative": (HEAD + "[states]\nx = {}", "[states]: x: derivative is missing"),
+    "no table": (HEAD + "[outputs]\ny = 1", "[outputs]: y: expected a table"),
+    "no expression": (STATE + "[where]\na = 1", "[where]: a: expected an expression"),
+    "range": (HEAD + "[parameters]\np = { start = 1, max = 0 }", "p: start = 1 is outside"),
+    "nominal": (HEAD + '[states]\nx = { derivative = "1", nominal = 0 }', "nominal = 0: expected"),
+    "finite": (HEAD + "[parameters]\np = { start = inf }", "p: start: expected a finite number"),
+    "truth": (HEAD + "[parameters]\np = { start = true }", "p: start: expected a number"),
+    "twice": (STATE + '[where]\nx = "1"', "[where]: x: this name is in [states] already"),
+    "function": (HEAD + "[inputs]\nsin = {}", "[inputs]: sin: this name is reserved"),
+    "solver": (HEAD + "[inputs]\nmax_step = {}", "[inputs]: max_step: this name is reserved"),
+    "der": (HEAD + "[inputs]\nder_x = {}", "[inputs]: der_x: this name is reserved"),
+    "name of it": (HEAD + '[inputs]\n"a b" = {}', "[inputs]: 'a b': expected a name"),
+    "unknown": (STATE + '[where]\na = "x + y"', "[where]: a: value: unknown name 'y'"),
+    "syntax": (STATE + '[where]\na = "x + "', "[where]: a: column 5: expected a number"),
+    "syntax below": (
+        HEAD + '[states]\nx = { derivative = "2 x" }',
+        "[states]: x: derivative: column 3: expected",
+    ),
+    "condition": (STATE + '[where]\na = "x < 1"', "a: value: column 3: expected a number"),
+    "loop": (
+        STATE + '[where]\na = "b + x"\nb = "c"\nc = "2 * a"', "algebraic loop 'a -> b -> c -> a'",
+    ),
+    "loop of one": (STATE + '[where]\na = "a"', "[where]: a: algebraic loop 'a -> a'"),
+    "modes": ("modes = 3\n" + STATE, "modes: expected a list of names"),
+    "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: 'a': is there twice"),
+    "mode as number": (
+        'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
+    ),
+    "event": (STATE + "[events.e]\n", "[events.e]: expected a table with when"),
+    "event key": (STATE + '[events.e]\nwhen = "x < 0"\nthen = 1', "[events.e]: unknown key 'then'"),
+    "no relation": (
+        STATE + '[events.e]\nwhen = "x < 0 and x > 1"', "[events.e]: when: expected one relation",
+    ),
+    "reinit": (
+        STATE + '[events.e]\nwhen = "x < 0"\nreinit = { y = "1" }',
+        "reinit: expected a state, got 'y'",
+    ),
+    "set": (
+        STATE + '[events.e]\nwhen = "x < 0"\nset = { x = "1 < 2" }', "set: expected one of modes",
+    ),
+    "set to number": (
+        'modes = ["a"]\n' + STATE + '[events.e]\nwhen = "x < 0"\nset = { a = "1" }',
+        "[events.e]: set: a: column 1: expected a condition",
+    ),
+    "unit of reinit": (
+        HEAD + '[states]\nx = { unit = "m", derivative = "1" }\n[inputs]\nu = { unit = "s" }\n'
+        '[events.e]\nwhen = "x < 0"\nreinit = { x = "u" }',
+        "[events.e]: reinit: x: column 1: expected unit m, got s",
+    ),
+    "check": (STATE + '[check]\n"text" = "x > 0"', "[check]: 'text': 'x' is no parameter"),
+    "check of number": (
+        HEAD + '[parameters]\np = { start = 1 }\n[check]\n"text" = "p"',
+        "'text': column 1: expected",
+    ),
+    "unit": (HEAD + "[inputs]\nu = { unit = 'furlong' }", "[inputs]: u: unit: unit 'furlong'"),
+    "units": (
+        HEAD + '[inputs]\nu = { unit = "m" }\n[outputs]\ny = { value = "u + u**2" }',
+        "[outputs]: y: value: column 3: '+': units m and m2 do not fit",
+    ),
+    "unit of rate": (
+        HEAD + '[states]\nx = { unit = "m", derivative = "x" }',
+        "[states]: x: derivative: column 1: expected unit m/s, got m",
+    ),
+    "unit of output": (
+        HEAD + '[inputs]\nu = { unit = "m" }\n[outputs]\ny = { value = "u", unit = "s" }',
+        "[outputs]: y: value: column 1: expected unit s, got m",
+    ),
+    "experiment": (STATE.replace("[", "experiment = { stop = 0 }\n[", 1), "experiment: expected"),
+    "control": (STATE.replace("[", 'description = "\\u0001"\n[', 1), "description: has a control"),
+    "deep": (STATE + f'[where]\na = "{"(" * 200}"', "a: column 102: more than 100 levels"),
+    "many": (
+        HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "1001 variables",
+    ),
+    "large": ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_is_one_line_with_its_place(name: str, tmp_path: Path) -> None:
+    text, expected = MISTAKES[name]
+    with pytest.raises(ModelFileError) as refused:
+        read_text(tmp_path, text)
+    message = str(refused.value)
+    assert message.startswith(f"{tmp_path / 'model.toml'}: ")
+    assert expected in message and "\n" not in message and len(message) < 500
+
+
+def test_texts_with_any_characters_stay_texts(tmp_path: Path) -> None:
+    odd = '*/ \\" < & %s ?? $x$ `` ünï 🙂 \\n\\n # [a](b)'
+    text = (
+        f'name = "M"\ndescription = "{odd}"\n[parameters]\np = {{ start = 1, '
+        f'description = "{odd}" }}\n[check]\n"{odd}" = "p > 0"\n'
+    )
+    model = Model(tmp_path, text)
+    content = tomllib.loads(declared(model.file))
+    given = tomllib.loads(text)["description"]
+    assert content["variables"]["p"]["description"] == " ".join(given.split())
+    assert odd[:8] in declaration.page(model.file)
+
+
+def test_value_references_stay_when_the_file_changes(tmp_path: Path) -> None:
+    path = tmp_path / "model.lock.toml"
+
+    def references(text: str) -> dict[str, int]:
+        file = read_text(tmp_path, text)
+        found = lock.references(path, declaration.keys(file))
+        path.write_text(lock.text(file.name, found))
+        return {name: found[name, kind] for name, kind in declaration.keys(file)}
+
+    first = references(STATE)
+    assert first == {"x": 1, "der_x": 2}
+    more = references(STATE + '[inputs]\nu = {}\n[where]\na = "x"\n')
+    assert more == {"x": 1, "der_x": 2, "u": 3, "a": 4}
+    assert references(STATE + "[inputs]\na = {}\nb = {}\n") == first | {"a": 5, "b": 6}
+    assert references(STATE + '[where]\na = "x"\n') == first | {"a": 4}
+    many = "".join(f"u{i} = {{}}\n" for i in range(100))
+    found = references(STATE + f"[inputs]\n{many}")
+    assert len({*found.values()}) == 102 and not {0, *range(80, 100)} & {*found.values()}
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["x", "[[variables]]\nname = 'x'\n", "a = 1", "variables = 3"]
+    + [2 * f"[[variables]]\nname = 'x'\nkind = '{kind}'\nreference = 5\n" for kind in ("local", "")]
+    + [f"[[variables]]\nname = 'x'\nkind = 'input'\nreference = {r}\n" for r in (0, 80, 99, 10000)],
+)
+def test_a_lock_file_that_says_nothing_clear_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "model.lock.toml"
+    path.write_text(text)
+    with pytest.raises(ModelFileError, match=r"^[^\n]*model.lock.toml: is no lock file: [^\n]*$"):
+        lock.references(path, [("x", "input")])
+
+
+def mutated(chance: random.Random, text: str) -> str:
+    """A text with some of its pieces moved, doubled, removed or replaced."""
+    odd = ["*/", '"', "'", "<", "\n", "\\", "{", "}", "(", "**", "-", "1e999", "if", "é", "\x00"]
+    for _ in range(chance.choice([1, 1, 2])):
+        a, b = sorted(chance.randrange(len(text)) for _ in range(2))
+        b = min(b, a + chance.randrange(12))
+        words = text.split()
+        piece = chance.choice([chance.choice(odd), str(chance.random()), "", chance.choice(words)])
+        text = text[:a] + piece + text[b:]
+    return text
+
+
+def read_mutations(folder: Path, seed: int, count: int) -> int:
+    """Read so many mutations of the examples and write the C of each that is one; their number."""
+    chance, accepted = random.Random(seed), 0
+    texts = [path.read_text() for path in EXAMPLES]
+    for _ in range(count):
+        text = mutated(chance, chance.choice(texts))
+        began = time.process_time()
+        try:
+            file = read_text(folder, text)
+            assert c_model.header(file) and c_model.source(file) and declared(file)
+            accepted += 1
+        except ModelFileError as error:
+            assert "\n" not in str(error) and len(str(error)) < 1000
+        assert time.process_time() - began < 2, text
+    return accepted
+
+
+def test_mutated_examples_are_read_or_refused(tmp_path: Path) -> None:
+    assert 60 < read_mutations(tmp_path, 0, 600) < 550

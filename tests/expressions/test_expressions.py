@@ -1,0 +1,145 @@
+"""Expressions: against Python's own arithmetic, and what is refused."""
+
+import math
+import random
+
+import pytest
+
+from rparm.expressions.evaluation import evaluated, parsed
+from rparm.expressions.kinds import CONDITION, check_kinds
+from rparm.expressions.parser import parse
+from rparm.expressions.tree import FUNCTIONS, ExpressionError, in_order, names
+from rparm.expressions.units import ONE, exponents, shown, unit_of, unit_of_exponents
+
+VALUES = {"x": 0.75, "y": -1.25, "z": 3.0}
+PYTHON = {name: getattr(math, name) for name in FUNCTIONS if hasattr(math, name)}
+PYTHON |= {"abs": abs, "min": min, "max": max, "pi": math.pi, "pow": math.pow, **VALUES}
+BINARY = [" + ", " - ", " * ", "/", "**", "  *"]
+
+
+def number(chance: random.Random, depth: int) -> str:
+    """Text of an expression that means the same in Python."""
+    kind = chance.randrange(9) if depth else 0
+    if kind == 0:
+        return chance.choice([*VALUES, "pi", "2.0", "0.5", ".25", "1e-3", "3."])
+    if kind < 5:
+        left, right = (number(chance, depth - 1) for _ in range(2))
+        return f"{left}{chance.choice(BINARY)}{right}"
+    inner = number(chance, depth - 1)
+    if kind == 5:
+        return f"({inner})"
+    if kind == 6:
+        return f"-{inner}"
+    if kind == 7:
+        return f"{chance.choice(['sin', 'atan', 'tanh', 'abs'])}({inner})"
+    return f"({inner} if {condition(chance, depth - 1)} else {number(chance, depth - 1)})"
+
+
+def condition(chance: random.Random, depth: int) -> str:
+    left, right = (number(chance, depth - 1) if depth > 0 else "x" for _ in range(2))
+    relation = f"{left} {chance.choice(['<', '<=', '>', '>='])} {right}"
+    if depth <= 0 or chance.random() < 0.5:
+        return relation
+    rest = condition(chance, depth - 1)
+    return chance.choice([f"not {relation}", f"{relation} and {rest}", f"{relation} or {rest}"])
+
+
+def outcome(calculate: object) -> float | None:
+    try:
+        value = calculate()
+        return None if isinstance(value, complex) or not math.isfinite(value) else value
+    except (ArithmeticError, TypeError, ValueError):  # comparisons of complex numbers
+        return None
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_it_calculates_as_python(seed: int) -> None:
+    chance = random.Random(seed)
+    defined = 0
+    for _ in range(100):
+        text = number(chance, 5)
+        expected = outcome(lambda text=text: eval(text, {"__builtins__": {}}, PYTHON))
+        found = outcome(lambda text=text: evaluated(parse(text), VALUES))
+        if expected is None or found is None:
+            continue  # Python has complex roots
+        defined += 1
+        assert found == pytest.approx(expected, rel=1e-12), text
+    assert defined > 50
+
+
+def test_operations_keep_the_order_of_the_text() -> None:
+    order = [node.op for node in in_order([parse("a - b - sin(c) * 2**-x**2")])]
+    assert order == ["name", "name", "-", "name", "sin", "number", "name", "number", "**"] + [
+        "negative", "**", "*", "-",
+    ]  # fmt: skip
+    assert names(parse("a * part.b + pi + max(c, a)")) == {"a", "part.b", "c"}
+
+
+def test_a_branch_that_is_not_taken_need_not_have_a_value() -> None:
+    assert parsed("1 / x if x > 0 else 0").value({"x": 0.0}) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "column"),
+    [
+        ("", 1), ("1 +", 4), ("2 x", 3), ("2x", 1), ("a < b < c", 7), ("1 if x", 7), ("f(x)", 1),
+        ("1 + not x", 5), ("sin()", 5), ("atan2(x)", 1), ("max(x)", 1), ("(a", 3), ("a)", 2),
+        ("a @ b", 3), ("a == b", 3), ("a // b", 4), ("'a'", 1), ("a[0]", 2), ("1e999", 1),
+        ("1 + True", 5), ("lambda: 1", 7), ("(" * 200, 102), ("-" * 200 + "1", 102), ("a.", 2),
+        ("1 + (2 < 3)", 8), ("x if y else z", 6), ("not (1 < 2) + 3", 8), ("1 < 2", 3),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_named_with_its_column(text: str, column: int) -> None:
+    with pytest.raises(ValueError, match=rf"^column {column}: ") as refused:
+        parsed(text)
+    assert "\n" not in str(refused.value)
+
+
+def test_long_texts_take_no_depth() -> None:
+    text = " + ".join(["x"] * 100_000)
+    assert evaluated(parse(text), {"x": 1.0}) == 100_000.0
+    check_kinds(parse(f"{text} < 1"), CONDITION)
+
+
+UNITS = {
+    "m": unit_of_exponents({"kg": 1}),
+    "l": unit_of_exponents({"m": 1}),
+    "omega": unit_of_exponents({"s": -1}),
+    "time": unit_of_exponents({"s": 1}),
+    "phi": ONE,
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("m * l**2 * omega**2 / 2", "kg.m2/s2"),
+        ("m * l**2 * omega**2 / 2 + 3", "kg.m2/s2"),
+        ("sqrt(l**2 + 4) * omega", "m/s"),
+        ("sin(phi) / time + omega", "1/s"),
+        ("abs(-l) if time > 1 else max(0, l)", "m"),
+        ("2**phi", "1"),
+        ("1 / (m * time)", "1/(kg.s)"),
+        ("l**0.5 * sqrt(l)", "m"),
+    ],
+)
+def test_units(text: str, unit: str) -> None:
+    assert shown(unit_of(parse(text), UNITS)) == unit
+
+
+@pytest.mark.parametrize(
+    ("text", "column"),
+    [("m + l", 3), ("sin(l)", 1), ("l**phi", 2), ("phi**l", 4), ("l < m", 3), ("2 * 3 + l", 7)],
+)
+def test_units_that_do_not_fit(text: str, column: int) -> None:
+    with pytest.raises(ExpressionError, match=f"^column {column}: "):
+        unit_of(parse(f"{text}"), UNITS, expected=UNITS["time"])
+
+
+def test_a_unit_is_a_product_of_symbols() -> None:
+    assert exponents("N.m.s/rad") == {"kg": 1, "m": 2, "s": -1, "rad": -1}
+    assert exponents("V/(A.s)") == {"kg": 1, "m": 2, "s": -4, "A": -2}
+    assert exponents("1") == {}
+    for text in ("", "kg m", "m/s/s", "x", "m^2", "2", "1.m", "(m)", "m10"):
+        with pytest.raises(ValueError):
+            exponents(text)
