@@ -1,0 +1,444 @@
+"""Checks every claim of a certificate by itself: in rational numbers, and in arb's intervals.
+
+The certificate says for each step what `prove` claims (README.md). Each claim is checked from those
+before it, so that the whole is a proof if none is wrong, whatever `prove` calculated and how. It
+shares nothing with `prove`.
+
+    python check.py PROBLEM POINTS CERTIFICATE
+"""
+
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+import flint
+from flint import arb, fmpq, fmpq_mat
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from motion_series import coefficients
+
+BITS = 192
+STATES = 4
+NOTHING = fmpq(0)
+
+
+class WrongClaim(Exception):
+    """A claim that does not hold, or that cannot be confirmed."""
+
+
+# ---- What is read --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Ball:
+    """All x with |x - middle| <= radius."""
+
+    middle: fmpq
+    radius: fmpq
+
+    @property
+    def arb(self) -> arb:
+        """An interval that contains it."""
+        return arb(self.middle) + arb(0, 1) * arb(self.radius)
+
+    def contains(self, x: arb) -> bool:
+        """Whether all of an interval is in it."""
+        return bool((x - arb(self.middle)).abs_upper() <= arb(self.radius))
+
+    def holds(self, middle: fmpq, radius: fmpq = NOTHING) -> bool:
+        """Whether another ball is in it."""
+        return abs(middle - self.middle) + radius <= self.radius
+
+
+@dataclass
+class Problem:
+    """What `prove` was asked.
+
+    Attributes
+    ----------
+    sines : list of tuple
+        Effort (0 or 1), amplitude, frequency in Hz, phase in rad.
+    steps : list of tuple
+        End of each communication step in s; value and derivatives of each effort at its begin.
+    """
+
+    parameters: list[Ball] = field(default_factory=list)
+    states: list[Ball] = field(default_factory=list)
+    sines: list[tuple[int, fmpq, fmpq, fmpq]] = field(default_factory=list)
+    start: fmpq = NOTHING
+    steps: list[tuple[fmpq, tuple[list[fmpq], list[fmpq]]]] = field(default_factory=list)
+
+
+@dataclass
+class Set:
+    """States centre + spread s + frame c, |s| <= what the problem says, |c| <= radii."""
+
+    centre: list[fmpq]
+    spread: list[list[fmpq]]
+    frame: list[list[fmpq]]
+    radii: list[fmpq]
+
+
+@dataclass
+class Step:
+    """The claims of one step."""
+
+    order: int
+    times: list[Ball]
+    balls: dict[str, list[Ball]]
+    jacobian: list[list[Ball]]
+    deviation: fmpq
+    after: Set
+
+
+def exactly(text: str) -> fmpq:
+    """A hexadecimal number."""
+    numerator, denominator = float.fromhex(text).as_integer_ratio()
+    return fmpq(numerator, denominator)
+
+
+def _numbers(words: Iterable[str]) -> list[fmpq]:
+    try:
+        return [exactly(word) for word in words]
+    except (ValueError, OverflowError) as error:
+        raise WrongClaim(f"a number is not finite: {error}") from error
+
+
+def _balls(words: Sequence[str]) -> list[Ball]:
+    """From hi, lo and radius of each."""
+    numbers = _numbers(words)
+    found = [Ball(numbers[i] + numbers[i + 1], numbers[i + 2]) for i in range(0, len(numbers), 3)]
+    if any(ball.radius < 0 for ball in found):
+        raise WrongClaim("a radius is negative")
+    return found
+
+
+def read_problem(lines: Iterable[str]) -> Problem:
+    """Read what `prove` was given."""
+    problem = Problem()
+    for name, *words in map(str.split, lines):
+        if name in ("parameters", "states"):
+            numbers = _numbers(words)
+            pairs = [Ball(*numbers[i : i + 2]) for i in range(0, len(numbers), 2)]
+            setattr(problem, name, pairs)
+        elif name == "sine":
+            effort, *numbers = words
+            problem.sines.append((int(float.fromhex(effort)), *_numbers(numbers)))
+        elif name == "start":
+            (problem.start,) = _numbers(words)
+        else:
+            end, *numbers = _numbers(words)
+            problem.steps.append((end, (numbers[:4], numbers[4:])))
+    return problem
+
+
+def read_certificate(lines: Iterable[str]) -> Iterator[Step | fmpq]:
+    """Steps, and after those of each communication step the time of its end."""
+    rows = map(str.split, lines)
+
+    def take(name: str) -> list[str]:
+        found, *words = next(rows, [""])
+        if found != name:
+            raise WrongClaim(f"expected {name}, found {found!r}")
+        return words
+
+    for name, *words in rows:
+        if name == "point":
+            yield exactly(words[0])
+            continue
+        times = _balls(take("times"))
+        names = ("hull", "box", "remainder", "endpoint")
+        balls = {name: _balls(take(name)) for name in names}
+        jacobian = [_balls(take("jacobian")) for _ in range(STATES)]
+        (deviation,) = _numbers(take("deviation"))
+        centre = _balls(take("centre"))
+        if any(ball.radius != 0 for ball in centre):
+            raise WrongClaim("a centre has a radius")
+        spread = [_numbers(take("spread")) for _ in range(STATES)]
+        frame = [_numbers(take("frame")) for _ in range(STATES)]
+        after = Set([x.middle for x in centre], spread, frame, _numbers(take("radii")))
+        yield Step(int(words[0]), times, balls, jacobian, deviation, after)
+
+
+# ---- What the problem says -----------------------------------------------------------------------
+
+
+class Start:
+    """Coordinates of uncertain states and parameters, and the set at the start."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.uncertain = [i for i, p in enumerate(problem.parameters) if p.radius > 0]
+        of_states = [i for i, x in enumerate(problem.states) if x.radius > 0]
+        self.directions = of_states + [STATES + k for k in range(len(self.uncertain))]
+        self.radii = [problem.states[i].radius for i in of_states]
+        self.radii += [problem.parameters[i].radius for i in self.uncertain]
+        self.set = Set(
+            [x.middle for x in problem.states],
+            [[fmpq(int(d == i)) for d in self.directions] for i in range(STATES)],
+            [[fmpq(int(i == j)) for j in range(STATES)] for i in range(STATES)],
+            [fmpq(0)] * STATES,
+        )
+
+
+def hull_radius(start: Start, of: Set, i: int) -> fmpq:
+    """How far state i of a set is from its centre at most."""
+    by_starts = (abs(x) * r for x, r in zip(of.spread[i], start.radii, strict=True))
+    by_frame = (abs(x) * r for x, r in zip(of.frame[i], of.radii, strict=True))
+    return sum((*by_starts, *by_frame), NOTHING)
+
+
+def effort_series(
+    derivatives: Sequence[fmpq],
+    sines: Iterable[Sequence[fmpq]],
+    within: arb,
+    elapsed: arb,
+    step: arb,
+    last: int,
+) -> list[arb]:
+    """Coefficients 0 to `last` of an effort at a time, or over an interval of times."""
+    polynomial = [arb(u) / arb.fac_ui(k) for k, u in enumerate(derivatives)]
+    found = []
+    for k in range(last + 1):
+        shifted = (
+            arb.bin_uiui(j, k) * c * within ** (j - k) for j, c in enumerate(polynomial) if j >= k
+        )
+        found.append(sum(shifted, arb(0)) * step**k)
+    for amplitude, frequency, phase in sines:
+        turn = 2 * arb.pi() * arb(frequency)
+        angle = turn * elapsed + arb(phase)
+        turned = (angle.sin(), angle.cos(), -angle.sin(), -angle.cos())
+        for k in range(last + 1):
+            found[k] += arb(amplitude) * turned[k % 4] * (turn * step) ** k / arb.fac_ui(k)
+    return found
+
+
+# ---- Checks --------------------------------------------------------------------------------------
+
+
+class Checker:
+    """Checks the steps of one certificate in their order."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.start = Start(problem)
+        self.set = self.start.set
+        self.exact = [arb(p.middle) for p in problem.parameters]
+        self.uncertain = [p.arb for p in problem.parameters]
+
+    def efforts(self, index: int, step: Step, over: arb, last: int) -> list[list[arb]]:
+        """Series of both efforts, `over` (s) after the begin of the step."""
+        length, within, elapsed = (ball.arb for ball in step.times)
+        of_sines = [[s[1:] for s in self.problem.sines if s[0] == i] for i in range(2)]
+        return [
+            effort_series(u, sines, within + over, elapsed + over, length, last)
+            for u, sines in zip(self.problem.steps[index][1], of_sines, strict=True)
+        ]
+
+    def step(self, index: int, step: Step) -> None:
+        """Check a step within a communication step; its end is then the set."""
+        self.check_hull(step)
+        inputs = self.efforts(index, step, arb(0), step.order)
+        self.check_endpoint(step, inputs)
+        hull = [ball.arb for ball in step.balls["hull"]]
+        series = coefficients(
+            hull, self.uncertain, inputs, step.times[0].arb, step.order, self.start.uncertain
+        )
+        self.check_jacobian(step, series)
+        self.check_box(index, step, series)
+        self.check_set(step)
+        self.set = step.after
+
+    def check_hull(self, step: Step) -> None:
+        """The hull contains the set at the begin."""
+        for i, ball in enumerate(step.balls["hull"]):
+            if not ball.holds(self.set.centre[i], hull_radius(self.start, self.set, i)):
+                raise WrongClaim(f"hull of state {i}")
+
+    def check_endpoint(self, step: Step, inputs: list[list[arb]]) -> None:
+        """The endpoint contains the value of the Taylor polynomial of the centre."""
+        centre = [arb(x) for x in self.set.centre]
+        series = coefficients(centre, self.exact, inputs, step.times[0].arb, step.order)
+        for i, ball in enumerate(step.balls["endpoint"]):
+            if not ball.contains(sum((x[0] for x in series[i]), arb(0))):
+                raise WrongClaim(f"endpoint of state {i}")
+
+    def check_jacobian(self, step: Step, series: list[list[list[arb]]]) -> None:
+        """The Jacobian contains the derivatives of that polynomial, anywhere in the hull."""
+        for i, row in enumerate(step.jacobian):
+            if len(row) != STATES + len(self.start.uncertain):
+                raise WrongClaim("number of directions")
+            for d, ball in enumerate(row):
+                if not ball.contains(sum((x[1 + d] for x in series[i]), arb(0))):
+                    raise WrongClaim(f"derivative {d} of state {i}")
+
+    def check_box(self, index: int, step: Step, series: list[list[list[arb]]]) -> None:
+        """All motions from the hull stay inside the box, by its remainder, which is as claimed."""
+        length = step.times[0].arb
+        whole = length * arb(0.5, 0.5)  # contains all times of the step
+        last = step.order + 1
+        box = [ball.arb for ball in step.balls["box"]]
+        inputs = self.efforts(index, step, whole, step.order)
+        over = coefficients(box, self.uncertain, inputs, length, last)
+        for i, ball in enumerate(step.balls["remainder"]):
+            if not ball.contains(over[i][last][0]):
+                raise WrongClaim(f"remainder of state {i}")
+        for i, ball in enumerate(step.balls["box"]):
+            terms = [x[0] for x in series[i]] + [step.balls["remainder"][i].arb]
+            middle = terms[0] + terms[1] / 2 - arb(ball.middle)
+            sizes = [middle, terms[1] / 2, *terms[2:]]
+            if not sum((x.abs_upper() for x in sizes), arb(0)) < arb(ball.radius):
+                raise WrongClaim(f"box of state {i}")
+
+    def check_set(self, step: Step) -> None:
+        """The set at the end contains all motions from the set at the begin, in rationals."""
+        after = step.after
+        frame = fmpq_mat([*after.frame])
+        deviation = frame.transpose() * frame
+        for i in range(STATES):
+            row = sum((abs(int(i == j) - deviation[i, j]) for j in range(STATES)), NOTHING)
+            if not row <= step.deviation < 1:
+                raise WrongClaim("deviation of the frame")
+        inverse = frame.inv()
+        rest = [self._rest(step, k) for k in range(STATES)]
+        middles = fmpq_mat([[ball.middle for ball in row[:STATES]] for row in step.jacobian])
+        before = fmpq_mat([*self.set.frame])
+        turned = inverse * middles * before
+        spread = _product(
+            [[ball.radius for ball in row[:STATES]] for row in step.jacobian],
+            [[abs(x) for x in row] for row in self.set.frame],
+        )
+        sizes = [[abs(inverse[i, k]) for k in range(STATES)] for i in range(STATES)]
+        widths = _product(sizes, spread)
+        for i in range(STATES):
+            needed = sum((sizes[i][k] * rest[k] for k in range(STATES)), NOTHING)
+            for j in range(STATES):
+                needed += (abs(turned[i, j]) + widths[i][j]) * self.set.radii[j]
+            if not needed <= after.radii[i]:
+                raise WrongClaim(f"radius {i} of the set")
+
+    def _rest(self, step: Step, k: int) -> fmpq:
+        """What neither the spread nor the frame accounts for, in state k."""
+        end, remainder = step.balls["endpoint"][k], step.balls["remainder"][k]
+        rest = abs(end.middle + remainder.middle - step.after.centre[k])
+        rest += end.radius + remainder.radius
+        for j, direction in enumerate(self.start.directions):
+            column = [(self.set.spread[i][j], step.jacobian[k][i]) for i in range(STATES)]
+            if direction >= STATES:
+                column.append((fmpq(1), step.jacobian[k][direction]))
+            middle = sum((x * ball.middle for x, ball in column), NOTHING)
+            radius = sum((abs(x) * ball.radius for x, ball in column), NOTHING)
+            rest += (abs(middle - step.after.spread[k][j]) + radius) * self.start.radii[j]
+        return rest
+
+    def point(self, balls: Sequence[Ball]) -> None:
+        """The balls that were printed contain the set."""
+        for i, ball in enumerate(balls):
+            if not ball.holds(self.set.centre[i], hull_radius(self.start, self.set, i)):
+                raise WrongClaim(f"printed ball of state {i}")
+
+
+def _product(x: Sequence[Sequence[fmpq]], y: Sequence[Sequence[fmpq]]) -> list[list[fmpq]]:
+    columns = list(zip(*y, strict=True))
+    return [
+        [sum((a * b for a, b in zip(row, column, strict=True)), NOTHING) for column in columns]
+        for row in x
+    ]
+
+
+class Clock:
+    """Whether the steps of a communication step fill it."""
+
+    def __init__(self, problem: Problem, begin: fmpq, end: fmpq) -> None:
+        self.since_start = begin - problem.start
+        self.whole = end - begin
+        self.within = fmpq(0)
+
+    def check(self, step: Step, is_last: bool) -> None:
+        """The step begins where the one before ended; the last one ends with the whole."""
+        length, within, elapsed = step.times
+        if not within.holds(self.within) or not elapsed.holds(self.since_start + self.within):
+            raise WrongClaim("time of the begin")
+        exact = self.whole - self.within if is_last else length.middle
+        if not length.holds(exact) or exact <= 0:
+            raise WrongClaim("length")
+        self.within += exact
+
+
+def check(
+    problem_lines: Iterable[str],
+    point_lines: Iterable[str],
+    certificate: Iterable[str],
+    progress: Callable[[int], object] | None = None,
+) -> int:
+    """Check all claims; how many steps there are. WrongClaim says what does not hold.
+
+    Parameters
+    ----------
+    problem_lines, point_lines, certificate : iterables of str
+        What `prove` was given, what it printed, and the file that it wrote.
+    progress : callable, optional
+        Called with 1 after each communication step.
+    """
+    precision, flint.ctx.prec = flint.ctx.prec, BITS
+    try:
+        return _check(read_problem(problem_lines), point_lines, certificate, progress)
+    finally:
+        flint.ctx.prec = precision
+
+
+def _check(
+    problem: Problem,
+    point_lines: Iterable[str],
+    certificate: Iterable[str],
+    progress: Callable[[int], object] | None,
+) -> int:
+    checker = Checker(problem)
+    points = [line.split() for line in point_lines]
+    ends = [end for end, _ in problem.steps]
+    if len(points) != len(ends) + 1 or any(words[0] != "point" for words in points):
+        raise WrongClaim(f"{len(points)} points for {len(ends)} communication steps")
+    checker.point(_balls(points[0][2:]))
+    count, begin, steps = 0, problem.start, []
+    index = 0
+    for claim in read_certificate(certificate):
+        if isinstance(claim, Step):
+            steps.append(claim)
+            continue
+        clock = Clock(problem, begin, ends[index])
+        if claim != ends[index] or exactly(points[index + 1][1]) != claim or not steps:
+            raise WrongClaim(f"communication point {index + 1}")
+        for number, step in enumerate(steps):
+            try:
+                clock.check(step, number == len(steps) - 1)
+                checker.step(index, step)
+            except WrongClaim as error:
+                raise WrongClaim(
+                    f"step to {float(Fraction(int(claim.p), int(claim.q)))!r} s: {error}"
+                ) from error
+        checker.point(_balls(points[index + 1][2:]))
+        count, begin, steps = count + len(steps), claim, []
+        index += 1
+        if progress is not None:
+            progress(1)
+    if index != len(ends) or steps:
+        raise WrongClaim("steps are missing at the end")
+    return count
+
+
+def main() -> int:
+    """Check the files named on the command line."""
+    problem, points, certificate = (
+        Path(name).read_text(encoding="utf-8").splitlines() for name in sys.argv[1:]
+    )
+    try:
+        print(f"{check(problem, points, certificate)} steps confirmed")
+    except WrongClaim as error:
+        print(f"not confirmed: {error}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

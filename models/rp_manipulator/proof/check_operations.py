@@ -1,0 +1,448 @@
+"""Checks single operations of `prove` in rational numbers and in arb's intervals.
+
+Operands are random, round, extreme, and such that many roundings go the same way. Each result has
+to contain whatever follows from numbers in the operands, and be hardly larger than that.
+
+    python check_operations.py PROGRAM
+"""
+
+import math
+import random
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import flint
+from flint import arb
+
+Parts = tuple[float, float, float]  # hi, lo, radius
+Range = tuple[Fraction, Fraction]  # least and largest value
+
+BITS = 400
+LOOSE = Fraction(1, 2**40)  # relative: by which a radius may exceed the least one
+ROUNDING = Fraction(1, 2**97)  # of the largest operand or result
+SMALLEST = Fraction(1, 2**880)
+TERMS = 40  # of the longest convolution
+
+
+class WrongAnswer(Exception):
+    """An operation whose result is not what it has to be."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """A line for `prove --operations`, and what its answer has to satisfy.
+
+    Attributes
+    ----------
+    check : callable
+        Raises WrongAnswer; gets the numbers of the answer.
+    """
+
+    line: str
+    check: Callable[[Sequence[float]], None]
+
+
+# ---- Operands ------------------------------------------------------------------------------------
+
+
+def number(draw: random.Random, exponents: int = 30) -> float:
+    """A double of any digits, or a round one."""
+    kind = draw.random()
+    if kind < 0.2:
+        return draw.choice((-1, 1)) * draw.choice((0.0, 0.5, 1.0, 1.5, 2.0, 3.0, 10.0, 1024.0))
+    size = math.ldexp(draw.uniform(0.5, 1.0), draw.randint(-exponents, exponents))
+    return draw.choice((-1, 1)) * size
+
+
+def operand(draw: random.Random, exponents: int = 30) -> Parts:
+    """A double or double-double; without radius, or with one from tiny to larger than itself."""
+    hi = number(draw, exponents)
+    half = math.ulp(hi) / 2
+    lo = draw.choice((0.0, half, -half / 2, half * draw.uniform(-1, 1)))
+    if hi + lo != hi:
+        lo = 0.0
+    sizes = (0.0, 0.0, math.ldexp(abs(hi), -draw.randint(90, 106)), draw.random() * abs(hi), 2.0)
+    return hi, lo, draw.choice(sizes) * draw.uniform(0.5, 1.0)
+
+
+def range_of(x: Parts) -> Range:
+    middle = Fraction(x[0]) + Fraction(x[1])
+    return middle - Fraction(x[2]), middle + Fraction(x[2])
+
+
+def text(*operands: Sequence[float]) -> str:
+    return " ".join(float(part).hex() for one in operands for part in one)
+
+
+# ---- What answers have to satisfy ----------------------------------------------------------------
+
+
+def balls(answer: Sequence[float]) -> list[Parts]:
+    found = [tuple(answer[i : i + 3]) for i in range(0, len(answer), 3)]
+    return [(hi, lo, radius) for hi, lo, radius in found]
+
+
+def is_finite(x: Parts) -> bool:
+    return all(map(math.isfinite, x))
+
+
+def contains(answer: Parts, expected: Range, size: Fraction) -> None:
+    """The answer contains a range, and is hardly larger; `size` is that of the operands."""
+    if not is_finite(answer):
+        raise WrongAnswer(f"is not finite: {answer}")
+    least, largest = range_of(answer)
+    if not (least <= expected[0] and expected[1] <= largest):
+        raise WrongAnswer(f"{answer} does not contain {tuple(map(float, expected))}")
+    half = max(expected[1] - least, largest - expected[0]) / 2
+    if Fraction(answer[2]) > half * (1 + LOOSE) * 2 + size * ROUNDING + SMALLEST:
+        raise WrongAnswer(f"{answer} is too large")
+    if abs(answer[1]) > math.ulp(answer[0]) / 2:
+        raise WrongAnswer(f"{answer}: the parts overlap")
+
+
+def products(x: Parts, y: Parts) -> Range:
+    corners = [a * b for a in range_of(x) for b in range_of(y)]
+    return min(corners), max(corners)
+
+
+def largest(x: Parts) -> Fraction:
+    return max(map(abs, range_of(x)))
+
+
+# ---- Arithmetic ----------------------------------------------------------------------------------
+
+
+def sums(draw: random.Random) -> Question:
+    x, y = operand(draw), operand(draw)
+    if draw.random() < 0.3:  # cancels, wholly or but for the last digits
+        y = (-x[0], draw.choice((-1, 1)) * x[1], y[2])
+        if draw.random() < 0.5:
+            y = (math.nextafter(y[0], 0.0), 0.0, y[2])
+    sign = draw.choice((1, -1))
+    a, b = range_of(x), range_of(y)
+    expected = (a[0] + b[0], a[1] + b[1]) if sign > 0 else (a[0] - b[1], a[1] - b[0])
+    name = "sum" if sign > 0 else "difference"
+    size = largest(x) + largest(y)
+    return Question(f"{name} {text(x, y)}", lambda z: contains(balls(z)[0], expected, size))
+
+
+def product(draw: random.Random) -> Question:
+    exponents = draw.choice((30, 30, 90))
+    x, y = operand(draw, exponents), operand(draw, exponents)
+    if draw.random() < 0.1:  # underflow
+        x = tuple(math.ldexp(part, -500) for part in x)
+        y = tuple(math.ldexp(part, -500) for part in y)
+    expected = products(x, y)
+    size = largest(x) * largest(y)
+    return Question(f"product {text(x, y)}", lambda z: contains(balls(z)[0], expected, size))
+
+
+def quotient(draw: random.Random) -> Question:
+    x, y = operand(draw), operand(draw)
+    line = f"quotient {text(x, y)}"
+    least, most = range_of(y)
+    if least <= 0 <= most or abs(y[0]) * (1 - 2**-40) <= y[2]:
+
+        def infinite(z: Sequence[float]) -> None:
+            if is_finite(balls(z)[0]) and least <= 0 <= most:
+                raise WrongAnswer(f"a finite quotient by {y}")
+
+        return Question(line, infinite)
+    corners = [a / b for a in range_of(x) for b in (least, most)]
+    expected = (min(corners), max(corners))
+    size = largest(x) / min(abs(least), abs(most))
+
+    def check(z: Sequence[float]) -> None:
+        (answer,) = balls(z)
+        # one bound serves both sides of a curved range: only containing is asked of wide ones
+        narrow = y[2] <= abs(y[0]) * 2**-60 and x[2] <= abs(x[0])
+        contains(answer, expected, size if narrow else Fraction(2) ** 200 * (size + 1))
+
+    return Question(line, check)
+
+
+def convolution(draw: random.Random) -> Question:
+    n = draw.choice((0, 1, 2, 7, 15, 16, 31, TERMS - 1))
+    x = [operand(draw, draw.choice((2, 10))) for _ in range(n + 1)]
+    y = [operand(draw, 2) for _ in range(n + 1)]
+    if draw.random() < 0.5:
+        x, y = [(a[0], a[1], 0.0) for a in x], [(b[0], b[1], 0.0) for b in y]
+    return _convolution(x, y)
+
+
+def one_sided_convolution(draw: random.Random) -> Question:
+    """Terms chosen one by one such that the roundings of the lower sum add up."""
+    high = low = 0.0
+    exact = Fraction(0)
+    x: list[Parts] = []
+    y: list[Parts] = []
+    for _ in range(TERMS):
+        best = None
+        for _ in range(60):
+            a, b = draw.uniform(1, 2), draw.uniform(1, 2)
+            term_error = Fraction(a) * Fraction(b) - Fraction(a * b)
+            total = high + a * b
+            sum_error = Fraction(high) + Fraction(a * b) - Fraction(total)
+            term = float(sum_error) + float(term_error)
+            lost = exact + sum_error + term_error - Fraction(low + term)
+            if best is None or lost > best[0]:
+                best = (lost, a, b, total, low + term, exact + sum_error + term_error)
+        assert best is not None
+        _, a, b, high, low, exact = best
+        x.append((a, 0.0, 0.0))
+        y.append((b, 0.0, 0.0))
+    return _convolution(x, y[::-1])
+
+
+def _convolution(x: Sequence[Parts], y: Sequence[Parts]) -> Question:
+    terms = [products(a, b) for a, b in zip(x, reversed(y), strict=True)]
+    expected = (sum(t[0] for t in terms), sum(t[1] for t in terms))
+    size = sum((largest(a) * largest(b) for a, b in zip(x, reversed(y), strict=True)), Fraction(0))
+    line = f"convolution {float(len(x) - 1).hex()} {text(*x, *y)}"
+    return Question(line, lambda z: contains(balls(z)[0], expected, size))
+
+
+def bounds(draw: random.Random) -> Question:
+    x = operand(draw)
+
+    def check(z: Sequence[float]) -> None:
+        least, most = range_of(x)
+        smallest = 0 if least <= 0 <= most else min(abs(least), abs(most))
+        low, high = Fraction(z[0]), Fraction(z[2])
+        if not low <= smallest or not largest(x) <= high:
+            raise WrongAnswer(f"{z[0]} to {z[2]} for {x}")
+        if smallest > largest(x) * LOOSE and low < smallest * (1 - LOOSE) - largest(x) * LOOSE:
+            raise WrongAnswer(f"{z[0]} is too small for {x}")
+
+    return Question(f"bounds {text(x, (0, 0, 0))}", check)
+
+
+def widened(draw: random.Random) -> Question:
+    x, by = operand(draw), abs(number(draw))
+    least, most = range_of(x)
+    expected = (least - Fraction(by), most + Fraction(by))
+    line = f"widened {text(x, (by, 0, 0))}"
+    return Question(line, lambda z: contains(balls(z)[0], expected, Fraction(by)))
+
+
+def scaled(draw: random.Random) -> Question:
+    x, power = operand(draw), math.ldexp(1.0, draw.randint(-20, 20))
+    if draw.random() < 0.2:
+        x, power = tuple(math.ldexp(part, -1020) for part in x), 0.25
+    a, b = range_of(x)
+    expected = (a * Fraction(power), b * Fraction(power))
+    line = f"scaled {text(x, (power, 0, 0))}"
+    return Question(line, lambda z: contains(balls(z)[0], expected, largest(x)))
+
+
+def between(draw: random.Random) -> Question:
+    a, b = number(draw, 40), number(draw, 40)
+    exact = Fraction(b) - Fraction(a)
+
+    def check(z: Sequence[float]) -> None:
+        if z[2] != 0 or Fraction(z[0]) + Fraction(z[1]) != exact:
+            raise WrongAnswer(f"{z} for {b!r} - {a!r}")
+
+    return Question(f"between {text((a, 0, 0), (b, 0, 0))}", check)
+
+
+# ---- Functions -----------------------------------------------------------------------------------
+
+
+def interval(x: Parts) -> arb:
+    return arb(x[0]) + arb(x[1]) + arb(0, 1) * arb(x[2])
+
+
+def encloses(answer: Parts, value: arb, width: float, rounding: float = 2.0**-96) -> None:
+    """The answer contains a value, and its radius is at most `width` but for rounding."""
+    if not is_finite(answer):
+        raise WrongAnswer(f"is not finite: {answer}")
+    distance = abs(value - arb(answer[0]) - arb(answer[1]))
+    if not distance <= arb(answer[2]):
+        raise WrongAnswer(f"{answer} does not contain {value.str(40)}")
+    if answer[2] > width * (1 + 2.0**-40) + rounding:
+        raise WrongAnswer(f"{answer} is too large")
+
+
+def points_of(x: Parts) -> list[arb]:
+    middle = arb(x[0]) + arb(x[1])
+    return [middle + arb(x[2]) * arb(share) for share in (-1, -0.5, 0, 0.75, 1)]
+
+
+def sine(draw: random.Random) -> Question:
+    hi = draw.choice((0.0, draw.uniform(-0.07, 0.07), draw.uniform(-7, 7), number(draw, 12)))
+    radius = draw.choice((0.0, 0.0, 1e-30, draw.random()))
+    x = (hi, math.ulp(hi) * draw.uniform(-0.5, 0.5), radius)
+    size = max(abs(hi), 2.0**-4)
+
+    def check(z: Sequence[float]) -> None:
+        of_sine, of_cosine = balls(z)
+        for point in points_of(x):
+            # every doubling of the angle enlarges errors up to threefold
+            encloses(of_sine, point.sin(), radius, 2.0**-96 * max(size, size * size))
+            encloses(of_cosine, point.cos(), radius, 2.0**-96 * max(1.0, size * size))
+
+    return Question(f"sine {text(x)}", check)
+
+
+def versine(draw: random.Random) -> Question:
+    """1 - cos of a small angle, relative to its size."""
+    x = (math.ldexp(draw.uniform(0.5, 1), -draw.choice((4, 4, 5, 6, 9))), 0.0, 0.0)
+
+    def check(z: Sequence[float]) -> None:
+        of_sine, of_versine = balls(z)
+        encloses(of_sine, arb(x[0]).sin(), 0.0, 2.0**-96 * x[0])
+        encloses(of_versine, 1 - arb(x[0]).cos(), 0.0, 2.0**-96 * x[0] * x[0])
+
+    return Question(f"versine {text(x)}", check)
+
+
+def effort(draw: random.Random) -> Question:
+    width = draw.choice((0.0, draw.random()))
+    within = (draw.random(), 0.0, width)
+    elapsed = (draw.uniform(0, 20), 0.0, width)
+    step = (draw.random(), 0.0, 0.0)
+    derivatives = [number(draw, 3) for _ in range(4)]
+    of_sine = (number(draw, 3), draw.random(), draw.uniform(-3, 3))
+    line = f"effort {text(within, elapsed, step)} {text(derivatives, of_sine)}"
+
+    def check(z: Sequence[float]) -> None:
+        amplitude, frequency, phase = map(arb, of_sine)
+        turn = 2 * arb.pi() * frequency
+        times = zip(points_of(within), points_of(elapsed), strict=True)
+        for t, since_start in times:
+            angle = turn * since_start + phase
+            turned = (angle.sin(), angle.cos(), -angle.sin(), -angle.cos())
+            for k, answer in enumerate(balls(z)):
+                rest = range(4 - k)
+                cubic = sum((arb(derivatives[k + j]) * t**j / arb.fac_ui(j) for j in rest), arb(0))
+                sinusoid = amplitude * turned[k % 4] * turn**k
+                value = (cubic + sinusoid) * arb(step[0]) ** k / arb.fac_ui(k)
+                encloses(answer, value, math.inf if width else 0.0, 1e-20)
+
+    return Question(line, check)
+
+
+# ---- Frames --------------------------------------------------------------------------------------
+
+
+def rotation(draw: random.Random) -> list[list[float]]:
+    """A product of plane rotations, rounded."""
+    frame = [[float(i == j) for j in range(4)] for i in range(4)]
+    for i in range(4):
+        for j in range(i):
+            angle = draw.uniform(-3, 3)
+            c, s = math.cos(angle), math.sin(angle)
+            for row in frame:
+                row[i], row[j] = c * row[i] - s * row[j], s * row[i] + c * row[j]
+    return frame
+
+
+def inverse(matrix: list[list[Fraction]]) -> list[list[Fraction]]:
+    """By Gauss and Jordan."""
+    n = len(matrix)
+    rows = [row + [Fraction(int(i == j)) for j in range(n)] for i, row in enumerate(matrix)]
+    for k in range(n):
+        pivot = max(range(k, n), key=lambda i: abs(rows[i][k]))
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in set(range(n)) - {k}:
+            rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return [row[n:] for row in rows]
+
+
+def double_double(x: Fraction) -> Parts:
+    return float(x), float(x - Fraction(float(x))), 0.0
+
+
+def frame(draw: random.Random) -> Question:
+    turned = rotation(draw)
+    of_inverse = inverse([[Fraction(x) for x in row] for row in turned])
+    sizes = [math.ldexp(draw.random(), -draw.choice((0, 30, 70))) for _ in range(4)]
+    rest = [math.ldexp(draw.random(), -draw.choice((0, 30, 70))) for _ in range(4)]
+    if draw.random() < 0.5:
+        # frame^T takes this column to the first axis, but frame^-1 does not: the bound covers that
+        columns = [[double_double(of_inverse[0][i]), *[(0.0, 0.0, 0.0)] * 3] for i in range(4)]
+        sizes, rest = [1.0, 0.0, 0.0, 0.0], [0.0] * 4
+    else:
+        columns = [[operand(draw, 2) for _ in range(4)] for _ in range(4)]
+    parts = [*turned, *(ball for row in columns for ball in row), sizes, rest]
+
+    def check(z: Sequence[float]) -> None:
+        deviation, *coordinates = map(Fraction, z)
+        for i in range(4):
+            row = [
+                abs(int(i == j) - sum(Fraction(r[i]) * Fraction(r[j]) for r in turned))
+                for j in range(4)
+            ]
+            if not sum(row) <= deviation:
+                raise WrongAnswer(f"deviation {z[0]} below {float(sum(row))}")
+            needed = sum(abs(of_inverse[i][k]) * Fraction(rest[k]) for k in range(4))
+            for j in range(4):
+                middle = sum(
+                    of_inverse[i][k] * (Fraction(columns[k][j][0]) + Fraction(columns[k][j][1]))
+                    for k in range(4)
+                )
+                radius = sum(abs(of_inverse[i][k]) * Fraction(columns[k][j][2]) for k in range(4))
+                needed += (abs(middle) + radius) * Fraction(sizes[j])
+            if not needed <= coordinates[i]:
+                raise WrongAnswer(f"coordinate {z[1 + i]} below {float(needed)}")
+            if coordinates[i] > needed * (1 + LOOSE) + deviation * 2 * sum(coordinates):
+                raise WrongAnswer(f"coordinate {z[1 + i]} far above {float(needed)}")
+
+    return Question(f"frame {text(*parts)}", check)
+
+
+# ---- All -----------------------------------------------------------------------------------------
+
+# how many of each, per round
+KINDS = {
+    sums: 400, product: 400, quotient: 300, convolution: 120, one_sided_convolution: 2, bounds: 60,
+    widened: 60, scaled: 60, between: 60, sine: 150, versine: 150, effort: 30,
+    frame: 30,
+}  # fmt: skip
+
+
+def questions(draw: random.Random, rounds: int) -> Iterator[Question]:
+    for kind, count in KINDS.items():
+        for _ in range(count * rounds):
+            yield kind(draw)
+
+
+def check(program: Path, rounds: int = 1, seed: int = 1) -> int:
+    """Ask the program and check all answers; how many. WrongAnswer names the first wrong one."""
+    precision, flint.ctx.prec = flint.ctx.prec, BITS
+    try:
+        asked = list(questions(random.Random(seed), rounds))
+        lines = "".join(f"{question.line}\n" for question in asked)
+        run = subprocess.run(
+            [program, "--operations"],
+            input=lines,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            timeout=60,
+        )
+        answers = run.stdout.splitlines()
+        if run.returncode != 0 or len(answers) != len(asked):
+            raise WrongAnswer(f"{len(answers)} answers to {len(asked)} questions: {run.stderr}")
+        for question, answer in zip(asked, answers, strict=True):
+            name, *words = answer.split()
+            try:
+                question.check([float.fromhex(word) for word in words])
+            except (WrongAnswer, OverflowError, ValueError) as error:
+                raise WrongAnswer(f"{name}: {error}; asked: {question.line[:400]}") from error
+        return len(asked)
+    finally:
+        flint.ctx.prec = precision
+
+
+if __name__ == "__main__":
+    try:
+        print(f"{check(Path(sys.argv[1]), *map(int, sys.argv[2:]))} operations confirmed")
+    except WrongAnswer as error:
+        sys.exit(f"not confirmed: {error}")

@@ -1,0 +1,136 @@
+"""Taylor coefficients of the arm's motion in arb's intervals, for check.py.
+
+With w = dq1, v = dq2, L = l1 + q2, P = L w and F = m1 lc1^2 + I1z + I2z, the momentum about the
+joint F w + m2 L P and the velocity v - a w along the slide have simple rates:
+
+    (F w + m2 L P)' = tau1 + a f2 + a m2 P w - g (m1 lc1 + m2 L) cos q1
+    (v - a w)'      = f2 / m2 + P w - g sin q1
+"""
+
+from collections.abc import Sequence
+
+from flint import arb
+
+Jet = list[arb]  # a value, then its derivatives along the directions
+Series = dict[str, list[Jet]]  # coefficients of t^k (the step)^k, by the name of the row
+STATES = ("q1", "q2", "w", "v")
+
+
+def coefficients(
+    states: Sequence[arb],
+    parameters: Sequence[arb],
+    efforts: Sequence[Sequence[arb]],
+    step: arb,
+    last: int,
+    along: Sequence[int] | None = None,
+) -> list[list[Jet]]:
+    """Coefficients of q1, q2, dq1, dq2 of the orders 0 to `last`.
+
+    Parameters
+    ----------
+    states, parameters : sequences of 4 and 8 arb
+        The origin; m1, m2, I1z, I2z, l1, lc1, a, g.
+    efforts : two sequences of arb
+        Coefficients of tau1 and f2.
+    along : sequence of int, optional
+        Derivatives are with respect to the states and to these parameters; None: there are none.
+    """
+    directions = 0 if along is None else 4 + len(along)
+    arithmetic = _Jets(directions)
+    given = [
+        arithmetic.variable(x, 4 + list(along or ()).index(i) if i in (along or ()) else None)
+        for i, x in enumerate(parameters)
+    ]
+    start = [arithmetic.variable(x, i if directions else None) for i, x in enumerate(states)]
+    rows = _begin(arithmetic, start, given)
+    for order in range(1, last + 1):
+        effort = [arithmetic.constant(of[order - 1]) for of in efforts]
+        _extend(arithmetic, rows, given, effort, step / order)
+    return [rows[name] for name in STATES]
+
+
+class _Jets:
+    """Values with derivatives, forward mode."""
+
+    def __init__(self, directions: int) -> None:
+        self.directions = directions
+
+    def constant(self, value: arb) -> Jet:
+        return [value] + [arb(0)] * self.directions
+
+    def variable(self, value: arb, direction: int | None) -> Jet:
+        return [value] + [arb(int(d == direction)) for d in range(self.directions)]
+
+    def times(self, x: Jet, y: Jet) -> Jet:
+        return [x[0] * y[0]] + [dx * y[0] + x[0] * dy for dx, dy in zip(x[1:], y[1:], strict=True)]
+
+    def over(self, x: Jet, y: Jet) -> Jet:
+        value = x[0] / y[0]
+        return [value] + [(dx - value * dy) / y[0] for dx, dy in zip(x[1:], y[1:], strict=True)]
+
+    def convolution(self, x: Sequence[Jet], y: Sequence[Jet]) -> Jet:
+        """The sum of x_i y_(n - i) over i = 0 .. n."""
+        pairs = list(zip(x, reversed(y), strict=True))
+        return [sum((a[0] * b[0] for a, b in pairs), arb(0))] + [
+            sum((a[d] * b[0] + a[0] * b[d] for a, b in pairs), arb(0))
+            for d in range(1, self.directions + 1)
+        ]
+
+
+def _plus(*jets: Jet) -> Jet:
+    return [sum(parts[1:], parts[0]) for parts in zip(*jets, strict=True)]
+
+
+def _minus(x: Jet, y: Jet) -> Jet:
+    return [a - b for a, b in zip(x, y, strict=True)]
+
+
+def _scaled(factor: arb, x: Jet) -> Jet:
+    return [factor * part for part in x]
+
+
+def _begin(of: _Jets, states: Sequence[Jet], parameters: Sequence[Jet]) -> Series:
+    q1, q2, w, v = states
+    sine, cosine = q1[0].sin(), q1[0].cos()
+    length = _plus(parameters[4], q2)
+    return {
+        "q1": [q1], "q2": [q2], "w": [w], "v": [v], "L": [length], "P": [of.times(length, w)],
+        "sin": [[sine] + [cosine * d for d in q1[1:]]],
+        "cos": [[cosine] + [-sine * d for d in q1[1:]]],
+    }  # fmt: skip
+
+
+def _extend(
+    of: _Jets, row: Series, parameters: Sequence[Jet], effort: Sequence[Jet], h: arb
+) -> None:
+    """Append the next order. h: the step over that order."""
+    m1, m2, I1z, I2z, _, lc1, a, g = parameters
+    tau1, f2 = effort
+    angular, sine, cosine = row["w"], row["sin"], row["cos"]
+    centrifugal = of.convolution(row["P"], angular)
+    weight = _plus(
+        of.times(of.times(m1, lc1), cosine[-1]),
+        of.times(m2, of.convolution(row["L"], cosine)),
+    )
+    push = _plus(f2, of.times(m2, centrifugal))
+    momentum = _scaled(h, _minus(_plus(tau1, of.times(a, push)), of.times(g, weight)))
+    sliding = _scaled(h, _minus(_plus(of.over(f2, m2), centrifugal), of.times(g, sine[-1])))
+    next_sine = _scaled(h, of.convolution(angular, cosine))
+    next_cosine = _scaled(-h, of.convolution(angular, sine))
+
+    row["q1"].append(_scaled(h, angular[-1]))
+    row["q2"].append(_scaled(h, row["v"][-1]))
+    row["L"].append(row["q2"][-1])
+    # momentum of this order = F w + m2 (L0 P + sum), P = L0 w + sum: solved for w
+    first = row["L"][0]
+    ahead_w = of.convolution(row["L"][1:], angular)
+    ahead_P = of.convolution(row["L"][1:], row["P"])
+    fixed = _plus(of.times(of.times(m1, lc1), lc1), I1z, I2z)
+    inertia = _plus(fixed, of.times(m2, of.times(first, first)))
+    known = of.times(m2, _plus(of.times(first, ahead_w), ahead_P))
+    next_w = of.over(_minus(momentum, known), inertia)
+    row["P"].append(_plus(of.times(first, next_w), ahead_w))
+    row["v"].append(_plus(sliding, of.times(a, next_w)))
+    row["w"].append(next_w)
+    row["sin"].append(next_sine)
+    row["cos"].append(next_cosine)

@@ -1,0 +1,1 @@
+"""Intervals that contain the exact motion, and the proven errors of runs."""

@@ -1,0 +1,124 @@
+"""Proven errors: of runs of an FMU with each method of integration, and of references."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rparm.errors import UserError, hint
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES
+from rparm.proof import prover
+from rparm.proof.prover import Enclosure, distances, is_nearest
+from rparm.runs import reference, simulation
+from rparm.runs.simulation import Result
+from rparm.scenarios.scenario import Scenario
+
+# of a scenario that is proven where nobody asks for it: communication steps, time that it takes
+MOST_STEPS = 20_000
+SECONDS = 10.0
+ASSUMED = "the equations of motion, exact parameters and inputs as given, and IEEE doubles"
+
+
+@dataclass(frozen=True)
+class ProvenError:
+    """Of one state in one run."""
+
+    error: float  # largest |run - exact motion| at communication points, in the state's unit
+    at: float  # s, where
+    radius: float  # of the widest interval that contains the exact state
+
+
+@dataclass(frozen=True)
+class ProvenReference:
+    """How good the reference of a scenario is."""
+
+    values: int  # of states
+    nearest: int  # those that are proven to be the doubles nearest to the exact ones
+    error: float  # largest distance from the exact value, beyond half a unit in the last place
+    radius: float  # of the widest interval
+
+
+def methods(fmu: Fmu, chosen: str | None = None) -> list[str]:
+    """Methods of integration of an FMU, or the chosen one; UserError if it is not one of them."""
+    variable = fmu.model.variables.get(METHOD)
+    known = list(variable.items) if variable is not None else []
+    if chosen is not None and chosen not in known:
+        raise UserError(f"--method: no method {chosen!r}{hint(chosen, known)}")
+    return [chosen] if chosen is not None else known
+
+
+def tolerance_of(method: str, tolerance: float) -> float:
+    """The relative tolerance that a method integrates at if asked for one."""
+    return max(tolerance, SMALLEST_TOLERANCES.get(method, 0.0))
+
+
+def errors(
+    fmu: Fmu,
+    scenario: Scenario,
+    enclosure: Enclosure,
+    method: str,
+    tolerance: float,
+    progress: Callable[[int], object] | None = None,
+) -> Mapping[str, ProvenError]:
+    """Proven errors of all states in a run, by name."""
+    run = replace(
+        scenario,
+        parameters=scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]},
+        reference_every=1,
+    )
+    result = simulation.simulate(fmu, run, tolerance_of(method, tolerance), progress)
+    return _largest(result, enclosure, np.arange(len(enclosure.times)))
+
+
+def of_run(
+    scenario: Scenario, result: Result, most_steps: int = MOST_STEPS
+) -> Mapping[str, ProvenError] | None:
+    """Proven errors of a run at the points that were recorded; None: nothing is proven.
+
+    That is so of models without a prover, where the proof does not come to the end, and of
+    scenarios of more than `most_steps` communication steps or that take more than `SECONDS`.
+    """
+    program = prover.provers().get(scenario.model)
+    if program is None or len(scenario.times) > most_steps + 1:
+        return None
+    try:
+        enclosure = program.enclose(scenario, seconds=SECONDS)
+    except UserError:  # takes too long, or is not there, as in an installed package
+        return None
+    if enclosure.stopped is not None:
+        return None
+    return _largest(result, enclosure, scenario.reference_rows)
+
+
+def _largest(result: Result, enclosure: Enclosure, rows: np.ndarray) -> dict[str, ProvenError]:
+    """Largest distances of the recorded states; they are those of the points `rows`."""
+    values = _columns(result.names, result.values, enclosure.states)
+    bounds = distances(values[: len(rows)], enclosure, rows)
+    worst = np.argmax(bounds, axis=0)
+    return {
+        name: ProvenError(
+            float(bounds[worst[i], i]),
+            float(enclosure.times[rows[worst[i]]]),
+            float(enclosure.radius[:, i].max()),
+        )
+        for i, name in enumerate(enclosure.states)
+    }
+
+
+def of_reference(fmu: Fmu, scenario: Scenario, enclosure: Enclosure) -> ProvenReference:
+    """How good the reference of a scenario is; UserError if it has none."""
+    expected = reference.load(scenario, fmu.model)
+    values = _columns(expected.names, expected.values, enclosure.states)
+    rows = scenario.reference_rows
+    beyond = distances(values, enclosure, rows) - np.spacing(np.abs(values)) / 2
+    return ProvenReference(
+        values.size,
+        int(is_nearest(values, enclosure, rows).sum()),
+        max(float(beyond.max()), 0.0),
+        float(enclosure.radius[rows].max()),
+    )
+
+
+def _columns(names: Sequence[str], values: np.ndarray, wanted: Sequence[str]) -> np.ndarray:
+    return values[:, [list(names).index(name) for name in wanted]]

@@ -1,0 +1,247 @@
+"""Faults planted in the program that encloses motions: each has to be noticed by the checkers.
+
+python -m tests.prove.faults [--random COUNT] [--seed SEED]
+"""
+
+import argparse
+import itertools
+import json
+import random
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.prove.problems import (
+    SMALL,
+    SOURCES,
+    TOO_BROAD,
+    Problem,
+    check,
+    check_operations,
+    enclosures,
+    run,
+)
+from tests.support.paths import ROOT
+
+sys.path.insert(0, str(ROOT / "tests" / "mutation"))
+import sites  # noqa: E402
+
+COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
+UNCOMPILABLE = "does not compile"
+FILES = ("ball.h", "arm_series.c", "effort.c", "frame.c", "step.c")
+SAMPLE = Path(__file__).with_name("random_faults.json")
+WIDEST = 1e-26  # radius of free motion
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A text that is replaced in a file, which has it once; and others."""
+
+    name: str
+    file: str
+    before: str
+    after: str
+    also: tuple[tuple[str, str], ...] = ()
+
+    def source(self, text: str) -> str:
+        """The file with the fault."""
+        for before, after in ((self.before, self.after), *self.also):
+            assert text.count(before) == 1, f"{self.name}: {self.file} was changed"
+            text = text.replace(before, after)
+        return text
+
+
+PLANTED = (
+    Fault("sum: one rounding of the midpoint", "ball.h", "(fabs(low) + fabs(rest))", "fabs(rest)"),
+    Fault("sum: the other one", "ball.h", "(fabs(low) + fabs(rest))", "fabs(low)"),
+    Fault("product: rounding of the lower parts", "ball.h", "+ 8.0 * HALF_ULP * products", ""),
+    Fault("convolution: rounding of the lower sum", "ball.h", "(low_sizes + 8.0", "(8.0"),
+    Fault("product: radius times radius", "ball.h", "(fabs(b.hi) + b.radius)", "fabs(b.hi)"),
+    Fault("radii rounded to nearest", "ball.h", "(1.0 + 0x1p-48)", "1.0"),
+    Fault("quotient: smallest divisor", "ball.h", "= ball_smallest(y)", "= fabs(y.hi)"),
+    Fault(
+        "quotient: remainder", "ball.h",
+        "ball_largest(ball_difference(x, ball_product(quotient, y)))", "x.radius",
+    ),
+    Fault(
+        "tail of the sine", "ball.h", "ball_widened(sum, ball_largest(term))",
+        "ball_widened(sum, (int)k % 2 ? 0.0 : ball_largest(term))",
+    ),
+    Fault(
+        "tail of the cosine", "ball.h", "ball_widened(sum, ball_largest(term))",
+        "ball_widened(sum, (int)k % 2 ? ball_largest(term) : 0.0)",
+    ),
+    Fault("radius of the sine's angle", "ball.h", "*sine = ball_widened(s, x.radius)", "*sine = s"),
+    Fault(
+        "inputs at the begin of the step only", "step.c",
+        "efforts_at(efforts, step, whole, step->order, inputs)",
+        "efforts_at(efforts, step, ball_exact(0.0), step->order, inputs)",
+    ),
+    # a remainder that is accurate fits into the room of every box: the check of the box is masked
+    # by that bound, and seen without it
+    Fault(
+        "box not checked", "step.c", "return inside;", "return true;",
+        (("return accurate;", "return true;"),),
+    ),
+    Fault("box without the first order's range", "step.c", "sum += ball_largest(half);", ""),
+    Fault("box without higher orders", "step.c", "sum += ball_largest(x[k]);", ""),
+    Fault(
+        "remainder over the hull", "step.c", "begin(&series, problem, step->box,",
+        "begin(&series, problem, step->hull,",
+    ),
+    Fault(
+        "no remainder at the end", "step.c", "ball_sum(step->endpoint[i], step->remainder[i])",
+        "step->endpoint[i]",
+    ),
+    Fault("inverse without its bound", "frame.c", "share * all * OUTWARD", "0.0"),
+    Fault("deviation of the frame", "frame.c", "return sum * OUTWARD;", "return 0x1p-60;"),
+    Fault(
+        "hull without the frame", "step.c", "radius += fabs(set->frame[i][j]) * set->radii[j];", "",
+    ),
+    Fault(
+        "derivatives at the centre", "step.c", "begin(&hull, problem, step->hull, false, true)",
+        "begin(&hull, problem, before->centre, false, true)",
+    ),
+    Fault(
+        "rounding of the spread", "step.c",
+        "rest[i] += ball_largest(difference) * problem->start_radii[j];", "",
+    ),
+    Fault(
+        "radius of the endpoint", "step.c", "rest[i] = end.radius;",
+        "rest[i] = step->remainder[i].radius;",
+    ),
+    Fault("time within the step", "step.c", "ball_sum(step->within, after)", "after"),
+    Fault(
+        "parameters without radii", "step.c",
+        "begin(&series, problem, step->box, false, false)",
+        "begin(&series, problem, step->box, true, false)",
+    ),
+)  # fmt: skip
+
+
+# functions that choose a frame, an order or the length of a step: any choice is good
+CHOICES = {
+    "frame_along", "order_by_length", "reflect", "expand_centre", "size_of_order", "is_accurate",
+}  # fmt: skip
+# statements whose mutants change no bound, and why
+MASKED = {
+    "if (*factor < 1.0)": "a longer step has to pass the same checks",
+    "for (double size = fabs(x.hi); size >= HALVED_BELOW; size *= 0.5)": "any x below 1 will do",
+    "rest[i] = (rest[i] + TINY) * OUTWARD": "TINY is far below OUTWARD's part of the rest",
+    "const double middle = hull->row[i][0][0].hi + 0.5 * hull->row[i][0][1].hi": "any box will do",
+    "step->box[i] = ball_around(middle, reached[i] * (1.0 + ROOM) + ACCURATE)": "any box will do",
+    "const double all = (reached[i] + ball_largest(step->remainder[i])) * (1.0 + CONFIRMED)":
+        "CONFIRMED is 2^-12; the bounds that it enlarges have OUTWARD for roundings",
+    "for (int d = 0; d < STATES + problem->uncertain; d++)": "one more, which nothing reads",
+    "for (int i = 0; i <= n; i += 16)": "OUTWARD is for 32 roundings, these are 17 and a few",
+    "*set = (struct states_set){0}": "the values are all written",
+    "struct ball quotient = {0.0, 0.0, 0.0}": "the values are all written",
+    "for (int j = 3 - k; j >= 0; j--)": "a fourth derivative would be below 2^-1000",
+    "return fabs(x.hi) <= DBL_MAX && fabs(x.lo) <= DBL_MAX && x.radius <= DBL_MAX":
+        "a radius of DBL_MAX is as good as an infinite one",
+}  # fmt: skip
+
+
+def random_faults(seed: int) -> Iterator[sites.Mutant]:
+    """Random mutants of what is calculated, without those of choices."""
+    every = [mutant for name in FILES for mutant in sites.mutants_of(name, text_of(name))]
+    random.Random(seed).shuffle(every)
+    yield from (mutant for mutant in every if mutant.function not in CHOICES)
+
+
+def sample() -> list[sites.Mutant]:
+    """The random mutants that the tests plant."""
+    return [sites.Mutant(**entry) for entry in json.loads(SAMPLE.read_text())]
+
+
+def source_of(fault: Fault | sites.Mutant) -> str:
+    """The file with the fault in it."""
+    text = text_of(fault.file)
+    return fault.source(text) if isinstance(fault, Fault) else sites.mutated(fault, text)
+
+
+def text_of(name: str) -> str:
+    return (SOURCES / name).read_text()
+
+
+def built(folder: Path, file: str, source: str) -> Path | None:
+    """The program with another source for one file; None: it does not compile."""
+    for path in SOURCES.glob("*.[ch]"):
+        (folder / path.name).write_text(source if path.name == file else path.read_text())
+    files = sorted(folder.glob("*.c"))
+    program = folder / "prove"
+    done = subprocess.run([*COMPILE, *files, "-o", program, "-lm"], capture_output=True)
+    return program if done.returncode == 0 else None
+
+
+def noticed(program: Path) -> str | None:
+    """How the checkers notice that something is wrong; None: they do not."""
+    try:
+        check_operations.check(program)
+    except check_operations.WrongAnswer as error:
+        return f"operation {str(error)[:60]}"
+    except subprocess.TimeoutExpired:
+        return "no answer"
+    for name, problem in SMALL.items():
+        answer, wrong = certified(problem, program)
+        if answer != 0 or wrong:
+            return f"{name}: {wrong or 'no certificate'}"
+    if not enclosures(SMALL["free"].text, program)[:, :, 2].max() < WIDEST:
+        return "free: too wide"
+    answer, wrong = certified(TOO_BROAD, program)
+    return f"too broad: {wrong}" if answer == 0 and wrong else None
+
+
+def certified(problem: Problem, program: Path) -> tuple[int, str]:
+    """The program's exit code, and what is wrong with its certificate."""
+    certificate = program.with_name("certificate")
+    try:
+        answer = run(problem.text, certificate, program)
+        if answer.returncode == 0:
+            lines = certificate.read_text().splitlines()
+            check.check(problem.text.splitlines(), answer.stdout.splitlines(), lines)
+    except subprocess.TimeoutExpired:
+        return 1, "no end"
+    except check.WrongClaim as error:
+        return 0, str(error)
+    return answer.returncode, ""
+
+
+def verdict(file: str, source: str) -> str | None:
+    """How a fault is noticed; None: it is not."""
+    with tempfile.TemporaryDirectory() as folder:
+        program = built(Path(folder), file, source)
+        return UNCOMPILABLE if program is None else noticed(program)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Plants faults; the checkers must notice each.")
+    parser.add_argument("--random", type=int, default=0, metavar="COUNT", help="draw a new sample")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    faults: list[Fault | sites.Mutant] = list(PLANTED)
+    if options.random:
+        faults = list(itertools.islice(random_faults(options.seed), options.random))
+    alive = 0
+    drawn = []
+    for fault in faults:
+        how = verdict(fault.file, source_of(fault))
+        name, statement = (
+            (fault.name, "") if isinstance(fault, Fault) else (fault.description(), fault.statement)
+        )
+        if how is None and statement in MASKED:
+            how = f"masked: {MASKED[statement]}"
+        alive += how is None
+        print(f"{'ALIVE' if how is None else 'dead '} {name}: {how}", flush=True)
+        if isinstance(fault, sites.Mutant) and how != UNCOMPILABLE:
+            drawn.append(fault.as_dict())
+    if options.random:
+        SAMPLE.write_text(json.dumps(drawn, indent=1) + "\n")
+    return int(alive > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,197 @@
+"""`prove` from the command line and from Python."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rparm
+from rparm import project
+from rparm.__main__ import main
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.proof import proven, prover
+from rparm.scenarios import scenario as scenarios
+
+PROVER = prover.provers()["rp_manipulator"]
+STATES = {"q1", "q2", "dq1", "dq2"}
+OWN = """
+model = "rp_manipulator"
+title = "Own"
+description = "A short fall."
+tolerance = 1e-8
+[time]
+start = 0.0
+stop = 0.2
+step = 0.01
+[initial]
+q1 = 0.3
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    path = tmp_path / "own.toml"
+    path.write_text(OWN)
+    return path
+
+
+def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
+    main(["prove", *arguments, "--json"])
+    return json.loads(capsys.readouterr().out)
+
+
+def test_errors_of_each_method(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = document(capsys, str(own), "--check")
+    assert found["exit_code"] == 0
+    assert set(found["methods"]) == {"cvode_adams", "cvode_bdf", "erk", "taylor"}
+    for errors in found["methods"].values():
+        assert set(errors) == STATES
+        for error in errors.values():
+            assert 0 < error["radius"] < 1e-28 < error["error"] < 1e-6
+            assert 0 <= error["at"] <= 0.2
+    assert found["checked"]["steps"] >= 20
+
+
+def test_proven_error_is_what_a_run_and_the_interval_say(own: Path) -> None:
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        scenario = scenarios.load(own, fmu.model)
+        enclosure = PROVER.enclose(scenario)
+        (error,) = [
+            e for n, e in proven.errors(fmu, scenario, enclosure, "erk", 1e-8).items() if n == "q1"
+        ]
+    own.write_text(OWN + '[parameters]\nsolver_method = "erk"\n')
+    run = rparm.Scenario(own).run()
+    apart = np.abs(run["q1"] - enclosure.high[:, 0])
+    assert error.error == pytest.approx(apart.max(), rel=1e-3)
+    assert error.at == run["time"][apart.argmax()]
+
+
+def test_start_within_an_interval(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The fall multiplies what the start was off by: each bound is that, and more."""
+    found = document(capsys, str(own), "--method", "taylor", "--within", "0.01deg")
+    assert list(found["methods"]) == ["taylor"]
+    for name in STATES:
+        assert 1e-5 < found["methods"]["taylor"][name]["radius"] < 1e-2 or name == "q2"
+    assert found["methods"]["taylor"]["q1"]["error"] >= np.radians(0.01)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(project.models()["rp_manipulator"].glob("scenarios/*.toml"))
+)
+def test_taylor_is_proven_to_1e_13_in_all_scenarios(path: Path) -> None:
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        scenario = scenarios.load(path, fmu.model)
+        errors = proven.errors(fmu, scenario, PROVER.enclose(scenario), "taylor", 1e-13)
+    assert max(error.error for error in errors.values()) <= 1e-13
+
+
+def test_references(capsys: pytest.CaptureFixture[str]) -> None:
+    found = document(capsys)
+    assert len(found["references"]) == 11
+    for reference in found["references"].values():
+        assert reference["nearest"] > 0.93 * reference["values"]
+        assert reference["error"] < 2e-16 and reference["radius"] < 1e-21
+
+
+def around_one(low: float) -> prover.Enclosure:
+    """A tiny interval around 1 + low."""
+    one = np.ones((1, 1))
+    return prover.Enclosure(np.zeros(1), ("x",), one, low * one, 1e-20 * one, None, ())
+
+
+def test_a_value_that_is_not_the_nearest_is_not_called_so() -> None:
+    one = np.ones((1, 1))
+    enclosure = around_one(0.0)
+    rows = np.arange(1)
+    above, below = np.nextafter(one, 2), np.nextafter(one, 0)
+    assert prover.is_nearest(one, enclosure, rows)
+    assert not prover.is_nearest(above, enclosure, rows)
+    assert not prover.is_nearest(below, enclosure, rows)
+
+
+def test_a_value_between_two_doubles_is_nearest_to_neither() -> None:
+    one = np.ones((1, 1))
+    assert not prover.is_nearest(one, around_one(2.0**-53), np.arange(1))
+
+
+def test_where_the_proof_ends(own: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = document(capsys, str(own), "--within", "100")
+    assert found["exit_code"] == 1
+    assert 0 <= found["holds_up_to"] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["rubber_buffers"], "expected a model whose motion can be proven"),
+        (["sine_effort"], "no scenario 'sine_effort', did you mean 'sine_efforts'?"),
+        (["coasting", "--method", "euler"], "--method: no method 'euler'"),
+        (["coasting", "--within", "1 kg"], "--within: unknown unit 'kg'"),
+        (["coasting", "--within=-1"], "--within: expected 0 or more, got -1"),
+        (["--method", "taylor"], "--method: expected a scenario with it"),
+    ],
+)
+def test_mistakes(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["prove", *arguments]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert text in line
+
+
+def test_a_wrong_certificate_is_no_proof(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    checker = PROVER._checker("check")
+
+    def refuse(*_: object) -> int:
+        raise checker.WrongClaim("box of state 0")
+
+    monkeypatch.setattr(checker, "check", refuse)
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu, pytest.raises(UserError, match="not confirmed"):
+        scenario = scenarios.load(own, fmu.model)
+        PROVER.check(scenario, PROVER.enclose(scenario))
+
+
+def test_a_proof_that_takes_too_long_is_given_up() -> None:
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        path = project.scenario_file("sine_efforts")
+        with pytest.raises(UserError, match="nothing can be proven"):
+            PROVER.enclose(scenarios.load(path, fmu.model), seconds=0.01)
+
+
+def test_from_python(own: Path) -> None:
+    """The exact start, and a bound that is near what two methods differ by."""
+    scenario = rparm.Scenario(own)
+    tight, loose = (scenario.proven_errors(method="erk", tolerance=x) for x in (1e-11, 1e-5))
+    assert set(tight) == STATES
+    assert all(tight[name] < loose[name] for name in STATES)
+
+
+def test_a_broad_start_is_proven_in_pieces() -> None:
+    """The pieces cover the start, and their intervals hold motions from its ends."""
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        scenario = scenarios.load(project.scenario_file("hanging_swing"), fmu.model)
+        broad = PROVER.enclose(scenario, {"q1": 2e-4})
+        assert broad.stopped is None and len(broad.starts) > 1
+        for off in (-1.99e-4, -0.5e-4, 0.0, 1.99e-4):
+            q1 = scenario.start_values["q1"] + off
+            one = PROVER.enclose(replace(scenario, initial=scenario.initial | {"q1": q1}))
+            assert np.all(np.abs(one.high - broad.high) <= broad.radius)
+
+
+def test_halves_cover_a_start() -> None:
+    start = {"x": (0.1, 0.3), "y": (1.0, 0.0)}
+    left, right = prover.halves(start)
+    assert left["y"] == right["y"] == (1.0, 0.0)
+    ends = [(Fraction(value), Fraction(radius)) for value, radius in (left["x"], right["x"])]
+    assert ends[0][0] - ends[0][1] <= Fraction(0.1) - Fraction(0.3)
+    assert ends[0][0] + ends[0][1] >= ends[1][0] - ends[1][1]
+    assert ends[1][0] + ends[1][1] >= Fraction(0.1) + Fraction(0.3)
+
+
+def test_the_page_of_a_scenario_says_what_is_proven(tmp_path: Path) -> None:
+    assert main(["run", "coasting", "--tolerance", "1e-8", "--output", str(tmp_path)]) == 0
+    page = (tmp_path / "scenarios" / "coasting.html").read_text()
+    assert "proven error at most" in page
+    assert "assumes the equations of motion, exact parameters and inputs" in page

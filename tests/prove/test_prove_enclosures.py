@@ -1,0 +1,209 @@
+"""Balls that contain the arm's motion, against references and other arithmetic; certificates."""
+
+import json
+import random
+import re
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flint import arb
+
+from rparm import project
+from rparm.fmi.fmu_file import read_model
+from rparm.runs import convergence, reference
+from rparm.scenarios import scenario as scenarios
+from tests.prove.exact_motion import integrate
+from tests.prove.problems import (
+    BUILD,
+    PARAMETERS,
+    PROGRAM,
+    SMALL,
+    TOO_BROAD,
+    ZERO,
+    Problem,
+    check,
+    check_operations,
+    enclosures,
+    run,
+)
+
+STATES = ("q1", "q2", "dq1", "dq2")
+NAMES = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g")
+FOLDER = project.model("rp_manipulator")
+SCENARIOS = sorted((FOLDER / "scenarios").glob("*.toml"))
+MODEL = read_model(BUILD / "RPManipulator.fmu")
+
+
+def problem_of(scenario: scenarios.Scenario) -> Problem:
+    value = scenario.start_values
+    inputs = [scenario.input(name) for name in ("tau1", "f2")]
+    ends = scenario.times[1:]
+    return Problem(
+        [value[name] for name in STATES],
+        [(end, (u,), (v,)) for end, u, v in zip(ends, inputs[0], inputs[1], strict=False)],
+        [value[name] for name in NAMES],
+        start=scenario.start,
+    )
+
+
+def half_unit(values: np.ndarray) -> np.ndarray:
+    return np.spacing(np.abs(values)) / 2
+
+
+# ---- Against references --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_references_are_nearly_nearest_doubles(path: Path) -> None:
+    scenario = scenarios.load(path, MODEL)
+    balls = enclosures(problem_of(scenario).text)[scenario.reference_rows]
+    expected = reference.load(scenario, MODEL)
+    values = np.stack([expected.column(name) for name in STATES], 1)
+    assert balls[:, :, 2].max() < 1e-21
+    errors = np.abs((values - balls[:, :, 0]) - balls[:, :, 1]) + balls[:, :, 2]
+    assert np.all(errors <= half_unit(values) + 2e-16)
+
+
+def test_exact_states_of_convergence_are_nearly_nearest_doubles() -> None:
+    problem = convergence.load(FOLDER / "convergence" / "smooth_inputs.toml", MODEL)
+    scenario = problem.scenario
+    sines = convergence.smooth_inputs(scenario)
+    offsets = [sines[name].offset for name in ("tau1", "f2")]
+    smooth = Problem(
+        [scenario.start_values[name] for name in STATES],
+        [(scenario.stop, (offsets[0],), (offsets[1],))],
+        [scenario.start_values[name] for name in NAMES],
+        sines=[(i, *term) for i, name in enumerate(("tau1", "f2")) for term in sines[name].terms],
+        start=scenario.start,
+    )
+    end = enclosures(smooth.text)[-1]
+    exact = json.loads(project.exact_state_file(scenario.path).read_text())["final"]
+    values = np.array([exact[name] for name in STATES])
+    assert end[:, 2].max() < 1e-21
+    errors = np.abs((values - end[:, 0]) - end[:, 1]) + end[:, 2]
+    assert np.all(errors <= half_unit(values) + 2e-16)
+
+
+# ---- Against 300 bits ----------------------------------------------------------------------------
+
+
+def inside(states: Sequence[arb], balls: np.ndarray) -> bool:
+    return all(
+        abs(x - arb(hi) - arb(lo)) < arb(radius)
+        for x, (hi, lo, radius) in zip(states, balls, strict=True)
+    )
+
+
+def random_problem(draw: random.Random) -> Problem:
+    parameters = [draw.uniform(low, 3 * low) for low in (1, 0.5, 0.05, 0.02, 0.3, 0.1)]
+    parameters += [draw.uniform(-0.3, 0.3), draw.choice((0.0, 1.62, 9.81))]
+    cubics = [[draw.uniform(-size, size) for size in (5, 10, 20, 50)] for _ in range(2)]
+    states = [draw.uniform(-3, 3), draw.uniform(0, 1), draw.uniform(-2, 2), draw.uniform(-1, 1)]
+    return Problem(states, [(draw.uniform(0.03, 0.1), *cubics)], parameters)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_random_arms_are_where_300_bits_say(seed: int) -> None:
+    problem = random_problem(random.Random(seed))
+    end = enclosures(problem.text)[-1]
+    time, *cubics = problem.steps[0]
+    assert end[:, 2].max() < 1e-27
+    assert inside(integrate(problem.states, problem.parameters, cubics, time), end)
+
+
+def test_uncertain_starts_and_parameters() -> None:
+    """All corners of the starts, each with parameters at random ends, and points between."""
+    radii, parameter_radii = (1e-3, 1e-3, 2e-3, 1e-3), (0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0, 1e-3, 0.0)
+    states, cubics = (-1.0, 0.3, 1.0, 0.5), ((1.0, 2.0, 0.0, 0.0), (-9.0, 0.0, 5.0, 0.0))
+    problem = Problem(states, [(0.2, *cubics)], radii=radii, parameter_radii=parameter_radii)
+    end = enclosures(problem.text)[-1]
+    assert end[:, 2].max() < 0.02
+    draw = random.Random(1)
+    corners = list(product((-1.0, 1.0), repeat=4))
+    points = [[draw.uniform(-1, 1) for _ in range(4)] for _ in range(4)]
+    for point in corners + points:
+        start = [x + share * r for x, share, r in zip(states, point, radii, strict=True)]
+        arm = [
+            p + draw.choice((-0.999, 0.999)) * r
+            for p, r in zip(PARAMETERS, parameter_radii, strict=True)
+        ]
+        assert inside(integrate(start, arm, cubics, 0.2), end)
+
+
+# ---- Certificates --------------------------------------------------------------------------------
+
+
+def certified(problem: Problem, folder: Path) -> tuple[list[str], list[str], list[str]]:
+    certificate = folder / "certificate"
+    points = run(problem.text, certificate).stdout
+    return tuple(text.splitlines() for text in (problem.text, points, certificate.read_text()))
+
+
+def test_operations_are_confirmed() -> None:
+    assert check_operations.check(PROGRAM, seed=2) > 1000
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_certificates_are_confirmed(name: str, tmp_path: Path) -> None:
+    assert check.check(*certified(SMALL[name], tmp_path)) > 0
+
+
+CLAIMS = ("times", "hull", "box", "remainder", "endpoint", "jacobian", "deviation", "radii")
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_a_claim_without_its_radius_is_refused(name: str, tmp_path: Path) -> None:
+    problem, points, certificate = certified(SMALL["uncertain"], tmp_path)
+    row = [i for i, line in enumerate(certificate) if line.startswith(name)][-1]
+    words = certificate[row].split()
+    place = -1 if name != "times" else 1
+    words[place] = "0x0p+0"
+    certificate[row] = " ".join(words)
+    with pytest.raises(check.WrongClaim):
+        check.check(problem, points, certificate)
+
+
+def test_a_smaller_result_is_refused(tmp_path: Path) -> None:
+    problem, points, certificate = certified(SMALL["free"], tmp_path)
+    *front, radius = points[-1].split()
+    points[-1] = " ".join([*front, (float.fromhex(radius) * 0.999).hex()])
+    with pytest.raises(check.WrongClaim, match="printed ball"):
+        check.check(problem, points, certificate)
+
+
+def test_a_missing_step_is_refused(tmp_path: Path) -> None:
+    problem, points, certificate = certified(SMALL["free"], tmp_path)
+    second = [i for i, line in enumerate(certificate) if line.startswith("step")][1]
+    with pytest.raises(check.WrongClaim):
+        check.check(problem, points, certificate[second:])
+
+
+# ---- What is no problem --------------------------------------------------------------------------
+
+
+def test_a_set_that_is_too_broad_stops_the_proof() -> None:
+    answer = run(TOO_BROAD.text)
+    assert answer.returncode == 1
+    name, reached = answer.stdout.splitlines()[-1].split()
+    assert name == "stopped" and 0 <= float.fromhex(reached) < 0.1
+
+
+def test_an_inertia_that_may_vanish_stops_the_proof() -> None:
+    """Without the bodies' inertia, J is 0 where link 2 passes the joint, at 0.25 s."""
+    parameters = (0.0, 1.0, 0.0, 1e-30, 0.5, 0.0, 0.1, 0.0)
+    problem = Problem((0.0, -0.25, 0.0, -1.0), [(1.0, ZERO, ZERO)], parameters)
+    answer = run(problem.text)
+    assert answer.returncode == 1
+    assert 0.2 < float.fromhex(answer.stdout.split()[-1]) < 0.25
+
+
+@pytest.mark.parametrize("bad", ["nan", "inf", "1e200", "word", "0x1p+0x"])
+def test_bad_numbers_are_refused(bad: str) -> None:
+    text = SMALL["free"].text
+    for line in ("parameters", "states", "start", "to"):
+        answer = run(re.sub(rf"^{line} \S+", f"{line} {bad}", text, flags=re.MULTILINE))
+        assert answer.returncode == 2
+        assert len(answer.stderr.splitlines()) == 1
