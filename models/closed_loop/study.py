@@ -11,10 +11,17 @@ from rparm.models.system_figure import tracking_error
 
 from rparm.system.study import Diagram
 
-__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure", "study_coupling"]
+__all__ = [
+    "COUPLING_PICTURE",
+    "DIAGRAMS",
+    "EXPERIMENT",
+    "MEASURES",
+    "figure",
+    "study_coupling",
+]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
-
+COUPLING_PICTURE = "coupling.png"
 
 MEASURES = (tracking_error(ARM),)
 
@@ -38,4 +45,4 @@ def study_coupling(ssp: Path, report: Path) -> dict[str, dict[str, object]]:
     """Study what the coupling costs; see coupling.md."""
     from rparm.models.closed_loop.coupling.run_study import run  # only `coupling` needs it
 
-    return run(report, ssp)
+    return run(report / COUPLING_PICTURE, ssp)

@@ -236,9 +236,9 @@ def test_tables_and_picture(
     assert main(["coupling", "--report", str(tmp_path / "new")]) == 0
     assert (tmp_path / "new" / "coupling.png").stat().st_size > 50_000
     text = capsys.readouterr().out
-    assert "FAILED" not in text and text.endswith("\npassed: 4 parts\n")
+    assert "FAILED" not in text and text.endswith("\npassed: 5 parts\n")
     assert text.count("passed") >= 14
     assert max(map(len, text.split("picture: ")[0].splitlines())) <= 80
     assert main(["coupling", "--json", "--report", str(tmp_path / "new")]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert len(found["parts"]) == 4 and all(part["passed"] for part in found["parts"].values())
+    assert len(found["parts"]) == 5 and all(part["passed"] for part in found["parts"].values())

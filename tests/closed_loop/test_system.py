@@ -260,7 +260,7 @@ def test_a_component_that_gives_nan_is_named(
 def test_a_component_that_fails_in_initialization_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path
 ) -> None:
-    """A path through the joint axis; Ecos itself would go on."""
+    """A path through the joint axis; Ecos itself would continue."""
     edits = {"resources/trajectory_nominal.ssv": replace('value="0.1"', 'value="0.4"')}
     path = edited(source, tmp_path / "unreachable.ssp", edits)
     err = fails(path, "nominal", tmp_path, capsys)

@@ -9,6 +9,7 @@ import numpy as np
 from rparm.models.closed_loop.coupling import tables
 from rparm.models.closed_loop.coupling.delays import study_tracking, tracking_passed
 from rparm.models.closed_loop.coupling.figure import figure
+from rparm.models.closed_loop.coupling.largest_steps import study_largest_steps
 from rparm.models.closed_loop.coupling.loop import opened
 from rparm.models.closed_loop.coupling.payload import study_payload
 from rparm.models.closed_loop.coupling.step_doubling import study_doubling
@@ -17,10 +18,8 @@ from rparm.models.closed_loop.coupling.step_errors import StepErrors, study_step
 from rparm.output_files import from_here, written
 from rparm.report.style import save
 
-FILE = "coupling.png"
 
-
-def run(report: Path, ssp: Path) -> dict[str, dict[str, object]]:
+def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
     """Make the study, print its tables, write its picture; the numbers of each part.
 
     Raises
@@ -28,7 +27,6 @@ def run(report: Path, ssp: Path) -> dict[str, dict[str, object]]:
     UserError
         If the system or a reference is missing, an FMU fails, or the picture cannot be written.
     """
-    path = Path(report) / FILE
     with opened(ssp) as loop:
         with written(path):  # a place that cannot be written shows before anything has run
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -40,6 +38,8 @@ def run(report: Path, ssp: Path) -> dict[str, dict[str, object]]:
         _print(tables.payload_lines(payload))
         doubling = study_doubling(loop)
         _print(tables.doubling_lines(doubling))
+        limits = study_largest_steps(loop)
+        _print(tables.limit_lines(limits))
     with written(path):
         save(figure(step_errors, tracking, doubling), path)
     print(f"\npicture: {from_here(path)}")
@@ -66,6 +66,11 @@ def run(report: Path, ssp: Path) -> dict[str, dict[str, object]]:
             "steps": [d.run.accepted for d in doubling],
             "fixed_steps": [d.fixed_steps for d in doubling],
             "passed": all(d.passed for d in doubling),
+        },
+        "largest steps": {
+            "predicted": {x.method.name: x.predicted for x in limits},
+            "measured": {x.method.name: x.measured for x in limits},
+            "passed": all(x.passed for x in limits),
         },
     }
 

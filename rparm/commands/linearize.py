@@ -1,0 +1,113 @@
+"""`linearize`: the linear model of an FMU or a system at a point."""
+
+import argparse
+import shlex
+from pathlib import Path
+
+from rparm import project
+from rparm.commands import Ended
+from rparm.errors import WrongValueError
+from rparm.options import add_fmi, add_report
+from rparm.output import console
+from rparm.output_files import check_writable, from_here, written
+from rparm.units import SECONDS, typed_quantity
+
+DESCRIPTION = (
+    "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a loop that "
+    "is broken, and the largest stable communication step."
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """What to linearize, at which point, and where results go."""
+    parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
+    add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
+    parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")
+    parser.add_argument(
+        "--at", nargs="+", default=[], metavar="NAME=VALUE", action="extend",
+        help="states, inputs and parameters, with units as in 30deg; with --trim also outputs",
+    )  # fmt: skip
+    parser.add_argument("--time", type=_seconds, help="time of the point (default: the start)")
+    for option, text in (
+        ("--trim", "states and inputs to move until the point is an equilibrium"),
+        ("--inputs", "inputs of the model (default: all)"),
+        ("--outputs", "outputs of the model (default: all)"),
+        ("--without", "components of a system to take as ideal, as sampled sensors"),
+    ):
+        parser.add_argument(option, nargs="+", metavar="NAME", help=text)
+    parser.add_argument(
+        "--break", dest="cut", default="", metavar="COMPONENT.INPUT",
+        help="break the loop at this input, and find its margins",
+    )  # fmt: skip
+    parser.add_argument(
+        "--step", type=_positive_seconds, metavar="TIME", help="sample the model, too, inputs held"
+    )
+    parser.add_argument(
+        "--save", nargs="+", default=[], type=Path, metavar="FILE", help=".json, .mat or .csv"
+    )
+    add_report(parser, "linearize")
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Linearize, print the tables, write page and files."""
+    from rparm.linearization import explained, page, point, saving
+    from rparm.linearization.study import Request, study
+
+    for path in options.save:
+        saving.check(path)
+    check_writable(options.report)
+    console.stage(f"linearizing {options.what}")
+    request = Request(
+        options.what, point.parsed(options.at), options.time, options.trim or (), options.inputs,
+        options.outputs, options.variant, options.cut, options.without or (), options.fmi,
+    )  # fmt: skip
+    found = study(request)
+    tables = [(explained.poles(found), explained.POLES)]
+    if found.linear.intervals:
+        tables.insert(0, (explained.intervals(found), explained.INTERVALS))
+    if found.margins is not None:
+        tables.append((explained.margins(found.margins), explained.MARGINS))
+    if found.largest:
+        tables.append((explained.largest(list(found.largest)), explained.STEPS))
+    for table, text in tables:
+        console.plain_table(table.title, table.head, table.rows)
+        console.remark(text)
+    for text in explained.notes(found):
+        console.remark(text)
+    for path in options.save:
+        saving.save(path, found, options.step)
+        print(f"saved: {from_here(path)}")
+    with written(options.report):
+        index = page.write(options.report, found, options.step, _command(options))
+    print(f"page: {from_here(index)}")
+    document = saving.document(found, options.step) | {"page": index.absolute()}
+    n, m, p = (len(getattr(found.linear, key)) for key in ("states", "inputs", "outputs"))
+    verdict = f"linear: {n} states, {m} inputs, {p} outputs"
+    return Ended(0, verdict, document, page=index)
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What to type for the same again."""
+    parts = [project.PROGRAM, "linearize", str(options.what)]
+    if options.fmi != project.VERSIONS[0]:
+        parts += ["--fmi", options.fmi]
+    for option in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
+        given = getattr(options, option)
+        if given not in (None, "", []):
+            values = given if isinstance(given, list) else [str(given)]
+            parts += ["--break" if option == "cut" else f"--{option}", *values]
+    return shlex.join(parts)
+
+
+def _seconds(text: str) -> float:
+    try:
+        return typed_quantity(text, SECONDS)
+    except WrongValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _positive_seconds(text: str) -> float:
+    seconds = _seconds(text)
+    if seconds <= 0:
+        raise argparse.ArgumentTypeError(f"expected a time above 0, got {text!r}")
+    return seconds

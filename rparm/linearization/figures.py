@@ -1,0 +1,244 @@
+"""Pictures of linear models: Bode, Nyquist, steps and poles; sampled models beside continuous."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from rparm.linearization.linear import Linear, hold
+from rparm.linearization.margins import (
+    AT_ZERO,
+    Margins,
+    Response,
+    closed_poles,
+    frequencies,
+    frequency_response,
+)
+from rparm.report.style import DASHED, ERRORS, INK, MUTED, RUN, STYLE
+from rparm.texts import milliseconds
+
+TEXTS = STYLE | {"text.parse_math": False}
+MOST = 3  # inputs and outputs that are drawn
+ROUNDING = 1e-12  # of the largest response: less is none
+AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
+SETTLED = 6.0  # time constants of the slowest pole that a step shows
+GROWN = 3.0  # those of the fastest one that grows
+FLATTEST = 0.1  # height of a picture of poles, of its width
+POINTS = 600
+FARTHEST = 3.0  # from the origin that a Nyquist diagram shows
+
+
+def bode(model: Linear, step: float | None, found: Margins | None = None) -> Figure:
+    """Gain and phase of each output by each input, with margins of a loop."""
+    with mpl.rc_context(TEXTS):
+        figure = Figure(figsize=(9, 6), layout="constrained")
+        gain, phase = figure.subplots(2, 1, sharex=True)
+        grid = _grid(model, closed_poles(model) if found else model.poles)
+        answers = [(label, one, frequency_response(one)(grid)) for label, one in _channels(model)]
+        largest = max((np.abs(values).max() for _, _, values in answers), default=0.0)
+        shown = [each for each in answers if np.abs(each[2]).max() > ROUNDING * largest]
+        for (label, one, values), color in zip(shown, _colors(), strict=False):
+            _bode(gain, phase, values, grid, color, label)
+            if step is not None:
+                below = grid[grid < math.pi / step]
+                name = f"{label}, held for {milliseconds(step)}"
+                response = sampled_response(one, step)(below)
+                _bode(gain, phase, response, below, color, name, DASHED)
+        if step is not None:
+            for axes in (gain, phase):
+                axes.axvline(0.5 / step, color=MUTED, linewidth=0.8, linestyle=":")
+        for crossing in found.gain_crossings if found else ():
+            for axes in (gain, phase):
+                axes.axvline(crossing.frequency / (2 * math.pi), color=INK, linewidth=0.8)
+            gain.axhline(0.0, color=INK, linewidth=0.8)
+            phase.axhline(-180.0, color=INK, linewidth=0.8)
+        gain.set_ylabel("gain (dB)")
+        phase.set_ylabel("phase (degrees)")
+        phase.set_xlabel("frequency (Hz)")
+        gain.set_xlim(grid[0] / (2 * math.pi), grid[-1] / (2 * math.pi))
+        gain.legend(fontsize=8)
+    return figure
+
+
+def _bode(
+    gain: Axes,
+    phase: Axes,
+    values: np.ndarray,
+    grid: np.ndarray,
+    color: str,
+    label: str,
+    line: object = "-",
+) -> None:
+    with np.errstate(divide="ignore"):
+        decibels = 20 * np.log10(np.abs(values))
+    hertz = grid / (2 * math.pi)
+    gain.semilogx(hertz, decibels, color=color, linestyle=line, label=label)
+    turned = np.degrees(np.unwrap(np.angle(values)))
+    phase.semilogx(
+        hertz, turned - 360 * np.round((turned[0] + 90) / 360), color=color, linestyle=line
+    )
+
+
+def nyquist(loop: Linear, step: float | None) -> Figure:
+    """L along the frequencies; -1 is where it becomes unstable."""
+    with mpl.rc_context(TEXTS):
+        figure = Figure(figsize=(6, 6), layout="constrained")
+        axes = figure.subplots()
+        grid = frequencies(loop)
+        _nyquist(axes, frequency_response(loop)(grid), "-", "continuous")
+        if step is not None:
+            below = grid[grid < math.pi / step]
+            name = f"held for {milliseconds(step)}"
+            _nyquist(axes, sampled_response(loop, step)(below), DASHED, name)
+        circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
+        axes.plot(circle.real, circle.imag, color=MUTED, linewidth=0.8, linestyle=":")
+        axes.plot(-1, 0, "+", color=ERRORS[0], markersize=14, markeredgewidth=2)
+        axes.set_xlim(-FARTHEST, FARTHEST)
+        axes.set_ylim(-FARTHEST, FARTHEST)
+        axes.set_aspect("equal")
+        axes.set_xlabel("real part of L")
+        axes.set_ylabel("imaginary part of L")
+        axes.legend(fontsize=8)
+    return figure
+
+
+def _nyquist(axes: Axes, values: np.ndarray, line: object, label: str) -> None:
+    axes.plot(values.real, values.imag, color=RUN, linestyle=line, label=label)
+    axes.plot(values.real, -values.imag, color=RUN, linestyle=line, alpha=0.35)
+
+
+def steps(model: Linear, step: float | None) -> Figure:
+    """Answer of each output to a step of each input by 1."""
+    with mpl.rc_context(TEXTS):
+        count = len(model.outputs)
+        figure = Figure(figsize=(9, 1.2 + 2 * count), layout="constrained")
+        every = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+        end = _end(model, step)
+        for axes, output in zip(every, model.outputs, strict=True):
+            for name, color in zip(model.inputs, _colors(), strict=False):
+                one = model.select([name], [output])
+                axes.plot(*_step(one, end / POINTS, end), color=color, label=f"step of {name}")
+                if step is not None:
+                    axes.plot(*_step(one, step, end), ".", color=color)
+            axes.set_ylabel(output)
+        every[0].legend(fontsize=8)
+        every[-1].set_xlim(0, end)
+        every[-1].set_xlabel("time (s)")
+    return figure
+
+
+def _step(model: Linear, length: float, end: float) -> tuple[np.ndarray, np.ndarray]:
+    transition, forced, _ = hold(model.A, model.B, length)
+    count = int(end / length) + 1
+    x, values = np.zeros(len(model.A)), np.empty(count)
+    for i in range(count):
+        values[i] = (model.C @ x + model.D[:, 0])[0]
+        x = transition @ x + forced[:, 0]
+    return length * np.arange(count), values
+
+
+def poles(model: Linear, step: float | None, closed: Linear | None = None) -> Figure:
+    """Poles in the plane of s, and of the sampled model in the plane of z."""
+    with mpl.rc_context(TEXTS):
+        figure = Figure(figsize=(9, 4.2), layout="constrained")
+        plain, sampled = figure.subplots(1, 2)
+        plain.axvline(0, color=INK, linewidth=0.8)
+        plain.plot(model.poles.real, model.poles.imag, "x", color=RUN, label="poles", markersize=9)
+        height = FLATTEST * np.abs(model.poles).max(initial=1.0)
+        low, high = plain.get_ylim()
+        plain.set_ylim(min(low, -height), max(high, height))
+        if closed is not None:
+            found = closed_poles(closed)
+            plain.plot(
+                found.real,
+                found.imag,
+                "+",
+                color=ERRORS[0],
+                label="when it is closed",
+                markersize=11,
+            )
+        plain.set_xlabel("real part (1/s): left of 0 dies out")
+        plain.set_ylabel("imaginary part (rad/s)")
+        plain.legend(fontsize=8)
+        if step is None:
+            sampled.set_visible(False)
+        else:
+            circle = np.exp(1j * np.linspace(0, 2 * math.pi, 200))
+            sampled.plot(circle.real, circle.imag, color=INK, linewidth=0.8)
+            found = np.linalg.eigvals(hold(model.A, model.B, step)[0])
+            sampled.plot(found.real, found.imag, "x", color=RUN, markersize=9)
+            sampled.set_aspect("equal")
+            sampled.set_xlabel(f"held for {milliseconds(step)}: within the circle dies out")
+    return figure
+
+
+def closed(loop: Linear) -> Linear:
+    """From what is asked for at the break to what is there, when the loop is closed."""
+    rest = 1 + loop.D[0, 0]
+    return replace(
+        loop,
+        A=loop.A - loop.B @ loop.C / rest,
+        B=loop.B / rest,
+        C=loop.C / rest,
+        D=loop.D / rest,
+    )
+
+
+def sampled_response(model: Linear, step: float) -> Response:
+    """As `frequency_response`, of the model that is sampled, with inputs held in between."""
+    transition, forced, _ = hold(model.A, model.B, step)
+    one = np.eye(len(model.A))
+
+    def at(w: np.ndarray) -> np.ndarray:
+        z = np.exp(1j * step * np.asarray(w))[:, None, None]
+        return (model.C @ np.linalg.solve(z * one - transition, forced + 0 * z) + model.D)[:, 0, 0]
+
+    return at
+
+
+def drawn(model: Linear) -> Linear:
+    """What of a model pictures show: the first outputs that respond, and inputs they respond to."""
+    s = 1j * _grid(model, np.empty(0))[:, None, None]
+    states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
+    sizes = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
+    responds = sizes > ROUNDING * sizes.max(initial=0.0)
+    outputs = np.flatnonzero(responds.any(axis=1))[:MOST]
+    inputs = np.flatnonzero(responds[outputs].any(axis=0))[:MOST]
+    return model.select([model.inputs[i] for i in inputs], [model.outputs[i] for i in outputs])
+
+
+def _channels(model: Linear) -> Iterator[tuple[str, Linear]]:
+    for output in model.outputs:
+        for name in model.inputs:
+            yield f"{output} by {name}", model.select([name], [output])
+
+
+def _colors() -> Iterator[str]:
+    while True:
+        yield from (RUN, *ERRORS)
+
+
+def _grid(model: Linear, further: np.ndarray) -> np.ndarray:
+    """Frequencies around the poles of a model and others, rad/s."""
+    rates = _rates(np.array([*model.poles, *further]))
+    low, high = math.log10(rates.min()) - AROUND, math.log10(rates.max()) + AROUND
+    return np.logspace(low, high, POINTS)
+
+
+def _rates(found: np.ndarray) -> np.ndarray:
+    """Sizes of poles that are not 0, in 1/s."""
+    rates = np.abs(found)
+    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
+    return rates if len(rates) else np.ones(1)
+
+
+def _end(model: Linear, step: float | None) -> float:
+    """How long a step is shown, s: until the slowest pole has settled."""
+    end = SETTLED / _rates(model.poles).min()
+    fastest = model.poles.real.max(initial=0.0)
+    end = min(end, GROWN / fastest) if fastest > 0 else end
+    return max(end, 20 * step) if step is not None else end

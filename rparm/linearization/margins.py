@@ -1,0 +1,194 @@
+"""Margins of a loop: by how much its gain, phase and delay may change until it becomes unstable.
+
+The loop is broken at a signal: L is what comes back, with its sign changed, by what is sent in.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rparm.linearization.linear import Linear
+
+SAME = 1e-9  # of the largest direction: states that inputs do not reach, or outputs do not see
+AT_ZERO = 1e-5  # of the fastest pole: slower ones are multiple poles at 0, moved by rounding
+MEANINGFUL = 1e6  # factors of the gain beyond it are those of rounding
+PER_DECADE = 400  # frequencies that are searched for crossings
+DECADES = 3  # below the slowest and above the fastest pole
+BISECTIONS = 80
+
+Response = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A frequency at which L has the gain 1 or the phase -180 degrees.
+
+    Attributes
+    ----------
+    frequency : float
+        rad/s.
+    value : complex
+        L there.
+    """
+
+    frequency: float
+    value: complex
+
+
+@dataclass(frozen=True)
+class Margins:
+    """What a loop bears; nan or inf if nothing of the kind makes it unstable.
+
+    Attributes
+    ----------
+    stable : bool
+        Whether the closed loop is stable; if not, the others say nothing.
+    gain_up, gain_down : float
+        Factors of the loop's gain, above and below 1, at which it loses stability; inf and 0 if
+        none does.
+    phase : float
+        Further lag in degrees.
+    delay : float
+        Further delay in s.
+    gain_crossings, phase_crossings : tuple of Crossing
+        Where the gain is 1, and where the phase is -180 degrees.
+    """
+
+    stable: bool
+    gain_up: float
+    gain_down: float
+    phase: float
+    delay: float
+    gain_crossings: tuple[Crossing, ...]
+    phase_crossings: tuple[Crossing, ...]
+
+
+def open_loop(broken: Linear) -> Linear:
+    """L of a system that is broken: one input, and the output that fed it; minimal."""
+    return minimal(
+        Linear(
+            **{
+                name: getattr(broken, name)
+                for name in ("states", "inputs", "outputs", "A", "B", "x", "u", "y", "rates")
+            },
+            C=-broken.C,
+            D=-broken.D,
+        )
+    )
+
+
+def margins(loop: Linear) -> Margins:
+    """Margins of a loop L, which has one input and one output and is minimal."""
+    response = frequency_response(loop)
+    grid = frequencies(loop)
+    gains = tuple(_crossings(response, grid, lambda value: np.log(np.abs(value))))
+    turns = tuple(
+        found for found in _crossings(response, grid, lambda value: value.imag)
+        if found.value.real < 0
+    )  # fmt: skip
+    factors = [1 / abs(found.value) for found in turns if abs(found.value) > 1 / MEANINGFUL]
+    factors = [factor for factor in factors if factor > 1 / MEANINGFUL]
+    lags = [(math.pi + float(np.angle(found.value))) % (2 * math.pi) for found in gains]
+    delays = [lag / found.frequency for lag, found in zip(lags, gains, strict=True)]
+    return Margins(
+        stable=bool(np.all(closed_poles(loop).real < 0)),
+        gain_up=min((factor for factor in factors if factor > 1), default=math.inf),
+        gain_down=max((factor for factor in factors if factor < 1), default=0.0),
+        phase=math.degrees(min(lags, default=math.nan)),
+        delay=min(delays, default=math.inf),
+        gain_crossings=gains,
+        phase_crossings=turns,
+    )
+
+
+def closed_poles(loop: Linear) -> np.ndarray:
+    """Poles of the loop when it is closed, 1/s."""
+    return np.linalg.eigvals(loop.A - loop.B @ loop.C / (1 + loop.D[0, 0]))
+
+
+def frequency_response(model: Linear) -> Response:
+    """The value of a model with one input and one output at frequencies in rad/s."""
+    one = np.eye(len(model.A))
+
+    def at(w: np.ndarray) -> np.ndarray:
+        s = 1j * np.asarray(w)[:, None, None]
+        return (model.C @ np.linalg.solve(s * one - model.A, model.B + 0 * s) + model.D)[:, 0, 0]
+
+    return at
+
+
+def frequencies(loop: Linear) -> np.ndarray:
+    """Frequencies in rad/s at which something may happen, ascending."""
+    rates = np.abs([*loop.poles, *closed_poles(loop)])
+    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
+    rates = rates if len(rates) else np.ones(1)
+    low, high = math.log10(rates.min()) - DECADES, math.log10(rates.max()) + DECADES
+    return np.logspace(low, high, 1 + int(PER_DECADE * (high - low)))
+
+
+def _crossings(
+    response: Response, grid: np.ndarray, function: Callable[[np.ndarray], np.ndarray]
+) -> Iterator[Crossing]:
+    """Where a function of L changes its sign."""
+    values = function(response(grid))
+    for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0).tolist():
+        low, high = math.log(grid[i]), math.log(grid[i + 1])
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            same = np.sign(function(response(np.array([math.exp(middle)])))[0])
+            low, high = (middle, high) if same == np.sign(values[i]) else (low, middle)
+        frequency = math.exp(low)
+        yield Crossing(frequency, complex(response(np.array([frequency]))[0]))
+
+
+def minimal(model: Linear) -> Linear:
+    """The same response from inputs to outputs with as few states as it takes.
+
+    States are combinations of the model's: they have no names of their own.
+    """
+    scale = _balance(model.A)
+    A, B, C = model.A * scale / scale[:, None], model.B / scale[:, None], model.C * scale
+    reached = _reached(A, B)
+    A, B, C = reached.T @ A @ reached, reached.T @ B, C @ reached
+    seen = _reached(A.T, C.T)
+    A, B, C = seen.T @ A @ seen, seen.T @ B, C @ seen
+    zeros = np.zeros(len(A))
+    return Linear(
+        states=tuple(f"z{i + 1}" for i in range(len(A))),
+        inputs=model.inputs,
+        outputs=model.outputs,
+        A=A,
+        B=B,
+        C=C,
+        D=model.D,
+        x=zeros,
+        u=model.u,
+        y=model.y,
+        rates=zeros,
+    )
+
+
+def _balance(A: np.ndarray) -> np.ndarray:
+    """Scales of states that make rows and columns of about the same size."""
+    from scipy.linalg import matrix_balance
+
+    return matrix_balance(A, permute=False, separate=True)[1][0] if len(A) else np.ones(0)
+
+
+def _reached(A: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of the states that inputs reach, (n, r)."""
+    n = len(A)
+    basis = np.zeros((n, 0))
+    new = B
+    size = max(np.linalg.norm(A, 2), 1e-300) if n else 1.0
+    while new.shape[1] and basis.shape[1] < n:
+        for _ in range(2):  # twice is enough against rounding
+            new = new - basis @ (basis.T @ new)
+        directions, sizes, _ = np.linalg.svd(new, full_matrices=False)
+        least = SAME * (size if basis.shape[1] else max(sizes.max(initial=0.0), 1e-300))
+        kept = directions[:, sizes > least]
+        basis = np.hstack([basis, kept])[:, :n]
+        new = A @ kept
+    return basis

@@ -1,0 +1,180 @@
+"""Linearizes an FMU or a system as a user asks for it."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from rparm import project
+from rparm.errors import UserError, hint
+from rparm.fmi.fmu_file import CO_SIMULATION, MODEL_EXCHANGE, Fmu
+from rparm.linearization import point
+from rparm.linearization.connections import connected
+from rparm.linearization.derivatives import FmuSubject
+from rparm.linearization.largest_step import LargestStep, largest_steps
+from rparm.linearization.linear import Linear
+from rparm.linearization.margins import Margins, margins, open_loop
+from rparm.linearization.system import SystemSubject
+from rparm.linearization.trim import Trimmed, trim
+from rparm.project import VERSIONS
+from rparm.system import ssp
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What is asked for.
+
+    Attributes
+    ----------
+    what : path or str
+        An FMU or SSP, or the name of one of the project.
+    at : mapping
+        Values of states, inputs and parameters, with `free` also of outputs: numbers in the
+        variables' units, or texts with a unit; by name, in a system "component.variable".
+    time : float, optional
+        s; default: 0, or the start of the system.
+    free : sequence of str
+        States and inputs that are moved until the point is an equilibrium.
+    inputs, outputs : sequence of str, optional
+        Those of the linear model; default: all.
+    variant : str
+        Of a system; "": the first.
+    cut : str
+        The input of a system at which the loop is broken; "": none.
+    without : sequence of str
+        Components of a system to take as ideal.
+    version : str
+        Of FMI, if `what` is a name.
+    kind : str
+        Of the FMU: model exchange, which says when something is sampled, or co-simulation; "":
+        the first that it has.
+    """
+
+    what: str | Path
+    at: Mapping[str, Any] = field(default_factory=dict)
+    time: float | None = None
+    free: Sequence[str] = ()
+    inputs: Sequence[str] | None = None
+    outputs: Sequence[str] | None = None
+    variant: str = ""
+    cut: str = ""
+    without: Sequence[str] = ()
+    version: str = VERSIONS[0]
+    kind: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What is found.
+
+    Attributes
+    ----------
+    path : Path
+    linear : Linear
+        Without held states.
+    units : dict of str to str
+        Of its variables that have one.
+    variant : str
+        "" if it is an FMU.
+    largest : list of LargestStep
+        Of a system that is not broken and has a loop.
+    loop : Linear, optional
+        L where the system is broken.
+    margins : Margins, optional
+        Of `loop`.
+    """
+
+    path: Path
+    linear: Linear
+    units: Mapping[str, str]
+    variant: str = ""
+    largest: Sequence[LargestStep] = ()
+    loop: Linear | None = None
+    margins: Margins | None = None
+
+
+def study(request: Request) -> Study:
+    """Linearize what is asked for."""
+    path = _path(request)
+    if path.suffix.lower() == ".ssp":
+        return _of_system(path, request)
+    for option, given in (
+        ("--variant", request.variant), ("--break", request.cut), ("--without", request.without)
+    ):  # fmt: skip
+        if given:
+            raise UserError(f"{option}: is for systems, and {path} is an FMU")
+    with ExitStack() as stack:
+        fmu = stack.enter_context(_opened(path, request.kind))
+        subject = stack.enter_context(FmuSubject(fmu, request.time or 0.0))
+        trimmed = _point(subject, request)
+        found = subject.at(trimmed.values)
+        subject.check(found)
+        found = _chosen(found.without(subject.held(found)), trimmed, request)
+        return Study(path, found, _units(subject, found))
+
+
+def _of_system(path: Path, request: Request) -> Study:
+    with ExitStack() as stack:
+        opened = stack.enter_context(ssp.unpacked(path))
+        variant = request.variant or next(iter(opened.system.parameters), "")
+        made = SystemSubject(opened, variant, request.time, request.without, request.cut)
+        subject = stack.enter_context(made)
+        trimmed = _point(subject, request)
+        parts = subject.parts(trimmed.values)
+        held = subject.held(parts)
+        parts = {name: part.without(held[name]) for name, part in parts.items()}
+        whole = connected(parts, subject.kept)
+        found = _chosen(whole, trimmed, request)
+        units = _units(subject, found)
+        if subject.cut is not None:
+            source = f"{subject.cut.start_component}.{subject.cut.start_connector}"
+            loop = open_loop(whole.select([request.cut], [source]))
+            return Study(path, found, units, variant, (), loop, margins(loop))
+        largest = largest_steps(parts, subject.connections, subject.ways)
+        return Study(path, found, units, variant, largest)
+
+
+def _path(request: Request) -> Path:
+    path, name = Path(request.what), str(request.what)
+    if path.suffix.lower() in (".fmu", ".ssp"):
+        return path
+    systems, models = project.systems(), project.models()
+    for folder in systems.values():
+        if name == folder.name or project.is_built_from(name, folder):
+            return project.built(folder, ".ssp", version=request.version)
+    for folder in models.values():
+        if name == folder.name or project.is_built_from(name, folder):
+            return project.built(folder, ".fmu", version=request.version)
+    known = hint(name, [*models, *systems])
+    raise UserError(f"{name}: expected a file .fmu or .ssp, or a name{known}")
+
+
+def _opened(path: Path, kind: str) -> Fmu:
+    """An FMU as one of a kind, or as one for model exchange if it can be."""
+    if kind:
+        return Fmu(path, kind=kind)
+    try:
+        return Fmu(path, kind=MODEL_EXCHANGE)
+    except UserError:
+        return Fmu(path, kind=CO_SIMULATION)
+
+
+def _point(subject: FmuSubject | SystemSubject, request: Request) -> Trimmed:
+    for name in request.free:
+        if name in request.at:
+            raise UserError(f"--trim: {name} has a value in --at: expected one or the other")
+    values, targets = point.checked(subject, request.at, bool(request.free))
+    if not request.free:
+        return Trimmed(values, {})
+    return trim(subject, values, request.free, targets)
+
+
+def _chosen(found: Linear, trimmed: Trimmed, request: Request) -> Linear:
+    return replace(found.select(request.inputs, request.outputs), intervals=trimmed.intervals)
+
+
+def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]:
+    names = (*found.states, *found.inputs, *found.outputs, *found.held)
+    known = {name: subject.variable(name).unit for name in names}
+    return {name: unit for name, unit in known.items() if unit}

@@ -1,0 +1,198 @@
+"""Equilibria by Newton's method on directional derivatives, and the intervals of dry friction.
+
+An equilibrium is where all derivatives of states are 0, but those that are a velocity which is
+given, and outputs have the values that they are to have. Some states and inputs are free.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rparm.errors import UserError, WrongValueError, hint
+from rparm.fmi.model import Value
+from rparm.linearization.linear import Linear
+from rparm.linearization.point import Subject
+
+MOST_STEPS = 60
+MOST_HALVINGS = 30
+EXACT = 1e-10  # of the terms that cancel in an equation: what is left counts as 0
+SINGULAR = 1e-10  # of the largest singular value
+PROBE = 1e-6  # by so much of itself, or of 1, a free variable is moved to see whether it matters
+DOUBLINGS = 60
+BISECTIONS = 100
+
+
+@dataclass(frozen=True, eq=False)
+class Trimmed:
+    """An equilibrium.
+
+    Attributes
+    ----------
+    values : dict
+        Of all that is set, with those of the free variables.
+    intervals : dict of str to (float, float)
+        Free variables that may lie anywhere in between, the others staying as they are; their
+        values are the middle, if both ends are finite.
+    """
+
+    values: dict[str, Value]
+    intervals: dict[str, tuple[float, float]]
+
+
+def trim(
+    subject: Subject,
+    values: Mapping[str, Value],
+    free: Sequence[str],
+    targets: Mapping[str, float],
+) -> Trimmed:
+    """Find an equilibrium by moving the variables `free`, from `values` or their start values.
+
+    UserError if there is none, or the equations leave it open where it is.
+    """
+    problem = _Problem(subject, values, free, targets)
+    point = problem.solved()
+    intervals: dict[str, tuple[float, float]] = {}
+    for _ in free:  # the middle of one may matter to the next
+        for i, name in enumerate(free):
+            found = problem.interval(point, i)
+            if found is not None:
+                intervals[name] = found
+                point[i] = sum(found) / 2 if all(map(math.isfinite, found)) else point[i]
+    problem.check_determined(point, [i for i, name in enumerate(free) if name not in intervals])
+    return Trimmed(problem.set_to(point), intervals)
+
+
+class _Problem:
+    """The equations, as functions of the free variables."""
+
+    def __init__(
+        self,
+        subject: Subject,
+        values: Mapping[str, Value],
+        free: Sequence[str],
+        targets: Mapping[str, float],
+    ) -> None:
+        self.subject, self.fixed = subject, dict(values)
+        self.free, self.targets = list(free), dict(targets)
+        first = subject.at(values)
+        known = (*first.states, *first.inputs)
+        for name in free:
+            if name not in known:
+                raise UserError(f"--trim: {name} is no state and no input{hint(name, known)}")
+        self.columns = [known.index(name) for name in free]
+        self.rows = [first.outputs.index(name) for name in targets]
+        self.equations = [*first.states, *targets]
+        self.start = np.array([*first.x, *first.u])[self.columns]
+
+    def set_to(self, point: np.ndarray) -> dict[str, Value]:
+        return self.fixed | dict(zip(self.free, map(float, point), strict=True))
+
+    def check_range(self, point: np.ndarray) -> None:
+        for name, value in zip(self.free, point, strict=True):
+            try:
+                self.subject.variable(name).check_range(value, value)
+            except WrongValueError as error:
+                raise UserError(f"--trim: {name} leaves its range: {error}") from error
+
+    def evaluated(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What is left of each equation, its derivatives by the free variables, its size."""
+        self.check_range(point)
+        found = self.subject.at(self.set_to(point))
+        wanted = np.array([*self.targets.values()])
+        left = np.concatenate([found.rates, found.y[self.rows] - wanted])
+        left[: len(found.states)][self._is_given_velocity(found)] = 0.0
+        responses = np.block([[found.A, found.B], [found.C[self.rows], found.D[self.rows]]])
+        whole = np.array([*found.x, *found.u])
+        size = np.abs(responses) @ np.abs(whole) + np.concatenate([0 * found.x, np.abs(wanted)])
+        return left, responses[:, self.columns], np.maximum(size, 1.0)
+
+    def _is_given_velocity(self, found: Linear) -> np.ndarray:
+        """Which derivatives are states that are not free: what moves as it is told to."""
+        n = len(found.states)
+        one = (np.count_nonzero(found.A, axis=1) == 1) & ~found.B.any(axis=1)
+        given = np.ones(n, bool)
+        given[[column for column in self.columns if column < n]] = False
+        return one & (found.A[:, given] == 1).any(axis=1)
+
+    def is_equilibrium(self, point: np.ndarray) -> bool:
+        left, _, size = self.evaluated(point)
+        return bool(np.all(np.abs(left) <= EXACT * size))
+
+    def solved(self) -> np.ndarray:
+        """Newton's method with steps that are halved until less is left."""
+        point = self.start
+        left, responses, size = self.evaluated(point)
+        for _ in range(MOST_STEPS):
+            if np.all(np.abs(left) <= EXACT * size):
+                return point
+            step = -np.linalg.lstsq(responses, left, rcond=SINGULAR)[0]
+            for _ in range(MOST_HALVINGS):
+                tried = self.evaluated(point + step)
+                if np.linalg.norm(tried[0]) < np.linalg.norm(left):
+                    break
+                step = step / 2
+            else:
+                break
+            point = point + step
+            left, responses, size = tried
+        worst = int(np.argmax(np.abs(left) / size))
+        name = self.equations[worst]
+        what = (
+            f"{name} stays {left[worst]:+.6g} off its value"
+            if name in self.targets
+            else f"the derivative of {name} stays at {left[worst]:.6g}"
+        )
+        raise UserError(f"--trim: no equilibrium found by {', '.join(self.free)}: {what}")
+
+    def interval(self, point: np.ndarray, i: int) -> tuple[float, float] | None:
+        """Values of a free variable at which all stays in equilibrium, if there is more than one.
+
+        UserError if it may have any value.
+        """
+        ends = tuple(self._end(point, i, side) for side in (-1.0, 1.0))
+        if all(map(math.isinf, ends)):
+            raise UserError(f"--trim: {self.free[i]} has no effect on the equilibrium")
+        return None if ends[0] == ends[1] else ends
+
+    def _end(self, point: np.ndarray, i: int, side: float) -> float:
+        """Where the equilibrium ends on one side."""
+
+        def holds(distance: float) -> bool:
+            moved = point.copy()
+            moved[i] += side * distance
+            try:
+                return self.is_equilibrium(moved)
+            except UserError:  # beyond the range of the variable
+                return False
+
+        far = PROBE * max(1.0, abs(point[i]))
+        if not holds(far):
+            return float(point[i])
+        near = far
+        for _ in range(DOUBLINGS):
+            far *= 2
+            if not holds(far):
+                break
+            near = far
+        else:
+            return side * math.inf
+        for _ in range(BISECTIONS):
+            middle = (near + far) / 2
+            if middle in (near, far):
+                break
+            near, far = (middle, far) if holds(middle) else (near, middle)
+        return float(point[i] + side * near)
+
+    def check_determined(self, point: np.ndarray, columns: Sequence[int]) -> None:
+        """Refuse an equilibrium that stays one if free variables change together."""
+        responses = self.evaluated(point)[1][:, columns]
+        if not len(columns):
+            return
+        _, sizes, directions = np.linalg.svd(responses)
+        rank = int(np.sum(sizes > SINGULAR * max(sizes.max(initial=0.0), 1e-300)))
+        if rank < len(columns):
+            open_ones = np.abs(directions[rank:]).max(axis=0) > 1e-6
+            names = [self.free[columns[i]] for i in np.flatnonzero(open_ones)]
+            raise UserError(f"--trim: the equilibrium leaves {', '.join(names)} open: free fewer")

@@ -1,0 +1,168 @@
+"""The command and `rparm.linearize`: documents, files, the page, and the model against a run."""
+
+import csv
+import json
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+import rparm
+from rparm import __main__ as cli
+from rparm.linearization import figures
+from rparm.linearization.margins import frequency_response
+
+POSE = {"q1": "30 deg", "q2": "0.1 m"}
+H = 0.01
+
+
+def document(command: list[str], capsys: pytest.CaptureFixture[str]) -> dict:
+    """The document of a command that goes well."""
+    assert cli.main(["linearize", "--json", *command]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+# ---- The model -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_multisine_tells_the_nonlinear_arm_from_its_sampled_model_by_the_amplitude(
+    fmi: int,
+) -> None:
+    """The difference is of second order: relative to the motion, it falls as the amplitude."""
+    hanging = {"q1": "-90 deg", "q2": "0.1 m"}
+    model = rparm.linearize("RPManipulator", at=hanging, trim=["tau1", "f2"], fmi=fmi)
+    sampled = model.zoh(H)
+    times = H * np.arange(101)
+    lines = np.random.default_rng(3).uniform(0, 2 * np.pi, size=(2, 8))
+    waves = [sum(np.sin(2 * np.pi * k * times + p) for k, p in enumerate(x, 1)) for x in lines]
+    differences = []
+    for amplitude in (1e-3, 1e-5):
+        u = amplitude * np.array(waves)
+        run = rparm.simulate(
+            rparm.fmu("RPManipulator", fmi=fmi),
+            stop_time=times[-1],
+            step=H,
+            start_values={**hanging, "solver_method": "taylor"},
+            inputs={name: model.at[name] + u[i] for i, name in enumerate(model.inputs)},
+            outputs=list(model.states),
+            tolerance=1e-13,
+        )
+        x = np.zeros((len(times), 4))
+        for i in range(len(times) - 1):
+            x[i + 1] = sampled.A @ x[i] + sampled.B @ u[:, i]
+        moved = np.column_stack([run[name] - model.at[name] for name in model.states])
+        differences.append(np.abs(moved - x).max() / np.abs(x).max())
+    assert differences[0] < 1e-3
+    assert differences[1] / differences[0] == pytest.approx(1e-2, rel=0.05)
+
+
+def test_it_is_that_of_python_control() -> None:
+    model = rparm.linearize("RPPlant", at={**POSE, "damping1": 1.0}, trim=["tau1", "f2"])
+    plain, sampled = model.ss(), model.zoh(H)
+    assert plain.state_labels == list(model.states) and sampled.dt == H
+    expected = control.c2d(plain, H, "zoh")
+    for name in "ABCD":
+        np.testing.assert_allclose(getattr(sampled, name), getattr(expected, name), atol=1e-12)
+    one = model.select(["tau1"], ["q1"])
+    w = np.array([0.1, 1.0, 50.0])
+    np.testing.assert_allclose(frequency_response(one)(w), one.ss()(1j * w), rtol=1e-9)
+    response = figures.sampled_response(one, H)(w)
+    np.testing.assert_allclose(response, one.zoh(H)(np.exp(1j * w * H)), rtol=1e-9)
+
+
+def test_units_and_numbers_of_any_kind_are_taken() -> None:
+    texts = rparm.linearize("RPPlant", at={"q1": "90 deg", "damping1": 1, "q2": "20 cm"})
+    numbers = rparm.linearize(
+        "rp_plant", at={"q1": np.pi / 2, "damping1": "1 N.m.s/rad", "q2": np.float64(0.2)}
+    )
+    np.testing.assert_array_equal(texts.A, numbers.A)
+
+
+# ---- The command ---------------------------------------------------------------------------------
+
+COMMAND = ["RPPlant", "--at", "q1=30deg", "coulomb_friction1=0.5", "--trim", "tau1", "f2"]
+
+
+def test_the_document_and_the_files_have_the_same(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [tmp_path / f"m.{kind}" for kind in ("json", "mat", "csv")]
+    command = [*COMMAND, "--step", "10ms", "--output", str(tmp_path / "page"), "--save"]
+    found = document([*command, *map(str, files)], capsys)
+    assert {"states", "inputs", "outputs", "A", "B", "C", "D", "at", "held", "poles"} <= set(found)
+    assert found["states"] == ["q2", "dq2"] and found["held"] == ["q1", "dq1"]
+    assert found["at"]["q1"] == pytest.approx(np.pi / 6)
+    assert set(found["left_out"]) == {"stop_impulse1", "stop_impulse2", "impact_loss", "grasp_loss"}
+    low, high = found["intervals"]["tau1"]
+    assert low < found["at"]["tau1"] < high
+    api = rparm.linearize(
+        "RPPlant", at={"q1": "30 deg", "coulomb_friction1": 0.5}, trim=["tau1", "f2"]
+    )
+    np.testing.assert_array_equal(found["A"], api.A)
+    assert found["zoh"]["A"] == api.zoh(0.01).A.tolist()
+
+    saved = json.loads(files[0].read_text())
+    assert saved == {key: found[key] for key in saved}
+    mat = loadmat(files[1], squeeze_me=True)
+    np.testing.assert_array_equal(mat["C"], found["C"])
+    assert mat["states"].tolist() == found["states"] and mat["zoh"]["step"] == 0.01
+    rows = list(csv.reader(files[2].open(newline="")))
+    whole = np.block([[api.A, api.B], [api.C, api.D]])
+    np.testing.assert_array_equal([[float(x) for x in row[1:]] for row in rows[1:]], whole)
+    assert rows[0] == ["", *api.states, *api.inputs]
+
+
+def test_a_page_with_pictures_explains_itself(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["ClosedLoop", "--break", "arm.tau1", "--step", "0.01", "--output", str(tmp_path)]
+    found = document(command, capsys)
+    assert found["margins"]["phase"] == pytest.approx(76.345, abs=1e-3)
+    assert found["margins"]["gain_up"] is None and found["margins"]["stable"]
+    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    for text in ("Margins", "76.345", "32.3705 ms", "Held: controller.integral1", "--break"):
+        assert text in page
+    for name in ("bode", "nyquist", "steps", "poles"):
+        assert f"{name}.png" in page and (tmp_path / f"{name}.png").stat().st_size > 5000
+
+
+def test_a_system_says_its_largest_steps(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = document(["closed_loop", "--output", str(tmp_path)], capsys)
+    steps = {(x["order"], x["inputs"]): x["step"] for x in found["largest_steps"]}
+    assert steps["jacobi", "held"] == pytest.approx(21.297e-3, rel=1e-4)
+    assert "Largest stable communication step" in (tmp_path / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "command, message",
+    [
+        (["rp_plnt"], "rp_plnt: expected a file .fmu or .ssp, or a name, did you mean 'rp_plant'"),
+        (["nowhere.fmu"], "nowhere.fmu: no such file"),
+        (["RPPlant", "--at", "q1"], "--at: expected NAME=VALUE, got 'q1'"),
+        (["RPPlant", "--at", "q1=1", "q1=2"], "--at: q1 is given twice"),
+        (["RPPlant", "--at", "q1=1x"], "q1: unknown unit 'x'"),
+        (["RPPlant", "--at", "mode1=2"], "mode1: is"),
+        (["RPPlant", "--at", "ee_x=1"], "ee_x: is an output, which --trim leads to a value"),
+        (["RPPlant", "--at", "tau1=1", "--trim", "tau1"], "--trim: tau1 has a value in --at"),
+        (["RPPlant", "--at", "stops1=rigid", "q1=3"], "q1 = 3 is refused: a start must be within"),
+        (["RPPlant", "--save", "nowhere/m.json"], "--save: nowhere/m.json: cannot be written"),
+        (["RPPlant", "--inputs", "tua1"], "inputs: no input 'tua1' to linearize, did you mean"),
+        (["RPPlant", "--outputs", "stop_impulse1"], "outputs: no output 'stop_impulse1'"),
+        (["RPPlant", "--break", "arm.tau1"], "--break: is for systems"),
+        (["RPPlant", "--step", "0"], "expected a time above 0"),
+        (["RPPlant", "--save", "m.txt"], "--save: m.txt: expected a name that ends with .json"),
+        (["RPSensor", "--at", "q1=1"], "is sampled"),
+        (["machine"], "is sampled"),
+    ],
+)
+def test_mistakes_are_one_line(
+    tmp_path: Path, command: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["linearize", *command, "--output", str(tmp_path)]) == 2
+    error = capsys.readouterr().err.strip()
+    assert message in error and "\n" not in error

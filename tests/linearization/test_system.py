@@ -1,0 +1,192 @@
+"""Systems put together from their components: poles in closed form, what is refused."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from rparm.errors import UserError
+from rparm.linearization.connections import connected
+from rparm.linearization.linear import Linear
+from rparm.linearization.margins import margins, minimal, open_loop
+from rparm.linearization.study import Request, study
+from rparm.linearization.system import SystemSubject
+from rparm.system import ssp
+from rparm.system.structure import Connection
+
+
+@contextmanager
+def opened(fmu: Path, name: str, variant: str, **options: object) -> Iterator[SystemSubject]:
+    with ExitStack() as stack:
+        unpacked = stack.enter_context(ssp.unpacked(fmu.with_name(f"{name}.ssp")))
+        yield stack.enter_context(SystemSubject(unpacked, variant, **options))
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_computed_torque_puts_all_poles_where_the_gains_say(version: str) -> None:
+    """s^2 + 40 s + 400 for both joints."""
+    found = study(Request("closed_loop", variant="nominal", version=version)).linear
+    assert found.poles == pytest.approx([-20.0] * 4, abs=1e-5)
+    assert found.held == ("controller.integral1", "controller.integral2")  # their gain is 0
+    assert found.states == ("arm.q1", "arm.q2", "arm.dq1", "arm.dq2")
+
+
+def test_it_answers_as_the_components_do_in_python_control(fmu: Path) -> None:
+    """The same system, connected by python-control."""
+    with opened(fmu, "ClosedLoop", "heavy_payload_integral") as subject:
+        parts = subject.parts({})
+        whole = connected(parts, subject.kept)
+        systems = []
+        for name, part in parts.items():
+            named = {key: [v.replace(".", "_") for v in getattr(part, key)] for key in KINDS}
+            named = {key: value for key, value in named.items() if value}
+            systems.append(control.ss(part.A, part.B, part.C, part.D, name=name, **named))
+        wires = [
+            [f"{c.end_component}.{c.end_connector}", f"{c.start_component}.{c.start_connector}"]
+            for c in subject.kept
+            if c.end_connector in parts[c.end_component].inputs
+        ]
+        one, out = "arm.tau1", ["arm.q1", "controller.f2"]
+        expected = control.interconnect(
+            systems, wires, inplist=[one], outlist=out, check_unused=False
+        )
+    chosen = whole.select([one], out)
+    for w in (0.3, 3.0, 30.0):
+        at = chosen.C @ np.linalg.solve(1j * w * np.eye(len(chosen.A)) - chosen.A, chosen.B)
+        assert at + chosen.D == pytest.approx(expected(1j * w), rel=1e-9)
+
+
+KINDS = ("inputs", "outputs", "states")
+
+
+def static(gain: float) -> Linear:
+    """A gain without states."""
+    none, one = np.zeros((0, 0)), np.zeros((0, 1))
+    empty, zero = np.zeros(0), np.zeros(1)
+    D = np.array([[gain]])
+    return Linear(
+        (), ("u",), ("y",), none, one, one.T.reshape(1, 0), D, x=empty, u=zero, y=zero, rates=empty
+    )
+
+
+def test_an_algebraic_loop_is_refused_with_its_path() -> None:
+    parts = {name: static(0.5) for name in "abc"}
+    ring = [Connection(start, "y", end, "u") for start, end in ("ab", "bc", "ca")]
+    with pytest.raises(UserError, match=r"algebraic loop: (\w\.y -> ){3}\w\.y$"):
+        connected(parts, ring)
+    chain = connected(parts, ring[:2])
+    assert chain.D[2, 0] == 0.125
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ({"variant": "pick_and_place"}, "component 'controller' is sampled"),
+        ({"variant": "wall_contact"}, "component 'sensor' is sampled.*--without sensor takes it"),
+        ({"variant": "wall_contact", "without": ["plant"]}, "has nothing to be fed by"),
+        ({"variant": "wall_contact", "without": ["sensors"]}, "did you mean 'sensor'"),
+        ({"variant": "wall"}, "no variant 'wall', did you mean 'wall_contact'"),
+        ({"cut": "plant.tua1"}, "--break: plant.tua1: no connection ends there"),
+        ({"at": {"plant.tau1": 1.0}, "variant": "stick_slip"}, "plant.tau1: is fed by a conn"),
+        ({"at": {"q1": 1.0}}, "q1: expected COMPONENT.VARIABLE"),
+        (
+            {"inputs": ["plant.q9"], **{"variant": "stick_slip", "without": ["sensor"]}},
+            "inputs: no",
+        ),
+    ],
+)
+def test_refused(options: dict, message: str) -> None:
+    with pytest.raises(UserError, match=message) as caught:
+        study(Request("machine", **options))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["RPSensor", "RPController"])
+def test_a_sampled_fmu_is_refused(name: str) -> None:
+    at = {"sample_time": "1 ms"}
+    with pytest.raises(UserError, match="is sampled"):
+        study(Request(name, at=at))
+
+
+def test_a_system_is_trimmed_with_all_loops_closed() -> None:
+    """Integral action takes the whole load, also where the loop is broken afterwards."""
+    free = ["arm.q1", "arm.q2", "controller.integral1", "controller.integral2"]
+    found = study(
+        Request("closed_loop", variant="heavy_payload_integral", free=free, cut="arm.tau1")
+    )
+    at = found.linear.at
+    assert at["arm.q1"] == pytest.approx(at["controller.q1_ref"], abs=1e-9)
+    # 0.2 kg more than the controller knows, at 0.5 m and across by 0.1 m
+    q1, g = at["arm.q1"], 9.81
+    lever = (0.5 + at["arm.q2"]) * np.cos(q1) - 0.1 * np.sin(q1)
+    known = (2 * 0.25 + 0.5 + at["arm.q2"]) * np.cos(q1) - 0.1 * np.sin(q1)
+    assert at["arm.tau1"] == pytest.approx(g * (known + 0.2 * lever), rel=1e-9)
+    assert found.margins is not None and found.margins.stable
+
+
+# ---- Margins -------------------------------------------------------------------------------------
+
+
+def test_margins_of_computed_torque_are_those_of_its_law(fmu: Path) -> None:
+    """L = (40 s + 400) / s^2: no gain margin, and the phase at the gain 1 in closed form."""
+    with opened(fmu, "ClosedLoop", "nominal", cut="arm.tau1") as subject:
+        broken = connected(subject.parts({}), subject.kept)
+    loop = open_loop(broken.select(["arm.tau1"], ["controller.tau1"]))
+    assert len(loop.states) == 2  # the other joint and integrators with gain 0 play no part
+    found = margins(loop)
+    w = np.sqrt((1600 + np.sqrt(1600**2 + 4 * 400**2)) / 2)
+    assert found.stable and found.gain_up == np.inf and found.gain_down == 0.0
+    assert [x.frequency for x in found.gain_crossings] == pytest.approx([w])
+    lag = np.arctan(w / 10)
+    assert found.phase == pytest.approx(np.degrees(lag), rel=1e-9)
+    assert found.delay == pytest.approx(lag / w, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_margins_are_those_of_python_control(seed: int) -> None:
+    """Random stable loops of order 3 to 5; and what the margins mean: at them it oscillates."""
+    source = np.random.default_rng(seed)
+    n = int(source.integers(3, 6))
+    A = source.normal(size=(n, n)) * 10
+    A -= (np.linalg.eigvals(A).real.max() + 1) * np.eye(n)
+    B, C = source.normal(size=(n, 1)), source.normal(size=(1, n)) * 20
+    loop = linear(A, B, C)
+    found = margins(loop)
+    gain, _, _, w_phase, w_gain, _ = control.stability_margins(loop.ss(), returnall=True)
+    ours = sorted(x.frequency for x in found.gain_crossings)
+    assert ours == pytest.approx(sorted(w_gain), rel=1e-6)
+    ours = sorted(1 / abs(x.value) for x in found.phase_crossings)
+    theirs = sorted(g for g, w in zip(gain, w_phase, strict=True) if w > 0)
+    assert ours == pytest.approx(theirs, rel=1e-6)
+    if found.stable and np.isfinite(found.gain_up):
+        edge = np.linalg.eigvals(A - found.gain_up * B @ C)
+        assert abs(edge.real.max()) < 1e-6 * np.abs(edge).max()
+
+
+def linear(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> Linear:
+    n, zero = len(A), np.zeros(1)
+    names = tuple(f"x{i}" for i in range(n))
+    x = np.zeros(n)
+    return Linear(names, ("u",), ("y",), A, B, C, np.zeros((1, 1)), x, zero, zero, x)
+
+
+def test_minimal_keeps_the_response_and_drops_what_plays_no_part() -> None:
+    source = np.random.default_rng(1)
+    A, B, C = source.normal(size=(4, 4)), source.normal(size=(4, 1)), source.normal(size=(1, 4))
+    whole = np.block([[A, np.zeros((4, 2))], [source.normal(size=(2, 6))]])
+    mixed = source.normal(size=(6, 6))
+    big = linear(
+        mixed @ whole @ np.linalg.inv(mixed),
+        mixed @ np.vstack([B, np.ones((2, 1))]),
+        np.hstack([C, np.zeros((1, 2))]) @ np.linalg.inv(mixed),
+    )
+    small = minimal(big)
+    assert len(small.states) == 4
+    for w in (0.1, 1.0, 10.0):
+        s = 1j * w
+        expected = C @ np.linalg.solve(s * np.eye(4) - A, B)
+        found = small.C @ np.linalg.solve(s * np.eye(4) - small.A, small.B)
+        assert found == pytest.approx(expected, rel=1e-8)

@@ -1,0 +1,118 @@
+"""Equilibria: closed forms of the arm, intervals of dry friction, what is refused."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import MODEL_EXCHANGE, Fmu
+from rparm.linearization import point
+from rparm.linearization.derivatives import FmuSubject
+from rparm.linearization.trim import Trimmed, trim
+
+M1, M2, LC1, L1, A, G = 2.0, 1.0, 0.25, 0.5, 0.1, 9.81  # start values of the arm's parameters
+FRICTION = {
+    "coulomb_friction1": 0.5,
+    "breakaway_friction1": 0.75,
+    "stribeck_velocity1": 0.05,
+    "coulomb_friction2": 1.0,
+}
+
+
+def gravity(q1: float, q2: float) -> tuple[float, float]:
+    """Efforts that hold the arm, from the heights of its centers of mass (N.m, N)."""
+    arm = (M1 * LC1 + M2 * (L1 + q2)) * math.cos(q1) - M2 * A * math.sin(q1)
+    return G * arm, G * M2 * math.sin(q1)
+
+
+@pytest.fixture(scope="module")
+def plant(fmu: Path) -> Iterator[FmuSubject]:
+    path = fmu.with_name("RPPlant.fmu")
+    with Fmu(path, kind=MODEL_EXCHANGE) as opened, FmuSubject(opened) as subject:
+        yield subject
+
+
+def trimmed(plant: FmuSubject, free: list[str], **given: object) -> Trimmed:
+    values, targets = point.checked(plant, given, with_outputs=True)
+    return trim(plant, values, free, targets)
+
+
+@pytest.mark.parametrize("pose", [(0.5, 0.3), (-1.2, 0.1), (2.0, -0.2)])
+def test_efforts_for_a_pose(plant: FmuSubject, pose: tuple[float, float]) -> None:
+    found = trimmed(plant, ["tau1", "f2"], q1=pose[0], q2=pose[1])
+    assert (found.values["tau1"], found.values["f2"]) == pytest.approx(gravity(*pose), rel=1e-9)
+    assert found.intervals == {}
+
+
+def test_pose_for_a_point_of_the_end_effector(plant: FmuSubject) -> None:
+    found = trimmed(plant, ["q1", "q2", "tau1", "f2"], ee_x="450 mm", ee_y=0.3)
+    q1, q2 = found.values["q1"], found.values["q2"]
+    along, across = np.array([math.cos(q1), math.sin(q1)]), np.array([-math.sin(q1), math.cos(q1)])
+    assert (L1 + q2) * along + A * across == pytest.approx([0.45, 0.3], abs=1e-9)
+    assert (found.values["tau1"], found.values["f2"]) == pytest.approx(gravity(q1, q2), rel=1e-8)
+
+
+@pytest.mark.parametrize("given", [{}, {"tau1": 9.0, "f2": 3.0}])
+def test_friction_holds_in_an_interval(plant: FmuSubject, given: dict[str, float]) -> None:
+    """Its ends are gravity and breakaway friction; the middle is taken."""
+    pose = {"q1": "30 deg", "q2": "300 mm"}
+    found = trimmed(plant, ["tau1", "f2"], **FRICTION, **pose)
+    expected = gravity(math.radians(30), 0.3)
+    for name, middle, friction in zip(("tau1", "f2"), expected, (0.75, 1.0), strict=True):
+        low, high = found.intervals[name]
+        assert (low, high) == pytest.approx((middle - friction, middle + friction), abs=1e-7)
+        assert found.values[name] == pytest.approx(middle, abs=1e-7)
+
+
+def test_slow_sliding_under_stribeck_friction_is_unstable(plant: FmuSubject) -> None:
+    """Friction falls with the velocity: that is stick-slip. Its pole from the falling curve."""
+    rate = 0.02
+    given = FRICTION | {"q1": 0.5, "dq1": rate, "g": 0.0, "a": 0.0, "coulomb_friction2": 1e3}
+    found = trimmed(plant, ["tau1"], **given)
+    linear = plant.at(found.values)
+    held = plant.held(linear)
+    assert held == ["q2", "dq2"]
+    fast = max(linear.without(held).poles.real)
+    inertia = M1 * LC1**2 + 0.1 + 0.05 + M2 * L1**2
+    slope = -2 * rate / 0.05**2 * 0.25 * math.exp(-((rate / 0.05) ** 2))
+    assert fast == pytest.approx(-slope / inertia, rel=1e-6)
+    assert fast > 5
+
+
+def test_a_touched_compliant_stop_gives_its_pair(plant: FmuSubject) -> None:
+    given = {"q2": 0.01, "stops2": "compliant", "upper2": 0.0, "stop_stiffness2": 400.0}
+    given |= {"g": 0.0, "a": 0.0, "coulomb_friction1": 1e3}
+    found = trimmed(plant, ["f2"], **given)
+    assert found.values["f2"] == pytest.approx(4.0)
+    linear = plant.at(found.values)
+    poles = linear.without(plant.held(linear)).poles
+    assert sorted(poles.imag) == pytest.approx([-20.0, 20.0])
+
+
+@pytest.mark.parametrize(
+    "free, given, message",
+    [
+        (["f2"], {"q1": 0.3}, "no equilibrium found by f2: the derivative of dq1 stays"),
+        (["tau1", "f2", "ee_mz"], {}, "leaves tau1, ee_mz open"),
+        (["tau1", "f2", "ee_fx"], {"q1": math.pi / 2, "a": 0.0}, "leaves tau1, ee_fx open"),
+        (["tau1", "f2"], {"ee_x": 9.0}, "ee_x stays"),
+        (["tau1", "mode1"], {}, "mode1 is no state and no input"),
+        (["tau1", "tua1"], {}, "did you mean 'tau1'?"),
+        (["tau1"], {"stop_impulse1": 0.0}, "stop_impulse1: is discrete"),
+        (["tau1"], {"D11": 0.5}, "D11: is calculated"),
+        (["tau1"], {"m2": "-1 kg"}, "m2: expected at least 1e-09 kg, got -1.0"),
+        (["tau1"], {"q1": "30 grad"}, "q1: unknown unit 'grad'"),
+        (["tau1"], {"q1": float("nan")}, "q1: expected a finite number"),
+        (["tau1"], {"q1": "nan"}, "q1: expected a number"),
+        (["tau1"], {"tau": 1.0}, "has no variable 'tau', did you mean 'tau1'?"),
+    ],
+)
+def test_refused(
+    plant: FmuSubject, free: list[str], given: dict[str, object], message: str
+) -> None:
+    with pytest.raises(UserError) as caught:
+        trimmed(plant, free, **given)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
