@@ -1,0 +1,191 @@
+"""`identify`: find parameters of an FMU that fit logs of a machine."""
+
+import argparse
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rparm import project
+from rparm.commands import Ended
+from rparm.errors import UserError, placed
+from rparm.input_files import number_in
+from rparm.options import add_report
+from rparm.output import console
+from rparm.output_files import check_writable, from_here, written
+from rparm.units import SECONDS, typed_quantity
+
+if TYPE_CHECKING:
+    from rparm.identification.identify import Identification
+    from rparm.identification.request import Request
+
+DESCRIPTION = (
+    "Fits parameters of an FMU to logs of a machine, and says how well they are known: a table, a "
+    "page, and the result as a scenario and as parameter files."
+)
+PART = "identify"
+SEGMENT = "0.4"  # s
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which FMU and logs, what is estimated, what is known."""
+    parser.add_argument("fmu", nargs="?", metavar="FMU", help="a file, or a model of the project")
+    parser.add_argument(
+        "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"
+    )
+
+    def several(option: str, name: str, text: str) -> None:
+        parser.add_argument(option, nargs="+", action="extend", default=[], metavar=name, help=text)
+
+    several("--parameters", "NAME", "to be estimated; 'NAME>OTHER': stays above OTHER")
+    several("--inputs", "NAME", "inputs that the logs have, each held over the step from its row")
+    several("--measured", "NAME", "outputs that the logs have")
+    several("--set", "NAME=VALUE", "other parameters, where they differ from the FMU's")
+    several("--start", "NAME=VALUE", "where the fit begins; of states that are not measured, too")
+    several("--columns", "NAME=COLUMN", "columns whose name is another one; time=COLUMN, too")
+    several("--units", "NAME=UNIT", "units of columns that have other ones, as deg or mm")
+    parser.add_argument(
+        "--delay", action="store_true", help="estimate by how much measured values are late, too"
+    )
+    parser.add_argument(
+        "--validate", type=Path, metavar="LOG.csv", help="run this log with the result"
+    )
+    parser.add_argument(
+        "--segment",
+        metavar="TIME",
+        default=SEGMENT,
+        help=f"length of a segment (default: {SEGMENT} s)",
+    )
+    parser.add_argument(
+        "--demo", action="store_true", help="make a log from a system of the project, and use it"
+    )
+    add_report(parser, PART)
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Identify, print a table, write page and files."""
+    from rparm.fmi.fmu_file import Fmu
+    from rparm.identification import identify, page, result_files, results
+
+    check_writable(options.report)
+    path, request, true = _asked(options)
+    with Fmu(path) as fmu:
+        console.stage("fitting")
+        found, model = identify.identify(fmu, request), fmu.model
+    _print(found, true)
+    with written(options.report):
+        options.report.mkdir(parents=True, exist_ok=True)
+        files = result_files.write(found, options.report, model)
+        files.append(page.write(found, options.report, model, true, _again(options)))
+    verdict = (
+        f"identified: {len(found.estimates)} parameters, page {from_here(files[-1])}"
+        if found.has_converged
+        else f"failed: the fit has not converged in {found.steps} steps"
+    )
+    document = results.document(found) | {"files": [file.absolute() for file in files]}
+    return Ended(0 if found.has_converged else 1, verdict, document, page=files[-1])
+
+
+def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, float]]:
+    """FMU and request of the options; the parameters' true values, as far as they are known."""
+    from rparm.identification import demo
+    from rparm.identification.request import Request
+
+    if options.demo:
+        if options.fmu or options.parameters or options.measured:
+            raise UserError("--demo: has a log, an FMU and parameters of its own")
+        console.stage("making a log")
+        folder = options.report
+        with written(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        made = demo.make(folder)
+        print(f"log: {from_here(made.request.logs[0])}")
+        return made.fmu, made.request, dict(made.true)
+    if not options.fmu or not options.logs:
+        raise UserError("expected an FMU and a log (--help explains)")
+    with placed("--segment"):
+        segment = typed_quantity(options.segment, SECONDS)
+    request = Request(
+        logs=options.logs,
+        parameters=_names(options.parameters),
+        inputs=_names(options.inputs),
+        measured=_names(options.measured),
+        settings=_values("--set", options.set),
+        starts=_values("--start", options.start),
+        columns=_pairs("--columns", options.columns),
+        units=_pairs("--units", options.units),
+        with_delay=options.delay,
+        validation=options.validate,
+        segment=segment,
+    )
+    return _fmu(options.fmu), request, {}
+
+
+def _fmu(given: str) -> Path:
+    """A file, or the FMU of a model of the project."""
+    path = Path(given)
+    if path.suffix.lower() == ".fmu":
+        return path
+    return project.built(project.model(given), ".fmu")
+
+
+def _again(options: argparse.Namespace) -> str:
+    """What to type for it, in the project's folder."""
+    parts = [project.PROGRAM, "identify"]
+    files = [options.fmu, *options.logs] if options.fmu else []
+    parts += [str(project.from_root(Path(file))) for file in files]
+    for name in ("parameters", "inputs", "measured", "set", "start", "columns", "units"):
+        given = getattr(options, name)
+        parts += [f"--{name}", *given] if given else []
+    if options.validate is not None:
+        parts += ["--validate", str(project.from_root(options.validate))]
+    parts += ["--segment", options.segment] if options.segment != SEGMENT else []
+    parts += [f"--{name}" for name in ("delay", "demo") if getattr(options, name)]
+    return shlex.join(parts)
+
+
+def _names(given: Sequence[str]) -> list[str]:
+    """Names between commas, or given one by one."""
+    return [name.strip() for text in given for name in text.split(",") if name.strip()]
+
+
+def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise UserError(f"{option}: expected NAME=VALUE, got {text!r}")
+        if name in found:
+            raise UserError(f"{option}: {name!r} is there twice")
+        found[name] = value
+    return found
+
+
+def _values(option: str, given: Sequence[str]) -> dict[str, Any]:
+    return {name: _value(text) for name, text in _pairs(option, given).items()}
+
+
+def _value(text: str) -> float | bool | str:
+    """A number, a truth, or a text: with a unit, or the name of an item."""
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        return number_in(text)
+    except ValueError:
+        return text
+
+
+def _print(found: "Identification", true: dict[str, float]) -> None:
+    from rparm.identification import results
+
+    rows = results.rows(found, true)
+    titles = ["value", "low", "high", *(["true"] if true else [])]
+    columns = dict.fromkeys(titles, 10) | {"unit": 9}
+    table = console.Table("parameter", [row[0] for row in rows], columns, result=0)
+    for name, cells, unit in rows:
+        table.row(name, [*cells, unit])
+    second = found.validation
+    also = "" if second is None else f", of the second log {second.chi2:.3g}"
+    print(f"chi2: {found.chi2:.3g}{also} (1: only noise is left)")
+    for text in found.warnings:
+        console.remark(text)

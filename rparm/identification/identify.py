@@ -1,0 +1,263 @@
+"""Identification in one call: from what is asked for to what is known."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rparm.errors import UserError
+from rparm.fmi.fmu_file import Fmu
+from rparm.identification import fit, logs, start_states
+from rparm.identification.combinations import Combination, Effects, combinations
+from rparm.identification.intervals import Covariances, Reduced, covariances, reduced
+from rparm.identification.logs import Recording, Segment
+from rparm.identification.parameters import DELAY, Parameters
+from rparm.identification.request import Checked, Request, checked
+from rparm.identification.residuals import Problem
+from rparm.identification.simulator import Simulator
+from rparm.identification.validation import Validation, validate
+from rparm.identification.whiteness import Whiteness, whiteness
+
+LEAD = 0.1  # of a segment: the longest delay
+WIDEST = np.log(1e6)  # of a distance from a limit: beyond, one end of an interval is not known
+FEWEST_SEGMENTS = 5  # for intervals by scatter
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % intervals; None where it cannot be known."""
+
+    value: float
+    low: float | None
+    high: float | None
+    classical: tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What a fit has found."""
+
+    fmu: Path
+    model: str
+    request: Request
+    checked: Checked
+    recordings: Sequence[Recording]
+    segments: Sequence[Segment]  # of all recordings
+    of_first: int  # how many of them are of the first recording
+    states: Sequence[str]
+    start_states: np.ndarray  # (segments, states)
+    predicted: Sequence[np.ndarray]  # (rows, outputs) of each segment
+    estimates: Mapping[str, Estimate]  # of the parameters
+    sums: Mapping[str, Estimate]  # of parameters of which only the sum is known
+    combinations: Sequence[Combination]
+    at_limit: Sequence[str]
+    known: Sequence[str]  # that covariances are of
+    covariances: Covariances
+    noise: np.ndarray  # (outputs,) of the measured values, whatever they follow
+    whiteness: Mapping[str, Whiteness]
+    validation: Validation | None
+    steps: int
+    has_converged: bool
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values of the FMU's parameters that were estimated."""
+        return {name: x.value for name, x in self.estimates.items() if name != DELAY}
+
+    @property
+    def chi2(self) -> float:
+        """Sum of the squared residuals in their noise, by degrees of freedom; 1: only noise."""
+        return self.covariances.variance
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader of the results must know."""
+        texts = []
+        if not self.has_converged:
+            texts.append(f"The fit has not converged in {self.steps} steps.")
+        if len(self.segments) < FEWEST_SEGMENTS:
+            texts.append(
+                f"{len(self.segments)} segments are too few for intervals by scatter: "
+                "a longer log, or a shorter segment, gives more."
+            )
+        if self.covariances.is_suspicious:
+            texts.append(
+                f"Intervals by scatter are {self.covariances.ratio:.1f} times as wide as the "
+                "classical ones: efforts or model are not exact."
+            )
+        colored = [name for name, test in self.whiteness.items() if not test.is_white]
+        if colored:
+            texts.append(
+                f"Residuals of {', '.join(colored)} are not white: more than noise is left."
+            )
+        texts += [f"{name} has come to its limit." for name in self.at_limit]
+        texts += [f"Cannot be known: {combination}." for combination in self.combinations]
+        return texts
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """Where the fit has ended, and what is left there."""
+
+    solution: fit.Solution
+    start_states: np.ndarray  # (segments, states)
+    predicted: Sequence[np.ndarray]  # (rows, outputs) of each segment
+    pieces: Sequence[Reduced]  # of each segment
+    rounding: float  # of the pieces' derivatives
+
+
+def identify(fmu: Fmu, request: Request) -> Identification:
+    """Fit parameters of an FMU to logs.
+
+    UserError if something in the request or in a log is wrong, or the FMU does not run.
+    """
+    known = checked(request, fmu)
+    lead = LEAD * request.segment if request.with_delay else 0.0
+    columns = known.reals, known.switches, known.outputs, request.columns.get("time", "time")
+    recordings = [logs.read(path, *columns) for path in request.logs]
+    cut = [logs.segments(recording, request.segment, lead) for recording in recordings]
+    segments, noise = [segment for each in cut for segment in each], logs.noise(recordings)
+    fitted = _fitted(fmu, request, known, segments, noise)
+    z, parameters = fitted.solution.z, known.parameters
+    if request.with_delay:
+        _check_delay(parameters.values(z)[parameters.names.index(DELAY)], lead)
+
+    # what is known
+    at_limit = parameters.at_limit(z)
+    effects = np.vstack([piece.by_parameters for piece in fitted.pieces])
+    effects = Effects(np.where(at_limit, 0.0, effects), fitted.rounding)
+    limits = [name for name, is_there in zip(parameters.names, at_limit, strict=True) if is_there]
+    unknown = [
+        each
+        for each in combinations(effects, np.diag(parameters.slopes(z)), parameters.names)
+        if not (len(each.names) == 1 and each.names[0] in limits)
+    ]
+    spread = covariances(fitted.pieces, effects.basis)
+    estimates, sums = _estimates(parameters, z, effects.basis, spread, unknown)
+    values = {name: x.value for name, x in estimates.items()}
+    tests = whiteness(fitted.pieces, len(noise))
+    second = request.validation and validate(fmu, request, known, values, noise)
+    return Identification(
+        fmu=fmu.path,
+        model=fmu.model.name,
+        request=request,
+        checked=known,
+        recordings=recordings,
+        segments=segments,
+        of_first=len(cut[0]),
+        states=start_states.states(fmu),
+        start_states=fitted.start_states,
+        predicted=fitted.predicted,
+        estimates=estimates,
+        sums=sums,
+        combinations=unknown,
+        at_limit=limits,
+        known=[parameters.names[i] for i in effects.basis],
+        covariances=spread,
+        noise=noise,
+        whiteness=dict(zip(known.outputs, tests, strict=True)),
+        validation=second,
+        steps=fitted.solution.steps,
+        has_converged=fitted.solution.has_converged,
+    )
+
+
+def _fitted(
+    fmu: Fmu, request: Request, known: Checked, segments: Sequence[Segment], noise: np.ndarray
+) -> _Fitted:
+    """Fit parameters and start states."""
+    names = list(known.reals), list(known.switches), list(known.outputs)
+    states = start_states.states(fmu)
+    with Simulator(
+        fmu, known.names, states, *names, known.settings, request.tolerance
+    ) as simulator:
+        guessed = start_states.guess(fmu, segments, names[2], known.starts)
+        guessed = start_states.admitted(simulator, segments, known.parameters, guessed)
+        scales = start_states.scales(guessed)
+        problem = Problem(simulator, known.parameters, segments, noise, scales)
+        found = fit.fit(problem, guessed / scales)
+        pieces = [reduced(each) for each in problem.linear(found.z, found.x, True)]
+        predicted = [
+            problem.predicted(segment, found.z, x)
+            for segment, x in zip(segments, found.x, strict=True)
+        ]
+    return _Fitted(found, found.x * scales, predicted, pieces, problem.rounding())
+
+
+def _check_delay(delay: float, longest: float) -> None:
+    if abs(delay) > longest:
+        raise UserError(
+            f"{DELAY}: {delay:.4g} s is longer than {longest:.4g} s, a tenth of a segment"
+        )
+
+
+def _estimates(
+    parameters: Parameters,
+    z: np.ndarray,
+    basis: np.ndarray,
+    spread: Covariances,
+    unknown: Sequence[Combination],
+) -> tuple[dict[str, Estimate], dict[str, Estimate]]:
+    """Estimates of all parameters, and of sums of them."""
+    values, unclear = parameters.values(z), {name for each in unknown for name in each.names}
+    widths = [np.zeros(len(z)), np.zeros(len(z))]
+    for width, halves in zip(widths, (spread.halves, spread.classical_halves), strict=True):
+        width[basis] = halves
+    ends = [_ends(parameters, z, basis, *pair) for pair in zip(
+        widths, (spread.scatter, spread.classical), strict=True)]  # fmt: skip
+    found = {}
+    for i, name in enumerate(parameters.names):
+        is_known = i in basis and name not in unclear
+        (low, high), classical = (tuple(each[i].tolist()) for each in ends)
+        found[name] = (
+            Estimate(float(values[i]), low, high, classical)
+            if is_known
+            else Estimate(float(values[i]), None, None, None)
+        )
+    sums = {}
+    for each in unknown:
+        shared = [other for other in unknown if set(other.names) & set(each.names)]
+        if each.effects is None or len(each.names) == 1 or len(shared) > 1:
+            continue
+        indices = [parameters.names.index(name) for name in each.names]
+        total = float(values[indices] @ np.sign(each.effects))
+        known = next(i for i in indices if i in basis)
+        sign = np.sign(each.effects[indices.index(known)])
+        moved = [total + sign * (end[known] - values[known]) for end in ends]
+        (low, high), classical = (tuple(sorted(each.tolist())) for each in moved)
+        sums[str(each)] = Estimate(total, low, high, classical)
+    return found, sums
+
+
+def _ends(
+    parameters: Parameters,
+    z: np.ndarray,
+    basis: np.ndarray,
+    widths: np.ndarray,
+    covariance: np.ndarray,
+) -> np.ndarray:
+    """Ends (parameters, 2) of the intervals, in the parameters' units.
+
+    Parameters
+    ----------
+    widths : ndarray, shape (parameters,)
+        Half intervals of the fit's numbers.
+    covariance : ndarray, shape (known, known)
+        Of those at `basis`.
+    """
+    ends = np.empty((len(z), 2))
+    slopes = parameters.slopes(z)[:, basis]
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    for i, parameter in enumerate(parameters.every):
+        moved = np.zeros(len(z))
+        moved[i] = widths[i]
+        ends[i] = sorted(parameters.values(z + sign * moved)[i] for sign in (-1, 1))
+        if parameter.greatest == np.inf and parameters.is_limited[i] and widths[i] > WIDEST:
+            ends[i, 1] = np.inf
+        if parameter.above in parameters.names and i in basis:
+            # it moves with the one that it is above
+            factor = widths[i] / deviations[list(basis).index(i)]
+            half = factor * np.sqrt(slopes[i] @ covariance @ slopes[i])
+            ends[i] = parameters.values(z)[i] + np.array([-half, half])
+    return ends

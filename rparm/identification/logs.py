@@ -1,0 +1,190 @@
+"""Segments of logs: rows between gaps, cut into pieces of equal length."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rparm.errors import UserError
+from rparm.scenarios import logs
+
+LENGTH = 0.4  # s, of a segment
+FEWEST_ROWS = 20  # of a segment
+MISSING = 1.5  # steps: rows are missing in a longer one
+GAP = 0.05  # of a segment: in a longer one the inputs are unknown
+MOST_ROWS = 2_000_000
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where the values of a variable are: name in the log, and what 1 in it is."""
+
+    name: str
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What of a log is used, with rows put in where few are missing."""
+
+    path: Path
+    times: np.ndarray  # (rows,) s, increasing
+    inputs: np.ndarray  # (rows, Real inputs), each held over the step from its row
+    switches: np.ndarray  # (rows, Boolean inputs) int32, the same
+    measured: np.ndarray  # (rows, outputs); NaN in rows that were put in
+    step: float  # s, the usual one
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """Consecutive rows of a recording, simulated from a start state of their own."""
+
+    times: np.ndarray  # (rows,)
+    inputs: np.ndarray  # (rows, Real inputs)
+    switches: np.ndarray  # (rows, Boolean inputs)
+    measured: np.ndarray  # (rows, outputs)
+    first: int  # row from which on measured values count: those before are only simulated
+
+    @property
+    def counts(self) -> np.ndarray:
+        """Rows (rows,) whose measured values count."""
+        rows = np.isfinite(self.measured).all(axis=1)
+        rows[: self.first] = False
+        return rows
+
+
+def read(
+    path: Path,
+    reals: Mapping[str, Column],
+    switches: Mapping[str, Column],
+    outputs: Mapping[str, Column],
+    time: str = "time",
+) -> Recording:
+    """Read a log's columns of inputs and outputs.
+
+    UserError if one is not there, holds what is no number, or does not change where it should.
+    """
+    log = logs.read(path)
+
+    def table(columns: Mapping[str, Column]) -> np.ndarray:
+        read = [column.scale * log.columns(time, column.name)[1] for column in columns.values()]
+        return np.column_stack(read) if read else np.empty((len(times), 0))
+
+    first = next(iter(outputs.values()))
+    times = log.columns(time, first.name)[0]
+    if len(times) > MOST_ROWS:
+        raise UserError(f"{path}: has {len(times)} rows, expected at most {MOST_ROWS}")
+    measured, on = table(outputs), table(switches)
+    for name, values in zip(outputs, measured.T, strict=True):
+        if np.ptp(values) == 0:
+            column = outputs[name].name
+            raise UserError(
+                f"{path}: column {column!r} is constant, {values[0]:g}: it tells nothing"
+            )
+    for name, values in zip(switches, on.T, strict=True):
+        if not np.isin(values, (0, 1)).all():
+            raise UserError(f"{path}: column {switches[name].name!r}: expected 0 or 1")
+    return _filled(Path(path), times, table(reals), on, measured)
+
+
+def _filled(
+    path: Path, times: np.ndarray, inputs: np.ndarray, switches: np.ndarray, measured: np.ndarray
+) -> Recording:
+    """Put rows in where few are missing; inputs are linear there."""
+    if len(times) < FEWEST_ROWS:
+        raise UserError(f"{path}: has {len(times)} rows, a segment needs {FEWEST_ROWS}")
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    counts = np.ones(len(steps), int)
+    short = (steps > MISSING * usual) & (steps <= max(GAP * LENGTH, 2 * usual))
+    counts[short] = np.rint(steps[short] / usual).astype(int)
+    if (counts == 1).all():
+        return Recording(path, times, inputs, switches.astype(np.int32), measured, usual)
+    # place of each new row, in old rows
+    places = np.append(
+        np.concatenate([i + np.arange(n) / n for i, n in enumerate(counts)]), len(steps)
+    )
+    old = np.arange(len(times))
+    there = places == np.floor(places)
+    filled = np.full((len(places), measured.shape[1]), np.nan)
+    filled[there] = measured
+    columns = [np.interp(places, old, values) for values in inputs.T]
+    return Recording(
+        path,
+        np.interp(places, old, times),
+        np.column_stack(columns) if columns else np.empty((len(places), 0)),
+        switches[np.floor(places).astype(int)].astype(np.int32),
+        filled,
+        usual,
+    )
+
+
+def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Segment]:
+    """Cut a recording at its gaps, and what is between them into pieces of about `length`.
+
+    UserError if nothing is long enough.
+
+    Parameters
+    ----------
+    length, lead : float
+        s; a segment is simulated from `lead` before its first measured value that counts.
+    """
+    times = recording.times
+    gaps = np.flatnonzero(np.diff(times) > max(GAP * length, 2 * recording.step)) + 1
+    found: list[Segment] = []
+    for begin, end in zip([0, *gaps], [*gaps, len(times)], strict=True):
+        span = times[end - 1] - times[begin] - lead
+        pieces = int((span + 0.5 * recording.step) // length)
+        if pieces < 1:
+            continue
+        cuts = times[begin] + lead + span * np.arange(pieces + 1) / pieces
+        rows = np.searchsorted(times[begin:end], cuts - 1e-9 * span) + begin
+        rows[-1] = end
+        for first, last in zip(rows[:-1], rows[1:], strict=True):
+            start = int(np.searchsorted(times, times[first] - lead - 1e-9 * span))
+            segment = _segment(recording, max(start, begin), int(first), int(last))
+            if np.count_nonzero(segment.counts) >= FEWEST_ROWS:
+                found.append(segment)
+    if not found:
+        longest = max(np.diff([times[0], *times[gaps - 1], *times[gaps], times[-1]]), default=0.0)
+        raise UserError(
+            f"{recording.path}: has {longest:.4g} s without a gap, a segment needs "
+            f"{length + lead:.4g} s and {FEWEST_ROWS} rows"
+        )
+    return found
+
+
+def _segment(recording: Recording, start: int, first: int, last: int) -> Segment:
+    rows = slice(start, last)
+    return Segment(
+        np.ascontiguousarray(recording.times[rows]),
+        np.ascontiguousarray(recording.inputs[rows]),
+        np.ascontiguousarray(recording.switches[rows]),
+        recording.measured[rows],
+        first - start,
+    )
+
+
+def noise(recordings: Sequence[Recording]) -> np.ndarray:
+    """Standard deviation (outputs,) of the measured values' noise, whatever they follow.
+
+    The third differences of what is smooth are small, those of noise are its square root of 20
+    times. A log in counts has at least the noise of rounding.
+    """
+    measured = [r.measured[np.isfinite(r.measured).all(axis=1)] for r in recordings]
+    third = np.vstack([np.diff(values, 3, axis=0) for values in measured])
+    found = np.sqrt(np.median(third**2, axis=0) / (20 * 0.4549))  # median of chi-squared, 1 d.o.f.
+    every = np.vstack(measured)
+    for i, values in enumerate(every.T):
+        differences = np.abs(np.diff(np.unique(values)))
+        found[i] = max(found[i], _count(differences) / np.sqrt(12), 1e-9 * np.ptp(values))
+    return found
+
+
+def _count(differences: np.ndarray) -> float:
+    """The difference of which all others are multiples, or 0."""
+    smallest = float(differences.min())
+    ratio = differences / smallest
+    is_grid = np.abs(ratio - np.rint(ratio)).max() < 1e-3 and len(np.unique(np.rint(ratio))) > 1
+    return smallest if is_grid or len(differences) < 100 else 0.0

@@ -1,0 +1,173 @@
+"""The page of an identification."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from rparm.fmi.model import Model
+from rparm.identification import figures, results
+from rparm.identification.identify import Identification
+from rparm.identification.parameters import DELAY
+from rparm.report import assets
+from rparm.report.overview import FAILED, RAN
+from rparm.report.pages import INDEX, RunPage, Table, write_page
+from rparm.report.run_data import Curve, Plot, RunData, thinned
+from rparm.report.style import save
+from rparm.texts import number, unit
+
+PICTURE = "correlations.png"
+
+
+def write(
+    found: Identification, folder: Path, model: Model, true: Mapping[str, float], again: str
+) -> Path:
+    """Write the page and its picture into a folder; its path. `again` is what makes it again."""
+    picture = figures.figure(found.whiteness, found.known, found.covariances.scatter)
+    save(picture, folder / PICTURE)
+    assets.write(folder)
+    logs = ", ".join(recording.path.name for recording in found.recordings)
+    page = RunPage(
+        title=f"{found.model}: identified parameters",
+        description=f"Fitted to {logs}: multiple shooting, a start state of its own each segment.",
+        status=RAN if found.has_converged else FAILED,
+        facts=[
+            ("model", found.model),
+            ("rows", str(sum(int(segment.counts.sum()) for segment in found.segments))),
+            ("segments", f"{len(found.segments)} of {number(found.request.segment)} s"),
+            ("chi2", f"{found.chi2:.4g} (1: only noise is left)"),
+            ("steps", str(found.steps)),
+        ],
+        data=_data(found, model),
+        tables=_tables(found, model, true),
+        failures=found.warnings,
+        diagram=(PICTURE, "Autocorrelations of the residuals, correlations of the parameters"),
+        again=again,
+        overview=False,
+    )
+    values = {"root": "", "page": page, "data": page.data and page.data.json()}
+    return write_page(folder / INDEX, "run.html", **values)
+
+
+# ---- Plots ---------------------------------------------------------------------------------------
+
+
+def _data(found: Identification, model: Model) -> RunData:
+    """Residuals and measured over simulated values of the first log, and of the second."""
+    shown = found.segments[: found.of_first]
+    times = np.concatenate([segment.times[segment.counts] for segment in shown])
+    measured = np.vstack([segment.measured[segment.counts] for segment in shown])
+    predicted = np.vstack(
+        [values[s.counts] for s, values in zip(shown, found.predicted, strict=False)]
+    )
+    plots = []
+    for k, name in enumerate(found.checked.outputs):
+        text = unit(model.variables[name].unit)
+        both = Curve("simulated", predicted[:, k], reference=measured[:, k])
+        plots.append(Plot(name, text, [both], note="Below it: what was measured."))
+        left = Curve("residual", predicted[:, k] - measured[:, k])
+        plots.append(Plot(f"residuals of {name}", text, [left]))
+    if found.validation is not None:
+        plots += _validation(found, model, times)
+    kept = thinned([values for plot in plots for values in plot.columns])
+    return RunData("identification", found.model, times[kept], [plot.at(kept) for plot in plots])
+
+
+def _validation(found: Identification, model: Model, times: np.ndarray) -> list[Plot]:
+    """The second log, from its start, over the times of the first."""
+    second = found.validation
+    assert second is not None
+    own = second.times - second.times[0] + times[0]
+    plots = []
+    for k, name in enumerate(found.checked.outputs):
+        there = np.isfinite(second.measured[:, k])
+        simulated = np.interp(times, own, second.predicted[:, k], right=np.nan)
+        measured = np.interp(times, own[there], second.measured[there, k], right=np.nan)
+        text = unit(model.variables[name].unit)
+        curve = Curve("simulated", simulated, reference=measured)
+        note = "The second log, in one go from its start. Below it: what was measured."
+        plots.append(Plot(f"validation: {name}", text, [curve], note=note))
+    return plots
+
+
+# ---- Tables --------------------------------------------------------------------------------------
+
+
+def _tables(found: Identification, model: Model, true: Mapping[str, float]) -> list[Table]:
+    return [
+        _parameters(found, true),
+        _outputs(found, model),
+        *([] if found.validation is None else [_second(found, model)]),
+    ]
+
+
+def _parameters(found: Identification, true: Mapping[str, float]) -> Table:
+    head = ["parameter", "value", "low", "high", "classical low", "classical high", "start", "unit"]
+    rows = []
+    for parameter in found.checked.parameters.every:
+        cells = results.texts(found.estimates[parameter.name])
+        start = results.text(parameter.start)
+        rows.append([parameter.name, *cells, start, unit(parameter.unit)])
+    for each in found.combinations:
+        if str(each) in found.sums:
+            rows.append([str(each), *results.texts(found.sums[str(each)]), "–", ""])
+    if true:
+        head.insert(2, "true")
+        for row in rows:
+            row.insert(2, results.text(true.get(str(row[0]))))
+    return Table(
+        "Parameters",
+        head,
+        rows,
+        "Intervals of 95 %. The first ones follow from the scatter between segments; the classical "
+        "ones take residuals for white noise.",
+    )
+
+
+def _outputs(found: Identification, model: Model) -> Table:
+    head = ["output", "noise", "residuals", "unit", "Ljung-Box", "p", "white"]
+    rows = []
+    differences = [
+        (values - segment.measured)[segment.counts]
+        for values, segment in zip(found.predicted, found.segments, strict=True)
+    ]
+    every = np.vstack(differences)
+    for (name, test), noise, values in zip(
+        found.whiteness.items(), found.noise, every.T, strict=True
+    ):
+        rms = float(np.sqrt(np.mean(values**2)))
+        sizes = f"{noise:.3g}", f"{rms:.3g}", unit(model.variables[name].unit)
+        is_white = "yes" if test.is_white else "no"
+        rows.append([name, *sizes, f"{test.statistic:.4g}", f"{test.p:.2g}", is_white])
+    return Table(
+        "Measured outputs",
+        head,
+        rows,
+        "Noise: of what was measured, whatever it follows, from its third differences and counts. "
+        f"Residuals: root mean square. Ljung-Box: over {_lags(found)} lags; p is the probability "
+        "of noise to look like this, below 0.01 it is not taken for noise.",
+    )
+
+
+def _lags(found: Identification) -> int:
+    return max(len(test.correlations) for test in found.whiteness.values())
+
+
+def _second(found: Identification, model: Model) -> Table:
+    second = found.validation
+    assert second is not None
+    rows = [
+        [name, f"{rms:.3g}", unit(model.variables[name].unit), f"{follows:.2f} s"]
+        for name, rms, follows in zip(
+            found.checked.outputs, second.rms, second.follows, strict=True
+        )
+    ]
+    late = " and the delay" if DELAY in found.estimates else ""
+    return Table(
+        f"Validation on {second.recording.path.name}",
+        ["output", "RMS of the error", "unit", "follows for"],
+        rows,
+        f"Run in one go with these parameters{late}; only the start state is fitted. An "
+        "unstable motion runs away after a while, however exact they are; it is followed until the "
+        f"error is a tenth of the range. Its segments by themselves have chi2 = {second.chi2:.4g}.",
+    )

@@ -1,0 +1,103 @@
+"""The result as files: a scenario that runs the log again, and the parameters as TOML and SSV."""
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from rparm import project
+from rparm.errors import UserError
+from rparm.fmi.model import Model, Value
+from rparm.identification.identify import Identification
+from rparm.identification.parameters import DELAY
+from rparm.output_files import whole
+
+SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"
+TYPES = ("Real", "Integer", "Boolean")  # of an SSV that all engines read
+
+
+def write(found: Identification, folder: Path, model: Model) -> list[Path]:
+    """Write the files; their paths. A scenario is of a model of the project only."""
+    values = {**found.checked.settings, **found.values}
+    texts = {PARAMETERS: _parameters(values, model), PARAMETER_SET: _set(values, model)}
+    try:
+        project.model(found.model)
+    except UserError:
+        (folder / SCENARIO).unlink(missing_ok=True)  # of another model
+    else:
+        texts[SCENARIO] = "\n".join(_scenario(found, folder, model, values))
+    for name, text in texts.items():
+        with whole(folder / name) as path:
+            path.write_text(text, encoding="utf-8", newline="\n")
+    return [folder / name for name in texts]
+
+
+def _parameters(values: dict[str, Value], model: Model) -> str:
+    lines = [f"{name} = {_toml(model.variables[name].written(x))}" for name, x in values.items()]
+    return "\n".join(["[parameters]", *lines, ""])
+
+
+def _toml(value: Value) -> str:
+    return json.dumps(value, ensure_ascii=False)  # numbers have all their digits
+
+
+def _set(values: dict[str, Value], model: Model) -> str:
+    """A parameter set of SSP 1.0."""
+    rows = [
+        f"    <ssv:Parameter name={quoteattr(name)}>"
+        f"<ssv:{kind} value={quoteattr(_toml(value))}/></ssv:Parameter>"
+        for name, value in values.items()
+        if (kind := model.variables[name].type) in TYPES
+    ]
+    head = (
+        '<?xml version="1.0" encoding="UTF-8"?>\n'
+        '<ssv:ParameterSet version="1.0" name="identified"\n'
+        '    xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">\n'
+    )
+    body = "\n".join(["  <ssv:Parameters>", *rows, "  </ssv:Parameters>"])
+    return f"{head}{body}\n</ssv:ParameterSet>\n"
+
+
+def _scenario(
+    found: Identification, folder: Path, model: Model, values: dict[str, Value]
+) -> Iterator[str]:
+    """Lines of a scenario over the first log, from its first segment's start state."""
+    log, times = found.recordings[0], found.recordings[0].times
+    start = float(found.segments[0].times[0])
+    steps = max(round((float(times[-1]) - start) / log.step), 1)
+    yield f"model = {_toml(project.model(found.model).name)}"
+    yield f"title = {_toml(f'Identified: {log.path.name}')}"
+    yield f"description = {_toml(f'Parameters fitted to {log.path.name}, compared with it')}"
+    yield f"tolerance = {found.request.tolerance!r}"
+    if DELAY in found.estimates:
+        late = found.estimates[DELAY].value
+        yield f"# what was measured is {late:.6g} s late: the comparison does not know it"
+    yield f"\n[time]\nstart = {start!r}\nstop = {float(times[-1])!r}"
+    yield f"step = {(float(times[-1]) - start) / steps:.12g}\n"
+    yield _parameters(values, model)
+    yield "[initial]"
+    for name, value in zip(found.states, found.start_states[0].tolist(), strict=True):
+        yield f"{name} = {value!r}"
+    file, time = _relative(log.path, folder), found.request.columns.get("time", "time")
+    checked = found.checked
+    for section, columns in (
+        ("inputs", {**checked.reals, **checked.switches}),
+        ("measured", checked.outputs),
+    ):
+        for name, column in columns.items():
+            yield f"\n[{section}.{name}]\nfile = {_toml(file)}\ncolumn = {_toml(column.name)}"
+            yield f"time = {_toml(time)}"
+            if section == "inputs":
+                yield "hold = true"
+            if column.scale != 1.0:
+                yield f"scale = {column.scale!r}"
+    yield ""
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """A path as it is from a folder; in full where there is no way, on another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return path.absolute().as_posix()

@@ -1,0 +1,210 @@
+"""Identification finds the parameters that made a log, and says how well it knows them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rparm
+from tests.identification import ripple
+from tests.identification.synthetic import ARM, INPUTS, MEASURED, PLANT, Machine, identified, write
+
+# ---- what is found -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("machine", [ARM, PLANT], ids=["arm", "plant"])
+def test_parameters_are_found_from_20_percent_off(machine: Machine, tmp_path: Path) -> None:
+    found = identified(machine, write(machine, tmp_path / "log.csv", 1), 1)
+    assert found.has_converged and found.warnings == []
+    assert 0.9 < found.chi2 < 1.1
+    for name, true in machine.true.items():
+        estimate = found.estimates[name]
+        half = (estimate.high - estimate.low) / 2
+        assert estimate.low < estimate.value < estimate.high
+        assert abs(estimate.value - true) < 2 * half  # four standard deviations
+        assert half < 0.02 * true
+
+
+def test_exact_logs_give_exact_parameters(tmp_path: Path) -> None:
+    machine = replace(ARM, noise=(0.0, 0.0), duration=4.0)
+    found = identified(machine, write(machine, tmp_path / "log.csv", 3), 3)
+    for name, true in machine.true.items():
+        assert found.estimates[name].value == pytest.approx(true, rel=1e-6)
+
+
+def test_fmi_3_finds_the_same(tmp_path: Path) -> None:
+    log = write(replace(ARM, duration=2.0), tmp_path / "log.csv", 3)
+    both = [
+        rparm.identify(
+            rparm.fmu("RPManipulator", version),
+            log,
+            parameters=["m2", "a"],
+            inputs=INPUTS,
+            measured=MEASURED,
+            settings={name: ARM.true[name] for name in ("I1z", "l1")},
+        ).values
+        for version in (2, 3)
+    ]
+    assert both[0] == both[1]
+
+
+def test_several_logs_tell_more_than_one(tmp_path: Path) -> None:
+    short = replace(ARM, duration=3.0)
+    logs = [write(short, tmp_path / f"{seed}.csv", seed) for seed in (4, 5, 6)]
+    one, three = identified(short, logs[0]), identified(short, logs)
+    for name, true in ARM.true.items():
+        narrow, wide = three.estimates[name], one.estimates[name]
+        assert narrow.high - narrow.low < 0.8 * (wide.high - wide.low)
+        assert abs(narrow.value - true) < narrow.high - narrow.low
+    assert len(three.segments) == 3 * len(one.segments)
+
+
+def test_missing_rows_and_irregular_times(tmp_path: Path) -> None:
+    whole = write(replace(ARM, duration=4.0), tmp_path / "whole.csv", 7)
+    table = np.loadtxt(whole, delimiter=",", skiprows=1)
+    random = np.random.default_rng(7)
+    kept = random.random(len(table)) > 0.02  # single rows are missing
+    kept[2000:2300] = False  # and a whole part
+    kept[2500:3000:2] = False  # half of the rows: other steps
+    path = tmp_path / "log.csv"
+    names = whole.read_text().splitlines()[0]
+    np.savetxt(path, table[kept], fmt="%.17g", delimiter=",", header=names, comments="")
+    found = identified(ARM, path, 7)
+    assert found.has_converged and 0.8 < found.chi2 < 1.2
+    for name, true in ARM.true.items():
+        estimate = found.estimates[name]
+        assert abs(estimate.value - true) < estimate.high - estimate.low
+
+
+def test_a_delay_is_found(tmp_path: Path) -> None:
+    machine = replace(PLANT, late=1.4e-3, noise=(2e-5, 2e-5))
+    log = write(machine, tmp_path / "log.csv", 8)
+    found = identified(machine, log, 8, delay=True)
+    late = found.estimates["delay"]
+    assert late.low < 1.4e-3 < late.high < 1.5e-3
+    ignored = identified(machine, log, 8)
+    wrong = [
+        name
+        for name, true in machine.true.items()
+        if not ignored.estimates[name].low < true < ignored.estimates[name].high
+    ]
+    assert wrong and ignored.warnings  # what is left out is seen
+
+
+def test_joints_that_start_at_a_stop(tmp_path: Path) -> None:
+    # the slide strikes its stops and rests there: measured a hair beyond
+    settings = {"stops2": "rigid", "restitution2": 0.3, "lower2": -0.3, "upper2": 0.3}
+    machine = replace(PLANT, settings=settings, duration=6.0, amplitude=0.7)
+    log = write(machine, tmp_path / "log.csv", 9)
+    seen = np.loadtxt(log, delimiter=",", skiprows=1)[:, 4]
+    assert np.count_nonzero(np.abs(seen) > 0.3) > 100
+    found = identified(machine, log, 9)
+    assert found.has_converged and 0.9 < found.chi2 < 1.1
+    assert found.estimates["m2"].value == pytest.approx(1.1, rel=3e-3)
+
+
+def test_breakaway_stays_above_sliding_friction(tmp_path: Path) -> None:
+    true = {"coulomb_friction1": 0.3, "breakaway_friction1": 0.6}
+    machine = Machine("rp_plant", true, {"stribeck_velocity1": 0.05}, duration=6.0, amplitude=0.6)
+    log = write(machine, tmp_path / "log.csv", 10)
+    found = identified(
+        machine,
+        log,
+        parameters=["breakaway_friction1>coulomb_friction1", "coulomb_friction1"],
+        start={"coulomb_friction1": 0.24, "breakaway_friction1": 0.3},
+    )
+    for name in true:
+        assert found.estimates[name].value == pytest.approx(true[name], rel=0.05)
+    assert found.estimates["breakaway_friction1"].value > found.estimates["coulomb_friction1"].value
+
+
+def test_a_parameter_that_is_not_there_comes_to_its_limit(tmp_path: Path) -> None:
+    machine = replace(ARM, model="rp_plant", duration=2.0)
+    log = write(machine, tmp_path / "log.csv", 11)
+    found = rparm.identify(
+        machine.fmu,
+        log,
+        parameters=["m2", "coulomb_friction1"],
+        inputs=INPUTS,
+        measured=MEASURED,
+        settings={name: true for name, true in ARM.true.items() if name != "m2"},
+        start={"coulomb_friction1": 0.1},
+    )
+    assert found.estimates["coulomb_friction1"].value < 1e-3
+    assert found.estimates["m2"].value == pytest.approx(1.1, rel=1e-3)
+
+
+# ---- what is not known, and what is not right ----------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("machine", "unknown"),
+    [
+        (Machine("rp_manipulator", {"m2": 1.0, "I1z": 0.1, "I2z": 0.05}), [["I1z", "I2z"]]),
+        (
+            Machine("rp_plant", {"armature1": 0.2, "I1z": 0.1, "m2": 1.0, "I2z": 0.05}),
+            [["armature1", "I1z", "I2z"]],
+        ),
+        (
+            Machine("rp_manipulator", {"m1": 2.0, "lc1": 0.25, "I1z": 0.1, "m2": 1.0}),
+            [["m1", "lc1", "I1z"]],
+        ),
+        (
+            Machine("rp_manipulator", {"m1": 2.0, "lc1": 0.25, "m2": 1.0}, {"g": 0.0}),
+            [["m1", "lc1"]],
+        ),
+        (Machine("rp_plant", {"m2": 1.0, "payload_mass": 0.5}), [["payload_mass"]]),
+        (
+            Machine("rp_manipulator", {"m1": 2.0, "m2": 1.0, "I1z": 0.1}, amplitude=0.0),
+            [["m1", "m2", "I1z"]],
+        ),
+        # nothing is invented where all can be known
+        (Machine("rp_manipulator", {"m1": 2.0, "m2": 1.0, "I1z": 0.1, "a": 0.1, "g": 9.8}), []),
+        (replace(PLANT, true={**PLANT.true, "armature2": 0.4, "l1": 0.5, "m1": 2.0}), []),
+    ],
+)
+def test_what_cannot_be_known_is_named(
+    machine: Machine, unknown: list[list[str]], tmp_path: Path
+) -> None:
+    machine = replace(machine, duration=4.0, noise=(1e-5, 1e-5))
+    found = identified(machine, write(machine, tmp_path / "log.csv", 12), 12)
+    assert [list(each.names) for each in found.combinations] == unknown
+    for name, estimate in found.estimates.items():
+        is_unknown = any(name in names for names in unknown)
+        assert (estimate.low is None) == (estimate.high is None) == is_unknown
+
+
+def test_a_sum_is_known_where_its_parts_are_not(tmp_path: Path) -> None:
+    machine = Machine("rp_plant", {"armature1": 0.2, "I1z": 0.1, "m2": 1.0}, duration=4.0)
+    found = identified(machine, write(machine, tmp_path / "log.csv", 13), 13)
+    (name, total), *others = found.sums.items()
+    assert name == "armature1 + I1z" and not others
+    assert abs(total.value - 0.3) < total.high - total.low < 0.01
+
+
+def test_noise_of_the_efforts_widens_the_intervals(tmp_path: Path) -> None:
+    machine = replace(PLANT, effort_noise=0.02, noise=(1e-5, 1e-5))
+    found = identified(machine, write(machine, tmp_path / "log.csv", 14), 14)
+    assert found.covariances.ratio > 5
+    assert any("not exact" in text for text in found.warnings)
+    for name, true in machine.true.items():
+        estimate = found.estimates[name]
+        assert abs(estimate.value - true) < estimate.high - estimate.low
+
+
+def test_a_torque_ripple_is_not_white(tmp_path: Path) -> None:
+    found = identified(ARM, ripple.write(tmp_path / "log.csv", 15), 15)
+    assert found.whiteness["q1"].p < 1e-6
+    assert any("not white" in text for text in found.warnings)
+
+
+def test_a_second_log_is_run_from_start_to_end(tmp_path: Path) -> None:
+    log = write(ARM, tmp_path / "log.csv", 16)
+    second = write(replace(ARM, duration=3.0), tmp_path / "second.csv", 17)
+    found = identified(ARM, log, 16, validate=second)
+    assert 0.9 < found.validation.chi2 < 1.1
+    assert (found.validation.rms < 3e-4).all() and (found.validation.follows == 3.0).all()
+    other = write(replace(ARM, true={**ARM.true, "m2": 1.3}, duration=3.0), second, 17)
+    wrong = identified(ARM, log, 16, validate=other)
+    assert wrong.validation.chi2 > 100

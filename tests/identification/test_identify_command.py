@@ -1,0 +1,218 @@
+"""The command: its JSON, its files, which rparm runs again, and a line for each mistake."""
+
+import json
+import tomllib
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from tests.identification.synthetic import ARM, write
+from tests.support.rparm_project import FMUS, assert_one_line, call
+
+GIVEN = ("--inputs", "tau1", "f2", "--measured", "q1", "q2")
+KNOWN = ("--set", "I1z=0.12", "a=110mm", "l1=0.55")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two seconds of the arm."""
+    return write(replace(ARM, duration=2.0), tmp_path_factory.mktemp("logs") / "log.csv", 1)
+
+
+@pytest.fixture
+def identify(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Call the command on the log, or another one; exit code, output and error."""
+
+    def run(*options: object, path: Path = log, given: Sequence[str] = GIVEN):
+        output = ("--output", tmp_path / "output")
+        return call(capsys, "identify", FMUS["rp_manipulator"], path, *given, *options, *output)
+
+    return run
+
+
+def changed(log: Path, folder: Path, row: int, column: int, text: str) -> Path:
+    """A log with one value replaced."""
+    lines = log.read_text().splitlines()
+    cells = lines[row].split(",")
+    cells[column] = text
+    lines[row] = ",".join(cells)
+    path = folder / "changed.csv"
+    path.write_text("\n".join(lines))
+    return path
+
+
+# ---- results -------------------------------------------------------------------------------------
+
+
+def test_json_has_what_was_found(identify, log: Path) -> None:
+    code, out, _ = identify("--parameters", "m2", *KNOWN, "--validate", log, "--json")
+    found = json.loads(out)
+    assert code == found["exit_code"] == 0
+    m2 = found["parameters"]["m2"]
+    assert m2["low"] < 1.1 < m2["high"] and m2["low"] < m2["value"] < m2["high"]
+    assert found["unidentifiable"] == [] and 0.8 < found["chi2"] < 1.2
+    assert found["whiteness"].keys() == {"q1", "q2"} and found["whiteness"]["q1"]["white"]
+    assert found["validation"]["follows"] == {"q1": 2.0, "q2": 2.0}
+    assert all(Path(file).is_file() for file in found["files"])
+
+
+def test_what_cannot_be_known_is_null(identify) -> None:
+    code, out, _ = identify("--parameters", "m2,I1z,I2z", "--set", "a=0.11", "l1=0.55", "--json")
+    found = json.loads(out)
+    assert code == 0 and found["unidentifiable"] == [["I1z", "I2z"]]
+    assert found["parameters"]["I1z"]["low"] is None
+    assert found["sums"].keys() == {"I1z + I2z"}
+    assert found["warnings"] == ["Cannot be known: I1z + I2z."]
+
+
+def test_the_files_run_again(identify, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert identify("--parameters", "m2", *KNOWN)[0] == 0
+    folder = tmp_path / "output"
+    code, out, _ = call(capsys, folder / "scenario.toml", "--json", "--output", tmp_path / "report")
+    (scenario,) = json.loads(out)["scenarios"]
+    assert code == 0
+    for compared in scenario["runs"][0]["measured"].values():
+        assert 0.9e-4 < compared["rms"] < 1e-3  # noise of the log, and a start state's that grows
+    values = tomllib.loads((folder / "parameters.toml").read_text())["parameters"]
+    assert values["a"] == 0.11 and values["m2"] == pytest.approx(1.1, rel=1e-3)
+    space = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
+    parsed = etree.parse(folder / "parameters.ssv")
+    written = {
+        node.get("name"): float(node[0].get("value"))
+        for node in parsed.iterfind(".//ssv:Parameter", space)
+    }
+    assert written == {name: x for name, x in values.items() if name in written}
+    assert {"m2", "a"} <= written.keys()
+
+
+def test_columns_may_have_other_names_and_units(identify, log: Path, tmp_path: Path) -> None:
+    table = np.loadtxt(log, delimiter=",", skiprows=1)
+    table[:, 3] = np.degrees(table[:, 3])
+    table[:, 4] *= 1000
+    path = tmp_path / "other.csv"
+    names = "t;torque;f2;enc1;enc2"
+    np.savetxt(path, table, fmt="%.17g", delimiter=";", header=names, comments="")
+    columns = "--columns", "time=t", "tau1=torque", "q1=enc1", "q2=enc2"
+    found = [
+        json.loads(identify("--parameters", "m2", *KNOWN, "--json", *more, path=file)[1])
+        for file, more in ((log, ()), (path, (*columns, "--units", "q1=deg", "q2=mm")))
+    ]
+    values = [each["parameters"]["m2"]["value"] for each in found]
+    assert values[0] == pytest.approx(values[1], rel=1e-9)
+
+
+def test_the_demo_finds_its_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from rparm.models.machine.identification import LATE, TRUE
+
+    code, out, _ = call(capsys, "identify", "--demo", "--json", "--output", tmp_path)
+    found = json.loads(out)
+    assert code == 0 and found["warnings"] == []
+    for name, true in {**TRUE, "delay": LATE}.items():
+        estimate = found["parameters"][name]
+        assert abs(estimate["value"] - true) < estimate["high"] - estimate["low"] < 0.01 * true
+    assert 0.9 < found["validation"]["chi2"] < 1.1
+
+
+# ---- mistakes ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--parameters", "m7"], "no variable 'm7'"),
+        (["--parameters", "q1"], "'q1' is not a parameter"),
+        (["--parameters", "solver_method"], "solver_method is of type Enumeration"),
+        (["--parameters", "m2", "m2"], "'m2' is there twice"),
+        ([], "at least one of parameters"),
+        (["--parameters", "m2", "--set", "m2=1"], "m2 is estimated"),
+        (["--parameters", "m2", "--set", "m1=2ft"], "unknown unit 'ft'"),
+        (["--parameters", "m2", "--set", "m1"], "expected NAME=VALUE, got 'm1'"),
+        (["--parameters", "m2", "--start", "m2=-1"], "m2: expected at least 1e-09 kg, got -1.0"),
+        (["--parameters", "m2", "--start", "m2=1e-9"], "expected a start above its limit 1e-09"),
+        (["--parameters", "m2", "--start", "m2=nan"], "expected a finite number"),
+        (["--parameters", "m2", "--columns", "q7=x"], "'q7' is not used"),
+        (["--parameters", "m2", "--columns", "q1=encoder"], "column 'encoder' is not there"),
+        (["--parameters", "m2", "--units", "q1=lightyear"], "unknown unit 'lightyear'"),
+        (["--parameters", "m2", "--segment", "3"], "a segment needs 3 s"),
+        (["--parameters", "m2", "--segment", "-1"], "segment: expected a length above 0 s"),
+        (["--parameters", "m2", "--segment", "1ms"], "20 rows"),
+        (["--parameters", "m2", "--segment", "1m"], "--segment: unknown unit 'm'"),
+        (["--parameters", "m2>m9"], "no variable 'm9'"),
+        (["--parameters", "m2", "--validate", "/nowhere.csv"], "/nowhere.csv: no such file"),
+    ],
+)
+def test_a_mistake_in_the_options_is_one_line(options: list[str], message: str, identify) -> None:
+    code, _, error = identify(*options)
+    assert code == 2 and message in error
+    assert_one_line(error)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (("--inputs", "tau9", "--measured", "q1"), "no variable 'tau9', did you mean 'tau1'?"),
+        (("--inputs", "q1", "--measured", "q1"), "'q1' is not an input"),
+        (("--inputs", "tau1", "--measured", "q9"), "no variable 'q9' (known: q1, q2, "),
+        (("--inputs", "tau1", "--measured", "solver_steps"), "is no continuous output"),
+        (("--inputs", "tau1", "--measured", "tau1"), "is no continuous output"),
+        (("--inputs", "tau1", "tau1", "--measured", "q1"), "'tau1' is there twice"),
+    ],
+)
+def test_a_wrong_variable_is_one_line(given: Sequence[str], message: str, identify) -> None:
+    code, _, error = identify("--parameters", "m2", given=given)
+    assert code == 2 and message in error
+    assert_one_line(error)
+
+
+def test_a_discrete_output_is_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    measured = "--parameters", "m2", "--inputs", "tau1", "--measured", "impact_loss"
+    code, _, error = call(capsys, "identify", FMUS["rp_plant"], log, *measured)
+    assert code == 2 and "'impact_loss' is no continuous output" in error
+    assert_one_line(error)
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "text", "message"),
+    [
+        (100, 3, "nan", "line 101: column 'q1': expected a finite number"),
+        (100, 4, "1,5", "line 101: expected 5 values, found 6"),
+        (100, 1, "abc", "line 101: column 'tau1': expected a number with a decimal point"),
+        (100, 0, "0.05", "line 101: expected a time after 0.098"),
+    ],
+)
+def test_a_mistake_in_a_log_is_one_line(
+    row: int, column: int, text: str, message: str, identify, log: Path, tmp_path: Path
+) -> None:
+    path = changed(log, tmp_path, row, column, text)
+    code, _, error = identify("--parameters", "m2", path=path)
+    assert code == 2 and message in error and str(path) in error
+    assert_one_line(error)
+
+
+def test_short_and_constant_logs_are_refused(identify, log: Path, tmp_path: Path) -> None:
+    lines = log.read_text().splitlines()
+    path = tmp_path / "log.csv"
+    constant = [lines[0], *(",".join([*line.split(",")[:3], "1", "2"]) for line in lines[1:])]
+    for content, message in (
+        (lines[:10], "has 9 rows, a segment needs 20"),
+        (lines[:300], "a segment needs 0.4 s"),
+        (constant, "column 'q1' is constant"),
+        (lines[:1], "has no rows"),
+    ):
+        path.write_text("\n".join(content))
+        code, _, error = identify("--parameters", "m2", path=path)
+        assert code == 2 and message in error
+        assert_one_line(error)
+
+
+def test_fmu_and_log_are_needed(capsys: pytest.CaptureFixture[str], log: Path) -> None:
+    for arguments in ((), (FMUS["rp_manipulator"],), ("--demo", FMUS["rp_manipulator"])):
+        code, _, error = call(capsys, "identify", *arguments)
+        assert code == 2
+        assert_one_line(error)
+    code, _, error = call(capsys, "identify", "rp_manipulatr", log)
+    assert code == 2 and "did you mean 'rp_manipulator'?" in error
