@@ -14,9 +14,9 @@ import numpy as np
 from rparm import project
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import Component, HeldInputs
-from rparm.campaign.loop import Part
 from rparm.coupling.connected_instance import start_value
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint
+from rparm.fmi.compiled.loop import Part
 from rparm.fmi.fmu_file import describe, read_model
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
 from rparm.scenarios import scenario
@@ -169,6 +169,14 @@ class ScenarioBase(Base):
             raise WrongValueError("the FMU gives no directional derivatives")
         found = [x.variable for x in describe(self.path).description.derivatives]
         return [(v.valueReference, v.derivative.valueReference) for v in found]
+
+    def discrete_outputs(self, kind: str) -> list[int]:
+        """Value references of the outputs of a type that change at events only."""
+        return [
+            v.reference
+            for v in self._model.variables.values()
+            if (v.causality, v.variability, v.type) == ("output", "discrete", kind)
+        ]
 
 
 class SystemBase(Base):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rparm.campaign.loop import Part
 from rparm.campaign.measures import Measure
+from rparm.fmi.compiled.loop import Part
 from rparm.fmi.model import Value
 
 
@@ -60,7 +60,7 @@ class Job:
     watched: tuple[str, ...]  # what is recorded
     columns: np.ndarray  # (watched,) of these, among the Reals of the loop
     integers: dict[str, tuple[int, str]]  # component and variable of those read at the end
-    tangent: tuple[np.ndarray, np.ndarray] | None  # references of derivatives and states
+    tangent: tuple[np.ndarray, ...] | None  # the first fields of loop.Tangent
     targets: tuple[tuple[str, Target], ...]  # by column of the table
     measures: tuple[Measure, ...]
     trajectories: frozenset[int]  # runs of which all that is recorded is kept

@@ -10,6 +10,7 @@ from rparm.campaign import analysis, figures
 from rparm.campaign.analysis import Index
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.job import Job
+from rparm.campaign.measures import LYAPUNOV
 from rparm.campaign.planning import FAILURE, RUN
 from rparm.campaign.results import MANIFEST, Results
 from rparm.report import assets
@@ -21,6 +22,10 @@ DRAWN = 24  # columns in a picture at most
 LISTED = 10  # reasons of failed runs at most
 WIDE = 0.5  # half a confidence interval of an index that says little
 NOTHING = "–"
+NO_VALUE = {
+    "settling": "does not settle",
+    LYAPUNOV: "has no value, as a discrete output changes (an impact, friction that holds),",
+}
 
 
 class Page:
@@ -100,7 +105,7 @@ class Page:
         texts = []
         for measure in self.job.measures:
             count = _lacking(self.kept[measure.column]) - self.failed
-            what = "does not settle" if measure.kind == "settling" else "is no finite number"
+            what = NO_VALUE.get(measure.kind, "is no finite number")
             if count:
                 texts.append(f"{measure.column} {what} in {count} of {self.campaign.count} runs.")
         return texts

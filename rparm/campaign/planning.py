@@ -9,7 +9,6 @@ import numpy as np
 
 from rparm.campaign.bases import Base, ScenarioBase
 from rparm.campaign.campaign_file import Campaign, Distribution
-from rparm.campaign.expressions import Expression
 from rparm.campaign.job import Component, Job, Target
 from rparm.campaign.measures import (
     FINAL_INTEGER,
@@ -20,6 +19,7 @@ from rparm.campaign.measures import (
     plain,
 )
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint, one_line, placed
+from rparm.expressions.evaluation import Expression
 from rparm.fmi.model import INPUTS, TOLERANCE, Value, Variable
 from rparm.texts import unit
 
@@ -234,7 +234,7 @@ class _Planner:
         found = (self.base.variable(name) for name in names)
         return {(component, variable.name): None for component, variable in found}
 
-    def tangent(self) -> tuple[np.ndarray, np.ndarray] | None:
+    def tangent(self) -> tuple[np.ndarray, ...] | None:
         if not self.campaign.keep.lyapunov:
             return None
         if not isinstance(self.base, ScenarioBase):
@@ -243,8 +243,8 @@ class _Planner:
             pairs = self.base.derivatives()
         if not pairs:
             self.fail("[keep] lyapunov", "the model has no continuous states")
-        derivatives, states = zip(*pairs, strict=True)
-        return np.array(derivatives, np.uint32), np.array(states, np.uint32)
+        found = (*zip(*pairs, strict=True), *map(self.base.discrete_outputs, ("Real", "Integer")))
+        return tuple(np.array(references, np.uint32) for references in found)
 
     def check_columns(self, measures: Sequence[Measure]) -> None:
         """Columns that the page asks for are there, and no name stands for two."""

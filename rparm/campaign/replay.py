@@ -46,6 +46,11 @@ class Replay:
         return [*(f"{name} = {value!r}" for name, value in values), *map(str, self.files)]
 
     @property
+    def page(self) -> Path | None:
+        """Its page, if it ended."""
+        return self.files[-1] if self.files else None
+
+    @property
     def document(self) -> dict[str, object]:
         """It for programs."""
         return dataclasses.asdict(self)

@@ -8,13 +8,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 
-from rparm.campaign import loop
-from rparm.campaign.fmi_calls import DISCARD, TERMINATED, functions
 from rparm.campaign.job import Job, Target
 from rparm.campaign.measures import Recorded
 from rparm.errors import UserError, one_line
+from rparm.fmi.compiled.loop import Tangent
+from rparm.fmi.compiled.stepper import Stepper
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
 
@@ -44,15 +43,16 @@ class Runner:
         self._job, self._fmus = job, fmus
         self._stack = ExitStack()
         self._instances: list[Instance] = []
-        self._reals = loop.Wires.of(
-            [c.reals for c in job.components], len(job.reals.names), np.float64
+        self._stepper = Stepper(
+            [c.reals for c in job.components],
+            [c.switches for c in job.components],
+            len(job.reals.names),
+            len(job.switches.names),
         )
-        self._switches = loop.Wires.of(
-            [c.switches for c in job.components], len(job.switches.names), np.int32
-        )
+        self._points = np.arange(1, job.steps + 1)
         self._held = job.reals.values.copy()
         self._record = np.empty((len(job.times), len(job.watched)))
-        self._tangent = loop.Tangent.none() if job.tangent is None else loop.Tangent(*job.tangent)
+        self._tangent = Tangent.none() if job.tangent is None else Tangent(*job.tangent)
         self._growth = np.empty(0 if job.tangent is None else job.steps)
         self._integers: list[int] = []  # at the end of the last run
         column = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
@@ -69,7 +69,7 @@ class Runner:
         for component in self._job.components:
             instance = self._fmus[component.archive].instance(component.name)
             self._instances.append(self._stack.enter_context(instance))
-        self._calls = loop.component_calls(self._instances)
+        self._stepper.connect(self._instances)
 
     def rows(self, numbers: Sequence[int], points: np.ndarray) -> Rows:
         """Make runs, with the values (runs, targets) of the job's targets."""
@@ -126,7 +126,8 @@ class Runner:
         self._propagate()
         for instance in self._instances:
             instance.exit_initialization()
-        self._check(loop.read_outputs(*self._state()), f"at the start, t = {job.start!r} s,")
+        self._stepper.read_outputs(f"at the start, t = {job.start!r} s,")
+        self._record[0] = self._stepper.reals.values[job.columns]
         self._tangent.deviation[:] = 1 / np.sqrt(max(len(self._tangent.deviation), 1))
 
     def _set_target(self, target: Target, value: float) -> None:
@@ -141,55 +142,39 @@ class Runner:
 
     def _propagate(self) -> None:
         """Set inputs in initialization mode until no output follows any more."""
-        reals, switches = self._reals, self._switches
+        stepper, reals, switches = self._stepper, self._stepper.reals, self._stepper.switches
         reals.values[: self._held.shape[1]] = self._held[0]
         switches.values[: self._job.switches.values.shape[1]] = self._job.switches.values[0]
         when = "in initialization"
         if not self._job.propagates:
-            self._check(loop.set_inputs(*self._state(), True), when)
+            stepper.set_inputs(when)
             return
         before = None
         for _ in range(len(self._instances) + 2):
-            self._check(loop.read_outputs(*self._state()), when)
+            stepper.read_outputs(when)
             found = np.concatenate([reals.values, switches.values])
             if before is not None and np.array_equal(before, found):
                 return
             before = found
-            self._check(loop.set_inputs(*self._state(), True), when)
+            stepper.set_inputs(when)
         raise UserError("the connections form an algebraic loop")
 
     # ---- Steps -----------------------------------------------------------------------------------
 
-    def _state(self) -> tuple:
-        return self._calls, tuple(self._reals), tuple(self._switches)
-
     def _advance(self) -> None:
-        job, tangent = self._job, self._tangent
-        calls, reals, switches = self._state()
-        *failure, step = loop.advance(
-            calls,
+        job = self._job
+        _, failure = self._stepper.advance(
             job.times,
             self._held,
             job.switches.values,
-            reals,
-            switches,
+            self._points,
             job.columns,
-            self._record,
-            (tangent.derivatives, tangent.states, tangent.deviation),
+            self._record[1:],
+            self._tangent,
             self._growth,
         )
-        self._check(failure, f"in the step from t = {float(job.times[step])!r} s")
-
-    def _check(self, failure: Sequence[int], when: str) -> None:
-        """Raise the user's error if the loop says that a function failed."""
-        status, function, component = failure
-        if status < DISCARD:
-            return
-        instance = self._instances[component]
-        if status == TERMINATED:
-            raise UserError(f"{instance.name}: the FMU ends the simulation {when}")
-        error = FMICallException(functions(instance)[function], status)
-        raise instance.failure(error, when)
+        if failure is not None:
+            raise failure
 
 
 @contextmanager

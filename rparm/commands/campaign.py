@@ -4,7 +4,7 @@ import argparse
 import shlex
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, one_line
 from rparm.interruption import arrived
-from rparm.options import count, number
+from rparm.options import add_output, count, number
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import from_here, written
@@ -21,15 +21,11 @@ from rparm.output_files import from_here, written
 if TYPE_CHECKING:
     from distributed import Security
 
-    from rparm.campaign.campaign_file import Campaign
-    from rparm.campaign.job import Job
-    from rparm.campaign.points import Points
-    from rparm.campaign.results import Results
+    from rparm.campaign.work import Work
 
 DESCRIPTION = (
     "Runs what is missing of a campaign, on a cluster of Dask, and writes tables and a page. A "
-    "campaign that was stopped resumes. Exit code: 0 all runs are there, 1 the run of --replay "
-    "fails, 2 wrong use or stopped."
+    "campaign that was stopped resumes. Runs that fail are results; only that of --replay is bad."
 )
 NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
@@ -40,12 +36,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"
     )
-    parser.add_argument(
-        "--output",
-        type=Path,
-        metavar="DIR",
-        help="folder for the results (default: that in the file, or in build/campaigns/)",
-    )
+    folder = project.from_root(project.campaign_folder("NAME"))
+    add_output(parser, f"folder for the results (default: that in the file, or {folder})")
     parser.add_argument(
         "--replay",
         type=number,
@@ -86,31 +78,23 @@ def run(options: argparse.Namespace) -> Ended:
             f"{', '.join(missing)}: not installed, {project.how_to_install('campaign')} does it"
         )
     # imported here: what a campaign needs may not be installed
-    from rparm.campaign import bases, campaign_file, page, planning, quantities, replay, runs
-    from rparm.campaign.points import Points
-    from rparm.campaign.results import Results
+    from rparm.campaign import page, planning, replay, work
 
     security = _security(options)
-    campaign = campaign_file.read(options.file)
-    with bases.opened(campaign, options.fmu, options.file) as base:
-        texts = (*base.questions, *quantities.questions(campaign, base))
-        console.messages(f"warning: {options.file}", texts)
-        campaign = quantities.in_si(campaign, base, options.file)
-        job = planning.plan(campaign, base, options.file)
-        points = Points(campaign, planning.constants(campaign, base))
-        folder = _folder(options, campaign)
-        text = Path(options.file).read_text(encoding="utf-8")
-        results = Results(folder, campaign, job, text)
+
+    def ask(questions: Sequence[str]) -> None:
+        console.messages(f"warning: {options.file}", questions)
+
+    with work.opened(options.file, options.fmu, options.output, ask) as made:
+        campaign, results, folder = made.campaign, made.results, made.results.folder
         if options.replay is not None:
             results.check()
             again = f"{_command(options)} --replay {options.replay}"
-            made = replay.replay(campaign, base, points, options.replay, folder, again)
-            print(*made.lines, sep="\n")
-            verdict = f"failed: {made.failure}" if made.failure else f"ran: run {options.replay}"
-            return Ended(1 if made.failure else 0, verdict, made.document)
-        runs.check(job, base.archives, base.path)
-        results.begin()
-        _run_missing(options, security, campaign, job, base.archives, points, results)
+            one = replay.replay(campaign, made.base, made.points, options.replay, folder, again)
+            print(*one.lines, sep="\n")
+            verdict = f"failed: {one.failure}" if one.failure else f"ran: run {options.replay}"
+            return Ended(1 if one.failure else 0, verdict, one.document, page=one.page)
+        _run_missing(options, security, made)
         failed = results.failed()
         digest = results.digest()
         print(f"table: {digest}")
@@ -120,10 +104,12 @@ def run(options: argparse.Namespace) -> Ended:
         if campaign.count > page.MOST:
             print(f"results: {from_here(folder)}, no page of more than {page.MOST} runs")
             return Ended(0, verdict, document)
-        units = planning.units(campaign, base, job.measures)
+        units = planning.units(campaign, made.base, made.job.measures)
         try:
             with written(folder):
-                index = page.Page(campaign, job, results, units, _command(options)).write(digest)
+                index = page.Page(campaign, made.job, results, units, _command(options)).write(
+                    digest
+                )
         except UserError:
             raise
         except Exception as error:  # the libraries that draw raise what they like
@@ -132,7 +118,7 @@ def run(options: argparse.Namespace) -> Ended:
                 "the results are complete"
             ) from error
     print(f"page: {from_here(index)}")
-    return Ended(0, verdict, {**document, "page": index.absolute()})
+    return Ended(0, verdict, {**document, "page": index.absolute()}, page=index)
 
 
 def _security(options: argparse.Namespace) -> "Security | None":
@@ -158,47 +144,30 @@ def _command(options: argparse.Namespace) -> str:
     return shlex.join(parts)
 
 
-def _folder(options: argparse.Namespace, campaign: "Campaign") -> Path:
-    if options.output is not None:
-        return options.output
-    if campaign.output is not None:
-        return options.file.parent / campaign.output
-    return project.campaign_folder(options.file.stem)
-
-
-def _run_missing(
-    options: argparse.Namespace,
-    security: "Security | None",
-    campaign: "Campaign",
-    job: "Job",
-    archives: Mapping[str, bytes],
-    points: "Points",
-    results: "Results",
-) -> None:
+def _run_missing(options: argparse.Namespace, security: "Security | None", made: "Work") -> None:
     """Run the blocks whose results are not there."""
-    blocks = results.missing()
+    blocks = made.begin()
     if not blocks:
         return
     from rparm.campaign import cluster, engine  # takes long
 
-    count = campaign.count
+    campaign, count = made.campaign, made.campaign.count
     ahead = sum(len(campaign.block_range(block)) for block in blocks)
     console.stage("starting workers" if options.scheduler is None else "calling the scheduler")
     if ahead < count:
         print(f"resumes: {count - ahead} of {count} runs are there")
     try:
         with (
-            results.workers_folder() as files,
+            made.results.workers_folder() as files,
             cluster.opened(
                 options.scheduler, options.workers, files, security, not options.no_dashboard
             ) as client,
         ):
             if not options.no_dashboard:
                 print(f"dashboard: {client.dashboard_link}", flush=True)
-            made = engine.Engine(client, campaign, job, archives, points, results)
             begin = time.perf_counter()
             with Progress(campaign.title, ahead, "runs") as progress:
-                made.run(blocks, progress)
+                made.run(client, blocks, progress)
             seconds = time.perf_counter() - begin
     except BaseException:  # Dask may turn that of a signal into another one
         if arrived():

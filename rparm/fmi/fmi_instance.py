@@ -277,6 +277,21 @@ class Instance(ABC):
     def _derivative_call(self, references: Array, orders: Array, values: Array) -> Call:
         """Call that gets derivatives of Real outputs."""
 
+    def partials(self, unknowns: Sequence[str], knowns: Sequence[str]) -> np.ndarray:
+        """Partial derivatives of Real variables by directional derivatives, (unknowns, knowns).
+
+        `knowns` are continuous states and inputs.
+        """
+        variables = self.fmu.model.variables
+        rows = [variables[name].reference for name in unknowns]
+        found = np.zeros((len(unknowns), len(knowns)))
+        for column, name in enumerate(knowns if rows else ()):
+            with self.explained(f"({name})"):
+                found[:, column] = self.fmi.getDirectionalDerivative(
+                    rows, [variables[name].reference], [1.0]
+                )
+        return found
+
     @abstractmethod
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
         """Polynomials up to `order` for the Real inputs `names`, to set at once, many times."""

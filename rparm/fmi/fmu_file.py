@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
@@ -16,31 +17,44 @@ from rparm.fmi.fmi2_instance import Fmi2Instance
 from rparm.fmi.fmi3_instance import Fmi3Instance
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.model import Model, described
+from rparm.fmi.model_exchange import Fmi2ModelExchange, Fmi3ModelExchange
 from rparm.input_files import UnreadableError, show
 from rparm.interruption import temporary_folder
 from rparm.project import VERSIONS
 
 DESCRIPTION = "modelDescription.xml"
 LIBRARY_SUFFIX = fmpy.sharedLibraryExtension  # of this platform
-INSTANCES: dict[str, type[Instance]] = {"2.0": Fmi2Instance, "3.0": Fmi3Instance}
+CO_SIMULATION, MODEL_EXCHANGE = "co-simulation", "model exchange"
+INSTANCES: dict[tuple[str, str], type[Instance]] = {
+    ("2.0", CO_SIMULATION): Fmi2Instance,
+    ("3.0", CO_SIMULATION): Fmi3Instance,
+    ("2.0", MODEL_EXCHANGE): Fmi2ModelExchange,
+    ("3.0", MODEL_EXCHANGE): Fmi3ModelExchange,
+}
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
 
 
 class Fmu:
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 
-    Raises UserError if the file is no FMU for co-simulation, of a known version of FMI, that runs
-    on this platform. The copy is made in the folder `within`, or where temporary files are.
-    Messages name the FMU by `shown`, where it lies in another archive.
+    Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
+    known version of FMI, that runs on this platform. The copy is made in the folder `within`, or
+    where temporary files are. Messages name the FMU by `shown`, where it lies in another archive.
     """
 
-    def __init__(self, path: Path, within: Path | None = None, shown: Path | None = None) -> None:
-        self.path = Path(shown or path)  # for messages
-        found, platform = _for_this_platform(Path(path), self.path)
+    def __init__(
+        self,
+        path: Path,
+        within: Path | None = None,
+        shown: Path | None = None,
+        kind: str = CO_SIMULATION,
+    ) -> None:
+        self.path, self.kind = Path(shown or path), kind  # the path for messages
+        found, platform = _for_this_platform(Path(path), self.path, kind)
         description, self.model = found.description, found.model
         self.guid = description.guid  # in FMI 3.0, the instantiationToken
         self.log_categories = [category.name for category in description.logCategories]
-        self.identifier = description.coSimulation.modelIdentifier  # name of the shared object
+        self.identifier = _interface(description, kind).modelIdentifier  # of the shared object
         with ExitStack() as unpacked:
             self.folder = unpacked.enter_context(temporary_folder(within))
             library = f"{self.identifier}{LIBRARY_SUFFIX}"
@@ -64,11 +78,11 @@ class Fmu:
         self._unpacked.close()
 
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
-        """A new instance, of the class for the FMU's version of FMI; `name` is in its messages.
+        """A new instance, of the class for the FMU's kind and version; `name` is in its messages.
 
         What `smooth_inputs` are: `Instance`.
         """
-        return INSTANCES[self.model.fmi_version](self, name, smooth_inputs)
+        return INSTANCES[self.model.fmi_version, self.kind](self, name, smooth_inputs)
 
 
 def read_model(path: Path) -> Model:
@@ -85,8 +99,8 @@ class Described:
     sizes: dict[str, int]  # of the files inside in bytes, by name
 
 
-def describe(path: Path) -> Described:
-    """Read what an FMU of a known version of FMI, for co-simulation, declares.
+def describe(path: Path, kind: str = CO_SIMULATION) -> Described:
+    """Read what an FMU of a known version of FMI, of a kind, declares.
 
     Raises UnreadableError.
     """
@@ -95,7 +109,7 @@ def describe(path: Path) -> Described:
         if DESCRIPTION not in sizes:
             raise UnreadableError(f"not an FMU, it has no {DESCRIPTION}")
         try:
-            description = _read(folder)
+            description = _read(folder, kind)
             return Described(description, described(description), sizes)
         except _WrongKindError:
             raise
@@ -107,44 +121,53 @@ def describe(path: Path) -> Described:
 
 
 class _WrongKindError(UnreadableError):
-    """An FMU of another version of FMI, or for other uses than co-simulation."""
+    """An FMU of another version of FMI, or of another kind."""
 
-    def __init__(self, root: etree._Element) -> None:
+    def __init__(self, root: etree._Element, kind: str) -> None:
         found = f"FMI {root.get('fmiVersion')}"
         found += " for model exchange" if root.find("ModelExchange") is not None else ""
         super().__init__(
-            f"expected an FMU of FMI {' or '.join(VERSIONS)} for co-simulation, found {found}"
+            f"expected an FMU of FMI {' or '.join(VERSIONS)} for {kind}, found {found}"
         )
 
 
-def _read(folder: Path) -> ModelDescription:
+def _interface(description: ModelDescription, kind: str) -> Any:
+    return description.coSimulation if kind == CO_SIMULATION else description.modelExchange
+
+
+def _read(folder: Path, kind: str) -> ModelDescription:
     """Model description in a folder, which fmpy reads once it is known to be one."""
     root = read_xml(folder / DESCRIPTION).getroot()
     if root.tag != "fmiModelDescription" or "fmiVersion" not in root.attrib:
         expected = "expected fmiModelDescription with an fmiVersion"
         raise UnreadableError(f"line {root.sourceline}: {expected}, found {show(root.tag)}")
     if root.get("fmiVersion") not in VERSIONS:
-        raise _WrongKindError(root)
+        raise _WrongKindError(root, kind)
     description = fmpy.read_model_description(folder)
-    if description.coSimulation is None:
-        raise _WrongKindError(root)
+    if _interface(description, kind) is None:
+        raise _WrongKindError(root, kind)
     if description.fmiVersion == "3.0":  # fmpy does not read it
-        given = root.find("CoSimulation").get("providesDirectionalDerivatives")
-        description.coSimulation.providesDirectionalDerivative = given in ("true", "1")
+        for node, interface in (
+            ("CoSimulation", description.coSimulation),
+            ("ModelExchange", description.modelExchange),
+        ):
+            if interface is not None:
+                given = root.find(node).get("providesDirectionalDerivatives")
+                interface.providesDirectionalDerivative = given in ("true", "1")
     return description
 
 
-def _for_this_platform(path: Path, shown: Path) -> tuple[Described, str]:
+def _for_this_platform(path: Path, shown: Path, kind: str = CO_SIMULATION) -> tuple[Described, str]:
     """What an FMU declares that can be run here, and the folder of its binary."""
     with placed(shown):
-        found = describe(path)
-    identifier = found.description.coSimulation.modelIdentifier
+        found = describe(path, kind)
+    identifier = _interface(found.description, kind).modelIdentifier
     if not re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII):
         raise UserError(
             f"{shown}: expected a C identifier as modelIdentifier, found {show(identifier)}"
         )
     platforms = sorted({name.split("/")[1] for name in found.sizes if BINARY.fullmatch(name)})
-    wanted = INSTANCES[found.model.fmi_version].PLATFORMS
+    wanted = INSTANCES[found.model.fmi_version, kind].PLATFORMS
     here = [platform for platform in wanted if platform in platforms]
     if not here:
         way_out = "; `fmpy compile` makes one" if any(map(SOURCE.fullmatch, found.sizes)) else ""

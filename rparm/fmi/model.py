@@ -45,6 +45,7 @@ class Variable:
     items: Mapping[str, int] = field(default_factory=dict)  # numbers of an Enumeration, by name
     units: Units = field(default_factory=dict)  # in which a Real may be given; empty: has none
     description: str = ""
+    variability: str | None = None
 
     def is_a(self, kind: str) -> bool:
         """Whether it is one of `KINDS`."""
@@ -119,6 +120,10 @@ class Model:
     gives_output_derivatives: bool
     saves_states: bool  # so that an instance can go back to an earlier point
     gives_directional_derivatives: bool
+    # Versions of FMI name these differently, and list parameters or not: not compared.
+    derivatives: tuple[str, ...] = field(default=(), compare=False)  # of `states`
+    # of outputs and derivatives: what each may depend on, by name; absent: on everything
+    dependencies: Mapping[str, tuple[str, ...]] = field(default_factory=dict, compare=False)
 
     @property
     def asks_for_inputs(self) -> bool:
@@ -175,27 +180,40 @@ class Model:
 
 
 def described(description: ModelDescription) -> Model:
-    """Model that a description of FMI 2.0 or 3.0, for co-simulation, declares.
+    """Model that a description of FMI 2.0 or 3.0 declares.
+
+    Of its capabilities those for co-simulation, or for model exchange if it has no others.
 
     ValueError if a start value or a limit is not a number.
     """
-    capabilities = description.coSimulation
+    slave = description.coSimulation
+    capabilities = slave or description.modelExchange
     displays = {
         unit.name: {x.name: display_unit(x.factor, x.offset) for x in unit.displayUnits}
         for unit in description.unitDefinitions
     }
-    derivatives = (unknown.variable.derivative for unknown in description.derivatives)
+    derivatives = {
+        unknown.variable.derivative.name: unknown.variable.name
+        for unknown in description.derivatives
+        if unknown.variable.derivative is not None
+    }
     return Model(
         name=description.modelName,
         fmi_version=description.fmiVersion,
         variables={v.name: _variable(v, displays) for v in description.modelVariables},
-        states=tuple(dict.fromkeys(state.name for state in derivatives if state is not None)),
+        states=tuple(derivatives),
         interpolates_inputs=bool(
-            capabilities.canInterpolateInputs or capabilities.providesIntermediateUpdate
+            slave and (slave.canInterpolateInputs or slave.providesIntermediateUpdate)
         ),
-        gives_output_derivatives=(capabilities.maxOutputDerivativeOrder or 0) >= 1,
+        gives_output_derivatives=bool(slave and (slave.maxOutputDerivativeOrder or 0) >= 1),
         saves_states=bool(capabilities.canGetAndSetFMUstate),
         gives_directional_derivatives=bool(capabilities.providesDirectionalDerivative),
+        derivatives=tuple(derivatives.values()),
+        dependencies={
+            unknown.variable.name: tuple(known.name for known in unknown.dependencies)
+            for unknown in (*description.derivatives, *description.outputs)
+            if unknown.dependencies is not None
+        },
     )
 
 
@@ -245,4 +263,5 @@ def _variable(variable: ModelVariable, displays: Displays) -> Variable:
         items={item.name: int(item.value) for item in declared.items},
         units=units,
         description=variable.description or "",
+        variability=variable.variability,
     )

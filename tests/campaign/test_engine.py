@@ -1,4 +1,4 @@
-"""Campaigns that are stopped or killed go on, and give the table of an undisturbed one.
+"""Campaigns that were stopped or killed resume, and give the table of an undisturbed one.
 
 cluster/long_kills.py kills workers and fills the disk.
 """

@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from rparm import __main__ as cli
-from rparm.campaign.fmi_calls import DO_STEP
-from rparm.campaign.loop import COLUMNS
 from rparm.campaign.measures import LYAPUNOV
 from rparm.campaign.runs import Rows
+from rparm.fmi.compiled.calls import DO_STEP
+from rparm.fmi.compiled.loop import COLUMNS
 from tests.campaign.cluster.processes import completed
 from tests.campaign.files import ARM, HEAD, campaign, commands, write
 from tests.campaign.runners import rows, runner
@@ -140,7 +140,7 @@ def test_a_run_that_the_fmu_ends_has_failed(tmp_path: Path) -> None:
     with runner(given, tmp_path, fmu=ARM3) as (runs, job, points):
         expected = rows(runs, job, points, [0, 1])
         column = COLUMNS + 1 + DO_STEP  # for the adapter
-        do_step = STEP3(int(runs._calls[0, column]))
+        do_step = STEP3(int(runs._stepper.calls[0, column]))
         final = set()
 
         @STEP3
@@ -150,7 +150,7 @@ def test_a_run_that_the_fmu_ends_has_failed(tmp_path: Path) -> None:
             terminates[0] = time >= 0.5
             return status
 
-        runs._calls[0, column] = cast(end, c_void_p).value
+        runs._stepper.calls[0, column] = cast(end, c_void_p).value
         found = rows(runs, job, points, [0, 1])
     assert final == {True}
     assert found.failures[0] == (

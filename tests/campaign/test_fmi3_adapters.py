@@ -14,8 +14,8 @@ from ctypes import (
 )
 from typing import Any
 
-from rparm.campaign.fmi3_adapters import ADDRESSES
-from rparm.campaign.fmi_calls import DERIVATIVE, GET_BOOLEAN, SET_BOOLEAN
+from rparm.fmi.compiled.calls import DERIVATIVE, GET_BOOLEAN, SET_BOOLEAN
+from rparm.fmi.compiled.fmi3_adapters import ADDRESSES
 
 INSTANCE = 0x1234
 COUNT = 3

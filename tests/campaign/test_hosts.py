@@ -62,7 +62,7 @@ def test_two_hosts_make_the_same_table(
     with cluster(here, [there, there]) as (address, scheduler, arms):
         process = start(file, tmp_path / "apart", "--scheduler", address, host=here)
         wait_for(lambda: blocks(tmp_path / "apart") >= 3)
-        os.kill(arms[0].pid, signal.SIGKILL)  # the other one goes on
+        os.kill(arms[0].pid, signal.SIGKILL)  # the other one continues
         code, out, err = finish(process)
         assert code == 0, err
         assert table(out) == undisturbed

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from rparm.campaign import expressions
 from rparm.campaign.measures import LYAPUNOV, Measure, Recorded, plain
+from rparm.expressions import evaluation as expressions
 
 TIMES = np.linspace(3.0, 5.0, 20001)
 ELAPSED = TIMES - 3.0

@@ -223,3 +223,68 @@ def test_the_exponent_is_the_growth_of_a_small_deviation(tmp_path: Path) -> None
             ends.append(rows(runs, job, points, [0]).measures[0, :4])
     growth = np.linalg.norm(ends[1] - ends[0]) / (2 * size)  # of a deviation of length 2 size
     assert found.measures[0, -1] == pytest.approx(np.log(growth) / 2.0, abs=1e-5)
+
+
+# no friction; the slide swings between springs, or strikes a rigid stop
+PLANT = (
+    HEAD
+    + """scenario = "rubber_buffers"
+sampling = "random"
+runs = 1
+time = { start = 0.0, stop = 0.5, step = 0.0005 }
+[set]
+relative_tolerance = 5e-12
+f2 = 0.0
+q2 = 0.0
+dq2 = 0.4
+damping1 = 0.0
+coulomb_friction1 = 0.0
+breakaway_friction1 = 0.0
+stops1 = "none"
+coulomb_friction2 = 0.0
+breakaway_friction2 = 0.0
+lower2 = -0.01
+upper2 = 0.01
+stop_stiffness2 = 300.0
+stop_damping2 = 2.0
+[parameters.q1]
+values = [0.4]
+[keep]
+lyapunov = true
+final = ["q1", "q2", "dq1", "dq2", "event_count"]
+"""
+)
+
+
+def test_the_exponent_passes_springs_and_has_no_value_where_a_deviation_jumps(
+    tmp_path: Path,
+) -> None:
+    """At a spring derivatives are continuous; at an impact and under dry friction they are not."""
+    size = 1e-7
+    with runner(campaign(tmp_path, PLANT), tmp_path) as (runs, job, points):
+        (found,) = rows(runs, job, points, [0]).measures
+        columns = [measure.column for measure in job.measures]
+    assert found[columns.index("final(event_count)")] > 2
+    states = [columns.index(f"final({name})") for name in ("q1", "q2", "dq1", "dq2")]
+    ends = []
+    for sign in (-1, 1):
+        half = sign * size / 2
+        text = PLANT.replace(
+            "q2 = 0.0\ndq2 = 0.4", f"q2 = {half!r}\ndq1 = {half!r}\ndq2 = {0.4 + half!r}"
+        )
+        text = text.replace("values = [0.4]", f"values = [{0.4 + half!r}]")
+        with runner(campaign(tmp_path, text), tmp_path) as (runs, job, points):
+            ends.append(rows(runs, job, points, [0]).measures[0, states])
+    growth = np.linalg.norm(ends[1] - ends[0]) / (2 * size)
+    exponent = found[columns.index(LYAPUNOV)]
+    assert exponent == pytest.approx(np.log(growth) / 0.5, abs=2e-3)
+    for change in (
+        ("upper2 = 0.01", 'upper2 = 0.01\nstops2 = "rigid"'),
+        (
+            "coulomb_friction2 = 0.0\nbreakaway_friction2 = 0.0",
+            "coulomb_friction2 = 0.5\nbreakaway_friction2 = 0.5",
+        ),
+    ):
+        with runner(campaign(tmp_path, PLANT, [change]), tmp_path) as (runs, job, points):
+            (other,) = rows(runs, job, points, [0]).measures
+        assert np.isnan(other[columns.index(LYAPUNOV)]) and np.isfinite(other[states]).all()

@@ -86,7 +86,7 @@ def stop_by_signals(file: Path, output: Path, undisturbed: str) -> None:
 
 
 def kill_scheduler(file: Path, output: Path, undisturbed: str) -> None:
-    """Kill a scheduler that runs elsewhere; another one goes on."""
+    """Kill a scheduler that runs elsewhere; another one takes over."""
     with cluster(LOOPBACK, [LOOPBACK, LOOPBACK]) as (address, scheduler, _):
         process = start(file, output, "--scheduler", address)
         wait_for(lambda: blocks(output) >= 5)

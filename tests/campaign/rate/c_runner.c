@@ -1,5 +1,5 @@
-/* The stepping loop of rparm/campaign/loop.py in C, over the same arrays: what a compiled runner
- * would gain. loop.py loads it as a shared library.
+/* The stepping loop of rparm/fmi/compiled/loop.py in C, over the same arrays: what a compiled
+ * runner would gain. loop.py loads it as a shared library.
  */
 #include <stdint.h>
 

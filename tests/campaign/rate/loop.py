@@ -20,8 +20,8 @@ import fmpy
 import numpy as np
 
 from rparm.campaign import campaign_file
-from rparm.campaign.loop import Wires
 from rparm.campaign.runs import Runner
+from rparm.fmi.compiled.loop import Wires
 from tests.campaign.rate.works import WORKS
 from tests.campaign.runners import runner
 from tests.support.paths import ROOT
@@ -59,15 +59,16 @@ def compiled(folder: Path) -> CDLL:
 
 def advance_in_c(library: CDLL, runs: Runner) -> None:
     """What `Runner._advance` does, in C."""
-    job, reals, switches = runs._job, runs._reals, runs._switches
+    job, stepper = runs._job, runs._stepper
+    reals, switches = stepper.reals, stepper.switches
     c_reals, c_switches = _as_c(reals), _as_c(switches)
 
     def data(array: np.ndarray) -> c_void_p:
         return c_void_p(array.ctypes.data)
 
     status = library.advance(
-        data(runs._calls),
-        c_int64(len(runs._calls)),
+        data(stepper.calls),
+        c_int64(len(stepper.calls)),
         data(job.times),
         c_int64(job.steps),
         data(runs._held),

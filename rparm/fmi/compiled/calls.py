@@ -2,7 +2,7 @@
 
 Addresses are arguments, not constants: one compiled loop serves every FMU, and numba keeps it on
 disk. All pointers are integers. Each call returns the FMU's status. FMUs of FMI 3.0 are called in
-the same way, through `rparm.campaign.fmi3_adapters`.
+the same way, through `rparm.fmi.compiled.fmi3_adapters`.
 """
 
 from ctypes import c_void_p, cast
@@ -21,6 +21,7 @@ FUNCTIONS = {
         "fmi2GetBoolean",
         "fmi2DoStep",
         "fmi2GetDirectionalDerivative",
+        "fmi2GetInteger",
     ),
     "3.0": (
         "fmi3SetFloat64",
@@ -29,9 +30,10 @@ FUNCTIONS = {
         "fmi3GetBoolean",
         "fmi3DoStep",
         "fmi3GetDirectionalDerivative",
+        "fmi3GetInt32",
     ),
 }
-SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(6)
+SET_REAL, GET_REAL, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE, GET_INTEGER = range(7)
 DISCARD = 2  # the first status of FMI that stops a run
 TERMINATED = 100  # no status of FMI: the FMU asks to end the simulation
 
@@ -67,7 +69,7 @@ def _call(builder: ir.IRBuilder, kinds: list[ir.Type], arguments: list[ir.Value]
 
 @intrinsic
 def move_values(_context, function, component, references, count, values):
-    """fmi2SetReal, fmi2GetReal, fmi2SetBoolean or fmi2GetBoolean."""
+    """fmi2SetReal, fmi2GetReal, fmi2SetBoolean, fmi2GetBoolean or fmi2GetInteger."""
     signature = types.int32(types.int64, types.int64, types.int64, types.int64, types.int64)
 
     def generate(_context, builder, _signature, arguments):

@@ -1,7 +1,7 @@
 """Functions with the prototypes of FMI 2.0 that call an FMU of FMI 3.0: the loop knows only these.
 
 In place of the component, each adapter takes a row of pointers: to the FMU's instance, then to its
-functions, in the order of `rparm.campaign.fmi_calls`. Importing this module compiles them.
+functions, in the order of `rparm.fmi.compiled.calls`. Importing this module compiles them.
 """
 
 import numpy as np
@@ -10,9 +10,10 @@ from numba import carray, cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from rparm.campaign.fmi_calls import DISCARD, TERMINATED
+from rparm.fmi.compiled.calls import DISCARD, TERMINATED
 
 INSTANCE, SET_FLOAT64, GET_FLOAT64, SET_BOOLEAN, GET_BOOLEAN, DO_STEP, DERIVATIVE = range(7)
+GET_INT32 = 7
 
 POINTER, SIZE, REAL, STATUS = types.voidptr, types.uintp, types.float64, types.int32
 ROW = types.CPointer(POINTER)
@@ -78,6 +79,11 @@ def _get_real(row, references, count, values):
 
 
 @_move
+def _get_integer(row, references, count, values):
+    return _call(row[GET_INT32], (row[INSTANCE], references, count, values, count))
+
+
+@_move
 def _set_boolean(row, references, count, values):
     return _move_booleans(row, SET_BOOLEAN, references, count, values)
 
@@ -109,5 +115,7 @@ def _derivative(row, unknowns, unknown_count, knowns, known_count, direction, re
     )
 
 
-ADAPTERS = (_set_real, _get_real, _set_boolean, _get_boolean, _do_step, _derivative)
+ADAPTERS = (
+    _set_real, _get_real, _set_boolean, _get_boolean, _do_step, _derivative, _get_integer,
+)  # fmt: skip
 ADDRESSES = tuple(adapter.address for adapter in ADAPTERS)

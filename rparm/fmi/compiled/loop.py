@@ -13,11 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from rparm.campaign.fmi_calls import (
+from rparm.fmi.compiled.calls import (
     DERIVATIVE,
     DISCARD,
     DO_STEP,
     GET_BOOLEAN,
+    GET_INTEGER,
     GET_REAL,
     SET_BOOLEAN,
     SET_REAL,
@@ -28,7 +29,7 @@ from rparm.campaign.fmi_calls import (
 )
 from rparm.fmi.fmi_instance import Instance
 
-COLUMNS = 7  # component and addresses of its functions
+COLUMNS = 8  # component and addresses of its functions
 
 
 @dataclass(frozen=True)
@@ -71,20 +72,28 @@ class Wires(NamedTuple):
 class Tangent:
     """A small deviation of the states, carried along by directional derivatives.
 
-    The exponent of its growth is that of Lyapunov over a finite time.
+    The exponent of its growth is that of Lyapunov over a finite time. At an event it may jump,
+    which derivatives do not see: a step in which a discrete output changes has the growth nan.
     """
 
     derivatives: np.ndarray  # (states,) value references
     states: np.ndarray  # (states,) value references
+    reals: np.ndarray  # value references of discrete outputs that are Real
+    integers: np.ndarray  # of those that are Integer
     deviation: np.ndarray = field(init=False)  # (states,) of length 1
 
     def __post_init__(self) -> None:
         self.deviation = np.empty(len(self.states))
 
+    @property
+    def fields(self) -> tuple[np.ndarray, ...]:
+        """As the loop takes it."""
+        return self.derivatives, self.states, self.reals, self.integers, self.deviation
+
     @staticmethod
     def none() -> "Tangent":
         """No deviation is carried along."""
-        return Tangent(np.zeros(0, np.uint32), np.zeros(0, np.uint32))
+        return Tangent(*[np.zeros(0, np.uint32)] * 4)
 
 
 def component_calls(instances: Sequence[Instance]) -> np.ndarray:
@@ -99,7 +108,7 @@ def component_calls(instances: Sequence[Instance]) -> np.ndarray:
         if instance.fmu.model.fmi_version == "2.0":
             called[:] = own
         else:
-            from rparm.campaign.fmi3_adapters import ADDRESSES  # takes time
+            from rparm.fmi.compiled.fmi3_adapters import ADDRESSES  # takes time
 
             called[:] = adapted.ctypes.data, *ADDRESSES
             adapted[:] = own
@@ -193,6 +202,22 @@ def _growth(calls, derivatives, states, deviation, rate):
 
 
 @njit(cache=True, nogil=True)
+def _changes(calls, references, function, values, before):
+    """Read discrete outputs of the first component; the FMU's status, and whether one differs."""
+    if len(references) == 0:
+        return 0, False
+    before[:] = values
+    status = move_values(
+        calls[0, 1 + function],
+        calls[0, 0],
+        references.ctypes.data,
+        len(references),
+        values.ctypes.data,
+    )
+    return status, np.any(before != values)
+
+
+@njit(cache=True, nogil=True)
 def _normalize(deviation):
     """Scale to length 1; the length before."""
     total = 0.0
@@ -205,8 +230,10 @@ def _normalize(deviation):
 
 
 @njit(cache=True, nogil=True)
-def advance(calls, times, held, held_switches, reals, switches, watched, record, tangent, growth):
-    """All steps of a run, from its first communication point; outputs have been read there.
+def advance(
+    calls, times, held, held_switches, reals, switches, points, watched, record, tangent, growth
+):
+    """Make all steps from times[0], where outputs have been read.
 
     Parameters
     ----------
@@ -214,10 +241,13 @@ def advance(calls, times, held, held_switches, reals, switches, watched, record,
     times : (n + 1,) s
     held, held_switches : (n + 1, held values), zero-order hold: over the step from times[i]
     reals, switches : tuples of Wires
+    points : (rows,)
+        Where outputs are read: indices of times from 1 on, that increase. Where components are
+        connected, that is everywhere.
     watched : (variables,) columns among the Reals
-    record : (n + 1, variables)
-        What an importer reads after the step to times[i].
-    tangent : (derivatives, states, deviation), empty if none is carried along
+    record : (rows, variables)
+        What an importer reads after the step to times[points[j]].
+    tangent : fields of Tangent, empty if no deviation is carried along
     growth : (n,)
         By how much each step lengthens the deviation: filled if one is carried along.
 
@@ -226,12 +256,20 @@ def advance(calls, times, held, held_switches, reals, switches, watched, record,
     status, function, component, step
         What failed; status 0 if nothing did.
     """
-    derivatives, states, deviation = tangent
+    derivatives, states, discrete_reals, discrete_integers, deviation = tangent
     carried = len(states) > 0
+    numbers = np.empty((2, len(discrete_reals)))
+    integers = np.empty((2, len(discrete_integers)), np.int32)
+    if carried:
+        status, _ = _changes(calls, discrete_reals, GET_REAL, numbers[0], numbers[1])
+        if status >= DISCARD:
+            return status, GET_REAL, 0, 0
+        status, _ = _changes(calls, discrete_integers, GET_INTEGER, integers[0], integers[1])
+        if status >= DISCARD:
+            return status, GET_INTEGER, 0, 0
     before, after = np.empty_like(deviation), np.empty_like(deviation)
     values, truths = reals[5], switches[5]
-    for k in range(len(watched)):
-        record[0, k] = values[watched[k]]
+    row = 0
     for i in range(len(times) - 1):
         length = times[i + 1] - times[i]
         for j in range(held.shape[1]):
@@ -249,9 +287,11 @@ def advance(calls, times, held, held_switches, reals, switches, watched, record,
             status = do_step(calls[c, 1 + DO_STEP], calls[c, 0], times[i], length)
             if status >= DISCARD:
                 return status, DO_STEP, c, i
-        status, function, c = read_outputs(calls, reals, switches)
-        if status >= DISCARD:
-            return status, function, c, i
+        is_read = row < len(points) and points[row] == i + 1
+        if is_read:
+            status, function, c = read_outputs(calls, reals, switches)
+            if status >= DISCARD:
+                return status, function, c, i
         if carried:  # Heun's method
             for k in range(len(deviation)):
                 before[k] = deviation[k] + length * before[k]
@@ -261,6 +301,18 @@ def advance(calls, times, held, held_switches, reals, switches, watched, record,
             for k in range(len(deviation)):
                 deviation[k] = 0.5 * (deviation[k] + before[k] + length * after[k])
             growth[i] = _normalize(deviation)
-        for k in range(len(watched)):
-            record[i + 1, k] = values[watched[k]]
+            status, jumps = _changes(calls, discrete_reals, GET_REAL, numbers[0], numbers[1])
+            if status >= DISCARD:
+                return status, GET_REAL, 0, i
+            status, turns = _changes(
+                calls, discrete_integers, GET_INTEGER, integers[0], integers[1]
+            )
+            if status >= DISCARD:
+                return status, GET_INTEGER, 0, i
+            if jumps or turns:
+                growth[i] = np.nan
+        if is_read:
+            for k in range(len(watched)):
+                record[row, k] = values[watched[k]]
+            row += 1
     return 0, 0, 0, 0
