@@ -5,22 +5,24 @@
 #   ./setup.sh              for building and ./run.sh
 #   ./setup.sh --campaign   for ./run.sh campaign too
 #   ./setup.sh --federation for ./run.sh federation too
+#   ./setup.sh --control    for ./run.sh linearize, identify, prove --check too
 #   ./setup.sh --release    for ./release.sh too
 #   ./setup.sh --dev        for ./test.sh too
 #   ./setup.sh --platforms  for ./test.sh --all too: clang, analysers, other platforms, browsers
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
-usage() { echo "usage: ./setup.sh [--campaign | --federation | --release | --dev | --platforms]" >&2; exit 2; }
+usage() { echo "usage: ./setup.sh [--campaign | --federation | --control | --release | --dev | --platforms]" >&2; exit 2; }
 [ "$#" -le 1 ] || usage
-campaign=no federation=no release=no dev=no platforms=no
+campaign=no federation=no control=no release=no dev=no platforms=no
 case "${1-}" in
   "") ;;
   --campaign) campaign=yes ;;
   --federation) federation=yes ;;
+  --control) control=yes ;;
   --release) release=yes ;;
-  --dev) campaign=yes federation=yes dev=yes ;;
-  --platforms) campaign=yes federation=yes release=yes dev=yes platforms=yes ;;
+  --dev) campaign=yes federation=yes control=yes dev=yes ;;
+  --platforms) campaign=yes federation=yes control=yes release=yes dev=yes platforms=yes ;;
   --help | -h) sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; exit ;;
   *) usage ;;
 esac
@@ -126,6 +128,7 @@ for program in build/venv/lib/python3*/site-packages/ecospy/binaries/{ecos,proxy
 done
 [ "$campaign" = no ] || install_requirements campaign
 [ "$federation" = no ] || install_requirements federation
+[ "$control" = no ] || install_requirements control
 [ "$release" = no ] || install_requirements release
 [ "$dev" = no ] || install_requirements dev
 

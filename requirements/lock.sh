@@ -27,7 +27,7 @@ write() {
 # These go into one environment: all are solved at once, and run.txt is a part of the others.
 cat requirements/*.txt 2>/dev/null | grep -v '^-' >"$work/all.txt" || true
 solve "$work/all.txt" "${upgrade[@]}" requirements/*.in
-for name in run campaign federation release dev; do
+for name in run campaign federation control release dev; do
   above=() others=()
   if [ "$name" != run ]; then
     above=("-r run.txt")

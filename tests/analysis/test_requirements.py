@@ -27,19 +27,33 @@ OPTIONS = {"-r run.in", "-r run.txt", "--only-binary :all:"}
 # What each environment runs: patterns of files; what they import of the project belongs to it too.
 COMMANDS = {
     "run": (
-        "rparm/__main__.py", "rparm/commands/[!cf]*.py", "rparm/commands/coupling.py",
+        "rparm/__main__.py", "rparm/commands/[!cfil]*.py", "rparm/commands/coupling.py",
+        "rparm/commands/completion.py", "rparm/commands/fmu.py", "rparm/commands/list.py",
         "rparm/system/ecos.py", "models/*/animation.py", "models/*/study.py",
         "fmu/generate.py", "fmu/document.py", "fmu/references.py", "fmu/package.py",
-        "fmu/source_code.py",
+        "fmu/source_code.py", "fmu/equations_to_fmu.py",
     ),
-    "campaign": ("rparm/commands/campaign.py", "rparm/campaign/*.py"),
+    "campaign": (
+        "rparm/commands/campaign.py", "rparm/campaign/*.py", "rparm/fmi/compiled/*.py",
+        "rparm/runs/compiled_steps.py",
+    ),
+    "control": (
+        "rparm/commands/linearize.py", "rparm/linearization/*.py", "rparm/commands/identify.py",
+        "rparm/identification/*.py",
+    ),
     "federation": ("rparm/commands/fed*.py", "rparm/federation/*.py"),
     "release": ("fmu/bill_of_materials.py", "fmu/wheel.py", "playground/build.py"),
     "dev": ("rparm/report/recording.py", "fmu/[!w]*.py", "models/**/*.py", "tests/**/*.py"),
 }  # fmt: skip
+# what others use only where its packages are installed
+OPTIONAL = (
+    "rparm/campaign/*.py", "rparm/federation/*.py", "rparm/identification/*.py",
+    "rparm/linearization/*.py", "rparm/runs/compiled_steps.py",
+)  # fmt: skip
 # each of these runs in the environment of its importer
 ELSEWHERE = [*(ROOT / "tests" / "importers").glob("run_*.py")]
-TOGETHER = ("run", "campaign", "federation", "dev")  # in one environment, that of the tests
+# in one environment, that of the tests
+TOGETHER = ("run", "campaign", "federation", "control", "dev")
 
 Lock = dict[str, Requirement]
 
@@ -159,13 +173,17 @@ def own_modules() -> dict[str, list[Path]]:
     return found
 
 
+def top_folder(path: Path) -> str:
+    return path.relative_to(ROOT).parts[0] if path.is_relative_to(ROOT) else ""
+
+
 def foreign_imports(patterns: tuple[str, ...]) -> dict[str, Path]:
     """Packages that are neither Python's nor the project's: by which file, of those reached."""
     todo = sorted({path for pattern in patterns for path in ROOT.glob(pattern)} - {*ELSEWHERE})
     assert todo
+    done = {path for pattern in OPTIONAL for path in ROOT.glob(pattern)} - {*todo}
     own = own_modules()
     folders = {path.parent.name for paths in own.values() for path in paths}
-    done: set[Path] = set()
     found: dict[str, Path] = {}
     while todo:
         path = todo.pop()
@@ -174,7 +192,9 @@ def foreign_imports(patterns: tuple[str, ...]) -> dict[str, Path]:
         done.add(path)
         for module in imported(path):
             top = module.partition(".")[0]
-            todo += own.get(module, ())
+            named = own.get(module, [])
+            nearer = [other for other in named if top_folder(other) == top_folder(path)]
+            todo += nearer or named
             if top not in {*own, *folders, *sys.stdlib_module_names}:
                 found.setdefault(top, path)
     return found
