@@ -5,20 +5,28 @@
 #   ./run.sh NAME ...            these scenarios
 #   ./run.sh FILE.toml           a scenario of your own, from anywhere
 #   ./run.sh new NAME            write NAME.toml, a scenario to start from
+#   ./run.sh build FILE.toml     make FMUs of a file with equations
+#   ./run.sh new-model NAME      write such a file to start from
 #   ./run.sh list                names of the scenarios; also --list
 #   ./run.sh system              all variants of all systems in Ecos
 #   ./run.sh system NAME ...     these variants, or all of these systems
 #   ./run.sh coupling            what the coupling of the closed loop costs
 #   ./run.sh playground          make a page with the plant, for a browser
 #   ./run.sh campaign FILE.toml  many runs over parameters, on all cores
+#   ./run.sh linearize NAME      linear model of an FMU or a system, margins
+#   ./run.sh identify FMU LOG    parameters that fit a log of a machine
+#   ./run.sh prove NAME          how far a run is from the exact motion at most
 #   ./run.sh federation          the closed loop, each FMU in its own process
 #   ./run.sh federate            one of these processes, on another machine
+#   ./run.sh fmu NAME            copy an FMU, for another tool
+#   ./run.sh completion SHELL    what makes bash, zsh or tcsh complete all this
 #   ./run.sh help COMMAND        all options of a command; of scenarios: run
 #
-#   --open     then open the page in a browser: scenarios, system, playground
-#   --fmi 3    only FMUs of FMI 3.0: scenarios, system, coupling, federation
-#   --json     one JSON document on standard output, all else on standard error
-#   --quiet    the last line only, and what is wrong
+#   --open         then show what was written in a browser
+#   --output DIR   write into this folder
+#   --fmi 3        only FMUs of FMI 3.0: scenarios, system, coupling, federation
+#   --json         print one JSON document, and all else on standard error
+#   --quiet        print the last line only, and what is wrong
 #
 # Exit codes: 0 all well, 1 a result is bad, 2 wrong use or failure, 130 Ctrl-C.
 set -euo pipefail
@@ -26,12 +34,12 @@ unset PYTHONPATH PYTHONHOME  # may lead to other modules than those tested here
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 
 # the command, which --json and --quiet may precede, and what of the arguments matters here
-command="" quiet=no help=no  # help: nothing is run
+command="" quiet=no json=no help=no  # help: nothing is run
 for argument; do
   case "$argument" in
     --) break ;;
     --quiet) quiet=yes ;;
-    --json) ;;
+    --json) json=yes ;;
     *)
       [ -n "$command" ] || command=$argument
       case "$command $argument" in *" --help" | *" -h" | "run --list") help=yes ;; esac
@@ -56,67 +64,56 @@ follow() {
   [ "$bar" = no ] || printf '\r%60s\r' '' >&2
 }
 
+# fail TEXT: end because nothing can be run
+fail() {
+  echo "run.sh: $*" >&2
+  [ "$json" = no ] || printf '{"exit_code": 2, "error": "%s"}\n' "$*"
+  exit 2
+}
+
 # set_up OPTION ...: what is missing; nothing of it is a result
 set_up() {
-  if [ "$quiet" = yes ]; then "$root/setup.sh" "$@" >/dev/null; else "$root/setup.sh" "$@" >&2; fi
+  if [ "$quiet" = yes ]; then "$root/setup.sh" "$@" >/dev/null; else "$root/setup.sh" "$@" >&2; fi ||
+    fail "the set-up failed"
 }
 
 # build WHAT OPTION ...: with these options of cmake --build
 build() {
+  log="$root/build/build.log"
   stage "configuring"
   : >"$log"
   cmake -S "$root" -B "$root/build" -DBUILD_TESTING=OFF 2>&1 | follow &&
     stage "building $1" &&
     cmake --build "$root/build" "${@:2}" 2>&1 | follow ||
-    { cat "$log" >&2; echo "run.sh: the build failed" >&2; exit 1; }
+    { cat "$log" >&2; fail "the build failed, build/build.log says why"; }
 }
 
 # Whether it cannot be the name of a scenario: then nothing is built before Python says so.
 is_unknown() {
   case "$1" in
     "" | -* | *.[Tt][Oo][Mm][Ll]) return 1 ;;
-    run | new | system | coupling | campaign | federation) return 1 ;;
+    run | new | system | coupling | campaign | federation | fmu | linearize | identify | prove | build) return 1 ;;
   esac
   ! compgen -G "$root/models/*/scenarios/$1.toml" >/dev/null
 }
 
-case "$command" in
-  --help | -h) usage; exit ;;
-  help)
-    case "${*: -1}" in
-      help | --json | --quiet) usage; exit ;;
-      playground) command=playground help=yes ;;
-    esac
-    ;;
-esac
-
-if [ "$command" = playground ]; then
-  [ "$help" = no ] || { echo "usage: ./run.sh playground [--open] [--quiet]"; exit; }
-  for argument; do
-    case "$argument" in
-      playground | --open | --quiet) ;;
-      *) echo "usage: ./run.sh playground [--open] [--quiet]" >&2; exit 2 ;;
-    esac
-  done
-  set_up --release
-  SECONDS=0
-  page="$root/build/playground/index.html"
-  log="$root/build/playground.log"
-  build "the playground" --target playground
-  echo "$page: $(wc -c <"$page") bytes, built in $SECONDS s"
-  [[ " $* " != *" --open "* ]] || PYTHONPATH="$root" "$root/build/venv/bin/python" -P -c \
-    "import pathlib, sys; from rparm.report import browser; browser.show(pathlib.Path(sys.argv[1]))" "$page"
-  exit
+if [ "$json" = no ]; then
+  case "$command ${*: -1}" in
+    --help\ * | -h\ * | "help help" | "help --quiet") usage; exit ;;
+  esac
 fi
+[ "$command" != help ] || help=yes
 
 case "$command" in
   campaign) set_up --campaign ;;
   federation | federate) set_up --federation ;;
+  linearize | identify) set_up --control ;;
+  playground) if [ "$help" = yes ]; then set_up; else set_up --release; fi ;;
   *) set_up ;;
 esac
-log="$root/build/build.log"
 case "$command" in
-  help | list | --list | --version | federate) ;;
+  list | --list | --version | --help | -h | federate | completion) ;;
+  playground) [ "$help" = yes ] || build "the playground" --target playground ;;
   *) [ "$help" = yes ] || is_unknown "$command" || build "the FMUs" --parallel 2 ;;
 esac
 [ -n "$command" ] || set -- run "$@"

@@ -1,15 +1,26 @@
 """Drives FMUs through fmpy: compares them with references, plots, couples, runs systems.
 
-For programs: `fmu`, `simulate`, `Scenario`, `System`, `Table`; docs/python-api.md is their page.
+For programs there are the names in `__all__`; docs/python-api.md is their page.
 """
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rparm.api import Scenario, System, Table, fmu, simulate
+    from rparm.api import (
+        Scenario,
+        System,
+        Table,
+        fmu,
+        identify,
+        linearize,
+        run_campaign,
+        simulate,
+    )
 
-__all__ = ["Scenario", "System", "Table", "fmu", "simulate"]
+__all__ = [
+    "Scenario", "System", "Table", "fmu", "identify", "linearize", "run_campaign", "simulate",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
@@ -10,19 +11,19 @@ from io import TextIOWrapper
 from typing import NoReturn, TextIO
 
 from rparm import command_line, project
+from rparm.command_line import Answered
 from rparm.commands import Ended
 from rparm.errors import UserError, reason
 from rparm.interruption import handle_endings
 from rparm.output import streams
+from rparm.output_files import whole, written
+from rparm.report import browser
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit code: 0 passed, 1 a bound exceeded, 2 a user's mistake.
-
-    2 also if the system gives out: no memory, no room on the disk or for the output.
-    """
+    """Run the command line; the exit code, as `command_line.EXIT_CODES` says."""
     if isinstance(sys.stdout, TextIOWrapper):  # names that it cannot encode are no reason to stop
         sys.stdout.reconfigure(errors="backslashreplace")
     project.set_library_caches()
@@ -53,7 +54,12 @@ def _ended(arguments: Sequence[str]) -> Ended:
     try:
         options = command_line.parsed(arguments)
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
-        return import_module(f"rparm.commands.{options.command}").run(options)
+        ended = import_module(f"rparm.commands.{options.command.replace('-', '_')}").run(options)
+        _keep_document(options, ended)
+        _show_page(options, ended)
+        return ended
+    except Answered as answer:
+        return Ended(0, answer.text, {answer.name: answer.text})
     except UserError as error:
         return Ended(2, "", error=error)
     except ModuleNotFoundError as error:
@@ -63,16 +69,42 @@ def _ended(arguments: Sequence[str]) -> Ended:
         return Ended(2, "", error=UserError(f"{error.name}: not installed, {way_out} does it"))
 
 
+def _keep_document(options: Namespace, ended: Ended) -> None:
+    """Write the document of a command that writes nothing else."""
+    folder = getattr(options, "document", None)
+    if folder is not None:
+        path = folder / f"{options.command}.json"
+        with written(path):
+            folder.mkdir(parents=True, exist_ok=True)
+            text = f"{streams.document(_document(ended))}\n"
+            with whole(path) as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _show_page(options: Namespace, ended: Ended) -> None:
+    """Show what a command has written."""
+    if not options.open:
+        return
+    if ended.page is not None:
+        browser.show(ended.page)
+    elif ended.error is None:
+        print(f"--open: {options.command} has written no page", file=sys.stderr)
+
+
+def _document(ended: Ended) -> dict[str, object]:
+    """How a command has ended, for programs."""
+    error = {} if ended.error is None else {"error": str(ended.error)}
+    return {"exit_code": ended.code, **ended.document, **error}
+
+
 def _say(ended: Ended, as_json: bool, results: TextIO | None) -> int:
     """Print how a command has ended; the exit code."""
-    document = {"exit_code": ended.code, **ended.document}
     if ended.error is not None:
-        document["error"] = str(ended.error)
-        _refuse(document["error"])
+        _refuse(str(ended.error))
     if ended.verdict:
         print(ended.verdict, file=sys.stdout if as_json else results)
     if as_json:
-        print(streams.document(document), file=results)
+        print(streams.document(_document(ended)), file=results)
     for stream in (sys.stdout, results):
         if stream is not None:
             stream.flush()
@@ -115,6 +147,7 @@ def _as_program() -> int:
 
 def _end(code: int) -> NoReturn:
     """End the process, but not HELICS, which may wait for ever for a process that is gone."""
+    exec("")  # a Ctrl-C that was caught above another exec would count: CPython ends by the signal
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

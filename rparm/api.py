@@ -4,25 +4,31 @@ All values are in the units of their variables (SI), times in s. What is wrong r
 `rparm.errors.UserError`, whose text is one line.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from numbers import Real
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rparm import project, trajectory_csv
 from rparm.coupling import in_process
-from rparm.errors import UserError, hint, placed
+from rparm.errors import UserError, hint
+from rparm.federation import addresses, federation
+from rparm.federation.federation import Record
 from rparm.fmi.fmu_file import Fmu
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value
-from rparm.runs import reference, simulation
+from rparm.fmi.model import Model, Value
+from rparm.proof import proven, prover
+from rparm.runs import given, reference, simulation
+from rparm.runs.given import Input
 from rparm.scenarios import scenario as scenarios
-from rparm.system import comparison, ecos, ssp
+from rparm.system import comparison, ecos, ssp, study
+from rparm.system.ssp import Ssp
 
-Input = float | bool | np.ndarray | Sequence[float] | tuple[Any, Any] | Callable[[float], float]
-WHOLE = 1e-9  # of a step: by so much the stop time may miss a communication point
+if TYPE_CHECKING:
+    from rparm.identification.identify import Identification
+    from rparm.linearization.linear import Linear
 
 
 class Table(Mapping[str, np.ndarray]):
@@ -101,6 +107,9 @@ def simulate(
 ) -> Table:
     """Run an FMU for co-simulation, of FMI 2.0 or 3.0.
 
+    Where numba is installed, a compiled loop makes the steps. The first run of a program loads it
+    for half a second; the first one ever compiles it for some seconds.
+
     Parameters
     ----------
     fmu : path
@@ -123,8 +132,8 @@ def simulate(
         Row i is what is read right after the step to time i; row 0 at the start.
     """
     path = Path(fmu)
-    times = _times(start_time, stop_time, step)
-    if not (_is_number(tolerance) and 0 < tolerance < 1):
+    times = given.times(start_time, stop_time, step)
+    if not (given.is_number(tolerance) and 0 < tolerance < 1):
         raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
     with Fmu(path) as opened:
         model = opened.model
@@ -134,17 +143,126 @@ def simulate(
                 raise UserError(
                     f"{path}: has no Real output {name!r}{hint(name, model.real_outputs)}"
                 )
-        given = _start_values(model, start_values or {})
-        signals = {name: _input(model, name, x, times) for name, x in (inputs or {}).items()}
+        values = given.start_values(model, start_values or {})
+        signals = {
+            name: given.input_values(model, name, x, times) for name, x in (inputs or {}).items()
+        }
         run = scenarios.Scenario(
             name=path.stem, model=model.name, path=path, title=path.stem, description="",
-            parameters=given, initial={}, start=times[0], stop=times[-1], steps=(step,),
+            parameters=values, initial={}, start=times[0], stop=times[-1], steps=(step,),
             tolerance=tolerance, times=times, signals={}, inputs=signals, reference_every=1,
             defaults=model.start_values,
         )  # fmt: skip
-        result = simulation.simulate(opened, run)
+        result = simulation.simulate(opened, run, compiled=True)
         columns = [result.names.index(name) for name in names]
         return Table(result.times, names, result.values[:, columns], _units(model))
+
+
+def linearize(
+    fmu_or_ssp: str | Path,
+    *,
+    at: Mapping[str, Value] | None = None,
+    time: float | None = None,
+    trim: Sequence[str] = (),
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    variant: str = "",
+    break_at: str = "",
+    without: Sequence[str] = (),
+    fmi: int = 2,
+) -> "Linear":
+    """The linear model of an FMU or a system at a point; rparm/linearization/README.md explains.
+
+    Parameters
+    ----------
+    fmu_or_ssp : path or str
+        A file, or a name of the project; a name is taken from version `fmi` of FMI.
+    at : mapping, optional
+        States, inputs and parameters by name, as numbers or texts with a unit ("30 deg"); with
+        `trim` also outputs. In a system names are "component.variable".
+    time : float, optional
+        s; default: 0, or the start of the system.
+    trim : sequence of str
+        States and inputs to move until the point is an equilibrium.
+    inputs, outputs : sequence of str, optional
+        Those of the model; default: all.
+    variant, break_at, without
+        Of a system: its parameter set (default: the first), an input whose connection is cut, and
+        components that are taken as ideal.
+
+    Returns
+    -------
+    Linear
+        `A`, `B`, `C`, `D`; `states`, `inputs`, `outputs`, `held`; `ss()` and `zoh(step)` give them
+        to python-control.
+    """
+    with _needing("control"):
+        from rparm.linearization.study import Request, study
+    asked = Request(
+        fmu_or_ssp, at or {}, time, tuple(trim), inputs, outputs, variant, break_at, tuple(without),
+        version=_version(fmi),
+    )  # fmt: skip
+    return study(asked).linear
+
+
+def identify(
+    fmu: str | Path,
+    logs: str | Path | Sequence[str | Path],
+    *,
+    parameters: Sequence[str],
+    inputs: Sequence[str],
+    measured: Sequence[str],
+    settings: Mapping[str, Value] | None = None,
+    start: Mapping[str, Value] | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    delay: bool = False,
+    validate: str | Path | None = None,
+    segment: float = 0.4,
+    tolerance: float = 1e-8,
+) -> "Identification":
+    """Fit parameters of an FMU to logs of a machine; needs the extra `control`.
+
+    Parameters
+    ----------
+    fmu : path
+        Any FMU for co-simulation whose states can be set; see `fmu` for those of the project.
+    logs : path or sequence of path
+        CSV files with a row of names; "time" in s.
+    parameters : sequence of str
+        To be estimated. "name>other" stays above another parameter.
+    inputs, measured : sequence of str
+        Inputs and Real outputs that the logs have.
+    settings, start : mapping, optional
+        Values of other parameters; where the fit begins, of parameters and of states.
+    columns, units : mapping, optional
+        Names and units of columns, by variable, where they differ from its own.
+    delay : bool
+        Estimate by how much the measured values are late, too.
+    validate : path, optional
+        A log to run with the result.
+    segment, tolerance : float
+        Length of a segment in s; relative tolerance of the integrator.
+
+    Returns
+    -------
+    Identification
+        `estimates` by name, each with `value`, `low` and `high` (95 %, by the scatter between
+        segments) and `classical`; `combinations` that cannot be known; `chi2`, `whiteness`,
+        `validation`, `warnings`.
+    """
+    with _needing("control"):
+        from rparm.identification import identify as identification
+        from rparm.identification.request import Request
+    files = [logs] if isinstance(logs, str | Path) else logs
+    request = Request(
+        logs=[Path(log) for log in files], parameters=parameters, inputs=inputs,
+        measured=measured, settings=settings or {}, starts=start or {}, columns=columns or {},
+        units=units or {}, with_delay=delay, segment=segment, tolerance=tolerance,
+        validation=None if validate is None else Path(validate),
+    )  # fmt: skip
+    with Fmu(Path(fmu)) as opened:
+        return identification.identify(opened, request)
 
 
 class Scenario:
@@ -172,7 +290,8 @@ class Scenario:
             Relative; default: that of the scenario.
         """
         with self._opened(fmi) as (opened, loaded):
-            result = simulation.simulate(opened, loaded, tolerance)
+            loaded = replace(loaded, panels=())  # Integers, which only pages draw, cost time
+            result = simulation.simulate(opened, loaded, tolerance, compiled=True)
             return Table(result.times, result.names, result.values, _units(opened.model))
 
     def errors(self, table: Table) -> dict[str, float]:
@@ -186,11 +305,80 @@ class Scenario:
             for name, column in expected.columns.items()
         }
 
+    def proven_errors(
+        self, *, method: str | None = None, tolerance: float | None = None
+    ) -> dict[str, float]:
+        """How far each state in a run is from the exact motion at most, by validated integration.
+
+        Assumed are the equations of motion, exact parameters and inputs as given, and IEEE doubles.
+
+        Parameters
+        ----------
+        method : str, optional
+            Of integration; default: that of the scenario.
+        tolerance : float, optional
+            Relative; default: that of the scenario.
+
+        Returns
+        -------
+        dict of str to float
+            Largest distance at communication points, by the name of the state, in its unit.
+        """
+        program = prover.of_scenario(self.path)
+        with self._opened(2) as (opened, loaded):
+            enclosure = program.enclose(loaded)
+            if enclosure.stopped is not None:
+                raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
+            used = method or opened.model.method(loaded.parameters)
+            (used,) = proven.methods(opened, used)
+            found = proven.errors(opened, loaded, enclosure, used, tolerance or loaded.tolerance)
+        return {name: each.error for name, each in found.items()}
+
     @contextmanager
     def _opened(self, fmi: int) -> Iterator[tuple[Fmu, scenarios.Scenario]]:
         folder = scenarios.folder_of(self.path)
         with Fmu(project.built(folder, ".fmu", version=_version(fmi))) as opened:
             yield opened, scenarios.load(self.path, opened.model)
+
+
+def run_campaign(
+    file: str | Path,
+    *,
+    output: str | Path | None = None,
+    fmu: str | Path | None = None,
+    workers: int | None = None,
+) -> dict[str, np.ndarray]:
+    """Make all runs of a campaign that are missing, in processes of this machine.
+
+    The processes import your program: call this under ``if __name__ == "__main__":``.
+
+    Parameters
+    ----------
+    file : path
+        The campaign, as the command takes it.
+    output : path, optional
+        Folder for the results; default: that in the file, or that of the command.
+    fmu : path, optional
+        The FMU or SSP; default: that of the project.
+    workers : int, optional
+        Number of processes; default: one a core.
+
+    Returns
+    -------
+    dict of str to ndarray
+        A value a run, (runs,), in SI units: "run", parameters, what is kept, and "failure", why a
+        run failed, else empty.
+    """
+    with _needing("campaign"):
+        from rparm.campaign import cluster, work
+    with work.opened(Path(file), fmu and Path(fmu), output and Path(output)) as made:
+        if blocks := made.begin():
+            with (
+                made.results.workers_folder() as files,
+                cluster.opened(None, workers, files) as client,
+            ):
+                made.run(client, blocks)
+        return made.table()
 
 
 class System:
@@ -218,26 +406,60 @@ class System:
         Parameters
         ----------
         engine : str
-            "master", that of rparm, or "ecos", where ecospy is installed.
+            "master", that of rparm; "ecos", where ecospy is installed; "helics", each FMU in its
+            own process, where helics is installed.
 
         Returns
         -------
         Table
             Columns "component.variable": all Real outputs and states, read after the inputs of
-            the next step have been set.
+            the next step have been set. With "helics": all Real outputs, read after
+            the step.
         """
         if variant not in self.variants:
             raise UserError(
                 f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
             )
-        engines = {"master": in_process.run, "ecos": ecos.run}
+        engines = {"master": in_process.run, "ecos": ecos.run, "helics": _by_helics}
         if engine not in engines:
             raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
         with ssp.unpacked(self.path) as opened:
-            names = comparison.recorded(opened)
-            run = engines[engine](opened, variant, names)
-            units = {name: opened.variable(name).unit for name in names}
-        return Table(run.times, names, run.values, units)
+            run = engines[engine](opened, variant, comparison.recorded(opened))
+            units = {name: opened.variable(name).unit for name in run.names}
+        return Table(run.times, run.names, run.values, units)
+
+    def study_coupling(self, output: str | Path) -> dict[str, dict[str, object]]:
+        """Study what the coupling costs, if the system has such a study; prints its tables.
+
+        Parameters
+        ----------
+        output : path
+            Folder for its picture.
+
+        Returns
+        -------
+        dict of str to dict
+            Numbers of each part of the study; "passed" says whether they are as expected.
+        """
+        folder, known = study.of_coupling()
+        if not project.is_built_from(self.path.stem, folder):
+            raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
+        return known.study_coupling(self.path, Path(output))
+
+
+def _by_helics(opened: Ssp, variant: str, _: Sequence[str]) -> Record:
+    """Each FMU in its own process."""
+    return federation.run(opened, variant, addresses.free())
+
+
+@contextmanager
+def _needing(extra: str) -> Iterator[None]:
+    """Say how to install what an extra of the distribution has, if an import finds it missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        way_out = project.how_to_install(extra)
+        raise UserError(f"{error.name}: not installed, {way_out} does it") from error
 
 
 def _version(fmi: int) -> str:
@@ -249,76 +471,3 @@ def _version(fmi: int) -> str:
 
 def _units(model: Model) -> dict[str, str | None]:
     return {variable.name: variable.unit for variable in model.variables.values()}
-
-
-def _is_number(given: object) -> bool:
-    return isinstance(given, Real) and not isinstance(given, bool) and bool(np.isfinite(given))
-
-
-def _times(start: float, stop: float, step: float) -> np.ndarray:
-    """Communication points in s; UserError if no whole number of steps leads to the stop time."""
-    for name, value in (("start_time", start), ("stop_time", stop), ("step", step)):
-        if not _is_number(value):
-            raise UserError(f"{name}: expected a finite number, got {value!r}")
-    if start < 0 or stop <= start or step <= 0:
-        raise UserError(
-            "expected 0 <= start_time < stop_time and step > 0, "
-            f"got {start!r}, {stop!r} and {step!r}"
-        )
-    exact = (stop - start) / step
-    count = round(exact)
-    if not 1 <= count <= scenarios.MAX_STEPS:
-        raise UserError(f"expected 1 to {scenarios.MAX_STEPS} steps, got {exact:.6g}")
-    if abs(exact - count) > WHOLE * max(count, 1):
-        raise UserError(f"step: expected a whole number of steps to the stop time, got {exact:.6g}")
-    times = start + step * np.arange(count + 1)
-    times[-1] = stop
-    return times
-
-
-def _start_values(model: Model, given: Mapping[str, Any]) -> dict[str, Value]:
-    checked = {}
-    for name, value in given.items():
-        with placed(f"start_values: {name}"):
-            variable = model.variables.get(name)
-            kind = INITIAL if variable is not None and variable.is_a(INITIAL) else PARAMETERS
-            value = value.item() if isinstance(value, np.generic) else value
-            checked[name] = model.find(name, kind).checked(value)
-    return checked
-
-
-def _input(model: Model, name: str, given: Any, times: np.ndarray) -> np.ndarray:
-    """Values of an input at all communication points."""
-    with placed(f"inputs: {name}"):
-        variable = model.find(name, INPUTS)
-    boolean = variable.type == "Boolean"
-    try:
-        values = _sampled(given, times, bool if boolean else float)
-    except (TypeError, ValueError) as error:
-        raise UserError(f"inputs: {name}: expected numbers: {error}") from error
-    if values.shape != times.shape:
-        raise UserError(f"inputs: {name}: expected {len(times)} values, got {values.shape}")
-    if not boolean:
-        bad = np.flatnonzero(~np.isfinite(values))
-        if len(bad):
-            at = float(times[bad[0]])
-            raise UserError(f"inputs: {name}: is {values[bad[0]]} at t = {at!r} s, not finite")
-        with placed(f"inputs: {name}"):
-            variable.check_range(float(values.min()), float(values.max()))
-    return values
-
-
-def _sampled(given: Any, times: np.ndarray, kind: type) -> np.ndarray:
-    if isinstance(given, str):
-        raise TypeError(f"got the text {given!r}")
-    if callable(given):
-        return np.array([given(float(t)) for t in times], dtype=kind)
-    if isinstance(given, tuple) and len(given) == 2:
-        points, values = (np.asarray(part, dtype=float) for part in given)
-        if points.ndim != 1 or points.shape != values.shape or not len(points):
-            raise ValueError("times and values of a table have the same length")
-        if not np.all(np.diff(points) > 0):
-            raise ValueError("the times of a table increase")
-        return np.interp(times, points, values).astype(kind)
-    values = np.asarray(given, dtype=kind)
-    return np.full(times.shape, values) if values.ndim == 0 else values

@@ -45,13 +45,19 @@ def together(errors: Sequence[UserError]) -> UserError:
     return UserError("; ".join(dict.fromkeys(map(str, errors))))
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of an error message that proposes the closest of `known`, or nothing."""
+def closest(name: str, known: Iterable[str]) -> str:
+    """The one of `known` that `name` may be meant for, or nothing."""
     known = list(known)
     close = difflib.get_close_matches(name, known, n=1)
     if not close and len(name) >= SHORTEST_PART:
         close = [other for other in known if name.lower() in other.lower()]
-    return f", did you mean {close[0]!r}?" if close else ""
+    return close[0] if close else ""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of an error message that proposes the closest of `known`, or nothing."""
+    guess = closest(name, known)
+    return f", did you mean {guess!r}?" if guess else ""
 
 
 def hint(name: str, known: Iterable[str], label: str = "known") -> str:

@@ -4,12 +4,15 @@ import codecs
 import re
 import stat
 import tomllib
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from rparm.errors import UnplacedError, UserError, placed, reason
+from rparm.errors import UnplacedError, UserError, closest, placed, reason
 
 LARGEST_TOML = 10_000_000  # bytes: some seconds of parsing
+MOST_GUESSED = 1000  # files of a folder that are compared with a name: milliseconds
 # the parser's time grows with the square of a key's parts: a.b.c
 LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){32}""")
 
@@ -26,11 +29,21 @@ def check_regular(path: Path) -> None:
     try:
         mode = Path(path).stat().st_mode
     except FileNotFoundError:
-        raise UnreadableError("no such file") from None
+        raise UnreadableError(missing(path)) from None
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise UnreadableError(f"cannot be read: {reason(error)}") from None
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise UnreadableError("cannot be read: is a device or a pipe, expected a file")
+
+
+def missing(path: Path) -> str:
+    """What to say of a file that is not there; guesses which one of its kind may be meant."""
+    path, beside = Path(path), []
+    with suppress(OSError, ValueError):  # no folder, or one that cannot be read
+        others = islice(path.parent.iterdir(), MOST_GUESSED)
+        beside = sorted(other.stem for other in others if other.suffix == path.suffix)
+    guess = closest(path.stem, beside)
+    return f"no such file, did you mean {guess + path.suffix!r}?" if guess else "no such file"
 
 
 def is_file(path: Path) -> bool:

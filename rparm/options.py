@@ -20,6 +20,9 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quiet", action="store_true", help="print the last line only, and what is wrong"
     )
+    parser.add_argument(
+        "--open", action="store_true", help="then show what was written in a browser"
+    )
 
 
 def add_system(
@@ -53,9 +56,20 @@ def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     )
 
 
-def add_open(parser: argparse.ArgumentParser) -> None:
-    """Whether a browser shows the report."""
-    parser.add_argument("--open", action="store_true", help="then open the report in a browser")
+def add_output(parser: argparse.ArgumentParser, text: str) -> None:
+    """Where something else goes than pages and results."""
+    parser.add_argument("--output", type=Path, metavar="DIR", help=text)
+
+
+def add_document(parser: argparse.ArgumentParser) -> None:
+    """Where the document goes, for a command that writes nothing else."""
+    parser.add_argument(
+        "--output",
+        dest="document",
+        type=Path,
+        metavar="DIR",
+        help="write what --json prints into this folder, too",
+    )
 
 
 def add_silence(parser: argparse.ArgumentParser, default: float, text: str) -> None:

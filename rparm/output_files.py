@@ -1,6 +1,7 @@
 """Files that appear complete or not at all."""
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,11 +30,20 @@ def written(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise UserError(f"{path}: the report cannot be written: {reason(error)}") from error
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+
+
+def copied(file: Path, path: Path) -> Path:
+    """Copy a file to `path`, whose folder is made; return it. UserError if that fails."""
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole(path) as temporary:
+            shutil.copyfile(file, temporary)
+    return path
 
 
 def check_writable(folder: Path) -> None:
-    """Refuse a folder for the report that cannot be made or written, before anything runs."""
+    """Refuse a folder that cannot be made or written, before anything runs."""
     with written(folder):
         existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         with uninterrupted(), TemporaryFile(dir=existing, prefix="rparm-"):

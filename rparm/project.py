@@ -9,9 +9,13 @@ models/SYSTEM/references/VARIANT/       ecos.csv of a variant of the system
 models/SYSTEM/study.py                  what to measure, draw and study there
 models/SYSTEM/system.svg                its components and the signals between them
 models/*/animation.py                   what of a run the report animates
+models/SYSTEM/identification.py         makes a log of the system, to identify parameters from
+models/MODEL/proof/proof.toml           what the program that encloses motions reads and gives
+build/proof/MODEL/prove                 that program
 build/*.fmu, build/*.ssp                built from the folder of the same name, without regard
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
+build/runtime/runtime.json              what FMUs of own equations are linked with
 build/report/                           what the commands write: index.html, folders of its parts
 
 An installed package has models/ in its folder share/, FMUs and SSPs as `rparm.shipped` says, and
@@ -37,7 +41,9 @@ PROGRAM = "rparm" if INSTALLED else "./run.sh"
 STRUCTURE = "SystemStructure.ssd"
 DIAGRAM = "system.svg"
 STUDY = "study"  # the module of a system's folder that rparm.system.study describes
+IDENTIFICATION = "identification"  # the module of a system's folder for rparm.identification.demo
 ANIMATION = "animation"  # the module of a model's or system's folder for rparm.report.motion
+PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
@@ -181,6 +187,36 @@ def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0
     raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
 
 
+def proof_file(folder: Path) -> Path:
+    """What the program that encloses motions of a model reads and gives."""
+    return folder / PROOF / f"{PROOF}.toml"
+
+
+def proof_program(folder: Path) -> Path:
+    """That program; UserError if it is not there."""
+    if INSTALLED:
+        raise UserError(f"{folder.name}: an installed rparm cannot prove: use a checkout")
+    program = ROOT / "build" / PROOF / folder.name / "prove"
+    program = program.with_suffix(".exe") if os.name == "nt" else program
+    if not program.is_file():
+        raise UserError(f"{program}: not there, {PROGRAM} builds it")
+    return program
+
+
+def model_builder() -> tuple[Path, Path]:
+    """The program that makes FMUs of own equations, and what it builds on.
+
+    UserError if they are not here.
+    """
+    if INSTALLED:
+        raise UserError("build: an installed rparm cannot build FMUs yet, a checkout can")
+    tool = ROOT / "fmu" / "equations_to_fmu.py"
+    runtime = ROOT / BUILD_FOLDERS[VERSIONS[0]] / "runtime" / "runtime.json"
+    if not runtime.is_file():
+        raise UserError(f"{runtime}: is not there, {PROGRAM} build makes it")
+    return tool, runtime
+
+
 def from_root(path: Path) -> Path:
     """`path` as it is given in commands that run in the project's folder, if it has one."""
     path = path.absolute()
@@ -206,9 +242,9 @@ def playground_page() -> Path:
 
 
 def plotly_script() -> Path:
-    """The library that draws the plots of pages: of the package plotly, or shipped without it."""
+    """The library that draws the plots of pages: of the package plotly, or shipped as .gz."""
     if INSTALLED:
-        return ROOT / "plotly" / "plotly.min.js"
+        return ROOT / "plotly" / "plotly.min.js.gz"
     found = find_spec("plotly")
     assert found is not None and found.origin is not None  # requirements/run.in has it
     return Path(found.origin).parent / "package_data" / "plotly.min.js"
@@ -228,7 +264,9 @@ def how_to_install(extra: str) -> str:
     """The command that installs what an extra of the distribution needs."""
     if INSTALLED:
         return f'pip install "rparm[{extra}]"'
-    return f"./setup.sh --{extra}" if extra in ("campaign", "federation") else "./setup.sh"
+    return (
+        f"./setup.sh --{extra}" if extra in ("campaign", "control", "federation") else "./setup.sh"
+    )
 
 
 def cache_folder(part: str) -> Path:

@@ -1,13 +1,14 @@
 """Trajectories as CSV files in the layout of the FMI cross-check."""
 
 import csv
+import lzma
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from rparm.input_files import UnreadableError, number_in, read_text
+from rparm.input_files import UnreadableError, decoded, is_file, number_in, read_bytes, read_text
 from rparm.output_files import whole
 
 LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
@@ -54,7 +55,7 @@ def _shortest(value: float) -> str:
 
 
 def read(path: Path, failure: Failure) -> tuple[tuple[str, ...], np.ndarray]:
-    """Read trajectories as `write` writes them.
+    """Read trajectories as `write` writes them; those of an installed package are compressed.
 
     Returns
     -------
@@ -64,9 +65,11 @@ def read(path: Path, failure: Failure) -> tuple[tuple[str, ...], np.ndarray]:
         At least one row; finite.
     """
     try:
-        text = read_text(path, LARGEST)
+        text = _text(path)
     except UnreadableError as error:
         raise failure(str(error), None) from None
+    except lzma.LZMAError:
+        raise failure("is damaged", None) from None
     except UnicodeDecodeError:
         raise failure("not a text file", None) from None
     if not text:
@@ -88,6 +91,13 @@ def read(path: Path, failure: Failure) -> tuple[tuple[str, ...], np.ndarray]:
     if not rows:
         raise failure("has no values", 1)
     return names, np.array(rows)
+
+
+def _text(path: Path) -> str:
+    packed = path.with_name(f"{path.name}.xz")
+    if is_file(packed) and not is_file(path):
+        return decoded(lzma.decompress(read_bytes(packed, LARGEST)))
+    return read_text(path, LARGEST)
 
 
 def _numbers(row: list[str], columns: int, line: int, failure: Failure) -> list[float]:

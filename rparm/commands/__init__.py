@@ -5,6 +5,7 @@ Each has a DESCRIPTION for its help, `add_options`, and `run`, which takes the o
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from rparm.errors import UserError
 
@@ -17,3 +18,4 @@ class Ended:
     verdict: str  # the last line
     document: Mapping[str, object] = field(default_factory=dict)  # for programs
     error: UserError | None = None
+    page: Path | None = None  # that --open shows

@@ -11,8 +11,7 @@ from rparm.system import study
 
 DESCRIPTION = (
     "Steps the system in several orders, with inputs held and extrapolated and with step-size "
-    "control, and compares it with the solution in continuous time. Exit code: 0 as expected, "
-    "1 not, 2 wrong use."
+    "control, and compares it with the solution in continuous time."
 )
 
 
@@ -30,4 +29,7 @@ def run(options: argparse.Namespace) -> Ended:
     console.stage(f"studying the coupling of {folder.name}")
     parts = known.study_coupling(path, options.report)
     failed = [name for name, part in parts.items() if not part["passed"]]
-    return Ended(1 if failed else 0, console.verdict_line(failed, parts, "part"), {"parts": parts})
+    picture = (options.report / known.COUPLING_PICTURE).absolute()
+    verdict = console.verdict_line(failed, parts, "part")
+    document = {"parts": parts, "picture": picture}
+    return Ended(1 if failed else 0, verdict, document, page=picture)

@@ -9,7 +9,7 @@ from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, component, screen, watching
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import parts
-from rparm.options import add_silence
+from rparm.options import add_document, add_silence
 from rparm.system import ssp
 
 DESCRIPTION = "Steps one component of a system until the federation has come to the end."
@@ -25,6 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     text = "most that a call of the FMU may take, or the broker be silent"
     add_silence(parser, SILENCE, text)
+    add_document(parser)
     # for processes that a federation starts: they end with their standard input
     parser.add_argument("--owned", action="store_true", help=argparse.SUPPRESS)
 

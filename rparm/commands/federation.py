@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rparm import project
+from rparm import project, trajectory_csv
 from rparm.commands import Ended
 from rparm.coupling.master import Master
 from rparm.errors import UserError, hint
@@ -16,10 +16,11 @@ from rparm.federation import SILENCE, addresses, federation, screen
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import parts, real_connections
-from rparm.options import add_silence, add_system
+from rparm.options import add_output, add_silence, add_system
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output.result_tables import FederationTable
+from rparm.output_files import check_writable, written
 from rparm.system import comparison, ecos, ssp, study
 from rparm.system.ssp import Ssp
 from rparm.texts import counted
@@ -27,8 +28,7 @@ from rparm.texts import counted
 DESCRIPTION = (
     "Runs variants of the closed loop with each FMU in its own process, coupled by HELICS, and "
     "compares every value with that of the master that steps all in one process in Jacobi order. "
-    "The processes may be on several machines. Exit code: 0 all within the bound, 1 not, 2 wrong "
-    "use or a process that fails."
+    "The processes may be on several machines."
 )
 BOUND = 1e-12  # on the largest difference to the master, relative to the variable's largest value
 
@@ -55,6 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="components that are not started here, in one variant: prints the command for each",
     )
     add_silence(parser, SILENCE, "processes that do not answer for so long end the federation")
+    add_output(parser, "write what was recorded of each variant into this folder, VARIANT.csv")
 
 
 def run(options: argparse.Namespace) -> Ended:
@@ -66,6 +67,8 @@ def run(options: argparse.Namespace) -> Ended:
         path = project.built(folder, ".ssp", "--ssp", options.fmi)
     address = addresses.free() if options.listen is None else options.listen
     addresses.check_free(address)
+    if options.output:
+        check_writable(options.output)
     key()  # what is wrong with it is said before anything runs
     with ssp.unpacked(path) as system:
         _check_names(system, options)
@@ -92,11 +95,20 @@ def run(options: argparse.Namespace) -> Ended:
             seconds = {"helics": record.wall_time, "ecos": ecos_time, "master": master_time}
             times = {by: 1e6 * s / steps for by, s in seconds.items()}
             table.row(name, steps, difference, list(times.values()), passed)
+            if options.output:
+                _write(options.output / f"{name}.csv", record)
             row = {"name": name, "steps": steps, "difference": difference, "bound": BOUND}
             rows.append({**row, "microseconds_per_step": times, "passed": passed})
             failed += [] if passed else [name]
     code = 1 if failed else 0
     return Ended(code, console.verdict_line(failed, names, "variant"), {"variants": rows})
+
+
+def _write(path: Path, record: Record) -> None:
+    """Write what was recorded of a variant."""
+    with written(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trajectory_csv.write(path, record.times, record.names, record.values)
 
 
 def _command(path: Path, variant: str, component: str, address: str) -> str:

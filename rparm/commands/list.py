@@ -5,6 +5,7 @@ import textwrap
 
 from rparm import project
 from rparm.commands import Ended
+from rparm.options import add_document
 from rparm.output import console
 from rparm.scenarios import scenario
 from rparm.texts import shortened
@@ -12,8 +13,9 @@ from rparm.texts import shortened
 DESCRIPTION = "Prints the name and the title of every scenario."
 
 
-def add_options(_: argparse.ArgumentParser) -> None:
-    """It has none."""
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Where the list goes."""
+    add_document(parser)
 
 
 def run(_: argparse.Namespace) -> Ended:

@@ -7,12 +7,12 @@ from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, reason
 from rparm.fmi.fmu_file import read_model
+from rparm.options import add_output
 from rparm.output_files import whole
 from rparm.scenarios import template
 
 DESCRIPTION = (
-    f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} NAME.toml. "
-    "Exit code: 0 written, 2 the file exists or cannot be written."
+    f"Writes NAME.toml, a scenario with comments that runs as it is: {project.PROGRAM} NAME.toml."
 )
 SUFFIX = ".toml"
 # what no file can be called on Windows, with any suffix
@@ -27,15 +27,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="MODEL",
         help="what to simulate (default: the model with the most scenarios)",
     )
+    add_output(parser, "folder for the file (default: this one, or that of the path)")
 
 
 def run(options: argparse.Namespace) -> Ended:
     """Write the file."""
     path = _path(options.name)
+    if options.output:
+        path = options.output / path
     folder = project.model(options.model) if options.model else _usual_model()
     model = read_model(project.built(folder, ".fmu"))
     text = template.text(path.stem, folder.name, model)
     try:
+        if options.output:
+            options.output.mkdir(parents=True, exist_ok=True)
         path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
     except FileExistsError:
         raise UserError(f"{path}: exists already, choose another name") from None
@@ -48,7 +53,7 @@ def run(options: argparse.Namespace) -> Ended:
         path.unlink(missing_ok=True)
         raise UserError(f"{path}: cannot be written: {reason(error)}") from error
     verdict = f"{path}: written; run it by {project.PROGRAM} '{path}'"
-    return Ended(0, verdict, {"file": path.absolute(), "model": folder.name})
+    return Ended(0, verdict, {"file": path.absolute(), "model": folder.name}, page=path)
 
 
 def _path(name: str) -> Path:

@@ -15,7 +15,8 @@ from rparm.commands import Ended
 from rparm.commands import list as scenario_list
 from rparm.errors import UserError, did_you_mean, placed, together
 from rparm.fmi.fmu_file import Fmu
-from rparm.options import add_fmi, add_open, add_report, relative_tolerance
+from rparm.input_files import missing
+from rparm.options import add_fmi, add_report, relative_tolerance
 from rparm.output import console, results
 from rparm.output.progress import Progress
 from rparm.output.result_tables import RunTable, SweepTable, measured
@@ -24,7 +25,6 @@ from rparm.output.results import Done
 from rparm.output_files import check_writable, from_here, written
 from rparm.project import VERSIONS
 from rparm.report import pages
-from rparm.report.browser import show
 from rparm.report.writer import ReportWriter
 from rparm.runs import convergence
 from rparm.runs.comparison import Failure, Run, Runs
@@ -38,8 +38,7 @@ DESCRIPTION = (
     "Simulates each scenario at its own tolerance and at 1e-11, and over the tolerances 1e-4 to "
     "1e-11; compares all outputs with the reference, and prints the largest errors. Without names, "
     "measures the order of convergence in the communication step too. The FMUs are of FMI 2.0; "
-    "those of FMI 3.0 must give the same bits. Exit code: 0 all as it should be, 1 not, 2 wrong "
-    "use."
+    "those of FMI 3.0 must give the same bits."
 )
 SUFFIX = ".toml"
 FIRST, TWIN = VERSIONS  # of FMI: what runs, and what has to give the same bits
@@ -63,7 +62,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_fmi(parser, None, "run only FMUs of this version of FMI")
     add_report(parser)
-    add_open(parser)
     parser.add_argument(
         "--tolerance",
         type=relative_tolerance,
@@ -111,13 +109,11 @@ def run(options: argparse.Namespace) -> Ended:
         print(f"{name}: {from_here(file)}")
     index = options.report / pages.INDEX
     print(f"report: {from_here(index)}")
-    if options.open:
-        show(page)
-    return _ended(done, index.absolute())
+    return _ended(done, index.absolute(), page)
 
 
-def _ended(done: Done, report: Path) -> Ended:
-    """How the command ends."""
+def _ended(done: Done, report: Path, page: Path) -> Ended:
+    """How the command ends, with the page to show."""
     wrong = [x.scenario.name for x in (*done.runs, *done.sweeps, *done.studies) if not x.passed]
     wrong += [failure.scenario.name for failure in done.failures]
     everything = [*done.chosen, *done.own]
@@ -128,8 +124,8 @@ def _ended(done: Done, report: Path) -> Ended:
     document = {"passed": not wrong, **results.document(done), "report": report}
     if done.failures:
         error = together([UserError(failure.text) for failure in done.failures])
-        return Ended(2, verdict, document, error)
-    return Ended(1 if wrong else 0, verdict, document)
+        return Ended(2, verdict, document, error, page)
+    return Ended(1 if wrong else 0, verdict, document, page=page)
 
 
 def _check(
@@ -200,8 +196,7 @@ def _files(names: Sequence[str]) -> tuple[list[Path], list[Path]]:
         elif project.is_ours(path):
             files[path.resolve()] = None
         elif not os.path.lexists(path):
-            guess = did_you_mean(name, map(str, _siblings(path)))
-            raise UserError(f"{path}: no such file{guess}")
+            raise UserError(f"{path}: {missing(path)}")
         elif own.setdefault(path.stem, path) != path:
             other = own[path.stem]
             raise UserError(f"{path}: its page would have the name of that of {other}")

@@ -10,12 +10,11 @@ from rparm.command_line import PROGRAM
 from rparm.commands import Ended
 from rparm.coupling import in_process
 from rparm.errors import UserError, did_you_mean, hint, together
-from rparm.options import add_open, add_report, add_system
+from rparm.options import add_report, add_system
 from rparm.output import console
 from rparm.output.result_tables import VariantTable
 from rparm.output_files import check_writable, from_here, written
 from rparm.report import overview, system_page
-from rparm.report.browser import show
 from rparm.report.overview import Entry
 from rparm.report.system_page import Section
 from rparm.system import comparison, ecos, ssp
@@ -23,8 +22,7 @@ from rparm.system.comparison import Outcome, Reference
 from rparm.texts import counted
 
 DESCRIPTION = (
-    "Runs the variants of the systems in Ecos and compares every variable with the reference. Exit "
-    "code: 0 all within the bound, 1 not, 2 wrong use, a wrong system or a component that fails."
+    "Runs the variants of the systems in Ecos and compares every variable with the reference."
 )
 
 
@@ -38,7 +36,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="variants, or systems with all theirs (default: all)",
     )
     add_report(parser)
-    add_open(parser)
     parser.add_argument(
         "--pictures",
         type=Path,
@@ -170,14 +167,12 @@ def _run(
     with written(options.report):
         index = overview.record(options.report, overview.SYSTEM, entries)
     print(f"report: {from_here(index)}")
-    if options.open:
-        show(index)
     failed = [*failures, *(outcome.variant for outcome in outcomes if not outcome.passed)]
     verdict = console.verdict_line(failed, rows, "variant")
     document = {"passed": not failed, "variants": rows, "report": index.absolute()}
     if failures:
-        return Ended(2, verdict, document, together(list(failures.values())))
-    return Ended(1 if failed else 0, verdict, document)
+        return Ended(2, verdict, document, together(list(failures.values())), index)
+    return Ended(1 if failed else 0, verdict, document, page=index)
 
 
 def _row(section: Section, outcome: Outcome) -> dict[str, object]:

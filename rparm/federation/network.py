@@ -322,7 +322,7 @@ class Federate:
         self._h.helicsFederateDisconnect(self._federate)
 
     def fail(self, text: str) -> None:
-        """End the federation, because this process cannot go on."""
+        """End the federation, because this process has failed."""
         if self._federate is not None:
             with suppress(self._h.HelicsException):  # it has ended already
                 self._h.helicsFederateGlobalError(self._federate, 1, text)

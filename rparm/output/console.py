@@ -97,6 +97,16 @@ class Table:
         remark(text)
 
 
+def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """Print a table that is complete, under its title."""
+    cells = [[str(cell) for cell in row] for row in (head, *rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    print(f"\n{title}")
+    for row in cells:
+        padded = [f"{cell:<{wide}}" for cell, wide in zip(row, widths, strict=True)]
+        print((INDENT + INDENT.join(padded)).rstrip(), flush=True)
+
+
 def remark(text: str) -> None:
     """Print a text in lines that are set in."""
     wrapped = textwrap.wrap(

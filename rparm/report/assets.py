@@ -45,7 +45,9 @@ def write(report: Path) -> None:
 @functools.cache
 def _plotly() -> bytes:
     """The library, compressed, in a script that unpacks it."""
-    bundle = project.plotly_script().read_bytes()
+    file = project.plotly_script()
+    bundle = file.read_bytes()
+    bundle = gzip.decompress(bundle) if file.suffix == ".gz" else bundle
     version = re.search(rb"plotly\.js v(\S+)", bundle[:200])
     assert version is not None
     packed = base64.b64encode(gzip.compress(bundle, mtime=0)).decode("ascii")

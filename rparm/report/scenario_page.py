@@ -8,6 +8,8 @@ import numpy as np
 
 from rparm import trajectory_csv
 from rparm.fmi.model import Model, Value, Variable
+from rparm.proof import proven
+from rparm.proof.proven import ProvenError
 from rparm.report import motion, overview
 from rparm.report.measured_data import measured_tables, with_measured
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
@@ -48,14 +50,15 @@ def write(
     csv = _write_values(folder / f"{name}.csv", first.result, columns, digits)
     rows, plots = _thinned(_plots(runs, columns))
     moving, times = motion.of_run(first, rows), first.result.times[rows]
+    proof = proven.of_run(scenario, first.result) or {}
     page = RunPage(
         title=scenario.title,
         description=scenario.description,
         status=FAILED if failures or not all(run.passed for run in runs) else status(first),
-        facts=_facts(first),
+        facts=[*_facts(first), *_proven(proof, first.fmu.model)],
         data=RunData(scenario.name, scenario.title, times, plots, motion=moving),
         tables=_tables(runs),
-        notes=_notes(runs),
+        notes=[*_notes(runs), *([f"The proven error assumes {proven.ASSUMED}."] if proof else [])],
         failures=[
             *(sentence(run.violation) for run in runs if run.violation),
             *map(_described, failures),
@@ -235,6 +238,12 @@ def _facts(run: Run) -> list[tuple[str, str]]:
         ("tolerance", short(result.tolerance)),
         ("worst error", f"{run.error:.1e}{bound} ({run.worst})"),
     ]
+
+
+def _proven(proof: Mapping[str, ProvenError], model: Model) -> list[tuple[str, str]]:
+    """How far each state is from the exact motion at most."""
+    texts = [f"{n} {e.error:.1e} {unit(model.variables[n].unit)}" for n, e in proof.items()]
+    return [("proven error at most", ", ".join(texts))] if texts else []
 
 
 def _lengths(steps: Sequence[float]) -> str:

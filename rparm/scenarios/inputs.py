@@ -171,9 +171,11 @@ class InputReader:
         if variable.type == "Boolean":
             numbers = self._on_or_off(table, numbers, where)
         elif "scale" in table:
-            known = variable.units
+            scale = reader.quantity(table["scale"], f"{where} scale", variable.units, True)
+            if scale == 0:
+                reader.fail(f"{where} scale: expected another number than 0, it loses the log")
             with np.errstate(over="ignore"):  # is looked for later
-                numbers = numbers * reader.quantity(table["scale"], f"{where} scale", known, True)
+                numbers = numbers * scale
         return Logged(times - self._times[0], numbers, is_held, f"{file}, column {column}")
 
     def _log(self, file: str) -> Log:

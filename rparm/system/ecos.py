@@ -1,6 +1,6 @@
 """Runs a system in Ecos, in a child process.
 
-Ecos goes on when a component fails, says so in its log only at level debug, and leaves its
+Ecos continues when a component fails, says so in its log only at level debug, and leaves its
 temporary files behind. So the run is a child process whose log is read and whose temporary folder
 is removed: `python -m rparm.system.ecos FOLDER` is that child.
 """

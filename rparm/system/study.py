@@ -53,8 +53,10 @@ class Study(Protocol):
 class CouplingStudy(Study, Protocol):
     """The module of a system that has a study of what the coupling costs."""
 
+    COUPLING_PICTURE: str  # file name of what it draws
+
     def study_coupling(self, ssp: Path, report: Path) -> dict[str, dict[str, object]]:
-        """Study what the coupling costs, print tables, write pictures.
+        """Study what the coupling costs, print tables, write the picture.
 
         Numbers of each part of the study by its name; whether all is well is ``passed``.
         """

@@ -7,7 +7,7 @@ import pytest
 
 from rparm.coupling.master import Master
 from rparm.errors import UserError
-from rparm.fmi.fmu_file import INSTANCES, Fmu
+from rparm.fmi.fmu_file import CO_SIMULATION, INSTANCES, Fmu
 from rparm.runs import simulation
 from rparm.scenarios import scenario
 from rparm.system.structure import Connection
@@ -112,7 +112,7 @@ def test_a_boolean_input_and_parameter_reach_the_fmu(
 ) -> None:
     counted: list[tuple[float, int]] = []
     read = wheel.model.variables["turns"].reference
-    instance_class = INSTANCES[wheel.model.fmi_version]
+    instance_class = INSTANCES[wheel.model.fmi_version, CO_SIMULATION]
     do_step = instance_class.do_step
 
     def step_and_read(self, start: float, length: float, goes_back: bool = False) -> None:

@@ -162,7 +162,7 @@ def test_an_fmu_may_end_the_simulation(opened3: Fmu, monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), FMICallException("fmi3SetFloat64", 3)])
 def test_what_is_raised_within_a_step_is_not_lost(opened3: Fmu, error: BaseException) -> None:
-    """ctypes would print it and go on."""
+    """ctypes would print it and continue."""
     loaded = load(SHORT)
     times: list[float] = []
 

@@ -107,3 +107,16 @@ with uninterrupted():
 def test_an_exception_in_a_block_stays_what_it_is() -> None:
     with pytest.raises(ValueError, match="of the block"), uninterrupted():
         raise ValueError("of the block")
+
+
+def test_an_interrupt_that_was_caught_does_not_set_the_exit_code(tmp_path: Path) -> None:
+    (tmp_path / "interrupted.py").write_text(
+        "from rparm import __main__ as program\n"
+        "try: exec('raise KeyboardInterrupt')\n"  # as where numba is imported
+        "except KeyboardInterrupt: program._end(130)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "interrupted"],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=False,
+    )  # fmt: skip
+    assert done.returncode == 130

@@ -113,6 +113,8 @@ MISTAKES = [
     ("time,force\n1.1,1\n2,1\n", "", "log.csv: begins at 1.1 s, the run needs it from 1.0 to 1."),
     ("time,force\n1,1\n2,-11\n", "", "[inputs.force]: expected at least -10.0, got -11.0"),
     (LOG, "scale = 1e308\n", "[inputs.force]: expected finite values, got an overflow"),
+    (LOG, "scale = 0\n", "[inputs.force] scale: expected another number than 0"),
+    (LOG, "scale = -0.0\n", "[inputs.force] scale: expected another number than 0"),
     (LOG, "scale = 'x'\n", "[inputs.force] scale: expected a number, got 'x'"),
     (LOG, "hold = 1\n", "[inputs.force] hold: expected true or false, got 1"),
     (LOG, "column = 2\n", "[inputs.force] column: expected a text, got 2"),
@@ -153,6 +155,7 @@ def test_what_is_no_file(write: Write, section: str, monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(logs, "LARGEST", 100)
     for file, message in (
         ("none.csv", "none.csv: no such file"),
+        ("bigg", "bigg: no such file, did you mean 'big'?"),
         (".", "cannot be read: Is a directory"),
         ("pipe", "is a device or a pipe"),
         ("/dev/zero", "is a device or a pipe"),

@@ -1,5 +1,6 @@
 """Good references are read, bad files are refused."""
 
+import lzma
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -74,6 +75,18 @@ def test_missing_or_binary_reference(project: Path) -> None:
     assert "not a text file" in refused(project)
     reference_file(project, LONG).unlink()
     assert "no such file" in refused(project)
+
+
+def test_a_reference_of_an_installed_package_is_compressed(project: Path) -> None:
+    scenario, model = load(LONG, project), declared("rp_manipulator")
+    expected = reference.load(scenario, model)
+    file = reference_file(project, LONG)
+    packed = file.with_name(f"{file.name}.xz")
+    packed.write_bytes(lzma.compress(file.read_bytes()))
+    file.unlink()
+    assert reference.load(scenario, model).values.tobytes() == expected.values.tobytes()
+    packed.write_bytes(packed.read_bytes()[:-9])
+    assert "is damaged" in refused(project)
 
 
 @pytest.mark.parametrize(

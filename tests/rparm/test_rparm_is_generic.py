@@ -18,6 +18,7 @@ WORDS = {"branch", "mode", "motion", "radius", "turns", "duration", "frequency",
 WORDS |= {"start_time", "position"}
 WORDS |= {"delay"}  # an argument of tqdm
 WORDS |= {"seed"}  # of random numbers
+WORDS |= {"angle", "damping"}  # of complex numbers and of poles
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from rparm.command_line import COMMANDS
+from rparm.command_line import COMMANDS, EXIT_CODES
 from tests.support.paths import ROOT
 
 SETUP = """#!/bin/sh
@@ -70,6 +70,10 @@ NOT_BUILT = [
     (["run", "--list"], ["run", "--list"]),
     (["--json", "list"], ["--json", "list"]),
     (["help", "system"], ["help", "system"]),
+    (["help", "playground"], ["help", "playground"]),
+    (["--json", "help"], ["--json", "help"]),
+    (["--help", "--json"], ["--help", "--json"]),
+    (["completion", "bash"], ["completion", "bash"]),
     (["system", "--help"], ["system", "--help"]),
     (["federate", "a", "b"], ["federate", "a", "b"]),
     (["sytem"], ["sytem"]),  # no name of a scenario: refused at once
@@ -83,6 +87,8 @@ BUILT = [
     (["My Scenario.TOML"], ["My Scenario.TOML"]),
     (["system", "--json", "--", "--help"], ["system", "--json", "--", "--help"]),
     (["new", "x"], ["new", "x"]),
+    (["fmu", "RPPlant"], ["fmu", "RPPlant"]),
+    (["playground", "--open"], ["playground", "--open"]),
 ]
 
 
@@ -101,7 +107,8 @@ def test_which_command_is_called(
     assert found["arguments"] == ["-P", "-m", "rparm", *wanted]
     assert (root / "build/built").exists() == built
     said = done.stderr.splitlines()
-    stages = ["run.sh: configuring", "run.sh: building the FMUs"] if built else []
+    what = "the playground" if "playground" in arguments else "the FMUs"
+    stages = ["run.sh: configuring", f"run.sh: building {what}"] if built else []
     if "--quiet" in arguments:
         assert said == []
     else:
@@ -116,8 +123,6 @@ def test_quiet_says_nothing(root: Path) -> None:
 
 @pytest.mark.parametrize("arguments", [["power_off"], ["playground"], ["--quiet", "power_off"]])
 def test_a_terminal_shows_how_far_a_build_is(root: Path, arguments: list[str]) -> None:
-    (root / "build/playground").mkdir()
-    (root / "build/playground/index.html").touch()
     ours, theirs = pty.openpty()
     done = call(root, *arguments, stderr=theirs)
     os.close(theirs)
@@ -136,10 +141,19 @@ def test_a_terminal_shows_how_far_a_build_is(root: Path, arguments: list[str]) -
 
 def test_a_build_that_fails_shows_its_log(root: Path) -> None:
     (root / "build/broken").touch()
+    said = "the build failed, build/build.log says why"
     for arguments in (["power_off"], ["--json"], ["--quiet"], ["playground"]):
         done = call(root, *arguments)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert done.stderr.endswith("no rule\nrun.sh: the build failed\n")
+        assert done.returncode == 2 and done.stderr.endswith(f"no rule\nrun.sh: {said}\n")
+        found = json.loads(done.stdout) if "--json" in arguments else done.stdout
+        assert found == ({"exit_code": 2, "error": said} if "--json" in arguments else "")
+
+
+def test_a_set_up_that_fails_is_a_document_too(root: Path) -> None:
+    (root / "setup.sh").write_text("#!/bin/sh\nexit 1\n", encoding="utf-8")
+    done = call(root, "list", "--json")
+    assert done.returncode == 2
+    assert json.loads(done.stdout) == {"exit_code": 2, "error": "the set-up failed"}
 
 
 def test_help_names_every_command(root: Path) -> None:
@@ -148,10 +162,5 @@ def test_help_names_every_command(root: Path) -> None:
         assert (done.returncode, done.stderr) == (0, "")
         for command in (*COMMANDS.keys() - {"run"}, "help COMMAND"):
             assert f"./run.sh {command} " in done.stdout
+        assert EXIT_CODES.removeprefix("exit codes: ") in done.stdout
         assert max(map(len, done.stdout.splitlines())) <= 80
-
-
-def test_wrong_use_of_the_playground(root: Path) -> None:
-    assert call(root, "help", "playground").stdout.startswith("usage: ./run.sh playground")
-    done = call(root, "playground", "--opne")
-    assert (done.returncode, done.stdout) == (2, "") and done.stderr.startswith("usage: ")

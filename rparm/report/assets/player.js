@@ -107,7 +107,7 @@ class Player {
 
   #frame(now) {
     if (!this.playing) return;
-    // a page in the background gets no frames: go on where it was
+    // a page in the background gets no frames: resume there
     const elapsed = this.last === null ? 0 : Math.min((now - this.last) / 1000, 1);
     if (this.last === null || !this.calm.matches || elapsed >= Player.CALM) {
       this.last = now;

@@ -1,0 +1,101 @@
+"""`completion`: what makes a shell complete commands, options, names and files."""
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import shtab
+
+from rparm import command_line, project
+from rparm.commands import Ended
+from rparm.options import add_output
+from rparm.output_files import written
+from rparm.system import comparison
+
+SCRIPT = Path(project.PROGRAM).name
+DESCRIPTION = (
+    "Prints a script that makes a shell complete commands, options, scenarios and files. In bash: "
+    f'eval "$({project.PROGRAM} completion bash)". In zsh the same with zsh, after compinit. In '
+    "tcsh: save it, then source the file."
+)
+# names of files that the shells look for
+SHELLS = {"bash": SCRIPT, "zsh": f"_{SCRIPT}", "tcsh": f"{SCRIPT}.tcsh"}
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Which shell, and where the script goes."""
+    parser.add_argument("shell", choices=list(SHELLS), help="the shell that reads the script")
+    add_output(parser, "write the script into this folder, by the name that the shell looks for")
+
+
+def run(options: argparse.Namespace) -> Ended:
+    """Print the script, with the names of the scenarios and systems that there are."""
+    script = shtab.complete(_all_commands(), options.shell)
+    if options.output is None:
+        return Ended(0, script, {"script": script})
+    file = options.output / SHELLS[options.shell]
+    with written(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"{script}\n", encoding="utf-8", newline="\n")
+    return Ended(0, f"{file}: written", {"script": script, "file": file.absolute()})
+
+
+def _all_commands() -> argparse.ArgumentParser:
+    """One parser that knows what those of all commands know."""
+    whole = argparse.ArgumentParser(prog=SCRIPT)
+    commands = whole.add_subparsers()
+    known = _values()
+    for name, text in command_line.COMMANDS.items():
+        made = command_line.parser(name)
+        for action in made._actions:
+            value = known.get(f"{name} {action.metavar}") or known.get(str(action.metavar))
+            if value:
+                action.complete = value
+        commands.add_parser(name, parents=[made], add_help=False, help=text)
+    commands.add_parser("help", help="explain a command").add_argument(
+        "name", choices=list(command_line.COMMANDS)
+    )
+    return whole
+
+
+def _values() -> dict[str, dict[str, Any]]:
+    """How to complete a value, by the name that help has for it, after that of its command."""
+    variants = {
+        name: comparison.reference_names(folder) for name, folder in project.systems().items()
+    }
+    all_variants = [variant for names in variants.values() for variant in names]
+    models = _words("models", project.models())
+    return {
+        "DIR": shtab.DIRECTORY,
+        "PATH": shtab.FILE,
+        "PEM": shtab.FILE,
+        "SSP": shtab.glob("*.ssp"),
+        "FILE.toml": shtab.glob("*.toml"),
+        "{2,3}": _words("versions", [version[0] for version in project.VERSIONS]),
+        "MODEL": models,
+        "SCENARIO": _words("scenarios", project.scenario_files()),
+        "VARIANT": _words("variants", all_variants),
+        "fmu NAME": models,
+        "run NAME": _words("scenario_files", project.scenario_files(), "*.toml"),
+        "system NAME": _words("systems", [*variants, *all_variants]),
+        "federation NAME": _words("variants", all_variants),
+    }
+
+
+def _words(kind: str, names: Iterable[str], pattern: str = "") -> dict[str, Any]:
+    """Complete one of `names`, or a file that is like `pattern`: in tcsh one of `names` only."""
+    words, function = " ".join(names), f"_rparm_{kind}"
+    bash, zsh = [f'compgen -W "{words}" -- "$1"'], f"_alternative '{kind}:{kind}:({words})'"
+    before = ""
+    if pattern:
+        files = shtab.glob(pattern)
+        before = files["preamble"]["bash"]
+        bash.append(f'{files["bash"]} "$1"')
+        zsh += f" 'files:file:_files -g \"{pattern}\"'"
+    preamble = {"bash": before + _function(function, bash), "zsh": _function(function, [zsh])}
+    return {"bash": function, "zsh": function, "tcsh": f"({words})", "preamble": preamble}
+
+
+def _function(name: str, lines: Iterable[str]) -> str:
+    return "\n".join([f"{name}() {{", *(f"  {line}" for line in lines), "}"])

@@ -1,0 +1,198 @@
+"""What all commands have: --json, --quiet, --output and --open; and completion by a shell."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from rparm import command_line, project, trajectory_csv
+from rparm.command_line import COMMANDS
+from rparm.commands.completion import SCRIPT, SHELLS
+from rparm.system import study
+from tests.support.paths import ROOT
+from tests.support.rparm_project import SHORT, assert_one_line, call
+from tests.support.ssp_files import SSP
+
+# what each command cannot do without
+NEEDED = {
+    "new": ["x"],
+    "build": ["x.toml"],
+    "new-model": ["x"],
+    "linearize": ["x"],
+    "campaign": ["x.toml"],
+    "federate": ["x.ssp", "variant", "component", "--broker", "tcp://127.0.0.1:1"],
+    "fmu": ["x"],
+    "completion": ["bash"],
+}
+COMMON = ["--json", "--quiet", "--output", "here", "--open"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_them(command: str) -> None:
+    arguments = [command, *NEEDED.get(command, []), *COMMON]
+    options = command_line.parsed(arguments)
+    assert options.json and options.quiet and options.open
+    assert Path("here") in vars(options).values()
+    for option in (["--json"], ["--quiet"], ["--open"], ["--output", "here"]):
+        alone = vars(command_line.parsed([command, *NEEDED.get(command, []), *option]))
+        without = vars(command_line.parsed([command, *NEEDED.get(command, [])]))
+        assert sum(alone[name] != without[name] for name in alone) == 1
+
+
+@pytest.fixture
+def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What a browser is given."""
+    addresses: list[str] = []
+    monkeypatch.setattr("webbrowser.open_new_tab", lambda url: bool(addresses.append(url)) or True)
+    return addresses
+
+
+def test_a_run_and_a_new_scenario_are_shown(
+    project: Path, fmu: Path, tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = project / "report"
+    arguments = (SHORT, "--tolerance", "1e-8", "--fmu", fmu, "--output", folder, "--open")
+    assert call(capsys, "run", *arguments)[0] == 0
+    assert len(shown) == 1 and Path(shown[0].removeprefix("file://")).is_relative_to(folder)
+
+
+def test_a_new_scenario_goes_into_a_folder_and_is_shown(
+    tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "below" / "here"
+    assert call(capsys, "new", "mine", "--output", folder, "--open")[0] == 0
+    assert (folder / "mine.toml").is_file() and shown == [(folder / "mine.toml").as_uri()]
+    (tmp_path / "taken").touch()
+    code, _, err = call(capsys, "new", "mine", "--output", tmp_path / "taken")
+    assert code == 2 and "taken" in err
+    assert_one_line(err)
+
+
+def test_the_playground_is_copied_and_shown(
+    tmp_path: Path,
+    shown: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = tmp_path / "index.html"
+    page.write_text("the page", encoding="utf-8")
+    monkeypatch.setattr(project, "playground_page", lambda: page)
+    code, out, _ = call(capsys, "playground", "--output", tmp_path / "mine", "--open", "--json")
+    copy = tmp_path / "mine" / "playground.html"
+    assert (code, copy.read_text(encoding="utf-8")) == (0, "the page")
+    assert json.loads(out) == {"exit_code": 0, "page": str(copy)} and shown == [copy.as_uri()]
+
+
+def test_the_picture_of_the_coupling_is_shown(
+    tmp_path: Path,
+    shown: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    _, module = study.of_coupling()
+
+    def draw(_: Path, report: Path) -> dict[str, dict[str, object]]:
+        (report / module.COUPLING_PICTURE).touch()
+        return {"part": {"passed": True}}
+
+    monkeypatch.setattr(module, "study_coupling", draw)
+    code, out, _ = call(capsys, "coupling", "--output", tmp_path, "--open", "--json")
+    picture = Path(json.loads(out)["picture"])
+    assert code == 0 and picture.is_file() and picture.parent == tmp_path
+    assert shown == [picture.as_uri()]
+
+
+def test_a_command_without_a_page_writes_its_document_and_says_that_there_is_none(
+    tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = call(capsys, "list", "--json", "--quiet", "--output", tmp_path, "--open")
+    assert code == 0 and err == "--open: list has written no page\n" and shown == []
+    assert (tmp_path / "list.json").read_text(encoding="utf-8") == out
+    (tmp_path / "taken").touch()
+    code, _, err = call(capsys, "list", "--output", tmp_path / "taken")
+    assert code == 2 and "taken/list.json: cannot be written" in err
+    assert_one_line(err)
+
+
+def test_an_fmu_is_copied(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments, built in ((["RPPlant"], "build"), (["rp_plant", "--fmi", "3"], "build/fmi3")):
+        folder = tmp_path / built
+        code, out, _ = call(capsys, "fmu", *arguments, "--output", folder)
+        file = folder / "RPPlant.fmu"
+        assert code == 0 and out.startswith(f"{file}: FMI ")
+        assert file.read_bytes() == (ROOT / built / "RPPlant.fmu").read_bytes()
+    code, _, err = call(capsys, "fmu", "RPPlants")
+    assert code == 2 and "no model 'RPPlants'" in err
+    assert_one_line(err)
+
+
+def test_a_federation_writes_what_it_recorded(
+    tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("nominal", "--ssp", SSP, "--output", tmp_path, "--json", "--quiet", "--open")
+    code, out, err = call(capsys, "federation", *arguments)
+    assert code == 0 and err == "--open: federation has written no page\n" and shown == []
+    (row,) = json.loads(out)["variants"]
+    names, values = trajectory_csv.read(tmp_path / "nominal.csv", lambda text, _: ValueError(text))
+    assert names[0] == "time" and "arm.q1" in names and len(values) == row["steps"] + 1
+
+
+# ---- completion ----------------------------------------------------------------------------------
+
+BASH = """
+source "$1"; shift
+COMP_WORDS=("$@") COMP_CWORD=$(($# - 1))
+function=$(complete -p "$1" | sed 's/.* -F \\([^ ]*\\) .*/\\1/')
+$function
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("completion") / "script"
+    done = subprocess.run(
+        ["build/venv/bin/python", "-P", "-m", "rparm", "completion", "bash"],
+        cwd=ROOT, env={"PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE, check=True,
+    )  # fmt: skip
+    file.write_bytes(done.stdout)
+    return file
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["sys"], ["system"]),
+        (["run", "--tol"], ["--tolerance"]),
+        (["system", "--o"], ["--output", "--open"]),
+        (["run", "sine_eff"], ["sine_efforts"]),
+        (["run", "sine_efforts", "hanging_s"], ["hanging_swing"]),
+        (["run", "my_"], ["my_scenario.toml"]),
+        (["run", "--fmi", ""], ["2", "3"]),
+        (["run", "--output", "m"], ["my folder"]),
+        (["system", "pick_and_place_"], ["pick_and_place_untold"]),
+        (["fmu", "rp_pl"], ["rp_plant"]),
+        (["completion", ""], list(SHELLS)),
+        (["help", "fed"], ["federation", "federate"]),
+    ],
+)
+def test_bash_completes(script: Path, tmp_path: Path, words: list[str], wanted: list[str]) -> None:
+    (tmp_path / "my_scenario.toml").touch()
+    (tmp_path / "my_notes.txt").touch()
+    (tmp_path / "my folder").mkdir()
+    done = subprocess.run(
+        ["bash", "-c", BASH, "bash", script, SCRIPT, *words],
+        cwd=tmp_path, text=True, capture_output=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split("\n")[:-1] == wanted
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_every_shell_has_a_script(
+    shell: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, out, err = call(capsys, "completion", shell)
+    assert (code, err) == (0, "") and SCRIPT in out and "hanging_swing" in out
+    assert call(capsys, "completion", shell, "--output", tmp_path)[0] == 0
+    assert (tmp_path / SHELLS[shell]).read_text(encoding="utf-8") == out
