@@ -11,7 +11,7 @@ from pathlib import Path
 import rparm
 
 PAGE = Path(__file__).with_name("python-api.md")
-HEAD = """\
+HEAD = '''\
 # Python
 
 Made from the docstrings by `build/venv/bin/python -m docs.python_api`.
@@ -46,6 +46,28 @@ table = loop.run("nominal")
 print(loop.variants, table["arm.q1"][-1])
 ```
 
+A campaign of eight runs:
+
+```python
+from pathlib import Path
+
+Path("payload.toml").write_text("""
+title = "Payload"
+description = "How far does the arm fall with another second link?"
+scenario = "hanging_swing"
+time = { stop = 0.5 }
+sampling = "sobol"
+runs = 8
+[parameters.m2]
+uniform = [0.5, 1.5]
+[keep]
+final = ["q1"]
+""")
+if __name__ == "__main__":  # its processes import this program
+    runs = rparm.run_campaign("payload.toml", output="payload")
+    print(runs["m2"], runs["final(q1)"])
+```
+
 A mistake is one line:
 
 ```python
@@ -56,7 +78,7 @@ try:
 except UserError as error:
     print(error)
 ```
-"""
+'''
 
 
 def page() -> str:

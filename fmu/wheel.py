@@ -1,6 +1,7 @@
 """Hook of hatchling: what the wheel carries besides the Python package, below rparm/share.
 
-models/                    scenarios, references, campaigns, systems and the modules that study them
+models/                    scenarios, references, campaigns, systems and their modules; tables as
+                           .csv.xz, which `rparm.trajectory_csv` reads like .csv
 pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them
 plotly/, playground/       the library that draws on pages; the plant for a browser
 
@@ -9,6 +10,8 @@ RPARM_RELEASE names the folder of a release that is there; without it, one is bu
 
 from __future__ import annotations
 
+import gzip
+import lzma
 import os
 import shutil
 import subprocess
@@ -24,6 +27,7 @@ from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
 OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
+FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 
 
 class CustomBuildHook(BuildHookInterface):
@@ -38,8 +42,12 @@ class CustomBuildHook(BuildHookInterface):
         self.folder = tempfile.mkdtemp()
         staging = Path(self.folder)
         include = build_data["force_include"]
-        for file in sorted((root / "models").rglob("*")):
-            if file.suffix in OF_MODELS and not file.stem.endswith("_in"):
+        for file in filter(_is_used, sorted((root / "models").rglob("*"))):
+            if file.suffix == ".csv":
+                packed = staging / f"{file.relative_to(root).as_posix()}.xz"
+                packed.parent.mkdir(parents=True, exist_ok=True)
+                packed.write_bytes(lzma.compress(file.read_bytes(), preset=9))
+            else:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         write_pieces(release, staging)
         _add_plotly(root, staging)
@@ -51,6 +59,13 @@ class CustomBuildHook(BuildHookInterface):
         """Remove what was only made for the wheel."""
         if self.target_name == "wheel":
             shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _is_used(file: Path) -> bool:
+    """Whether a file of a model is of use where there are no tests and no references are made."""
+    makes_references = file.suffix == ".py" and file.parent.name == "references"
+    only_tested = file.suffix == ".csv" and file.stem.endswith(FOR_TESTS)
+    return file.suffix in OF_MODELS and not makes_references and not only_tested
 
 
 def _built(root: Path) -> Path:
@@ -73,6 +88,7 @@ def _add_plotly(root: Path, staging: Path) -> None:
     package = found[0]
     folder = staging / "plotly"
     folder.mkdir()
-    shutil.copy(package / "package_data" / "plotly.min.js", folder)
+    script = (package / "package_data" / "plotly.min.js").read_bytes()
+    (folder / "plotly.min.js.gz").write_bytes(gzip.compress(script, mtime=0))
     (license_file,) = sorted(package.parent.glob("plotly-*.dist-info/**/LICENSE.txt"))
     shutil.copy(license_file, folder)
