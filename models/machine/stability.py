@@ -74,7 +74,7 @@ def least_damping(
     Parameters
     ----------
     contact : Contact
-        Its damping plays no role; with held inputs neither does its mass.
+        Its damping is not used; with held inputs neither is its mass.
     step : float
         s, small against the period of the contact.
     order, inputs : str
@@ -171,9 +171,9 @@ def growth(contact: Contact, step: float, order: str = "jacobi", inputs: str = "
 def exact_least_damping(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> float:
-    """Damping above which the contact is stable, of the eigenvalues, N.s/m.
+    """Damping above which the contact is stable, from the eigenvalues, N.s/m.
 
-    Its own damping plays no role.
+    Its own damping is not used.
 
     Raises
     ------

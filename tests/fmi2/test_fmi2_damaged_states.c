@@ -249,6 +249,27 @@ EACH_METHOD static void test_forged_states_do_no_harm(void) {
     TEST_ASSERT_EQUAL_INT(0, setitimer(ITIMER_PROF, &limit, NULL));
 }
 
+/* Replaces a number wherever its bits stand; how often that was. */
+static size_t replace_number(struct fmu_bytes *bytes, double number, double by) {
+    size_t replaced = 0;
+    for (size_t at = 0; at + sizeof number <= bytes->size; at++) {
+        if (memcmp(bytes->data + at, &number, sizeof number) == 0) {
+            memcpy(bytes->data + at, &by, sizeof by);
+            replaced++;
+        }
+    }
+    return replaced;
+}
+
+/* Bytes with a valid checksum are refused by a message with this text. */
+static void assert_refused_naming(fmi2Component c, struct fmu_bytes *bytes, const char *text) {
+    fmi2FMUstate made = NULL;
+    set_checksum(bytes);
+    ASSERT_ERROR(fmu.DeSerializeFMUstate(c, bytes->data, bytes->size, &made));
+    TEST_ASSERT_NULL(made);
+    fmu_assert_logged(&messages, text);
+}
+
 /* A value that no instance can have is refused, and the message names it. A field is found by its
  * bits, which are unique. */
 static void test_an_impossible_value_is_named(void) {
@@ -268,20 +289,8 @@ static void test_an_impossible_value_is_named(void) {
         fmu_set(c, cases[i].reference, marked);
         fmu_initialize(c, 0.0, 0.0);
         struct fmu_bytes bytes = fmu_save_bytes(c);
-        size_t replaced = 0;
-        for (size_t at = 0; at + sizeof marked <= bytes.size; at++) {
-            if (memcmp(bytes.data + at, &marked, sizeof marked) == 0) {
-                memcpy(bytes.data + at, &impossible, sizeof impossible);
-                replaced++;
-            }
-        }
-        TEST_ASSERT_GREATER_THAN_size_t(0, replaced);
-        set_checksum(&bytes);
-
-        fmi2FMUstate made = NULL;
-        ASSERT_ERROR(fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
-        TEST_ASSERT_NULL(made);
-        fmu_assert_logged(&messages, cases[i].name);
+        TEST_ASSERT_GREATER_THAN_size_t(0, replace_number(&bytes, marked, impossible));
+        assert_refused_naming(c, &bytes, cases[i].name);
         fmu_bytes_free(&bytes);
         fmu_free(c);
     }
@@ -291,25 +300,21 @@ static void test_an_impossible_value_is_named(void) {
 static void test_an_instance_has_one_time(void) {
     const double later = 2.0;
     const fmi2Component c = fmu_used(FMU_CVODE_ADAMS, &messages);
-    const struct fmu_bytes bytes = fmu_save_bytes(c);
+    struct fmu_bytes bytes = fmu_save_bytes(c);
     size_t places = 0;
     for (size_t at = 0; at + sizeof later <= bytes.size; at++) {
         if (memcmp(bytes.data + at, &fmu_used_until, sizeof later) != 0) {
             continue;
         }
         struct fmu_bytes forged = fmu_bytes_copy(&bytes, bytes.size);
-        fmi2FMUstate made = NULL;
         memcpy(forged.data + at, &later, sizeof later);
-        set_checksum(&forged);
-        ASSERT_ERROR(fmu.DeSerializeFMUstate(c, forged.data, forged.size, &made));
-        fmu_assert_logged(&messages, "contradicts");
+        assert_refused_naming(c, &forged, "contradicts");
         fmu_bytes_free(&forged);
         fmu_log_clear(&messages);
         places++;
     }
     TEST_ASSERT_EQUAL_size_t(2, places); // the variable, the clock
-    struct fmu_bytes whole = bytes;
-    fmu_bytes_free(&whole);
+    fmu_bytes_free(&bytes);
 }
 
 /* Times of a history that contradict each other: by name too. */
@@ -320,18 +325,8 @@ static void test_an_impossible_history_is_named(void) {
     struct fmu_bytes bytes = fmu_save_bytes(c);
     const double first_time = 0.125; // s since the restart; the latest is 0.1875
     const double late = 0.25;
-    size_t replaced = 0;
-    for (size_t at = 0; at + sizeof late <= bytes.size; at++) {
-        if (memcmp(bytes.data + at, &first_time, sizeof late) == 0) {
-            memcpy(bytes.data + at, &late, sizeof late);
-            replaced++;
-        }
-    }
-    TEST_ASSERT_EQUAL_size_t(1, replaced);
-    set_checksum(&bytes);
-    fmi2FMUstate made = NULL;
-    ASSERT_ERROR(fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
-    fmu_assert_logged(&messages, "latest_time = 0.1875");
+    TEST_ASSERT_EQUAL_size_t(1, replace_number(&bytes, first_time, late));
+    assert_refused_naming(c, &bytes, "latest_time = 0.1875");
     fmu_bytes_free(&bytes);
 }
 
@@ -340,11 +335,7 @@ static void test_a_phase_of_the_other_kind_is_refused(void) {
     enum { CONTINUOUS_TIME = 3 }; // enum phase, the second field
     const fmi2Component c = fmu_instantiate(&messages, false);
     struct fmu_bytes bytes = fmu_save_bytes(c);
-    fmi2FMUstate made = NULL;
     bytes.data[GUID_AT + strlen(RP_MANIPULATOR_GUID) + 8] = CONTINUOUS_TIME;
-    set_checksum(&bytes);
-    ASSERT_ERROR(fmu.DeSerializeFMUstate(c, bytes.data, bytes.size, &made));
-    TEST_ASSERT_NULL(made);
-    fmu_assert_logged(&messages, "Co-Simulation");
+    assert_refused_naming(c, &bytes, "Co-Simulation");
     fmu_bytes_free(&bytes);
 }

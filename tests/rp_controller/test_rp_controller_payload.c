@@ -135,7 +135,7 @@ static void test_a_payload_of_nothing_changes_no_bit(void) {
     }
 }
 
-/* PD has no model of the arm: the payload plays no role. */
+/* PD has no model of the arm: the payload does not matter. */
 static void test_pd_does_not_know_the_payload(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         next_sample(RP_CONTROLLER_PD);

@@ -156,7 +156,7 @@ static void test_an_event_in_model_exchange(void) {
         TEST_ASSERT_EQUAL_INT(1, get_integer(WHEEL_catches));
         TEST_ASSERT_FALSE(update_at(2.0));
         TEST_ASSERT_EQUAL_INT(1, get_integer(WHEEL_catches));
-        TEST_ASSERT_TRUE(to_stop() == 1.0); // plays no role any more
+        TEST_ASSERT_TRUE(to_stop() == 1.0); // no longer used
         fmu.FreeInstance(c);
     }
     c = NULL;
