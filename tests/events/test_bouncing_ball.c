@@ -1,6 +1,7 @@
 /* A ball that bounces: impacts at v1 / g + 2 v1 (e + ... + e^(k-1)) / g, rest at
  * v1 / g (1 + e) / (1 - e) from a height with v1 = sqrt(2 g h). */
 #include "continuous_states.h"
+#include "derivatives.h"
 #include "each_method.h"
 #include "toy_run.h"
 
@@ -151,6 +152,39 @@ EACH_METHOD static void test_the_lift_takes_it_from_the_floor(void) {
     run(2.0, 1.0, 1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0.5, get(TOY_POSITION));
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, 1.0, get(TOY_SPEED));
+}
+
+/* A step that leaves its event is followed by one that handles it. */
+EACH_METHOD static void test_an_impact_that_was_left_comes_with_the_next_step(void) {
+    const struct step_options left = {.at_event = EVENTS_LEFT};
+    const double first = impact_time(1.0, 0.8, 1);
+    prepare(&ball_description, method, 1e-10);
+    initialize();
+    ASSERT_OK(instance_do_step_with(instance, 0.0, 1.0, &left));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, first, instance_time(instance));
+    TEST_ASSERT_EQUAL_INT(0, get_int(TOY_EVENTS));
+    run(instance_time(instance), 0.1, 1);
+    TEST_ASSERT_EQUAL_INT(1, get_int(TOY_EVENTS));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-8, first, get(TOY_LAST_EVENT));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, 0.8 * g * first - 0.1 * g, get(TOY_SPEED));
+}
+
+/* A lift that equals the weight and grows takes it from the floor without an event of its own. */
+EACH_METHOD static void test_a_lift_that_grows_from_the_weight_on_takes_it_at_once(void) {
+    const unsigned reference = TOY_INPUT;
+    const int order = 1;
+    for (int rises = 0; rises < 2; rises++) {
+        const double slope = rises ? 1.0 : -1.0;
+        prepare(&ball_description, method, 1e-10);
+        set(TOY_POSITION, 0.0);
+        initialize();
+        run(0.0, 1.0, 1);
+        set(TOY_INPUT, g);
+        ASSERT_OK(instance_set_input_derivatives(instance, &reference, 1, &order, &slope));
+        run(1.0, 1.0, 1);
+        TEST_ASSERT_EQUAL_INT(0, get_int(TOY_EVENTS));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-8, rises ? 1.0 / 6.0 : 0.0, get(TOY_POSITION));
+    }
 }
 
 /* An integrator outside ends a little before the impact or a little after it. */

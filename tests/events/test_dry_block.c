@@ -3,6 +3,7 @@
 #include "each_method.h"
 #include "toy_run.h"
 
+#include "continuous_states.h"
 #include "derivatives.h"
 
 EACH_METHOD static void test_it_stops_and_stays(void) {
@@ -62,6 +63,36 @@ EACH_METHOD static void test_a_touch_does_not_break_it_away(void) {
     ASSERT_OK(instance_set_input_derivatives(instance, references, 2, orders, values));
     run(0.0, 3.0, 1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.0, get(TOY_SPEED));
+}
+
+/* In Event Mode the importer takes back the force that would have broken it away. */
+static void test_a_force_taken_back_in_event_mode_moves_nothing(void) {
+    const struct step_options left = {.at_event = EVENTS_LEFT};
+    struct discrete_update update;
+    prepare(&block_description, 1, 1e-10);
+    initialize();
+    set_slope(0.25);
+    ASSERT_OK(instance_do_step_with(instance, 0.0, 8.0, &left));
+    set(TOY_INPUT, 0.5);
+    ASSERT_OK(instance_update_discrete_states(instance, &update));
+    run(instance_time(instance), 1.0, 1);
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
+}
+
+/* A force exactly equal to the breakaway friction holds: outside, too. */
+static void test_a_force_equal_to_the_friction_triggers_nothing_outside(void) {
+    struct discrete_update update;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        prepare(&block_description, 1, 1e-10);
+        instance_integrate_outside(instance);
+        initialize();
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        set(TOY_INPUT, sign * 1.0);
+        instance_enter_event_mode(instance);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
+        TEST_ASSERT_EQUAL_INT(0, get_int(TOY_EVENTS));
+        TEST_ASSERT_FALSE(update.states_changed);
+    }
 }
 
 /* Inputs within the friction's limits: nothing moves, nothing is integrated. */

@@ -182,6 +182,21 @@ static void test_log_all_shows_every_call(void) {
     TEST_ASSERT_GREATER_OR_EQUAL_UINT(FMU_COUNT(called), fmu_log_count(&messages, "logAll"));
 }
 
+static void test_log_all_switches_every_category(void) {
+    static const char *const told[] = {"logAll", "logEvents", "logStatusDiscard", "logStatusError"};
+    const fmi2String name = "logAll";
+    for (fmi2Boolean on = fmi2False; on <= fmi2True; on++) {
+        const fmi2Component c = fmu_instantiate(&messages, !on);
+        ASSERT_OK(fmu.SetDebugLogging(c, on, 1, &name));
+        fmu_log_clear(&messages);
+        make_messages(c);
+        for (size_t i = 0; i < FMU_COUNT(told); i++) {
+            TEST_ASSERT_EQUAL_MESSAGE(on, fmu_log_count(&messages, told[i]) > 0, told[i]);
+        }
+        fmu_free(c);
+    }
+}
+
 static void test_reset_keeps_the_logging_settings(void) {
     const fmi2Component c = fmu_instantiate(&messages, true);
     ASSERT_OK(fmu.SetDebugLogging(c, fmi2False, 0, NULL));

@@ -76,6 +76,18 @@ static void test_the_layout_is_little_endian(void) {
     TEST_ASSERT_EQUAL_MEMORY(minus_a_tenth, bytes + 20 + strlen(guid), 8);
 }
 
+/* Nothing behind the end is read or written. */
+static void test_what_does_not_fit_is_cut_off(void) {
+    unsigned char bytes[8] = {1, 2, 3, 4, 5, 6, 7, 8};
+    double real = 0.5;
+    struct codec reading = codec_reading(bytes, 7);
+    codec_real(&reading, &real);
+    TEST_ASSERT_TRUE(reading.is_cut_off && real == 0.5);
+    struct codec writing = codec_writing(bytes, 7);
+    codec_real(&writing, &real);
+    TEST_ASSERT_TRUE(writing.is_cut_off && bytes[0] == 1 && bytes[7] == 8);
+}
+
 static void test_values_that_a_type_does_not_have_fail(void) {
     unsigned char bytes[8] = {2};
     struct codec codec = codec_reading(bytes, sizeof bytes);

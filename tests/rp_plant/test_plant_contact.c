@@ -1,6 +1,7 @@
 /* Contacts with compliant stops: where they begin and end, their force, how an update changes
  * them. */
 #include "plant_test_support.h"
+#include "rp_plant_contact.h"
 #include "unity.h"
 
 #include <math.h>
@@ -102,6 +103,22 @@ static void test_at_rest_on_the_limit_the_force_decides(void) {
     plant_test_update(&v, -1);
     assert_contact(RP_PLANT_PUSHED);
     TEST_ASSERT_EQUAL_INT(RP_PLANT_BACKWARD, v.modes.joint[1]);
+}
+
+/* Where it breaks away, the force equals the friction and gives no acceleration: the mode tells. */
+static void test_a_joint_that_breaks_away_on_the_limit_goes_where_its_mode_says(void) {
+    static const struct {
+        int mode, contact;
+    } cases[] = {{RP_PLANT_BACKWARD, RP_PLANT_PUSHED}, {RP_PLANT_FORWARD, RP_PLANT_APART}};
+    v.parameters.coulomb_friction[1] = 2.0;
+    for (int i = 0; i < 2; i++) {
+        struct rp_plant_modes modes = v.modes;
+        put(-1.0, 0.0);
+        v.inputs.tau[1] = 2.0 * cases[i].mode;
+        modes.joint[1] = cases[i].mode;
+        rp_plant_begin_contacts(&v.parameters, v.q, v.dq, &v.inputs, &modes);
+        TEST_ASSERT_EQUAL_INT(cases[i].contact, modes.contact[1]);
+    }
 }
 
 /* The velocity 1 / c is written to the bit, so that the next search begins at 0. */
