@@ -58,7 +58,6 @@ need python3-venv has_venv
 need libtbb12 has_libtbb
 need unzip command -v unzip
 if [ "$release" = yes ]; then
-  need llvm-14 command -v llvm-lipo-14
   need llvm command -v llvm-ar
 fi
 if [ "$platforms" = yes ]; then

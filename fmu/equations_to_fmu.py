@@ -13,9 +13,11 @@ from pathlib import Path
 from declaration.load import DeclarationError
 from document import DocumentError
 from equations import declaration, lock
-from equations.building import Runtime, build
+from equations.building import PLACES, build
 from equations.model_file import ModelFileError, read
+from equations.runtime import Runtime
 from generate import write_if_changed
+from package import pack
 from source_code import SourceCodeError
 
 MISTAKES = (ModelFileError, DeclarationError, DocumentError, SourceCodeError, OSError)
@@ -25,17 +27,27 @@ def main() -> int:
     """Build; 2 with a line on standard error where something is wrong."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="the file of the model")
-    parser.add_argument("--runtime", type=Path, required=True, help="runtime.json of the build")
     parser.add_argument("--output", type=Path, required=True, help="folder for the FMUs")
+    parser.add_argument(
+        "--runtime", type=Path, nargs="+", required=True, help="runtime.json of each platform"
+    )
+    parser.add_argument(
+        "--of-this-machine", action="store_true", help="that is the platform: any compiler will do"
+    )
     arguments = parser.parse_args()
     try:
         file = read(arguments.file, declaration.solver_names())
         lock_file = lock.path_of(arguments.file)
         references = lock.references(lock_file, declaration.keys(file))
-        runtime = Runtime.load(arguments.runtime)
+        runtimes = [Runtime.load(path, arguments.of_this_machine) for path in arguments.runtime]
         with tempfile.TemporaryDirectory() as work:
-            paths = build(file, references, runtime, Path(work).resolve(), arguments.output)
-        write_if_changed(lock_file, lock.text(file.name, references))
+            built = build(file, references, runtimes, Path(work).resolve())
+            # all that can go wrong in the model has gone right: nothing is written before
+            write_if_changed(lock_file, lock.text(file.name, references))
+            paths = []
+            for version, entries in built.items():
+                paths.append(arguments.output / PLACES[version] / f"{file.name}.fmu")
+                pack(paths[-1], entries)
     except MISTAKES as error:
         print(f"{error!s:.2000}", file=sys.stderr)
         return 2

@@ -8,14 +8,15 @@ import zipfile
 from pathlib import Path
 
 from atomic_write import atomic_write
+from universal import universal
 
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)
 UNIX = 3
 
 
-def collect(entries: list[str]) -> dict[str, Path]:
-    """Map archive names to files; an entry is NAME=PATH, a folder stands for all files below it."""
-    files: dict[str, Path] = {}
+def collect(entries: list[str]) -> list[tuple[str, Path]]:
+    """Archive names and files; an entry is NAME=PATH, a folder stands for all files below it."""
+    files: list[tuple[str, Path]] = []
     for entry in entries:
         name, separator, source = entry.partition("=")
         path = Path(source)
@@ -23,20 +24,26 @@ def collect(entries: list[str]) -> dict[str, Path]:
             raise ValueError(f"'{entry}' is not NAME=PATH with an existing file or folder")
         if path.is_dir():
             below = (p for p in path.rglob("*") if p.is_file())
-            files |= {f"{name}/{p.relative_to(path).as_posix()}": p for p in below}
+            files += [(f"{name}/{p.relative_to(path).as_posix()}", p) for p in below]
         else:
-            files[name] = path
+            files.append((name, path))
     return files
 
 
-def pack(archive: Path, files: dict[str, Path]) -> None:
-    """Write the archive to a temporary name and rename it, so that a broken one never stays."""
+def pack(archive: Path, files: list[tuple[str, Path]]) -> None:
+    """Write the archive to a temporary name and rename it, so that a broken one never stays.
+
+    Libraries for macOS may have the same name: they become one.
+    """
+    contents: dict[str, list[bytes]] = {}
+    for name, path in files:
+        contents.setdefault(name, []).append(path.read_bytes())
     archive.parent.mkdir(parents=True, exist_ok=True)
     with (
         atomic_write(archive) as temporary,
         zipfile.ZipFile(temporary, "w") as target,
     ):
-        for name in sorted(files):
+        for name, parts in sorted(contents.items()):
             info = zipfile.ZipInfo(name, FIXED_DATE)
             info.create_system = UNIX
             # an FMU is compressed already, and can so be shared with the file beside the system
@@ -45,7 +52,8 @@ def pack(archive: Path, files: dict[str, Path]) -> None:
             executable = name.startswith("binaries/")
             info.external_attr = (0o100755 if executable else 0o100644) << 16
             # the level of the archive would not hold for a ZipInfo
-            target.writestr(info, files[name].read_bytes(), compresslevel=9)
+            content = parts[0] if len(parts) == 1 else universal(parts)
+            target.writestr(info, content, compresslevel=9)
 
 
 def main() -> int:

@@ -1,17 +1,13 @@
-# Target release: build/release/NAME.fmu and fmi3/NAME.fmu with the binaries of all platforms and the sources, the wheel,
-# checksums and a bill of materials. Each platform is built by its preset (CMakePresets.json) in build/platforms.
+# Target release: build/release/NAME.fmu and fmi3/NAME.fmu with the binaries of all platforms and the sources, what else is
+# built for them (built.py), the wheel, checksums and a bill of materials. Each platform is built by its preset
+# (CMakePresets.json) in build/platforms.
 
 set(RELEASE_PLATFORMS x86_64-linux x86_64-windows x86_64-darwin aarch64-darwin aarch64-linux)
 set(RELEASE_FOLDER ${PROJECT_BINARY_DIR}/release)
 
 include(FindZig)
-if(ZIG)
-  file(REAL_PATH ${ZIG} zig_folder)
-  cmake_path(GET zig_folder PARENT_PATH zig_folder)
-endif()
-find_program(LIPO NAMES lipo llvm-lipo llvm-lipo-14 DOC "Joins libraries for macOS")
 set(mingw_header ${zig_folder}/lib/libc/include/any-windows-any/_mingw_mac.h)
-if(EXISTS ${mingw_header} AND EXISTS ${zig_folder}/LICENSE AND LIPO AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
+if(EXISTS ${mingw_header} AND EXISTS ${zig_folder}/LICENSE AND OWN_LIBM AND NOT CMAKE_CROSSCOMPILING)
   set(CAN_RELEASE ON)
   # what zig puts into the libraries, and under which licenses
   execute_process(COMMAND ${ZIG} version OUTPUT_VARIABLE zig_version OUTPUT_STRIP_TRAILING_WHITESPACE)
@@ -38,10 +34,20 @@ function(add_platform platform)
     VERBATIM)
 endfunction()
 
+file(GLOB provers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/models/*/proof/CMakeLists.txt)
+list(TRANSFORM provers REPLACE ".*/([^/]+)/proof/CMakeLists.txt" "\\1_prove")
 set(platform_targets "")
+set(platform_builds "")
+set(platform_provers "")
 foreach(platform IN LISTS RELEASE_PLATFORMS)
-  add_platform(${platform} libraries)
+  add_platform(${platform} libraries runtime ${provers})
   list(APPEND platform_targets platform_${platform})
+  list(APPEND platform_builds ${PROJECT_BINARY_DIR}/platforms/${platform})
+  foreach(prover IN LISTS provers)
+    string(REGEX REPLACE "_prove$" "/prove" program ${prover})
+    string(APPEND program $<$<STREQUAL:${platform},x86_64-windows>:.exe>)
+    list(APPEND platform_provers ${PROJECT_BINARY_DIR}/platforms/${platform}/proof/${program})
+  endforeach()
 endforeach()
 
 # library_of(platform below name result): the shared object of an FMU for a platform.
@@ -66,32 +72,16 @@ function(add_release_fmu name version)
   set(target ${name}${${version}_suffix})
   set(below ${${version}_below})
 
-  # a library for each folder in the archive; the one for two platforms is made of theirs
+  # package.py makes one of two with the same name
   set(libraries "")
   set(binaries "")
   foreach(platform IN LISTS RELEASE_PLATFORMS)
     folder_in_fmu(${version} ${platform} folder)
     library_of(${platform} "${below}" ${name} library)
     list(APPEND libraries ${library})
-    if(folder STREQUAL "darwin64")
-      list(APPEND darwin_libraries ${library})
-      set(library ${PROJECT_BINARY_DIR}/platforms/universal-darwin/${name}.dylib)
-    endif()
     cmake_path(GET library EXTENSION suffix)
     list(APPEND binaries binaries/${folder}/${name}${suffix}=${library})
   endforeach()
-  list(REMOVE_DUPLICATES binaries)
-  if(darwin_libraries)
-    set(universal ${PROJECT_BINARY_DIR}/platforms/universal-darwin/${name}.dylib)
-    cmake_path(GET universal PARENT_PATH universal_folder)
-    add_custom_command(
-      OUTPUT ${universal}
-      COMMAND ${CMAKE_COMMAND} -E make_directory ${universal_folder}
-      COMMAND ${LIPO} -create ${darwin_libraries} -output ${universal}
-      DEPENDS ${platform_targets} ${darwin_libraries}
-      VERBATIM)
-    list(APPEND libraries ${universal})
-  endif()
 
   set(described ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name}/${below}release)
   set(fmu ${RELEASE_FOLDER}/${below}${name}.fmu)
@@ -108,6 +98,7 @@ function(add_release_fmu name version)
     COMMENT "Packing release/${below}${name}.fmu"
     COMMAND_EXPAND_LISTS VERBATIM)
   add_custom_target(${target}_release DEPENDS ${fmu})
+  set_property(GLOBAL APPEND PROPERTY release_libraries ${libraries})
   set_property(GLOBAL APPEND PROPERTY release_files ${fmu})
   set_property(GLOBAL APPEND PROPERTY release_targets ${target}_release)
 endfunction()
@@ -116,7 +107,7 @@ endfunction()
 function(add_release)
   if(NOT CAN_RELEASE)
     add_custom_target(release
-      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig with its license and headers, and llvm-lipo (./setup.sh --release), and OWN_LIBM."
+      COMMAND ${CMAKE_COMMAND} -E echo "A release needs zig with its license and headers (./setup.sh --release), and OWN_LIBM."
       COMMAND ${CMAKE_COMMAND} -E false VERBATIM)
     return()
   endif()
@@ -127,17 +118,31 @@ function(add_release)
       --part musl,${MUSL_VERSION},MIT,https://musl.libc.org
       --part zig,${zig_version},MIT,https://ziglang.org
       --part mingw-w64,${mingw_version},ZPL-2.1,https://www.mingw-w64.org)
+  # the libraries of FMUs have all that those of own equations are linked with
+  get_property(libraries GLOBAL PROPERTY release_libraries)
+  set(built ${RELEASE_FOLDER}/built.tar.xz)
+  set(page ${PROJECT_BINARY_DIR}/playground/index.html)
+  add_custom_command(
+    OUTPUT ${built}
+    COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/built.py ${platform_builds}
+            --page ${page} --output ${built}
+    DEPENDS ${platform_targets} ${libraries} ${platform_provers} playground ${page}
+            ${FMU_SOURCE_DIR}/built.py ${FMU_SOURCE_DIR}/source_code.py
+    COMMENT "Packing what is built for all platforms"
+    VERBATIM)
+  list(APPEND files ${built})
   add_custom_target(release_files DEPENDS ${targets} ${files})
 
   set(wheel ${RELEASE_FOLDER}/rparm-${PROJECT_VERSION}-py3-none-any.whl)
-  file(GLOB_RECURSE packaged CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/* ${PROJECT_SOURCE_DIR}/models/*)
+  file(GLOB_RECURSE packaged CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/* ${PROJECT_SOURCE_DIR}/models/*
+       ${PROJECT_SOURCE_DIR}/fmu/*.py ${PROJECT_SOURCE_DIR}/fmu/*.toml ${PROJECT_SOURCE_DIR}/fmu/*.css)
   list(FILTER packaged EXCLUDE REGEX __pycache__)
   add_custom_command(
     OUTPUT ${wheel}
     COMMAND ${CMAKE_COMMAND} -E env RPARM_RELEASE=${RELEASE_FOLDER}
             ${Python3_EXECUTABLE} -m hatchling build -t wheel -d ${RELEASE_FOLDER}
     WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
-    DEPENDS ${targets} ${files} ${packaged} playground ${FMU_SOURCE_DIR}/wheel.py ${PROJECT_SOURCE_DIR}/pyproject.toml
+    DEPENDS ${targets} ${files} ${packaged} ${PROJECT_SOURCE_DIR}/pyproject.toml
             ${PROJECT_SOURCE_DIR}/README.md
     COMMENT "Packing the wheel"
     VERBATIM)

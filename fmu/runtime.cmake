@@ -1,5 +1,5 @@
-# What FMUs of own equations are linked with (build_model.py): all that is the same for every model, compiled
-# once. BUILD/runtime/runtime.json says where it is and how a model is compiled and linked to it.
+# What FMUs of own equations are linked with: all that is the same for every model, compiled once.
+# BUILD/runtime/runtime.json says where it is and how a model is compiled and linked to it: equations/building.py.
 
 if(WASM)
   return() # the playground has its own models
@@ -19,7 +19,7 @@ foreach(version IN LISTS FMI_VERSIONS)
 endforeach()
 list(JOIN runtime_versions ",\n" runtime_versions)
 
-# what it links to, each library behind those that use it
+# what it links to, each library behind those that use it; the elementary functions as objects, as FMUs do
 set(linked "")
 libraries_in(runtime_fmi2 linked)
 set(runtime_libraries "")
@@ -29,36 +29,46 @@ foreach(library IN LISTS linked)
   if(type STREQUAL "STATIC_LIBRARY")
     manifest_entry(${library} entry)
     list(APPEND runtime_sources "${entry}")
-  endif()
-  if(type STREQUAL "STATIC_LIBRARY" AND NOT library STREQUAL "elementary_functions")
-    list(APPEND runtime_libraries "\"$<TARGET_FILE:${library}>\"")
+    if(NOT library STREQUAL "elementary_functions")
+      list(APPEND runtime_libraries $<TARGET_FILE:${library}>)
+    endif()
   endif()
 endforeach()
-list(JOIN runtime_libraries ", " runtime_libraries)
 list(JOIN runtime_sources ",\n" runtime_sources)
-list(JOIN FMU_LINK_OPTIONS "\", \"" link_options)
-set(elementary "")
 set(licenses "\"license.txt\": \"${PROJECT_SOURCE_DIR}/LICENSE\", \"sundials.txt\": \"${SUNDIALS_LICENSE}\"")
 if(OWN_LIBM)
-  set(elementary "$<TARGET_OBJECTS:elementary_functions>")
+  list(PREPEND runtime_libraries $<TARGET_OBJECTS:elementary_functions>)
   string(APPEND licenses ", \"musl.txt\": \"${MUSL_LICENSE}\"")
 endif()
+if(ZIG_TARGET)
+  string(APPEND licenses ", \"zig.txt\": \"${zig_folder}/LICENSE\"")
+  string(APPEND licenses ", \"mingw-w64.txt\": \"${zig_folder}/lib/libc/mingw/COPYING\"")
+endif()
 
+# CMake keeps the first word of a compiler and its other words apart; @NAME@ stands for the name of the FMU
+separate_arguments(compiler UNIX_COMMAND "${CMAKE_C_COMPILER} ${CMAKE_C_COMPILER_ARG1}")
 separate_arguments(flags UNIX_COMMAND "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_RELEASE}")
 set(compile ${flags} -std=c17 ${CMAKE_C_COMPILE_OPTIONS_PIC} -fvisibility=hidden)
+separate_arguments(link UNIX_COMMAND "${CMAKE_SHARED_LINKER_FLAGS}")
+list(APPEND link -shared ${FMU_LINK_OPTIONS})
+if(APPLE)
+  list(APPEND link -install_name @rpath/@NAME@${FMU_LIBRARY_SUFFIX})
+endif()
+list(JOIN link "\", \"" link)
 set(include "$<TARGET_PROPERTY:runtime_fmi2,INCLUDE_DIRECTORIES>")
 file(GENERATE OUTPUT ${PROJECT_BINARY_DIR}/runtime/runtime.json CONTENT "{
 \"version\": \"${PROJECT_VERSION}\",
-\"compiler\": \"${CMAKE_C_COMPILER}\",
+\"platform\": \"${PLATFORM}\",
+\"compiler\": [\"$<JOIN:${compiler},\"$<COMMA> \">\"],
 \"options\": [\"$<JOIN:${compile};$<TARGET_PROPERTY:runtime_fmi2,COMPILE_OPTIONS>,\"$<COMMA> \">\"],
 \"include\": [\"$<JOIN:${include},\"$<COMMA> \">\"],
 \"versions\": {${runtime_versions}},
-\"libraries\": [${runtime_libraries}],
-\"elementary\": [\"$<JOIN:${elementary},\"$<COMMA> \">\"],
-\"link\": [\"${link_options}\"],
+\"libraries\": [\"$<JOIN:${runtime_libraries},\"$<COMMA> \">\"],
+\"link\": [\"${link}\"],
 \"sources\": [${runtime_sources}],
 \"roots\": {\"project\": \"${PROJECT_SOURCE_DIR}\", \"generated\": \"${PROJECT_BINARY_DIR}\",
-\"fmi\": \"${FMI_HEADERS_DIR}\", \"sundials\": \"${SUNDIALS_SOURCE_DIR}\", \"musl\": \"${MUSL_SOURCE_DIR}\"},
+\"fmi\": \"${FMI_HEADERS_DIR}\", \"sundials\": \"${SUNDIALS_SOURCE_DIR}\", \"musl\": \"${MUSL_SOURCE_DIR}\",
+\"zig\": \"${zig_folder}\"},
 \"suffix\": \"${FMU_LIBRARY_SUFFIX}\",
 \"licenses\": {${licenses}}
 }

@@ -20,10 +20,11 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-PROJECT = Path(__file__).parents[1]
-PRELUDE = PROJECT / "fmu" / "source_code.h"
-PLATFORM = PROJECT / "src" / "model" / "platform.h"
+# of the root `project`: in front of all files
+PRELUDE = Path("fmu", "source_code.h")
+PLATFORM = Path("src", "model", "platform.h")
 
 # the library whose functions get other names, and the header with these
 ELEMENTARY = "elementary_functions"
@@ -53,10 +54,6 @@ class Library:
     sources: list[Path]
     include: list[Path]  # folders, in the order in which they are searched
     prelude: Path | None  # header in front of each file
-
-
-# for the header in front of all files
-COMMON = Library("", [], [PLATFORM.parent], None)
 
 
 @dataclass(frozen=True)
@@ -100,13 +97,15 @@ class SourceFolder:
         self.roots = sorted(roots.items(), key=lambda root: -len(root[1].parts))
         self.texts: dict[str, str] = {}
         self.origins: dict[str, Path] = {}
+        prelude, platform = (roots["project"] / path for path in (PRELUDE, PLATFORM))
         self.system_headers = {
-            line.name for path in (PRELUDE, PLATFORM) for line in includes(read(path))
+            line.name for path in (prelude, platform) for line in includes(read(path))
         }
+        self.prelude = self.add_header(prelude, Library("", [], [platform.parent], None))
 
     def add_library(self, library: Library) -> None:
         """Add the files of a library, each behind its preludes."""
-        preludes = [self.add_header(PRELUDE, COMMON), RENAMES]
+        preludes = [self.prelude, RENAMES]
         if library.prelude is not None:
             preludes.append(self.add_header(library.prelude, library))
         lines = "".join(f'#include "{name}"\n' for name in preludes)
@@ -193,20 +192,23 @@ def load(path: Path) -> Manifest:
     """Manifest that the build wrote."""
     try:
         content = json.loads(read(path))
-        return Manifest(
-            [
-                Library(
-                    entry["name"],
-                    [Path(source) for source in entry["sources"]],
-                    [Path(folder) for folder in entry["include"] if folder],
-                    Path(entry["prelude"]) if entry["prelude"] else None,
-                )
-                for entry in content["libraries"]
-            ],
-            {name: Path(folder) for name, folder in content["roots"].items()},
-        )
+        return manifest(content["libraries"], content["roots"], path.parent)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise SourceCodeError(f"{path}: is not a manifest: {error!r:.200}") from None
+
+
+def manifest(entries: list[dict[str, Any]], roots: dict[str, str], folder: Path) -> Manifest:
+    """Libraries and roots of a file of JSON in this folder, which relative paths begin at."""
+    libraries = [
+        Library(
+            entry["name"],
+            [folder / source for source in entry["sources"]],
+            [folder / include for include in entry["include"] if include],
+            folder / entry["prelude"] if entry["prelude"] else None,
+        )
+        for entry in entries
+    ]
+    return Manifest(libraries, {name: folder / root for name, root in roots.items() if root})
 
 
 def collect(manifest: Manifest) -> SourceFolder:

@@ -2,8 +2,10 @@
 
 models/                    scenarios, references, campaigns, systems and their modules; tables as
                            .csv.xz, which `rparm.trajectory_csv` reads like .csv
+fmu/, src/                 what makes FMUs of own equations: Python, and what it reads
 pieces, files.json         all FMUs and systems of the release, as `rparm.shipped` reads them
-plotly/, playground/       the library that draws on pages; the plant for a browser
+built.tar.xz               what else is built for each platform: built.py
+plotly/                    the library that draws on pages
 
 RPARM_RELEASE names the folder of a release that is there; without it, one is built here.
 """
@@ -27,6 +29,8 @@ from pieces import write_pieces  # noqa: E402
 
 SHARE = "rparm/share"
 OF_MODELS = (".csv", ".json", ".py", ".ssd", ".svg", ".toml")
+OF_FMU = ("fmu/**/*.py", "fmu/**/*.toml", "fmu/*.css", "src/instance/*.toml")
+OF_RELEASES = ("bill_of_materials", "built", "pieces", "references", "wheel")  # not for a model
 FOR_TESTS = ("_in", "sampled", "tightest")  # ends of names of tables that no command reads
 
 
@@ -49,11 +53,15 @@ class CustomBuildHook(BuildHookInterface):
                 packed.write_bytes(lzma.compress(file.read_bytes(), preset=9))
             else:
                 include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
+        for file in sorted(file for pattern in OF_FMU for file in root.glob(pattern)):
+            if file.stem in OF_RELEASES:
+                continue
+            include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
         write_pieces(release, staging)
+        shutil.copy(release / "built.tar.xz", staging)
         _add_plotly(root, staging)
         for file in sorted(path for path in staging.rglob("*") if path.is_file()):
             include[str(file)] = f"{SHARE}/{file.relative_to(staging).as_posix()}"
-        include[str(root / "build/playground/index.html")] = f"{SHARE}/playground/index.html"
 
     def finalize(self, *_: object) -> None:
         """Remove what was only made for the wheel."""
@@ -69,11 +77,11 @@ def _is_used(file: Path) -> bool:
 
 
 def _built(root: Path) -> Path:
-    """Build the release and the playground from the sources."""
+    """Build the release from the sources."""
     subprocess.run([root / "setup.sh", "--release"], check=True)
     for command in (
         ["-S", ".", "-B", "build", "-DBUILD_TESTING=OFF"],
-        ["--build", "build", "--target", "release_files", "playground", "--parallel", "2"],
+        ["--build", "build", "--target", "release_files", "--parallel", "2"],
     ):
         subprocess.run(["cmake", *command], cwd=root, check=True)
     return root / "build" / "release"

@@ -16,13 +16,16 @@ build/*.fmu, build/*.ssp                built from the folder of the same name, 
                                         to case and underscores; of FMI 2.0
 build/fmi3/                             the same of FMI 3.0
 build/runtime/runtime.json              what FMUs of own equations are linked with
+build/release/built.tar.xz              the same for all platforms, that program, and the playground
+fmu/equations_to_fmu.py                 makes these FMUs, in a process of its own
 build/report/                           what the commands write: index.html, folders of its parts
 
-An installed package has models/ in its folder share/, FMUs and SSPs as `rparm.shipped` says, and
-writes to rparm-output/ in the current folder.
+An installed package has fmu/ and models/ in its folder share/, what is built as `rparm.shipped`
+says, and writes to rparm-output/ in the current folder.
 """
 
 import os
+import platform
 import re
 from importlib import metadata
 from importlib.util import find_spec
@@ -30,7 +33,7 @@ from pathlib import Path
 
 import platformdirs
 
-from rparm import shipped
+from rparm import fmu_tools, shipped
 from rparm.errors import UserError, did_you_mean, hint
 
 PACKAGE = Path(__file__).resolve().parent
@@ -194,27 +197,51 @@ def proof_file(folder: Path) -> Path:
 
 def proof_program(folder: Path) -> Path:
     """That program; UserError if it is not there."""
-    if INSTALLED:
-        raise UserError(f"{folder.name}: an installed rparm cannot prove: use a checkout")
-    program = ROOT / "build" / PROOF / folder.name / "prove"
+    build = built_for_all() / platform_name() if INSTALLED else ROOT / "build"
+    program = build / PROOF / folder.name / "prove"
     program = program.with_suffix(".exe") if os.name == "nt" else program
-    if not program.is_file():
-        raise UserError(f"{program}: not there, {PROGRAM} builds it")
+    if not os.access(program, os.X_OK):
+        way_out = "RPARM_CACHE names another folder" if INSTALLED else f"{PROGRAM} builds it"
+        raise UserError(f"{program}: cannot be run; {way_out}")
     return program
 
 
-def model_builder() -> tuple[Path, Path]:
-    """The program that makes FMUs of own equations, and what it builds on.
+def platform_name() -> str:
+    """What FMI 3.0 calls this machine's platform."""
+    machine, system = platform.machine().lower(), platform.system().lower()
+    return f"{ {'amd64': 'x86_64', 'arm64': 'aarch64'}.get(machine, machine) }-{system}"
 
-    UserError if they are not here.
-    """
+
+def built_for_all() -> Path:
+    """Folder with what a release has built for each platform; UserError if there is none."""
     if INSTALLED:
-        raise UserError("build: an installed rparm cannot build FMUs yet, a checkout can")
-    tool = ROOT / "fmu" / "equations_to_fmu.py"
-    runtime = ROOT / BUILD_FOLDERS[VERSIONS[0]] / "runtime" / "runtime.json"
+        return shipped.unpacked(shipped.BUILT, cache_folder("built"))
+    archive = ROOT / "build" / "release" / shipped.BUILT.name
+    if not archive.is_file():
+        raise UserError(f"{archive}: not there, ./release.sh makes it")
+    return shipped.unpacked(archive, ROOT / "build" / "built")
+
+
+def model_builder() -> Path:
+    """The program that makes FMUs of own equations."""
+    return Path(fmu_tools.__path__[0]) / "equations_to_fmu.py"
+
+
+def runtimes(all_platforms: bool) -> list[Path]:
+    """What FMUs of own equations are linked with: for this machine, or for each platform.
+
+    UserError if it is not there.
+    """
+    if all_platforms:
+        return sorted(built_for_all().glob("*.json"))
+    if INSTALLED:
+        runtime = built_for_all() / f"{platform_name()}.json"
+        way_out = f"{PROGRAM} build --platforms builds for others"
+    else:
+        runtime, way_out = ROOT / "build" / "runtime" / "runtime.json", f"{PROGRAM} build makes it"
     if not runtime.is_file():
-        raise UserError(f"{runtime}: is not there, {PROGRAM} build makes it")
-    return tool, runtime
+        raise UserError(f"{runtime}: not there; {way_out}")
+    return [runtime]
 
 
 def from_root(path: Path) -> Path:
@@ -235,7 +262,7 @@ def campaign_folder(name: str) -> Path:
 
 def playground_page() -> Path:
     """The plant for a browser; UserError if it has not been built."""
-    page = ROOT / ("" if INSTALLED else "build") / "playground" / "index.html"
+    page = (built_for_all() if INSTALLED else ROOT / "build") / "playground" / "index.html"
     if not page.is_file():
         raise UserError(f"{page}: not there, {PROGRAM} playground builds it")
     return page

@@ -1,16 +1,20 @@
-"""FMUs and systems of an installed package, put together when they are first used.
+"""What an installed package has that is built, put together or unpacked when it is first used.
 
-The package has their bytes in pieces, each once: FMUs share most of their sources, and systems
-contain FMUs. The files keep every byte of those of the release.
+It has the bytes of FMUs and systems in pieces, each once: FMUs share most of their sources, and
+systems contain FMUs. The files keep every byte of those of the release.
 
 share/pieces     all pieces
 share/files.json  by the name of a file, VERSION OF FMI/NAME: its SHA-256, and its pieces as
                  [first byte, number of bytes]
+share/built.tar.xz  all else that is built for each platform (fmu/built.py)
 """
 
 import functools
 import hashlib
+import io
 import json
+import lzma
+import tarfile
 from pathlib import Path, PurePosixPath
 
 from rparm.errors import UserError, reason
@@ -19,6 +23,7 @@ from rparm.output_files import whole
 SHARE = Path(__file__).resolve().parent / "share"
 PIECES = SHARE / "pieces"
 FILES = SHARE / "files.json"
+BUILT = SHARE / "built.tar.xz"
 
 
 def names() -> list[str]:
@@ -41,15 +46,46 @@ def file(name: str, cache: Path) -> Path:
     content = _joined(entry["pieces"])
     if _digest(content) != entry["sha256"]:
         raise UserError(f"{PIECES}: damaged, install rparm again")
+    _write(path, content)
+    return path
+
+
+@functools.cache
+def unpacked(archive: Path, cache: Path) -> Path:
+    """The folder below `cache` with the files of an archive; those that differ are written.
+
+    UserError if it cannot be read, or if a file cannot be written.
+    """
+    try:
+        content = archive.read_bytes()
+        folder = cache / _digest(content)[:16]
+        with tarfile.TarFile(fileobj=io.BytesIO(lzma.decompress(content))) as opened:
+            for entry in opened:
+                file = opened.extractfile(entry)
+                assert file is not None  # the archive has no folders
+                _write(folder / entry.name, file.read(), bool(entry.mode & 0o100))
+    except (OSError, lzma.LZMAError, tarfile.TarError) as error:
+        raise UserError(f"{archive}: damaged, install rparm again: {reason(error)}") from error
+    return folder
+
+
+def _write(path: Path, content: bytes, is_program: bool = False) -> None:
+    """Write a file that is not there or has other bytes; UserError if it cannot be written."""
+    try:
+        if path.is_file() and path.read_bytes() == content:
+            return
+    except OSError:
+        pass  # writing it says what is wrong
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole(path) as temporary:
             temporary.write_bytes(content)
+            if is_program:
+                temporary.chmod(0o755)
     except OSError as error:
         raise UserError(
             f"{path}: cannot be written: {reason(error)}; RPARM_CACHE names another folder"
         ) from error
-    return path
 
 
 @functools.cache

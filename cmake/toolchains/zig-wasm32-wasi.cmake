@@ -2,5 +2,4 @@
 set(CMAKE_SYSTEM_NAME Generic)
 set(CMAKE_SYSTEM_PROCESSOR wasm32)
 set(ZIG_TARGET wasm32-wasi)
-set(ZIG_OPTIONS -O3 -s)
 include(${CMAKE_CURRENT_LIST_DIR}/zig.cmake)

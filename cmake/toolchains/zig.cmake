@@ -1,5 +1,5 @@
 # The C compiler of zig for another platform: clang with the C libraries and linkers of all of them. Included
-# by the files beside this one, which set ZIG_TARGET, CMAKE_SYSTEM_NAME, CMAKE_SYSTEM_PROCESSOR and, if need be, ZIG_OPTIONS.
+# by the files beside this one, which set ZIG_TARGET, CMAKE_SYSTEM_NAME and CMAKE_SYSTEM_PROCESSOR.
 
 include(${CMAKE_CURRENT_LIST_DIR}/../FindZig.cmake)
 if(NOT ZIG)
@@ -7,7 +7,8 @@ if(NOT ZIG)
 endif()
 list(APPEND CMAKE_TRY_COMPILE_PLATFORM_VARIABLES ZIG)
 
-set(CMAKE_C_COMPILER ${ZIG} cc -target ${ZIG_TARGET} -fno-sanitize=undefined ${ZIG_OPTIONS})
+# -O3 -s also when CMake tries the compiler: with other options zig would build another C library, for minutes
+set(CMAKE_C_COMPILER ${ZIG} cc -target ${ZIG_TARGET} -fno-sanitize=undefined -O3 -s)
 # they know the objects of all platforms
 find_program(CMAKE_AR NAMES llvm-ar llvm-ar-14 REQUIRED)
 find_program(CMAKE_RANLIB NAMES llvm-ranlib llvm-ranlib-14 REQUIRED)

@@ -1,9 +1,9 @@
 """`build`: makes FMUs of a file with equations."""
 
 import argparse
-import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from rparm import project
@@ -16,25 +16,37 @@ DESCRIPTION = (
     "examples/models/README.md explains the file. Beside it FILE.lock.toml keeps the value "
     "references."
 )
+# what the program imports, beside this package
+NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Which file, and where to."""
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
+    parser.add_argument(
+        "--platforms", action="store_true", help="for all platforms, by zig, not for this machine"
+    )
     add_output(parser, "folder for the FMUs (default: the current one)")
 
 
 def run(options: argparse.Namespace) -> Ended:
     """Build."""
-    tool, runtime = project.model_builder()
-    folder = options.output or Path()
-    command = [sys.executable, tool, options.file, "--runtime", runtime, "--output", folder]
-    environment = os.environ | {"PYTHONPATH": str(project.PACKAGE.parent)}
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        way_out = project.how_to_install("build")
+        raise UserError(f"{', '.join(missing)}: not installed, {way_out} does it")
+    tool = project.model_builder()
+    command = [sys.executable, tool, options.file, "--output", options.output or Path()]
+    command += ["--runtime", *project.runtimes(options.platforms)]
+    command += [] if options.platforms else ["--of-this-machine"]
+    # zig compiles its C library once
+    environment = {"ZIG_GLOBAL_CACHE_DIR": str(project.cache_folder("zig"))}
+    environment["PYTHONIOENCODING"] = "utf-8"
     ended = subprocess.run(
         command,
         capture_output=True,
         check=False,
-        env=environment,
+        env=environment | project.child_environment(),
         encoding="utf-8",
         errors="replace",
     )

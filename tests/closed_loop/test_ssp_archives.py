@@ -55,7 +55,7 @@ def test_the_archive_depends_on_its_contents_alone(archive: Path, tmp_path: Path
         files.extractall(tmp_path / "files")
         names = files.namelist()
     again = tmp_path / "again.ssp"
-    package.pack(again, {name: tmp_path / "files" / name for name in reversed(names)})
+    package.pack(again, [(name, tmp_path / "files" / name) for name in reversed(names)])
     assert again.read_bytes() == archive.read_bytes()
 
 

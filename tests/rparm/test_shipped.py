@@ -31,9 +31,9 @@ def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         for name in ("A", "B"):
             (tmp_path / name).write_text(f"{name} of {below.name}")
             files = {"sources/shared.bin": tmp_path / "shared.bin", "own": tmp_path / name}
-            pack(below / f"{name}.fmu", files)
+            pack(below / f"{name}.fmu", files.items())
         fmus = {f"resources/{name}.fmu": below / f"{name}.fmu" for name in ("A", "B")}
-        pack(below / "S.ssp", {"SystemStructure.ssd": tmp_path / "A", **fmus})
+        pack(below / "S.ssp", ({"SystemStructure.ssd": tmp_path / "A"} | fmus).items())
     write_pieces(folder, share)
     monkeypatch.setattr(shipped, "PIECES", share / "pieces")
     monkeypatch.setattr(shipped, "FILES", share / "files.json")
