@@ -8,6 +8,8 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from declaration.load import DeclarationError
@@ -43,16 +45,27 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as work:
             built = build(file, references, runtimes, Path(work).resolve())
             # all that can go wrong in the model has gone right: nothing is written before
-            write_if_changed(lock_file, lock.text(file.name, references))
+            with _written(lock_file):
+                write_if_changed(lock_file, lock.text(file.name, references))
             paths = []
             for version, entries in built.items():
                 paths.append(arguments.output / PLACES[version] / f"{file.name}.fmu")
-                pack(paths[-1], entries)
+                with _written(paths[-1]):
+                    pack(paths[-1], entries)
     except MISTAKES as error:
         print(f"{error!s:.2000}", file=sys.stderr)
         return 2
     print("\n".join(map(str, paths)))
     return 0
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
+    """Say that this file cannot be written where something of the system's fails."""
+    try:
+        yield
+    except OSError as error:
+        raise ModelFileError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 if __name__ == "__main__":

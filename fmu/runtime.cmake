@@ -50,7 +50,7 @@ separate_arguments(compiler UNIX_COMMAND "${CMAKE_C_COMPILER} ${CMAKE_C_COMPILER
 separate_arguments(flags UNIX_COMMAND "${CMAKE_C_FLAGS} ${CMAKE_C_FLAGS_RELEASE}")
 set(compile ${flags} -std=c17 ${CMAKE_C_COMPILE_OPTIONS_PIC} -fvisibility=hidden)
 separate_arguments(link UNIX_COMMAND "${CMAKE_SHARED_LINKER_FLAGS}")
-list(APPEND link -shared ${FMU_LINK_OPTIONS})
+list(APPEND link ${FMU_LINK_OPTIONS} -shared) # -static behind it would ask zig for an archive
 if(APPLE)
   list(APPEND link -install_name @rpath/@NAME@${FMU_LIBRARY_SUFFIX})
 endif()
