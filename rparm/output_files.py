@@ -57,3 +57,11 @@ def from_here(path: Path) -> Path:
     except OSError:  # it has been removed
         return path
     return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+def from_folder(path: Path, folder: Path) -> str:
+    """A path as it is from a folder; in full where there is no way, on another drive."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return path.absolute().as_posix()

@@ -190,6 +190,11 @@ def built(folder: Path, suffix: str, option: str = "", version: str = VERSIONS[0
     raise UserError(f"{build}: has no {kind} of {folder.name}: {way_out}")
 
 
+def fmu_of(subject: Path, option: str = "", version: str = VERSIONS[0]) -> Path:
+    """The FMU of what a scenario is of: a file itself, or what was built from a model's folder."""
+    return built(subject, ".fmu", option, version) if subject.is_dir() else subject
+
+
 def proof_file(folder: Path) -> Path:
     """What the program that encloses motions of a model reads and gives."""
     return folder / PROOF / f"{PROOF}.toml"

@@ -285,16 +285,21 @@ def _sha256(content: bytes) -> str:
 
 
 @contextmanager
-def opened(campaign: Campaign, given: Path | None, where: object = "campaign") -> Iterator[Base]:
-    """The scenario or system of a campaign, with the FMU or SSP `given`, or the built one.
+def opened(
+    campaign: Campaign, given: Path | None, where: Path = Path("campaign")
+) -> Iterator[Base]:
+    """The scenario or system of a campaign, with the FMU or SSP `given`, or that of its model.
 
-    UserError if it cannot be opened; beginning with `where` if the campaign's text is wrong.
+    UserError if it cannot be opened; beginning with `where`, the campaign's file, if that is wrong.
     """
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
         with _said_of(where):
-            file = project.scenario_file(campaign.scenario)
-        path = given or project.built(project.model_folder(file), ".fmu", "--fmu")
+            own = Path(campaign.scenario).suffix.lower() == ".toml"
+            beside = where.parent / campaign.scenario
+            file = beside if own else project.scenario_file(campaign.scenario)
+            subject = scenario.subject_of(file)
+        path = given or project.fmu_of(subject, "--fmu")
         model = read_model(path)
         with _said_of(where):
             loaded = scenario.load(file, model, times)

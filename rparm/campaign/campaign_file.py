@@ -162,7 +162,7 @@ class Campaign(_Table):
 
     title: Title
     description: Text
-    scenario: Name | None = None
+    scenario: Name | None = None  # or a file FILE.toml, beside this one
     system: Name | None = None
     variant: Name | None = None
     sampling: Literal["random", "sobol", "latin", "grid", "indices"]

@@ -8,7 +8,7 @@ from rparm.commands import Ended
 from rparm.errors import UserError, reason
 from rparm.fmi.fmu_file import read_model
 from rparm.options import add_output
-from rparm.output_files import whole
+from rparm.output_files import from_folder, whole
 from rparm.scenarios import template
 
 DESCRIPTION = (
@@ -25,7 +25,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--model",
         metavar="MODEL",
-        help="what to simulate (default: the model with the most scenarios)",
+        help="what to simulate, or a file .fmu (default: the model with the most scenarios)",
     )
     add_output(parser, "folder for the file (default: this one, or that of the path)")
 
@@ -35,9 +35,14 @@ def run(options: argparse.Namespace) -> Ended:
     path = _path(options.name)
     if options.output:
         path = options.output / path
-    folder = project.model(options.model) if options.model else _usual_model()
-    model = read_model(project.built(folder, ".fmu"))
-    text = template.text(path.stem, folder.name, model)
+    if Path(options.model or "").suffix.lower() == ".fmu":
+        subject = Path(options.model)
+        key, name = "fmu", from_folder(subject, path.parent)
+    else:
+        subject = project.model(options.model) if options.model else _usual_model()
+        key, name = "model", subject.name
+    model = read_model(project.fmu_of(subject))
+    text = template.text(path.stem, key, name, model)
     try:
         if options.output:
             options.output.mkdir(parents=True, exist_ok=True)
@@ -53,7 +58,7 @@ def run(options: argparse.Namespace) -> Ended:
         path.unlink(missing_ok=True)
         raise UserError(f"{path}: cannot be written: {reason(error)}") from error
     verdict = f"{path}: written; run it by {project.PROGRAM} '{path}'"
-    return Ended(0, verdict, {"file": path.absolute(), "model": folder.name}, page=path)
+    return Ended(0, verdict, {"file": path.absolute(), "model": name}, page=path)
 
 
 def _path(name: str) -> Path:

@@ -153,9 +153,8 @@ def _open(
     FMI is given, of the models whose scenarios have references.
     """
     given = stack.enter_context(Fmu(options.fmu)) if options.fmu else None
-    if given is not None and options.fmi not in (None, given.model.fmi_version):
-        found = given.model.fmi_version
-        raise UserError(f"{given.path}: is an FMU of FMI {found}, --fmi wants {options.fmi}")
+    if given is not None and options.fmi is not None:
+        _check_version(given, options.fmi)
     files, own = _files(options.names)
     if not options.names:
         files = [
@@ -166,21 +165,23 @@ def _open(
     if not files and not own:
         which = f" of {given.model.name}, the model of {options.fmu}" if given else ""
         raise UserError(f"{project.models_folder()}: has no scenarios{which}")
-    folders = {file: scenarios.folder_of(file) for file in (*files, *own)}
-    models = {folder.name: folder for folder in folders.values()}
-    compared = {folders[file].name: folders[file] for file in files}
+    subjects = {file: scenarios.subject_of(file) for file in (*files, *own)}
+    names = {file: scenarios.name_of(subject) for file, subject in subjects.items()}
+    models = {names[file]: subject for file, subject in subjects.items()}
+    compared = {names[file]: subjects[file] for file in files}
     if given is not None:
         fmus, twins = dict.fromkeys(models, given), {}
     elif options.fmi is not None:
-        fmus, twins = _built(models, options.fmi, "--fmu", stack), {}
+        fmus, twins = _opened(models, options.fmi, "--fmu", stack), {}
+        for fmu in fmus.values():
+            _check_version(fmu, options.fmi)
     else:
-        fmus = _built(models, FIRST, "--fmu", stack)
-        twins = _built(compared, TWIN, "", stack)
+        fmus = _opened(models, FIRST, "--fmu", stack)
+        twins = _opened(compared, TWIN, "", stack)
     for file in files if twins else ():
-        scenarios.load(file, twins[folders[file].name].model)
+        scenarios.load(file, twins[names[file]].model)
     loaded, users = (
-        [scenarios.load(file, fmus[folders[file].name].model) for file in some]
-        for some in (files, own)
+        [scenarios.load(file, fmus[names[file]].model) for file in some] for some in (files, own)
     )
     return loaded, users, fmus, twins
 
@@ -227,14 +228,20 @@ def _siblings(path: Path) -> list[Path]:
     return []
 
 
-def _built(
-    folders: Mapping[str, Path], version: str, option: str, stack: ExitStack
+def _opened(
+    subjects: Mapping[str, Path], version: str, option: str, stack: ExitStack
 ) -> dict[str, Fmu]:
-    """FMUs in build/ of one version of FMI, by their models."""
+    """FMUs by their models: those that scenarios name, else those in build/ of a version of FMI."""
     return {
-        name: stack.enter_context(Fmu(project.built(folder, ".fmu", option, version)))
-        for name, folder in folders.items()
+        name: stack.enter_context(Fmu(project.fmu_of(subject, option, version)))
+        for name, subject in subjects.items()
     }
+
+
+def _check_version(fmu: Fmu, wanted: str) -> None:
+    found = fmu.model.fmi_version
+    if found != wanted:
+        raise UserError(f"{fmu.path}: is an FMU of FMI {found}, --fmi wants {wanted}")
 
 
 def _runs(

@@ -1,7 +1,6 @@
 """The result as files: a scenario that runs the log again, and the parameters as TOML and SSV."""
 
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -11,22 +10,20 @@ from rparm.errors import UserError
 from rparm.fmi.model import Model, Value
 from rparm.identification.identify import Identification
 from rparm.identification.parameters import DELAY
-from rparm.output_files import whole
+from rparm.output_files import from_folder, whole
 
 SCENARIO, PARAMETERS, PARAMETER_SET = "scenario.toml", "parameters.toml", "parameters.ssv"
 TYPES = ("Real", "Integer", "Boolean")  # of an SSV that all engines read
 
 
 def write(found: Identification, folder: Path, model: Model) -> list[Path]:
-    """Write the files; their paths. A scenario is of a model of the project only."""
+    """Write the files; their paths."""
     values = {**found.checked.settings, **found.values}
-    texts = {PARAMETERS: _parameters(values, model), PARAMETER_SET: _set(values, model)}
-    try:
-        project.model(found.model)
-    except UserError:
-        (folder / SCENARIO).unlink(missing_ok=True)  # of another model
-    else:
-        texts[SCENARIO] = "\n".join(_scenario(found, folder, model, values))
+    texts = {
+        PARAMETERS: _parameters(values, model),
+        PARAMETER_SET: _set(values, model),
+        SCENARIO: "\n".join(_scenario(found, folder, model, values)),
+    }
     for name, text in texts.items():
         with whole(folder / name) as path:
             path.write_text(text, encoding="utf-8", newline="\n")
@@ -66,7 +63,7 @@ def _scenario(
     log, times = found.recordings[0], found.recordings[0].times
     start = float(found.segments[0].times[0])
     steps = max(round((float(times[-1]) - start) / log.step), 1)
-    yield f"model = {_toml(project.model(found.model).name)}"
+    yield _subject(found, folder)
     yield f"title = {_toml(f'Identified: {log.path.name}')}"
     yield f"description = {_toml(f'Parameters fitted to {log.path.name}, compared with it')}"
     yield f"tolerance = {found.request.tolerance!r}"
@@ -79,7 +76,7 @@ def _scenario(
     yield "[initial]"
     for name, value in zip(found.states, found.start_states[0].tolist(), strict=True):
         yield f"{name} = {value!r}"
-    file, time = _relative(log.path, folder), found.request.columns.get("time", "time")
+    file, time = from_folder(log.path, folder), found.request.columns.get("time", "time")
     checked = found.checked
     for section, columns in (
         ("inputs", {**checked.reals, **checked.switches}),
@@ -95,9 +92,8 @@ def _scenario(
     yield ""
 
 
-def _relative(path: Path, folder: Path) -> str:
-    """A path as it is from a folder; in full where there is no way, on another drive."""
+def _subject(found: Identification, folder: Path) -> str:
     try:
-        return Path(os.path.relpath(path, folder)).as_posix()
-    except ValueError:
-        return path.absolute().as_posix()
+        return f"model = {_toml(project.model(found.model).name)}"
+    except UserError:
+        return f"fmu = {_toml(from_folder(found.fmu, folder))}"

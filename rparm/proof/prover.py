@@ -208,14 +208,14 @@ class Prover:
 
 def of_scenario(path: Path) -> Prover:
     """The prover of the model of a scenario; UserError if it has none."""
-    folder = scenarios.folder_of(path)
+    name = scenarios.name_of(scenarios.subject_of(path))
     known = provers()
-    if folder.name not in known:
+    if name not in known:
         names = ", ".join(known) or "none"
         raise UserError(
-            f"{path}: expected a model whose motion can be proven ({names}), got {folder.name}"
+            f"{path}: expected a model whose motion can be proven ({names}), got {name}"
         )
-    return known[folder.name]
+    return known[name]
 
 
 def provers() -> dict[str, Prover]:

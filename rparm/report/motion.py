@@ -123,6 +123,8 @@ def of_recorded(
 
 def _animate(folder: str) -> Callable[[Recorded], Animation] | None:
     """Function `animation` of a folder below models/."""
+    if not folder.isidentifier():  # an FMU from elsewhere
+        return None
     name = f"rparm.models.{folder}.{project.ANIMATION}"
     try:
         found = find_spec(name)

@@ -15,13 +15,13 @@ import numpy as np
 from rparm import project
 from rparm.errors import UserError, did_you_mean
 from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, TOLERANCE, Model, Value
-from rparm.input_files import read_toml, show
+from rparm.input_files import is_file, missing, read_toml, show
 from rparm.scenarios.inputs import MEASURED, InputReader
 from rparm.scenarios.reader import Reader
 from rparm.scenarios.signals import Logged, Signal
 from rparm.units import SECONDS
 
-MODEL = "model"  # key of a file that is in no model's folder
+MODEL, FMU = "model", "fmu"  # keys of a file that is in no model's folder: one of them
 MAX_STEPS = 10_000_000
 MAX_PATTERN = 1000  # step lengths in a pattern
 SLIVER = 1e-9  # a last step shorter than this fraction of its full length joins the one before
@@ -36,7 +36,7 @@ class Scenario:
     """
 
     name: str
-    model: str  # folder name below models/
+    model: str  # folder name below models/, or path of the FMU that the file names
     path: Path
     title: str
     description: str
@@ -96,22 +96,38 @@ def title(path: Path) -> str:
     return reader.text(content["title"], "title")
 
 
-def folder_of(path: Path) -> Path:
-    """Folder of the model of a scenario: that its key `model` names, or else the one it lies in.
+def subject_of(path: Path) -> Path:
+    """What a scenario is of: the FMU that its key `fmu` names, or the folder of its model.
 
-    UserError if the file cannot be read, or names no model.
+    The key `model` names the model, else it is the one whose folder the file lies in. UserError if
+    the file cannot be read, or names nothing that is there.
     """
     content, reader = read_toml(path), Reader(path)
+    if FMU in content:
+        if MODEL in content:
+            reader.fail(f"has both {MODEL!r} and {FMU!r}: expected one of them")
+        fmu = path.absolute().parent / reader.text(content[FMU], FMU)
+        if not is_file(fmu):
+            reader.fail(f"{FMU}: {content[FMU]!r:.200}: {missing(fmu)}")
+        return fmu
     if MODEL not in content:
         if project.is_in_model(path):
             return project.model_folder(path)
         known = ", ".join(project.models())
-        reader.fail(f"missing key {MODEL!r}: the name of what the scenario is of (known: {known})")
+        reader.fail(
+            f"missing key {MODEL!r}, the name of what the scenario is of (known: {known}), or "
+            f"{FMU!r}, the file of an FMU"
+        )
     name = reader.text(content[MODEL], MODEL)
     try:
         return project.model(name)
     except UserError as error:
         reader.fail(f"{MODEL}: {error}")
+
+
+def name_of(subject: Path) -> str:
+    """`Scenario.model` for what `subject_of` gives."""
+    return subject.name if subject.is_dir() else str(subject)
 
 
 def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> Scenario:
@@ -128,13 +144,13 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     """
     path = Path(path)
     content = read_toml(path)
-    folder = folder_of(path)
+    subject = subject_of(path)
     reader = _Reader(path)
     reader.keys(
         content,
         "",
         required=("title", "description", "tolerance", "time"),
-        optional=(MODEL, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED),
+        optional=(MODEL, FMU, "reference_every", "panels", PARAMETERS, INITIAL, INPUTS, MEASURED),
     )
     tolerance = reader.number(content["tolerance"], "tolerance")
     if not 0 < tolerance < 1:
@@ -153,7 +169,7 @@ def load(path: Path, model: Model, times: Mapping[str, float] | None = None) -> 
     logs = inputs.hashes  # without those of measurements, which no run follows from
     return Scenario(
         name=path.stem,
-        model=folder.name,
+        model=name_of(subject),
         path=path.absolute(),
         title=reader.text(content["title"], "title"),
         description=reader.text(content["description"], "description"),

@@ -14,7 +14,7 @@ HEAD = """\
 # A scenario. Run it by {program} FILE.toml. Numbers are in SI units; in quotation marks a value may
 # have another one: "90 deg", "300 mm", "2kN".
 # "# name = value" is a start value as it is: remove the "# " to change it.
-model = {model}
+{key} = {model}
 title = {title}
 description = "What happens, in a sentence or two."
 tolerance = 1e-8  # of the integrator, relative: between 0 and 1
@@ -40,21 +40,22 @@ INPUT_HELP = """\
 """
 
 
-def text(name: str, folder: str, model: Model) -> str:
+def text(name: str, key: str, subject: str, model: Model) -> str:
     """Content of the file, which runs as it is.
 
     Parameters
     ----------
     name : str
         Of the scenario.
-    folder : str
-        Of the model, below models/.
+    key, subject : str
+        `model` and its folder below models/, or `fmu` and the path of an FMU from the file.
     model : Model
     """
     outputs = model.real_outputs[:2]
     panels = "# Further plots, each of variables of one unit:\n"
     panels += f"# panels = {json.dumps([[output] for output in outputs])}\n"
-    parts = [HEAD.format(program=PROGRAM, model=quoted(folder), title=quoted(name), panels=panels)]
+    given = {"key": key, "model": quoted(subject), "title": quoted(name), "panels": panels}
+    parts = [HEAD.format(program=PROGRAM, **given)]
     parts += _values(PARAMETERS, "Parameters.", model)
     parts += _values(INITIAL, "State at the start.", model)
     inputs = [variable for variable in model.variables.values() if variable.is_a(INPUTS)]

@@ -1,0 +1,112 @@
+"""Scenarios that name an FMU of own equations: every command takes them like any other."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rparm
+from tests.equations.examples import example
+from tests.support.rparm_project import assert_one_line, call
+
+SCENARIO = """fmu = "{fmu}"
+title = "Decay"
+description = "Of a quantity"
+tolerance = 1e-10
+[time]
+start = 0.0
+stop = 2.0
+step = 0.1
+[parameters]
+k = 1.5
+[initial]
+x = 2.0
+"""
+CAMPAIGN = """title = "Decays"
+description = "By rate"
+scenario = "{scenario}"
+sampling = "grid"
+[parameters.k]
+values = [0.5, 1.0]
+[keep]
+final = ["x"]
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scenario in another folder than its FMU."""
+    folder = tmp_path_factory.mktemp("own")
+    fmu = example("dahlquist", folder)
+    path = folder / "runs" / "decay.toml"
+    path.parent.mkdir()
+    path.write_text(SCENARIO.format(fmu=f"../{fmu.relative_to(folder).as_posix()}"))
+    return path
+
+
+def fmu_of(scenario: Path) -> Path:
+    return scenario.parents[1] / "dahlquist" / "Dahlquist.fmu"
+
+
+def test_it_runs_from_any_folder(
+    scenario: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = call(capsys, scenario, "--json", "--output", "report")
+    (found,) = json.loads(out)["scenarios"]
+    assert code == 0 and found["model"] == str(scenario.parent / "../dahlquist/Dahlquist.fmu")
+    assert found["runs"][0]["error"] < 1e-8
+    page = (tmp_path / "report" / "files" / "decay.html").read_text(encoding="utf-8")
+    assert "player" not in page  # there is nothing to animate
+    table = rparm.Scenario(scenario).run()
+    np.testing.assert_allclose(table["x"], 2.0 * np.exp(-1.5 * table["time"]), rtol=1e-8)
+
+
+def test_one_of_fmi_3_gives_the_same_bits(scenario: Path, tmp_path: Path) -> None:
+    path = tmp_path / "decay.toml"
+    path.write_text(SCENARIO.format(fmu=fmu_of(scenario).parent / "fmi3" / "Dahlquist.fmu"))
+    one, other = (rparm.Scenario(file).run() for file in (scenario, path))
+    assert one["x"].tobytes() == other["x"].tobytes()
+
+
+def test_an_fmu_of_another_version_is_refused(
+    scenario: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code, _, err = call(capsys, scenario, "--fmi", "3")
+    assert code == 2 and "is an FMU of FMI 2.0, --fmi wants 3.0" in err
+    assert_one_line(err)
+
+
+def test_a_campaign_names_its_file(scenario: Path) -> None:
+    file = scenario.parent / "decays.toml"
+    file.write_text(CAMPAIGN.format(scenario=scenario.name))
+    table = rparm.run_campaign(file, output=scenario.parent / "results", workers=1)
+    np.testing.assert_allclose(table["final(x)"], 2.0 * np.exp(-2.0 * table["k"]), rtol=1e-8)
+
+
+def test_new_writes_one(scenario: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = scenario.parent / "new.toml"
+    assert call(capsys, "new", path, "--model", fmu_of(scenario))[0] == 0
+    assert 'fmu = "../dahlquist/Dahlquist.fmu"' in path.read_text(encoding="utf-8")
+    assert rparm.Scenario(path).run()["x"][-1] == pytest.approx(np.exp(-2.0), rel=1e-6)
+
+
+def test_it_is_linearized_and_identified(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = fmu_of(scenario)
+    linear = rparm.linearize(fmu, at={"k": 1.5})
+    np.testing.assert_array_equal(linear.A, [[-1.5]])
+    log, times = tmp_path / "log.csv", np.arange(0.0, 3.0, 0.01)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(times))
+    rows = np.column_stack([times, np.exp(-0.8 * times) + noise])
+    np.savetxt(log, rows, delimiter=",", header="time,x", comments="")
+    given = ("--parameters", "k", "--measured", "x", "--output", tmp_path)
+    code, out, _ = call(capsys, "identify", fmu, log, *given, "--json")
+    k = json.loads(out)["parameters"]["k"]
+    assert code == 0 and abs(k["value"] - 0.8) < 3.0 * (k["high"] - k["low"])
+    assert rparm.Scenario(tmp_path / "scenario.toml").run()["x"][0] == pytest.approx(1.0, abs=0.01)
