@@ -1,9 +1,12 @@
 # add_fmu(NAME FOLDER models/... LIBRARY target [REFERENCES scenario ...] [VERSIONS fmi2 fmi3])
+# add_fmu(NAME EQUATIONS file.toml [FOLDER models/...] ...)
 #
 # Builds NAME.fmu (FMI 2.0) and fmi3/NAME.fmu (FMI 3.0) in the current build folder, or the one of them that
 # VERSIONS names, from the model's folder (variables.toml, README.md; model.png and pictures of the README
-# where there are any) and the library that defines its struct model. The archive carries inputs and references
-# of the scenarios after REFERENCES. Targets:
+# where there are any) and the library that defines its struct model. EQUATIONS: a file with equations in place of
+# both, with its lock file; the folder may have a page, terminals.toml and pictures. The archive carries inputs and
+# references of the scenarios after REFERENCES. Targets:
+#   NAME_equations             the library with the struct model of EQUATIONS
 #   NAME, NAME_fmi3            the shared objects
 #   NAME_fmu, NAME_fmi3_fmu    the archives
 #   NAME_description           struct model_description as a library
@@ -51,8 +54,30 @@ function(add_fmu_library name target version description folder)
   add_dependencies(libraries ${target})
 endfunction()
 
+# The library NAME_equations, and variables.toml and README.md beside its sources in the folder.
+function(add_equations name file terminals folder)
+  cmake_path(ABSOLUTE_PATH file BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
+  cmake_path(REPLACE_EXTENSION file LAST_ONLY .lock.toml OUTPUT_VARIABLE lock)
+  set(option "")
+  if(terminals)
+    set(option --terminals ${terminals})
+  endif()
+  file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/equations/*.py ${FMU_SOURCE_DIR}/declaration/*
+       ${PROJECT_SOURCE_DIR}/rparm/expressions/*.py ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
+  add_custom_command(
+    OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
+    COMMAND ${CMAKE_COMMAND} -E env PYTHONPATH=${PROJECT_SOURCE_DIR}
+            ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} ${option} --output ${folder}
+    DEPENDS ${file} ${lock} ${terminals} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py
+    COMMENT "Generating the equations of ${name}"
+    VERBATIM)
+  add_library(${name}_equations STATIC ${folder}/equations.c)
+  target_include_directories(${name}_equations PUBLIC ${folder})
+  target_link_libraries(${name}_equations PUBLIC model_interface PRIVATE elementary_functions)
+endfunction()
+
 function(add_fmu name)
-  cmake_parse_arguments(ARG "" "FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
+  cmake_parse_arguments(ARG "" "EQUATIONS;FOLDER;LIBRARY" "REFERENCES;VERSIONS" ${ARGN})
   if(NOT ARG_VERSIONS)
     set(ARG_VERSIONS ${FMI_VERSIONS})
   endif()
@@ -61,19 +86,41 @@ function(add_fmu name)
   set(out ${CMAKE_CURRENT_BINARY_DIR}/fmu/${name})
   set(generated ${out}/modelDescription.xml ${out}/fmi3/modelDescription.xml ${out}/terminalsAndIcons.xml
                 ${out}/variables.c ${out}/value_references.h)
-  file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
+  set(variables ${folder}/variables.toml)
+  set(readme ${folder}/README.md)
+  set(icon "")
+  set(copy_icon "")
+  if(ARG_FOLDER)
+    file(GLOB icon CONFIGURE_DEPENDS ${folder}/model.png)
+  endif()
+  if(ARG_EQUATIONS)
+    set(terminals "")
+    if(ARG_FOLDER)
+      file(GLOB terminals CONFIGURE_DEPENDS ${folder}/terminals.toml)
+    else()
+      set(folder ${out}/model)
+      set(readme ${folder}/README.md)
+    endif()
+    add_equations(${name} ${ARG_EQUATIONS} "${terminals}" ${out}/model)
+    set(ARG_LIBRARY ${name}_equations)
+    set(variables ${out}/model/variables.toml)
+    if(icon) # the generator looks for it beside variables.toml
+      set(copy_icon COMMAND ${CMAKE_COMMAND} -E copy ${icon} ${out}/model)
+    endif()
+  endif()
 
   # tables and model descriptions, again whenever a declaration changes
   file(GLOB generator CONFIGURE_DEPENDS ${FMU_SOURCE_DIR}/declaration/*.py ${FMU_SOURCE_DIR}/declaration/*.toml ${FMU_SOURCE_DIR}/fmi*/*.py)
   list(APPEND generator ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/provenance.py
                         ${FMU_SOURCE_DIR}/description_parts.py ${FMU_SOURCE_DIR}/atomic_write.py)
-  set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${folder}/variables.toml
+  set(generate ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/generate.py ${variables}
                --version ${PROJECT_VERSION} --license ${PROJECT_SOURCE_DIR}/LICENSE)
   file(GLOB declarations CONFIGURE_DEPENDS
     ${PROJECT_SOURCE_DIR}/src/instance/*.toml ${PROJECT_SOURCE_DIR}/models/*/variables.toml) # they include each other
-  set(declaration ${folder}/variables.toml ${icon} ${declarations} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
+  set(declaration ${variables} ${icon} ${declarations} ${generator} ${PROJECT_SOURCE_DIR}/LICENSE)
   add_custom_command(
     OUTPUT ${generated}
+    ${copy_icon}
     COMMAND ${generate} --output ${out}
     DEPENDS ${declaration}
     COMMENT "Generating the interface of ${name}"
@@ -94,11 +141,11 @@ function(add_fmu name)
   add_custom_command(
     OUTPUT ${out}/documentation/index.html
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
-            --readme ${folder}/README.md ${derivation} --model-description ${out}/modelDescription.xml
+            --readme ${readme} ${derivation} --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
     DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
             ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py
-            ${folder}/README.md ${derivation} ${pictures} ${out}/modelDescription.xml
+            ${readme} ${derivation} ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
     VERBATIM)
 
@@ -119,8 +166,8 @@ function(add_fmu name)
     endforeach()
     add_custom_command(
       OUTPUT ${references}
-      COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/references.py ${folder}/variables.toml ${ARG_REFERENCES}
-              --output ${out}/references
+      COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/references.py ${variables} ${ARG_REFERENCES}
+              --folder ${folder} --output ${out}/references
       DEPENDS ${FMU_SOURCE_DIR}/references.py ${declaration} ${reference_files}
       COMMENT "Collecting the references of ${name}"
       VERBATIM)

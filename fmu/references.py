@@ -166,9 +166,11 @@ def file_name(model: str, ending: str) -> str:
 # ---- all files
 
 
-def files(declaration: Declaration, names: Sequence[str]) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each file."""
-    folder, model = declaration.path.parent, declaration.model.name
+def files(
+    declaration: Declaration, names: Sequence[str], folder: Path
+) -> Iterator[tuple[str, bytes]]:
+    """Name and content of each file; folder: of the model."""
+    model = declaration.model.name
     scenarios = [read(folder / "scenarios" / f"{name}.toml") for name in names]
     yield MANIFEST, manifest(model, scenarios).encode()
     for scenario in scenarios:
@@ -194,13 +196,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("variables", type=Path, help="variables.toml of the model")
     parser.add_argument("names", nargs="+", metavar="NAME", help="scenarios of the model")
+    parser.add_argument("--folder", type=Path, help="of the model, if variables.toml is elsewhere")
     parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     arguments = parser.parse_args()
     for prefix, namespace in NAMESPACES.items():
         ET.register_namespace(prefix, namespace)
     try:
         declaration = load(arguments.variables)
-        write(arguments.output, dict(files(declaration, arguments.names)))
+        folder = arguments.folder or arguments.variables.parent
+        write(arguments.output, dict(files(declaration, arguments.names, folder)))
     except (DeclarationError, CarriedScenarioError, OSError) as error:
         print(f"references.py: {error!s:.2000}", file=sys.stderr)
         return 2

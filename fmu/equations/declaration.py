@@ -61,7 +61,9 @@ def indicator_names(file: ModelFile) -> list[str]:
 def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
     """Text of variables.toml."""
     writer = _Writer(file, references)
-    tables = [writer.table(variable) for variable in file.variables.values()]
+    shown = file.of("parameters", "inputs", "states", "outputs")
+    shown += [v for v in file.of("where") if (v.name, CAUSALITIES["where"]) in references]
+    tables = [writer.table(variable) for variable in shown]
     tables += [writer.table_of_rate(state) for state in file.of("states")]
     tables += [writer.table_of_mode(mode) for mode in file.modes if writer.events]
     tables += writer.tables_of_indicators()
@@ -198,9 +200,11 @@ class _Writer:
             if leaf not in leaves and leaf[1] in self.file.graph.relations:
                 todo += self.file.graph.relations[leaf[1]].distance.leaves
             leaves.add(leaf)
+        moving = {name for op, name in leaves if op in MOVING}
+        parameters = {name for op, name in leaves if op == "parameter"}
         return {
-            "dependencies": sorted(name or "time" for op, name in leaves if op in MOVING),
-            "parameters": sorted(name for op, name in leaves if op == "parameter"),
+            "dependencies": [n or "time" for n in ("", *self.file.variables) if n in moving],
+            "parameters": [n for n in self.file.variables if n in parameters],
         }
 
     def unit(self, variable: Variable) -> str:

@@ -1,7 +1,6 @@
-"""Events of files with equations: the ball, the thermostat, relations that switch, the wall."""
+"""Events of files with equations: the ball, the thermostat, relations that switch."""
 
 from pathlib import Path
-from shutil import copy
 
 import fmpy
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from tests.equations.examples import METHODS, build, example, simulated
-from tests.support.paths import ROOT
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
 G, E, V_MIN = 9.81, 0.7, 0.1
@@ -238,30 +236,6 @@ def test_a_state_that_is_restored_bounces_the_same(folder: Path, tmp_path: Path)
         unit.setFMUState(unit.deSerializeFMUstate(unit.serializeFMUstate(states[begin])))
         assert run(begin) == expected[begin:]
     unit.freeInstance()
-
-
-def test_the_wall_has_the_bits_of_that_by_hand(fmu: Path, tmp_path: Path) -> None:
-    own = build(copy(ROOT / "tests" / "equations" / "wall.toml", tmp_path), tmp_path)
-    hand = fmu.with_name("RPEnvironment.fmu")
-    given = ["stiffness", "damping", "position", "angle", "tip_x", "tip_z"]
-    given += ["ee_x", "ee_y", "ee_vx", "ee_vy", "ee_angle", "ee_rate"]
-    found = ["ee_fx", "ee_fy", "ee_mz", "penetration", "wall_force"]
-    units = [opened(path, tmp_path / str(i)) for i, path in enumerate((own, hand))]
-    names = [{n: reference(path, n) for n in (*given, *found)} for path in (own, hand)]
-    chance = np.random.default_rng(3)
-    touching = 0
-    for _ in range(500):
-        point = np.concatenate([chance.uniform(0.1, 2, 6), chance.uniform(-2, 2, 6)])
-        point[0] *= 1000
-        rows = []
-        for unit, references in zip(units, names, strict=True):
-            unit.setReal([references[n] for n in given], point)
-            rows.append(unit.getReal([references[n] for n in found]))
-        assert rows[0] == rows[1]
-        touching += rows[0][4] > 0
-    assert 100 < touching < 450
-    for unit in units:
-        unit.freeInstance()
 
 
 def test_a_model_without_states_has_modes(folder: Path, tmp_path: Path) -> None:

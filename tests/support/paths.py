@@ -7,7 +7,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 _TEXT = (ROOT / "CMakeLists.txt").read_text()
 _FMU = re.compile(
-    r"^add_fmu\((\w+) FOLDER models/(\w+) LIBRARY \w+(?:\s+REFERENCES ([\w ]+))?\)", re.M
+    r"^add_fmu\((\w+) FOLDER models/(\w+) (?:LIBRARY|EQUATIONS) \S+?(?:\s+REFERENCES ([\w ]+))?\)",
+    re.M,
 )
 _DECLARED = _FMU.findall(_TEXT)
 

@@ -1,0 +1,51 @@
+"""Writes the C of a file with equations and the variables.toml of its FMU, for the project's build.
+
+Value references are those of its lock file, which has to have all: `rparm build` writes it. An
+entry of [where] that the lock file does not name is no variable of the FMU. Terminals, which such
+a file cannot declare, come from another file.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from equations import c_model, declaration, lock
+from equations.model_file import ModelFileError, read
+from generate import write_if_changed
+
+
+def main() -> int:
+    """Write; 2 with a line on standard error where something is wrong."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("file", type=Path, help="the file of the model")
+    parser.add_argument("--output", type=Path, required=True, help="folder for the files")
+    parser.add_argument("--terminals", type=Path, help="file with [terminals], of variables.toml")
+    arguments = parser.parse_args()
+    try:
+        file = read(arguments.file, declaration.solver_names())
+        lock_file = lock.path_of(arguments.file)
+        references = lock.references(lock_file, [])
+        hidden = {variable.name for variable in file.of("where")}
+        for name, kind in declaration.keys(file):
+            if (name, kind) not in references and name not in hidden:
+                raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
+        terminals = arguments.terminals.read_text(encoding="utf-8") if arguments.terminals else ""
+        texts = {
+            "equations.h": c_model.header(file),
+            "equations.c": c_model.source(file),
+            "variables.toml": declaration.variables_toml(file, references) + terminals,
+            "README.md": declaration.page(file),
+        }
+        arguments.output.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            write_if_changed(arguments.output / name, text)
+    except (ModelFileError, OSError) as error:
+        print(f"equations_to_c.py: {error!s:.2000}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
