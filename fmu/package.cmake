@@ -73,6 +73,7 @@ function(add_equations name file terminals folder)
     VERBATIM)
   add_library(${name}_equations STATIC ${folder}/equations.c)
   target_include_directories(${name}_equations PUBLIC ${folder})
+  target_compile_options(${name}_equations PRIVATE -w) # what warnings are about, nobody has written
   target_link_libraries(${name}_equations PUBLIC model_interface PRIVATE elementary_functions)
 endfunction()
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from tests.fmu.symbols import libm, listed, standard
-from tests.support.paths import NAMES, ROOT
+from tests.support.paths import EVERY, ROOT
 
-FMUS = (*NAMES, *(f"fmi3/{name}" for name in NAMES))
+FMUS = (*EVERY, *(f"fmi3/{name}" for name in EVERY))
 
 
 @pytest.fixture(scope="module", params=FMUS)

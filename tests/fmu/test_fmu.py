@@ -13,7 +13,7 @@ import pytest
 from fmpy.util import create_plotly_figure
 from fmpy.validation import validate_fmu
 
-from tests.support.paths import FOLDERS, NAMES, ROOT
+from tests.support.paths import EVERY, FOLDERS, ROOT
 
 CROSS_CHECK = ("_in.csv", "_ref.csv", "_ref.opt")  # endings of a reference's files
 
@@ -53,7 +53,7 @@ def test_the_archive_holds_what_importers_look_for(fmu: Path) -> None:
     assert "effective_relative_tolerance" in page and "<math" in page
 
 
-EACH = [*(f"{name}.fmu" for name in NAMES), *(f"fmi3/{name}.fmu" for name in NAMES)]
+EACH = [*(f"{name}.fmu" for name in EVERY), *(f"fmi3/{name}.fmu" for name in EVERY)]
 
 
 @pytest.mark.parametrize("name", EACH)

@@ -21,7 +21,7 @@ import pytest
 
 from tests.importers.by_fmpy import co_simulation, euler
 from tests.support.instances import LoadedFmu
-from tests.support.paths import NAMES, ROOT
+from tests.support.paths import EVERY, ROOT
 
 SCRIPTS = ROOT / "tests" / "importers"
 BOUND = 1e-12  # of each output's maximum
@@ -219,7 +219,7 @@ def fmutool_check(fmu: Path, folder: Path) -> subprocess.CompletedProcess[str]:
     return start([folder_of(CHECKER) / "bin" / "fmutool", "-check", "-input", fmu], folder)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize("version", VERSIONS)
 def test_fmutool_finds_nothing(version: str, name: str, fmu: Path, tmp_path: Path) -> None:
     below = fmu.parent if version == "fmi2" else fmu.parent / version
