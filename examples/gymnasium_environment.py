@@ -1,13 +1,10 @@
-"""The arm as an environment of Gymnasium: efforts are actions, the FMU makes the steps.
-
-Beside rparm it needs: pip install gymnasium
+"""The arm as an environment of Gymnasium (pip install gymnasium): the FMU makes the steps.
 
 PYTHONPATH=. build/venv/bin/python examples/gymnasium_environment.py [PICTURE]
 """
 
-import shutil
 import sys
-from typing import Any
+from tempfile import TemporaryDirectory
 
 import gymnasium
 import matplotlib.pyplot as plt
@@ -17,58 +14,42 @@ from gymnasium.spaces import Box
 
 import rparm
 
-STATES, EFFORTS = ("q1", "q2", "dq1", "dq2"), ("tau1", "f2")
-LIMITS = np.array([20.0, 20.0])  # N.m, N
+LIMITS = np.array([20.0, 20.0])  # of the efforts: N.m, N
 GOAL = np.array([np.pi / 2, 0.1])  # rad, m: the arm stands
 PERIOD, STEPS = 0.02, 200  # s; of an episode
 
 
 class ArmEnvironment(gymnasium.Env):
-    """Bring the arm from a random pose at rest to its goal and keep it there.
-
-    Observations are q1 (rad), q2 (m) and their rates, actions the efforts divided by LIMITS.
-    """
+    """Observations are q1 (rad), q2 (m) and their rates, actions the efforts / LIMITS."""
 
     def __init__(self) -> None:
         self.observation_space = Box(-np.inf, np.inf, (4,), np.float64)
         self.action_space = Box(-1.0, 1.0, (2,), np.float64)
-        path = rparm.fmu("RPManipulator")
+        path, self.folder = rparm.fmu("RPManipulator"), TemporaryDirectory()
         description = read_model_description(path)
         references = {v.name: v.valueReference for v in description.modelVariables}
-        self._states = [references[name] for name in STATES]
-        self._efforts = [references[name] for name in EFFORTS]
-        self._folder = extract(path)
-        self._fmu = instantiate_fmu(self._folder, description, fmi_type="CoSimulation")
+        self.states = [references[name] for name in ("q1", "q2", "dq1", "dq2")]
+        self.efforts = [references[name] for name in ("tau1", "f2")]
+        self.fmu = instantiate_fmu(extract(path, self.folder.name), description)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[np.ndarray, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple:
         super().reset(seed=seed)
-        self._fmu.reset()
-        self._fmu.setupExperiment()
-        self._fmu.enterInitializationMode()
+        self.steps = 0
+        self.fmu.reset()
+        self.fmu.setupExperiment()
+        self.fmu.enterInitializationMode()
         pose = self.np_random.uniform([-np.pi, 0.0], [np.pi, 0.2])
-        self._fmu.setReal(self._states, [*pose, 0.0, 0.0])
-        self._fmu.exitInitializationMode()
-        self._steps = 0
-        return self._observe(), {}
+        self.fmu.setReal(self.states, [*pose, 0.0, 0.0])
+        self.fmu.exitInitializationMode()
+        return np.array(self.fmu.getReal(self.states)), {}
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
-        self._fmu.setReal(self._efforts, list(LIMITS * action))
-        self._fmu.doStep(self._steps * PERIOD, PERIOD)
-        self._steps += 1
-        state = self._observe()
-        cost = np.sum((state[:2] - GOAL) ** 2) + 0.01 * np.sum(np.square(action))
-        return state, -float(cost), False, self._steps >= STEPS, {}
-
-    def close(self) -> None:
-        if self._fmu is not None:
-            self._fmu.freeInstance()
-            shutil.rmtree(self._folder)
-            self._fmu = None
-
-    def _observe(self) -> np.ndarray:
-        return np.array(self._fmu.getReal(self._states))
+    def step(self, action: np.ndarray) -> tuple:
+        self.fmu.setReal(self.efforts, list(LIMITS * action))
+        self.fmu.doStep(self.steps * PERIOD, PERIOD)
+        self.steps += 1
+        state = np.array(self.fmu.getReal(self.states))
+        reward = -np.sum((state[:2] - GOAL) ** 2) - 0.01 * np.sum(np.square(action))
+        return state, float(reward), False, self.steps >= STEPS, {}
 
 
 def by_hand(state: np.ndarray) -> np.ndarray:
@@ -77,25 +58,15 @@ def by_hand(state: np.ndarray) -> np.ndarray:
     return np.clip(efforts / LIMITS, -1.0, 1.0)
 
 
-def main() -> None:
-    environment = ArmEnvironment()
-    figure, axis = plt.subplots(figsize=(7, 3), layout="constrained")
-    for seed in range(3):
-        state, _ = environment.reset(seed=seed)
-        angles, total, ended = [state[0]], 0.0, False
-        while not ended:
-            state, reward, _, ended, _ = environment.step(by_hand(state))
-            angles.append(state[0])
-            total += reward
-        print(f"seed {seed}: return {total:.3f}, ends at {state[0]:.3f} rad, {state[1]:.3f} m")
-        axis.plot(PERIOD * np.arange(len(angles)), angles, label=f"seed {seed}")
-    environment.close()
-    axis.axhline(GOAL[0], ls="--", color="k", label="goal")
-    axis.set(xlabel="time (s)", ylabel="q1 (rad)")
-    axis.legend()
-    if len(sys.argv) > 1:
-        figure.savefig(sys.argv[1], dpi=80)
-
-
 if __name__ == "__main__":
-    main()
+    environment = ArmEnvironment()
+    for seed in range(3):
+        states, ended = [environment.reset(seed=seed)[0]], False
+        while not ended:
+            state, reward, _, ended, _ = environment.step(by_hand(states[-1]))
+            states.append(state)
+        print(f"seed {seed}: ends at {state[0]:.3f} rad, {state[1]:.3f} m, reward {reward:.2g}")
+        plt.plot(PERIOD * np.arange(STEPS + 1), np.array(states)[:, 0])
+    plt.gca().set(xlabel="time (s)", ylabel="q1 (rad)")
+    if len(sys.argv) > 1:
+        plt.savefig(sys.argv[1], dpi=80)
