@@ -1,0 +1,309 @@
+"""FMUs by their names, and their runs, those of scenarios and those of systems, as tables."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rparm import project, trajectory_csv
+from rparm.coupling import in_process
+from rparm.errors import UserError, hint
+from rparm.federation import addresses, federation
+from rparm.federation.federation import Record
+from rparm.fmi.fmu_file import Fmu
+from rparm.fmi.model import Model, Value
+from rparm.proof import proven, prover
+from rparm.runs import given, reference, simulation
+from rparm.runs.given import Input
+from rparm.scenarios import scenario as scenarios
+from rparm.system import comparison, ecos, ssp, study
+from rparm.system.ssp import Ssp
+
+
+class Table(Mapping[str, np.ndarray]):
+    """Columns of a run, by the names of variables; "time" is the first.
+
+    Attributes
+    ----------
+    units : dict of str to str
+        Of the columns that have one.
+    """
+
+    def __init__(
+        self,
+        times: np.ndarray,
+        names: Sequence[str],
+        values: np.ndarray,
+        units: Mapping[str, str | None],
+    ) -> None:
+        self._names, self._times, self._values = tuple(names), times, values
+        self._columns = {"time": times} | dict(zip(names, values.T, strict=True))
+        known = {"time": "s"} | dict(units)
+        self.units = {name: unit for name in self._columns if (unit := known.get(name))}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._columns:
+            raise KeyError(f"no column {name!r}{hint(name, self._columns)}")
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        columns = ", ".join(self._columns)
+        return f"Table of {len(self._times)} rows: {columns}"
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all columns to a file, with 17 significant digits."""
+        try:
+            trajectory_csv.write(Path(path), self._times, self._names, self._values)
+        except OSError as error:
+            raise UserError(f"{path}: cannot be written: {error.strerror}") from error
+
+    def to_pandas(self) -> Any:
+        """The columns as a pandas.DataFrame; pandas must be installed."""
+        import pandas
+
+        return pandas.DataFrame(dict(self))
+
+
+def fmu(name: str, fmi: int = 2) -> Path:
+    """File of an FMU of the project.
+
+    Parameters
+    ----------
+    name : str
+        Of the FMU without its suffix, or of the folder of its model.
+    fmi : int
+        Version of FMI: 2 or 3.
+    """
+    return project.built(project.model(name), ".fmu", version=version(fmi))
+
+
+def simulate(
+    fmu: str | Path,
+    *,
+    stop_time: float,
+    step: float,
+    start_time: float = 0.0,
+    start_values: Mapping[str, Value] | None = None,
+    inputs: Mapping[str, Input] | None = None,
+    outputs: Sequence[str] | None = None,
+    tolerance: float = 1e-8,
+) -> Table:
+    """Run an FMU for co-simulation, of FMI 2.0 or 3.0.
+
+    Where numba is installed, a compiled loop makes the steps. The first run of a program loads it
+    for half a second; the first one ever compiles it for some seconds.
+
+    Parameters
+    ----------
+    fmu : path
+        Any FMU; see `fmu` for those of the project.
+    stop_time, step, start_time : float
+        s. `step` is the communication step; a whole number of them leads to the stop time.
+    start_values : mapping, optional
+        Parameters and states by name: numbers, texts with a unit ("30 deg"), items' names.
+    inputs : mapping, optional
+        Each a number, a function of time in s, a pair (times, values) that is interpolated, or the
+        values at all communication points. It is read at the beginning of a step and held over it.
+    outputs : sequence of str, optional
+        Real outputs to return; default: all.
+    tolerance : float
+        Relative, of the integrator.
+
+    Returns
+    -------
+    Table
+        Row i is what is read right after the step to time i; row 0 at the start.
+    """
+    path = Path(fmu)
+    times = given.times(start_time, stop_time, step)
+    if not (given.is_number(tolerance) and 0 < tolerance < 1):
+        raise UserError(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
+    with Fmu(path) as opened:
+        model = opened.model
+        names = list(model.real_outputs if outputs is None else outputs)
+        for name in names:
+            if name not in model.real_outputs:
+                raise UserError(
+                    f"{path}: has no Real output {name!r}{hint(name, model.real_outputs)}"
+                )
+        values = given.start_values(model, start_values or {})
+        signals = {
+            name: given.input_values(model, name, x, times) for name, x in (inputs or {}).items()
+        }
+        run = scenarios.Scenario(
+            name=path.stem, model=model.name, path=path, title=path.stem, description="",
+            parameters=values, initial={}, start=times[0], stop=times[-1], steps=(step,),
+            tolerance=tolerance, times=times, signals={}, inputs=signals, reference_every=1,
+            defaults=model.start_values,
+        )  # fmt: skip
+        result = simulation.simulate(opened, run, compiled=True)
+        columns = [result.names.index(name) for name in names]
+        return Table(result.times, names, result.values[:, columns], _units(model))
+
+
+class Scenario:
+    """A scenario of the project by its name, or one of your own by its file.
+
+    Parameters
+    ----------
+    name : str or path
+        Of a scenario, or a path that ends with .toml.
+    """
+
+    def __init__(self, name: str | Path) -> None:
+        own = Path(name).suffix.lower() == ".toml"
+        self.path = Path(name) if own else project.scenario_file(str(name))
+        self.title = scenarios.title(self.path)
+
+    def run(self, *, fmi: int = 2, tolerance: float | None = None) -> Table:
+        """Run it on the FMU of its model; rows are those of its reference.
+
+        Parameters
+        ----------
+        fmi : int
+            Version of FMI: 2 or 3.
+        tolerance : float, optional
+            Relative; default: that of the scenario.
+        """
+        with self._opened(fmi) as (opened, loaded):
+            loaded = replace(loaded, panels=())  # Integers, which only pages draw, cost time
+            result = simulation.simulate(opened, loaded, tolerance, compiled=True)
+            return Table(result.times, result.names, result.values, _units(opened.model))
+
+    def errors(self, table: Table) -> dict[str, float]:
+        """Largest error of each output of a run against the reference, relative to its scale."""
+        with self._opened(2) as (opened, loaded):
+            expected = reference.load(loaded, opened.model)
+        if len(table["time"]) != len(expected.times):
+            raise UserError(f"{self.path}: the reference has {len(expected.times)} rows")
+        return {
+            name: float(np.abs(table[name] - column).max()) / expected.scale(name)
+            for name, column in expected.columns.items()
+        }
+
+    def proven_errors(
+        self, *, method: str | None = None, tolerance: float | None = None
+    ) -> dict[str, float]:
+        """How far each state in a run is from the exact motion at most, by validated integration.
+
+        Assumed are the equations of motion, exact parameters and inputs as given, and IEEE doubles.
+
+        Parameters
+        ----------
+        method : str, optional
+            Of integration; default: that of the scenario.
+        tolerance : float, optional
+            Relative; default: that of the scenario.
+
+        Returns
+        -------
+        dict of str to float
+            Largest distance at communication points, by the name of the state, in its unit.
+        """
+        program = prover.of_scenario(self.path)
+        with self._opened(2) as (opened, loaded):
+            enclosure = program.enclose(loaded)
+            if enclosure.stopped is not None:
+                raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
+            used = method or opened.model.method(loaded.parameters)
+            (used,) = proven.methods(opened, used)
+            found = proven.errors(opened, loaded, enclosure, used, tolerance or loaded.tolerance)
+        return {name: each.error for name, each in found.items()}
+
+    @contextmanager
+    def _opened(self, fmi: int) -> Iterator[tuple[Fmu, scenarios.Scenario]]:
+        folder = scenarios.folder_of(self.path)
+        with Fmu(project.built(folder, ".fmu", version=version(fmi))) as opened:
+            yield opened, scenarios.load(self.path, opened.model)
+
+
+class System:
+    """A system of connected FMUs, by its name or the path of its SSP.
+
+    Attributes
+    ----------
+    variants : tuple of str
+        Names of its parameter sets.
+    """
+
+    def __init__(self, name: str | Path, *, fmi: int = 2) -> None:
+        self.path = Path(name)
+        if self.path.suffix.lower() != ".ssp":
+            known = project.systems()
+            if name not in known:
+                raise UserError(f"no system {str(name)!r}{hint(str(name), known)}")
+            self.path = project.built(known[str(name)], ".ssp", version=version(fmi))
+        with ssp.unpacked(self.path) as opened:
+            self.variants = tuple(opened.system.parameters)
+
+    def run(self, variant: str, *, engine: str = "master") -> Table:
+        """Step a variant from its start to its stop time, in Jacobi order.
+
+        Parameters
+        ----------
+        engine : str
+            "master", that of rparm; "ecos", where ecospy is installed; "helics", each FMU in its
+            own process, where helics is installed.
+
+        Returns
+        -------
+        Table
+            Columns "component.variable": all Real outputs and states, read after the inputs of
+            the next step have been set. With "helics": all Real outputs, read after
+            the step.
+        """
+        if variant not in self.variants:
+            raise UserError(
+                f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
+            )
+        engines = {"master": in_process.run, "ecos": ecos.run, "helics": _by_helics}
+        if engine not in engines:
+            raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
+        with ssp.unpacked(self.path) as opened:
+            run = engines[engine](opened, variant, comparison.recorded(opened))
+            units = {name: opened.variable(name).unit for name in run.names}
+        return Table(run.times, run.names, run.values, units)
+
+    def study_coupling(self, output: str | Path) -> dict[str, dict[str, object]]:
+        """Study what the coupling costs, if the system has such a study; prints its tables.
+
+        Parameters
+        ----------
+        output : path
+            Folder for its picture.
+
+        Returns
+        -------
+        dict of str to dict
+            Numbers of each part of the study; "passed" says whether they are as expected.
+        """
+        folder, known = study.of_coupling()
+        if not project.is_built_from(self.path.stem, folder):
+            raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
+        return known.study_coupling(self.path, Path(output))
+
+
+def _by_helics(opened: Ssp, variant: str, _: Sequence[str]) -> Record:
+    """Each FMU in its own process."""
+    return federation.run(opened, variant, addresses.free())
+
+
+def version(fmi: int) -> str:
+    """Version of FMI by its first digit; UserError if it is none of `project.VERSIONS`."""
+    for version in project.VERSIONS:
+        if str(fmi) in (version, version[0]):
+            return version
+    raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
+
+
+def _units(model: Model) -> dict[str, str | None]:
+    return {variable.name: variable.unit for variable in model.variables.values()}
