@@ -165,12 +165,12 @@ class Scenario:
         self.title = scenarios.title(self.path)
 
     def run(self, *, fmi: int = 2, tolerance: float | None = None) -> Table:
-        """Run it on the FMU of its model; rows are those of its reference.
+        """Run it on the FMU of its model, or that its file names; rows are those of its reference.
 
         Parameters
         ----------
         fmi : int
-            Version of FMI: 2 or 3.
+            Version of FMI: 2 or 3; an FMU that the file names has its own.
         tolerance : float, optional
             Relative; default: that of the scenario.
         """
@@ -221,8 +221,8 @@ class Scenario:
 
     @contextmanager
     def _opened(self, fmi: int) -> Iterator[tuple[Fmu, scenarios.Scenario]]:
-        folder = scenarios.folder_of(self.path)
-        with Fmu(project.built(folder, ".fmu", version=version(fmi))) as opened:
+        subject = scenarios.subject_of(self.path)
+        with Fmu(project.fmu_of(subject, version=version(fmi))) as opened:
             yield opened, scenarios.load(self.path, opened.model)
 
 
