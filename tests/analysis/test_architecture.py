@@ -91,6 +91,9 @@ MAY_IMPORT = {
     "models": {"models", "rparm"},
 }
 
+# modules of rparm that only lead to another folder
+ELSEWHERE = {("rparm", "models"): "models", ("rparm", "fmu_tools"): "fmu"}
+
 # ---- C: includes ---------------------------------------------------------------------------------
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
@@ -172,7 +175,7 @@ def graph_of_c_files(root: Path, symbols: dict[str, Symbols]) -> Graph:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """First parts of the names of the modules that a file imports; those of models are models.
+    """First parts of the names of the modules that a file imports, and where those lead to.
 
     Of rparm.expressions both parts count.
     """
@@ -188,7 +191,7 @@ def imports(path: Path) -> Iterator[str]:
             if parts[:2] == ["rparm", "expressions"]:
                 yield "rparm.expressions"
             else:
-                yield "models" if parts[:2] == ["rparm", "models"] else parts[0]
+                yield ELSEWHERE.get(tuple(parts[:2]), parts[0])
 
 
 def wrong_imports(root: Path) -> Iterator[str]:
@@ -409,6 +412,7 @@ def test_what_may_be_imported(project: Path, name: str, line: str) -> None:
     [
         ("rparm/run.py", "    from rparm.models.rp_plant.references import make", "models"),
         ("rparm/run.py", "    import generate", "generate"),
+        ("rparm/run.py", "    from rparm.fmu_tools.generate import header", "fmu"),
         ("rparm/run.py", "    from tests.support import paths", "tests"),
         ("fmu/document.py", "    from rparm.unit import Fmu", "rparm"),
         ("fmu/document.py", "    import rparm.models", "models"),

@@ -42,7 +42,7 @@ COMMANDS = {
         "rparm/identification/*.py",
     ),
     "federation": ("rparm/commands/fed*.py", "rparm/federation/*.py"),
-    "release": ("fmu/bill_of_materials.py", "fmu/wheel.py", "playground/build.py"),
+    "release": ("fmu/bill_of_materials.py", "fmu/built.py", "fmu/wheel.py", "playground/build.py"),
     "dev": ("rparm/report/recording.py", "fmu/[!w]*.py", "models/**/*.py", "tests/**/*.py"),
 }  # fmt: skip
 # what others use only where its packages are installed

@@ -5,56 +5,22 @@ import json
 import os
 import subprocess
 import sys
-import sysconfig
-import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 
 from rparm.command_line import COMMANDS
-from tests.support.missing import missing
+from tests.support.installed import RELEASE, Installed, wheel_of_release
 from tests.support.paths import NAMES, ROOT, SYSTEMS
 
-RELEASE = ROOT / "build" / "release"
 LARGEST, UNPACKED = 25_000_000, 22_000_000  # bytes; what it needs, with pip, has 230 MB more
 OF_CHECKOUT = ("./run.sh", "./setup.sh", "build/venv", "build/report")
 
 
 @pytest.fixture(scope="module")
 def wheel() -> Path:
-    found = sorted(RELEASE.glob("rparm-*-py3-none-any.whl"))
-    if not found:
-        missing(f"{RELEASE} has no wheel: ./release.sh builds it")
-    return found[0]
-
-
-class Installed:
-    """An environment with the wheel in a folder with a blank in its name.
-
-    What the wheel needs comes from the environment of the tests.
-    """
-
-    def __init__(self, wheel: Path, folder: Path) -> None:
-        self.folder = folder / "an environment"
-        self.work = folder / "somewhere else"
-        self.cache = folder / "cache"
-        self.work.mkdir()
-        venv.create(self.folder, symlinks=True, with_pip=False)
-        self.packages = Path(sysconfig.get_path("purelib", vars={"base": str(self.folder)}))
-        with zipfile.ZipFile(wheel) as archive:  # what pip does with a wheel of this kind
-            archive.extractall(self.packages)
-        others = sysconfig.get_path("purelib")
-        (self.packages / "others.pth").write_text(f"{others}\n")
-
-    def run(self, *arguments: object, **variables: str) -> subprocess.CompletedProcess[str]:
-        """Run `rparm ...` in another folder."""
-        python = self.folder / "bin" / "python"
-        environment = {"HOME": str(self.work), "RPARM_CACHE": str(self.cache), "PATH": "/nowhere"}
-        return subprocess.run(
-            [python, "-P", "-m", "rparm", *map(str, arguments)],
-            cwd=self.work, env=environment | variables, text=True, capture_output=True, check=False,
-        )  # fmt: skip
+    return wheel_of_release()
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +59,8 @@ def test_all_files_of_the_release_are_in_it(installed: Installed) -> None:
         cwd=installed.work, text=True, capture_output=True, check=True,
     )  # fmt: skip
     lines = (line.split("  ") for line in (RELEASE / "SHA256SUMS").read_text().splitlines())
-    expected = {name: checksum for checksum, name in lines if not name.endswith(".whl")}
+    of_fmus = (".fmu", ".ssp")
+    expected = {name: checksum for checksum, name in lines if name.endswith(of_fmus)}
     found = {
         name.replace("2.0/", "").replace("3.0/", "fmi3/"): hashlib.sha256(
             (installed.work / path).read_bytes()

@@ -66,12 +66,20 @@ def elementary_functions() -> set[str]:
 
 def test_a_release_has_checksums_of_all_its_files(release: Path) -> None:
     lines = [line.split("  ") for line in (release / "SHA256SUMS").read_text().splitlines()]
-    files = [path for pattern in ("*.fmu", "*.ssp", "*.whl") for path in release.rglob(pattern)]
+    files = [
+        path
+        for pattern in ("*.fmu", "*.ssp", "*.tar.xz", "*.whl")
+        for path in release.rglob(pattern)
+    ]
     found = {path.relative_to(release).as_posix() for path in files}
     assert {name for _, name in lines} == found
     names = {*(f"{name}.ssp" for name in SYSTEMS), *(f"{name}.fmu" for name in NAMES)}
     (wheel,) = release.glob("*.whl")
-    assert found == {wheel.name, *(f"{below}{name}" for below in BELOW.values() for name in names)}
+    assert found == {
+        wheel.name,
+        "built.tar.xz",
+        *(f"{below}{name}" for below in BELOW.values() for name in names),
+    }
     for checksum, name in lines:
         assert hashlib.sha256((release / name).read_bytes()).hexdigest() == checksum, name
 

@@ -18,6 +18,9 @@ from tests.support.missing import missing
 from tests.support.paths import ROOT
 
 BUILD = ROOT / "build"
+NATIVE_HOST = (
+    Path(os.environ.get("RP_FMU", BUILD / "RPManipulator.fmu")).parent / "tests/platform_host"
+)
 # of builds for one platform, of the hosts, and of wine
 SCRATCH = BUILD / "platforms"
 HOST_SOURCES = ("platform_host.c", "script.c", "calls.c", "run.c", "system.c")
@@ -167,19 +170,29 @@ def finish(command: list[str], folder: Path) -> None:
 class Runner:
     """The library of one FMU on one platform; the native one if there is no row."""
 
-    def __init__(self, row: Platform | None, name: str, fmu: Path, folder: Path) -> None:
-        """`fmu` is the native one; `folder` takes libraries, scripts and transcripts."""
+    def __init__(
+        self,
+        row: Platform | None,
+        name: str,
+        fmu: Path,
+        folder: Path,
+        archive: Path | None = None,
+    ) -> None:
+        """`fmu` is the native one; `folder` takes libraries, scripts and transcripts.
+
+        `archive` has the library of the row: that of the release if it is not given.
+        """
         self.row = row
         self.name = row.name if row else "native"
         self.model: Model = read_model(fmu)
         self.folder = folder / self.name / name
         self.folder.mkdir(parents=True, exist_ok=True)
         if row is None:
-            self.command = [str(fmu.parent / "tests" / "platform_host")]
+            self.command = [str(NATIVE_HOST)]
             archive, member = fmu, native_member(fmu)
         else:
             self.command = [*emulator_of(row), str(host_of(row))]
-            archive = archive_with(row, name)
+            archive = archive or archive_with(row, name)
             member = f"binaries/{row.folder}/{name}{row.suffix}"
         self.library = f"./{Path(member).name}"  # dlopen searches for names without a folder
         with zipfile.ZipFile(archive) as opened:

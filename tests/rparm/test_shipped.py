@@ -15,6 +15,7 @@ from rparm.errors import UserError
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
+from built import packed
 from package import pack
 from pieces import write_pieces
 
@@ -106,6 +107,44 @@ def test_a_full_disk_leaves_nothing_behind(release: Path, tmp_path: Path) -> Non
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert [path for path in (tmp_path / "cache").rglob("*") if path.is_file()] == []
+
+
+@pytest.fixture
+def archive(tmp_path: Path) -> Path:
+    """Two files, one of them a program."""
+    path = tmp_path / "archive.tar.xz"
+    path.write_bytes(packed([("project/a.h", CONTENT), ("x/proof/y/prove", b"#!/bin/true")]))
+    shipped.unpacked.cache_clear()
+    return path
+
+
+@pytest.mark.parametrize("broken", [None, "", "x"])
+def test_an_archive_is_unpacked_and_what_is_broken_mended(
+    archive: Path, tmp_path: Path, broken: str | None
+) -> None:
+    folder = shipped.unpacked(archive, tmp_path / "cache")
+    file, program = folder / "project" / "a.h", folder / "x" / "proof" / "y" / "prove"
+    file.unlink() if broken is None else file.write_text(broken)
+    before = program.stat()
+    shipped.unpacked.cache_clear()
+    assert shipped.unpacked(archive, tmp_path / "cache") == folder
+    assert file.read_bytes() == CONTENT
+    assert program.stat().st_mtime_ns == before.st_mtime_ns
+    assert (os.access(program, os.X_OK), os.access(file, os.X_OK)) == (True, False)
+    assert len([path for path in folder.rglob("*") if path.is_file()]) == 2
+
+
+@pytest.mark.parametrize("length", [0, 100, -1])
+def test_a_damaged_archive_is_named(archive: Path, tmp_path: Path, length: int) -> None:
+    archive.write_bytes(archive.read_bytes()[:length])
+    with pytest.raises(UserError, match="archive.tar.xz: damaged, install rparm again"):
+        shipped.unpacked(archive, tmp_path / "cache")
+
+
+def test_an_archive_with_no_place_to_go_is_named(archive: Path, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UserError, match="cannot be written: Not a directory; RPARM_CACHE names"):
+        shipped.unpacked(archive, tmp_path / "file" / "cache")
 
 
 AT_ONCE = """

@@ -1,0 +1,213 @@
+"""`rparm build` and the programs of `rparm prove` from the wheel: the same bits everywhere."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from rparm import project, shipped
+from rparm.commands import build
+from rparm.errors import UserError
+from tests.platforms import scripts
+from tests.platforms.platforms import PLATFORMS, Missing, Platform, Runner, emulator_of, finish
+from tests.platforms.scripts import METHODS, Model, Script, joined
+from tests.platforms.transcript import first_difference
+from tests.prove import problems
+from tests.support.installed import RELEASE, Installed, wheel_of_release
+from tests.support.missing import missing
+from tests.support.paths import ROOT
+
+MODEL = (ROOT / "examples" / "models" / "cart_and_pole.toml").read_text(encoding="utf-8")
+NAME = "CartAndPole"
+FMUS = (f"{NAME}.fmu", f"fmi3/{NAME}.fmu")
+ARCHIVE = "built.tar.xz"
+
+each_platform = pytest.mark.parametrize("row", PLATFORMS, ids=lambda row: row.name)
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    wheel = wheel_of_release()
+    pytest.importorskip("ziglang", reason="zig: ./setup.sh --release")
+    return Installed(wheel, tmp_path_factory.mktemp("installed"))
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    path = tmp_path / "my models" / "cart.toml"
+    path.parent.mkdir()
+    path.write_text(MODEL, encoding="utf-8")
+    return path
+
+
+def built(installed: Installed, model: Path, output: Path, *options: str, path: str = "/") -> Path:
+    """The FMU of FMI 2.0, by zig unless the path has another compiler."""
+    # the C library that zig has for the release
+    variables = {"PATH": path, "ZIG_GLOBAL_CACHE_DIR": str(ROOT / "build" / "zig")}
+    ran = installed.run("build", model, "--output", output, *options, **variables)
+    assert ran.returncode == 0, ran.stderr
+    return output / f"{NAME}.fmu"
+
+
+@pytest.fixture(scope="module")
+def for_all(installed: Installed, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("all platforms")
+    (folder / "cart.toml").write_text(MODEL, encoding="utf-8")
+    return built(installed, folder / "cart.toml", folder / "out", "--platforms")
+
+
+@pytest.mark.parametrize("path", ["/", "/usr/bin:/bin"], ids=["zig", "gcc"])
+def test_fmus_are_valid_and_their_values_those_of_the_checkout(
+    installed: Installed, model: Path, tmp_path: Path, path: str
+) -> None:
+    fmu = built(installed, model, tmp_path / "by the wheel", path=path)
+    for name in FMUS:
+        assert validate_fmu(str(fmu.parent / name)) == []
+    assert model.with_name("cart.lock.toml").is_file()
+    output = tmp_path / "by the checkout"
+    command = [sys.executable, "-P", "-m", "rparm", "build", model, "--output", output]
+    environment = project.child_environment()
+    subprocess.run(command, cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
+    script = by_all_methods(Runner(None, NAME, fmu, tmp_path).model)
+    # each in turn: the libraries have the same place
+    first, second = (
+        Runner(None, NAME, each, tmp_path).run(script)[0] for each in (fmu, output / fmu.name)
+    )
+    assert first_difference(script, first, second) is None
+
+
+def by_all_methods(model: Model) -> Script:
+    """Steps with rollback, a variant of the run for each method of integration."""
+    with pytest.MonkeyPatch.context() as patch:
+        changed = {"phi": 0.75, "v": 0.5, "solver_method": list(METHODS)}
+        patch.setitem(scripts.CHANGED, model.name, changed)
+        return joined(*(scripts.co_simulation(model, variant) for variant in METHODS))
+
+
+@each_platform
+def test_every_platform_gives_the_same_bits(for_all: Path, row: Platform, tmp_path: Path) -> None:
+    native = Runner(None, NAME, for_this_machine(for_all, tmp_path), tmp_path)
+    try:
+        other = Runner(row, NAME, for_all, tmp_path, archive=for_all)
+    except Missing as error:
+        missing(f"missing: {error}")
+    script = by_all_methods(native.model)
+    (expected,), (actual,) = native.run(script), other.run(script)
+    assert len(expected) > 10_000
+    assert first_difference(script, expected, actual) is None
+
+
+def for_this_machine(fmu: Path, folder: Path) -> Path:
+    """The FMU with the library for Linux alone."""
+    path = folder / fmu.name
+    with zipfile.ZipFile(fmu) as archive, zipfile.ZipFile(path, "w") as target:
+        for name in ("modelDescription.xml", f"binaries/linux64/{NAME}.so"):
+            target.writestr(name, archive.read(name))
+    return path
+
+
+def test_all_platforms_are_in_the_fmus(for_all: Path) -> None:
+    """As in those of the release, whose binaries test_release.py reads."""
+    for name in FMUS:
+        with zipfile.ZipFile(for_all.parent / name) as archive:
+            found = {
+                n for n in archive.namelist() if n.startswith(("binaries/", "documentation/l"))
+            }
+            contents = b"".join(map(archive.read, archive.namelist()))
+        with zipfile.ZipFile(RELEASE / name.replace(NAME, "RPPlant")) as archive:
+            names = (n.replace("RPPlant", NAME) for n in archive.namelist())
+            assert found == {n for n in names if n.startswith(("binaries/", "documentation/l"))}
+        assert str(ROOT).encode() not in contents
+
+
+def test_builds_at_once_give_the_same_bytes(
+    installed: Installed, for_all: Path, model: Path, tmp_path: Path
+) -> None:
+    cache = {"ZIG_GLOBAL_CACHE_DIR": str(ROOT / "build" / "zig")}
+    output = tmp_path / "out"
+    arguments = ("build", model, "--platforms", "--output", output)
+    started = [installed.start(*arguments, **cache) for _ in range(2)]
+    for process in started:
+        _, errors = process.communicate()
+        assert process.returncode == 0, errors
+    for name in FMUS:
+        assert (output / name).read_bytes() == (for_all.parent / name).read_bytes()
+    assert {path.name for path in model.parent.iterdir()} == {"cart.toml", "cart.lock.toml"}
+    assert {path.name for path in output.rglob("*")} == {f"{NAME}.fmu", "fmi3"}
+
+
+def test_what_cannot_be_written_is_one_line_and_leaves_nothing(
+    installed: Installed, model: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / "out"
+    output.mkdir()
+    (output / f"{NAME}.fmu").mkdir()
+    ran = installed.run("build", model, "--output", output, PATH="/usr/bin")
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert ran.stderr == f"error: {output / NAME}.fmu: cannot be written: Is a directory\n"
+    assert [path.name for path in output.iterdir()] == [f"{NAME}.fmu"]
+
+
+def test_a_mistake_in_the_model_writes_nothing(installed: Installed, model: Path) -> None:
+    model.write_text(MODEL.replace('derivative = "v"', 'derivative = "w"'), encoding="utf-8")
+    ran = installed.run("build", model)
+    assert ran.returncode == 2 and ran.stderr.count("\n") == 1
+    assert [path.name for path in model.parent.iterdir()] == [model.name]
+
+
+def test_what_is_not_installed_is_named(
+    installed: Installed, model: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hidden = installed.work / "ziglang"  # a package without a compiler, in front of the other
+    hidden.mkdir()
+    (hidden / "__init__.py").write_text("", encoding="utf-8")
+    ran = installed.run("build", model, "--platforms", PYTHONPATH=str(installed.work))
+    assert ran.returncode == 2 and ran.stderr.count("\n") == 1
+    (hidden / "__init__.py").unlink()
+    hidden.rmdir()
+    monkeypatch.setattr(project, "INSTALLED", True)
+    monkeypatch.setattr(build, "find_spec", lambda name: None if name == "pydantic" else True)
+    with pytest.raises(UserError, match=r'^pydantic: not installed, pip install "rparm\[build\]"'):
+        build.run(None)
+
+
+# ---- The programs that prove ---------------------------------------------------------------------
+
+
+@each_platform
+def test_programs_of_every_platform_prove_the_same(row: Platform, tmp_path: Path) -> None:
+    if not (RELEASE / ARCHIVE).is_file():
+        missing(f"{RELEASE} has no {ARCHIVE}: ./release.sh builds it")
+    folder = shipped.unpacked(RELEASE / ARCHIVE, tmp_path) / row.preset / "proof" / "rp_manipulator"
+    (program,) = folder.iterdir()
+    try:
+        command = [*emulator_of(row), str(program)]
+    except Missing as error:
+        missing(f"missing: {error}")
+    for problem in problems.SMALL.values():
+        answer = tmp_path / "answer"
+        script = 'input=$1 answer=$2; shift 2; exec "$@" <"$input" >"$answer"'
+        (tmp_path / "asked").write_text(problem.text, encoding="utf-8")
+        finish(["sh", "-c", script, "sh", str(tmp_path / "asked"), str(answer), *command], tmp_path)
+        assert answer.read_text() == problems.run(problem.text).stdout != ""
+
+
+def test_the_wheel_proves(installed: Installed) -> None:
+    arguments = ("prove", "free_fall", "--method", "taylor", "--json")
+    ran = installed.run(*arguments)
+    assert ran.returncode == 0, ran.stderr
+    command = [sys.executable, "-P", "-m", "rparm", *arguments]
+    environment = project.child_environment()
+    here = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+    )
+    assert proven(ran.stdout) == proven(here.stdout)
+
+
+def proven(document: str) -> dict:
+    """What a document says of the methods."""
+    return json.loads(document)["methods"]
