@@ -57,6 +57,8 @@ class CustomBuildHook(BuildHookInterface):
             if file.stem in OF_RELEASES:
                 continue
             include[str(file)] = f"{SHARE}/{file.relative_to(root).as_posix()}"
+        page = "examples/models/README.md"
+        include[str(root / page)] = f"{SHARE}/{page}"
         write_pieces(release, staging)
         shutil.copy(release / "built.tar.xz", staging)
         _add_plotly(root, staging)

@@ -212,9 +212,11 @@ def proof_program(folder: Path) -> Path:
 
 
 def platform_name() -> str:
-    """What FMI 3.0 calls this machine's platform."""
-    machine, system = platform.machine().lower(), platform.system().lower()
-    return f"{ {'amd64': 'x86_64', 'arm64': 'aarch64'}.get(machine, machine) }-{system}"
+    """What FMI 3.0 calls the platform of this machine's binaries."""
+    if os.name == "nt":
+        return "x86_64-windows"  # Windows on Arm runs them, too
+    machine = platform.machine().replace("arm64", "aarch64")
+    return f"{machine}-{platform.system().lower()}"
 
 
 def built_for_all() -> Path:
@@ -225,6 +227,11 @@ def built_for_all() -> Path:
     if not archive.is_file():
         raise UserError(f"{archive}: not there, ./release.sh makes it")
     return shipped.unpacked(archive, ROOT / "build" / "built")
+
+
+def page_of_models() -> Path:
+    """The page that explains files with equations."""
+    return from_root(ROOT / "examples" / "models" / "README.md")
 
 
 def model_builder() -> Path:

@@ -13,7 +13,7 @@ from rparm.options import add_output
 
 DESCRIPTION = (
     "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and fmi3/NAME.fmu. "
-    "examples/models/README.md explains the file. Beside it FILE.lock.toml keeps the value "
+    f"{project.page_of_models()} explains the file. Beside it FILE.lock.toml keeps the value "
     "references."
 )
 # what the program imports, beside this package
