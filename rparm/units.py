@@ -1,8 +1,8 @@
 """Values that users give with a unit, as "90 deg", "300 mm" or "2kN": what they are in SI.
 
 What is known for a variable: its own unit, the display units that its FMU declares for it, and both
-with one factor exchanged: m, s and N take the prefixes m, c and k, and each factor its own
-display units. Conversions are exact and rounded once; degrees are those of `math.radians`.
+with one factor exchanged: m, s and N take the prefixes m, c and k, rad takes m, and each factor its
+own display units. Conversions are exact and rounded once; degrees are those of `math.radians`.
 """
 
 import math
@@ -17,7 +17,7 @@ from rparm.errors import WrongValueError, did_you_mean
 from rparm.input_files import show
 
 PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
-PREFIXED = ("m", "s", "N")
+PREFIXED = {"m": "mck", "s": "mck", "N": "mck", "rad": "m"}
 NONE = (None, "", "1")  # what variables without a unit have
 ANGLE = "rad"
 DEGREE = Fraction(180 / math.pi)  # degrees of a radian
@@ -90,8 +90,8 @@ def _exchanged(name: str, displays: Displays) -> Iterator[tuple[str, Unit]]:
 def _alternatives(symbol: str, displays: Displays) -> dict[str, Unit]:
     """What may stand for a factor of a unit."""
     found = {name: unit for name, unit in displays.get(symbol, {}).items() if not unit.offset}
-    if symbol in PREFIXED:
-        found |= {f"{prefix}{symbol}": Unit(factor) for prefix, factor in PREFIXES.items()}
+    for prefix in PREFIXED.get(symbol, ""):
+        found[f"{prefix}{symbol}"] = Unit(PREFIXES[prefix])
     return found
 
 

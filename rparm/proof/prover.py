@@ -11,6 +11,7 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -87,7 +88,7 @@ class Prover:
         """
         off = within or {}
         start = {n: (float(scenario.start_values[n]), off.get(n, 0.0)) for n in self.states}
-        return self._in_pieces(scenario, start, HALVINGS, progress, seconds)
+        return reduce(hull, self._in_pieces(scenario, start, HALVINGS, progress, seconds))
 
     def _in_pieces(
         self,
@@ -96,17 +97,17 @@ class Prover:
         halvings: int,
         progress: Callable[[int], object] | None,
         seconds: float,
-    ) -> Enclosure:
+    ) -> list[Enclosure]:
         found = self._from_start(scenario, start, progress, seconds)
         if found.stopped is None or not halvings or not any(r for _, r in start.values()):
-            return found
+            return [found]
         parts = []
         for half in halves(start):
-            part = self._in_pieces(scenario, half, halvings - 1, progress, seconds)
-            if part.stopped is not None:
-                return found
-            parts.append(part)
-        return hull(*parts)
+            more = self._in_pieces(scenario, half, halvings - 1, progress, seconds)
+            if more[0].stopped is not None:
+                return [found]
+            parts += more
+        return parts
 
     def _from_start(
         self,
@@ -167,9 +168,15 @@ class Prover:
     ) -> tuple[int, int]:
         """Prove again, with certificates, and check every claim of them, and single operations.
 
-        How many steps and operations are confirmed. UserError if one is not.
+        How many steps and operations are confirmed. UserError if one is not, or if the intervals
+        are not those of `enclosure`.
         """
-        steps = sum(self._check(scenario, start, progress) for start in enclosure.starts)
+        checked = [self._check(scenario, start, progress) for start in enclosure.starts]
+        steps = sum(count for count, _ in checked)
+        again = reduce(hull, (answer for _, answer in checked))
+        for name in ("times", "high", "low", "radius"):
+            if not np.array_equal(getattr(again, name), getattr(enclosure, name)):
+                raise UserError(f"{scenario.path}: the proof is not confirmed: {name} differ")
         operations = self._checker("check_operations")
         try:
             return steps, operations.check(project.proof_program(self.folder))
@@ -178,7 +185,7 @@ class Prover:
 
     def _check(
         self, scenario: Scenario, start: Start, progress: Callable[[int], object] | None
-    ) -> int:
+    ) -> tuple[int, Enclosure]:
         checker = self._checker("check")
         program = project.proof_program(self.folder)
         with tempfile.TemporaryDirectory() as folder:
@@ -192,9 +199,10 @@ class Prover:
             ).stdout.splitlines()
             try:
                 with certificate.open(encoding="utf-8") as claims:
-                    return checker.check(problem, points, claims, progress)
+                    count = checker.check(problem, points, claims, progress)
             except checker.WrongClaim as error:
                 raise UserError(f"{scenario.path}: the proof is not confirmed: {error}") from error
+        return count, self.answer(points, start)
 
     def _checker(self, name: str) -> ModuleType:
         try:

@@ -64,7 +64,10 @@ def test_the_points_of_a_grid(tmp_path: Path) -> None:
 
 
 MISTAKES = {
-    "[parameters.q1] normal: unknown unit 'mm' (known: rad, deg)": ("[-2.0, 0.2]", '["2 mm", 1]'),
+    "[parameters.q1] normal: unknown unit 'mm' (known: rad, deg, mrad)": (
+        "[-2.0, 0.2]",
+        '["2 mm", 1]',
+    ),
     "[parameters.q1] uniform: unknown unit 'degs', did you mean 'deg'?": (
         "normal = [-2.0, 0.2]",
         'uniform = [0, "2 degs"]',

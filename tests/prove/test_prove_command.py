@@ -153,6 +153,14 @@ def test_a_wrong_certificate_is_no_proof(own: Path, monkeypatch: pytest.MonkeyPa
         PROVER.check(scenario, PROVER.enclose(scenario))
 
 
+def test_a_certificate_of_other_intervals_is_no_proof(own: Path) -> None:
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        scenario = scenarios.load(own, fmu.model)
+        found = PROVER.enclose(scenario)
+        with pytest.raises(UserError, match="not confirmed: radius differ"):
+            PROVER.check(scenario, replace(found, radius=found.radius / 2))
+
+
 def test_a_proof_that_takes_too_long_is_given_up() -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         path = project.scenario_file("sine_efforts")

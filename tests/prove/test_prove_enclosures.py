@@ -174,6 +174,30 @@ def test_a_smaller_result_is_refused(tmp_path: Path) -> None:
         check.check(problem, points, certificate)
 
 
+@pytest.mark.parametrize(("row", "kept"), [(0, 2), (-1, 2), (-1, -3)])
+def test_fewer_results_are_refused(row: int, kept: int, tmp_path: Path) -> None:
+    problem, points, certificate = certified(SMALL["free"], tmp_path)
+    points[row] = " ".join(points[row].split()[:kept])
+    with pytest.raises(check.WrongClaim, match="balls for 4 states"):
+        check.check(problem, points, certificate)
+
+
+@pytest.mark.parametrize("order", ["0", "-1"])
+def test_a_polynomial_without_slope_is_refused(order: str, tmp_path: Path) -> None:
+    problem, points, certificate = certified(SMALL["free"], tmp_path)
+    with pytest.raises(check.WrongClaim, match="order below 1"):
+        check.check(
+            problem, points, [re.sub(r"^step \d+", f"step {order}", x) for x in certificate]
+        )
+
+
+def test_another_start_is_refused(tmp_path: Path) -> None:
+    problem, points, certificate = certified(SMALL["free"], tmp_path)
+    points[0] = points[0].replace("0x0p+0", "0x1p-1", 1)
+    with pytest.raises(check.WrongClaim, match="time of the start"):
+        check.check(problem, points, certificate)
+
+
 def test_a_missing_step_is_refused(tmp_path: Path) -> None:
     problem, points, certificate = certified(SMALL["free"], tmp_path)
     second = [i for i, line in enumerate(certificate) if line.startswith("step")][1]
@@ -198,6 +222,15 @@ def test_an_inertia_that_may_vanish_stops_the_proof() -> None:
     answer = run(problem.text)
     assert answer.returncode == 1
     assert 0.2 < float.fromhex(answer.stdout.split()[-1]) < 0.25
+
+
+def test_a_stop_within_the_last_place_of_a_time_is_a_stop() -> None:
+    """The slide would pass the joint at 3/4 of a step whose ends are neighbours."""
+    parameters = (0.0, 1.0, 0.0, 1e-50, 0.5, 0.0, 0.1, 0.0)
+    states = (0.0, -(0.5 - 3 * 2.0**-54), 0.0, -1.0)
+    answer = run(Problem(states, [(1 + 2.0**-52, ZERO, ZERO)], parameters, start=1.0).text)
+    assert answer.returncode == 1
+    assert answer.stdout.splitlines()[-1] == "stopped 0x1p+0"
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "1e200", "word", "0x1p+0x"])

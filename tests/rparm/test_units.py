@@ -94,7 +94,7 @@ def test_a_variable_takes_its_own_unit_and_numbers_as_they_are(model: str) -> No
         )
 
 
-RADIANS, METRES = "(known: rad, deg)", "(known: m, mm, cm, km)"
+RADIANS, METRES = "(known: rad, deg, mrad)", "(known: m, mm, cm, km)"
 NUMBER = "expected a number, or a number and its unit"
 WRONG = [
     ("q1", "90 degs", f"unknown unit 'degs', did you mean 'deg'? {RADIANS}"),

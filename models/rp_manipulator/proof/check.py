@@ -8,8 +8,7 @@ shares nothing with `prove`.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,149 +16,22 @@ import flint
 from flint import arb, fmpq, fmpq_mat
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+from certificate import (
+    NOTHING,
+    STATES,
+    Ball,
+    Problem,
+    Set,
+    Step,
+    WrongClaim,
+    exactly,
+    of_states,
+    read_certificate,
+    read_problem,
+)
 from motion_series import coefficients
 
 BITS = 192
-STATES = 4
-NOTHING = fmpq(0)
-
-
-class WrongClaim(Exception):
-    """A claim that does not hold, or that cannot be confirmed."""
-
-
-# ---- What is read --------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Ball:
-    """All x with |x - middle| <= radius."""
-
-    middle: fmpq
-    radius: fmpq
-
-    @property
-    def arb(self) -> arb:
-        """An interval that contains it."""
-        return arb(self.middle) + arb(0, 1) * arb(self.radius)
-
-    def contains(self, x: arb) -> bool:
-        """Whether all of an interval is in it."""
-        return bool((x - arb(self.middle)).abs_upper() <= arb(self.radius))
-
-    def holds(self, middle: fmpq, radius: fmpq = NOTHING) -> bool:
-        """Whether another ball is in it."""
-        return abs(middle - self.middle) + radius <= self.radius
-
-
-@dataclass
-class Problem:
-    """What `prove` was asked.
-
-    Attributes
-    ----------
-    sines : list of tuple
-        Effort (0 or 1), amplitude, frequency in Hz, phase in rad.
-    steps : list of tuple
-        End of each communication step in s; value and derivatives of each effort at its begin.
-    """
-
-    parameters: list[Ball] = field(default_factory=list)
-    states: list[Ball] = field(default_factory=list)
-    sines: list[tuple[int, fmpq, fmpq, fmpq]] = field(default_factory=list)
-    start: fmpq = NOTHING
-    steps: list[tuple[fmpq, tuple[list[fmpq], list[fmpq]]]] = field(default_factory=list)
-
-
-@dataclass
-class Set:
-    """States centre + spread s + frame c, |s| <= what the problem says, |c| <= radii."""
-
-    centre: list[fmpq]
-    spread: list[list[fmpq]]
-    frame: list[list[fmpq]]
-    radii: list[fmpq]
-
-
-@dataclass
-class Step:
-    """The claims of one step."""
-
-    order: int
-    times: list[Ball]
-    balls: dict[str, list[Ball]]
-    jacobian: list[list[Ball]]
-    deviation: fmpq
-    after: Set
-
-
-def exactly(text: str) -> fmpq:
-    """A hexadecimal number."""
-    numerator, denominator = float.fromhex(text).as_integer_ratio()
-    return fmpq(numerator, denominator)
-
-
-def _numbers(words: Iterable[str]) -> list[fmpq]:
-    try:
-        return [exactly(word) for word in words]
-    except (ValueError, OverflowError) as error:
-        raise WrongClaim(f"a number is not finite: {error}") from error
-
-
-def _balls(words: Sequence[str]) -> list[Ball]:
-    """From hi, lo and radius of each."""
-    numbers = _numbers(words)
-    found = [Ball(numbers[i] + numbers[i + 1], numbers[i + 2]) for i in range(0, len(numbers), 3)]
-    if any(ball.radius < 0 for ball in found):
-        raise WrongClaim("a radius is negative")
-    return found
-
-
-def read_problem(lines: Iterable[str]) -> Problem:
-    """Read what `prove` was given."""
-    problem = Problem()
-    for name, *words in map(str.split, lines):
-        if name in ("parameters", "states"):
-            numbers = _numbers(words)
-            pairs = [Ball(*numbers[i : i + 2]) for i in range(0, len(numbers), 2)]
-            setattr(problem, name, pairs)
-        elif name == "sine":
-            effort, *numbers = words
-            problem.sines.append((int(float.fromhex(effort)), *_numbers(numbers)))
-        elif name == "start":
-            (problem.start,) = _numbers(words)
-        else:
-            end, *numbers = _numbers(words)
-            problem.steps.append((end, (numbers[:4], numbers[4:])))
-    return problem
-
-
-def read_certificate(lines: Iterable[str]) -> Iterator[Step | fmpq]:
-    """Steps, and after those of each communication step the time of its end."""
-    rows = map(str.split, lines)
-
-    def take(name: str) -> list[str]:
-        found, *words = next(rows, [""])
-        if found != name:
-            raise WrongClaim(f"expected {name}, found {found!r}")
-        return words
-
-    for name, *words in rows:
-        if name == "point":
-            yield exactly(words[0])
-            continue
-        times = _balls(take("times"))
-        names = ("hull", "box", "remainder", "endpoint")
-        balls = {name: _balls(take(name)) for name in names}
-        jacobian = [_balls(take("jacobian")) for _ in range(STATES)]
-        (deviation,) = _numbers(take("deviation"))
-        centre = _balls(take("centre"))
-        if any(ball.radius != 0 for ball in centre):
-            raise WrongClaim("a centre has a radius")
-        spread = [_numbers(take("spread")) for _ in range(STATES)]
-        frame = [_numbers(take("frame")) for _ in range(STATES)]
-        after = Set([x.middle for x in centre], spread, frame, _numbers(take("radii")))
-        yield Step(int(words[0]), times, balls, jacobian, deviation, after)
 
 
 # ---- What the problem says -----------------------------------------------------------------------
@@ -238,6 +110,8 @@ class Checker:
 
     def step(self, index: int, step: Step) -> None:
         """Check a step within a communication step; its end is then the set."""
+        if step.order < 1:
+            raise WrongClaim("order below 1")
         self.check_hull(step)
         inputs = self.efforts(index, step, arb(0), step.order)
         self.check_endpoint(step, inputs)
@@ -399,7 +273,9 @@ def _check(
     ends = [end for end, _ in problem.steps]
     if len(points) != len(ends) + 1 or any(words[0] != "point" for words in points):
         raise WrongClaim(f"{len(points)} points for {len(ends)} communication steps")
-    checker.point(_balls(points[0][2:]))
+    if exactly(points[0][1]) != problem.start:
+        raise WrongClaim("time of the start")
+    checker.point(of_states(points[0][2:]))
     count, begin, steps = 0, problem.start, []
     index = 0
     for claim in read_certificate(certificate):
@@ -417,7 +293,7 @@ def _check(
                 raise WrongClaim(
                     f"step to {float(Fraction(int(claim.p), int(claim.q)))!r} s: {error}"
                 ) from error
-        checker.point(_balls(points[index + 1][2:]))
+        checker.point(of_states(points[index + 1][2:]))
         count, begin, steps = count + len(steps), claim, []
         index += 1
         if progress is not None:

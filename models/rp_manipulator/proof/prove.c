@@ -46,9 +46,16 @@ static bool step_on(struct run *run, const struct effort efforts[EFFORTS], struc
     return false;
 }
 
-/* All steps from one communication point to the next. Returns how far the proof came. */
-static double communication_step(struct run *run, double from, double to,
-                                 const struct effort efforts[EFFORTS]) {
+/* Not above from + within, and not below from. */
+static double rounded_down(double from, struct ball within) {
+    const struct ball time = ball_sum(ball_exact(from), within);
+    const double below = time.hi - 0x1p-52 * fabs(time.hi);
+    return below > from ? below : from;
+}
+
+/* All steps from one communication point to the next. False: the proof holds up to `reached`. */
+static bool communication_step(struct run *run, double from, double to,
+                               const struct effort efforts[EFFORTS], double *reached) {
     static struct arm_step step; // too large for the stack of every system
     const struct ball since_start = ball_between(run->problem.start, from);
     struct ball remaining = ball_between(from, to);
@@ -58,7 +65,8 @@ static double communication_step(struct run *run, double from, double to,
         step.within = within;
         step.elapsed = ball_sum(since_start, within);
         if (i == MOST_STEPS || !step_on(run, efforts, remaining, &step)) {
-            return from + within.hi;
+            *reached = rounded_down(from, within);
+            return false;
         }
         last = step.length.hi == remaining.hi;
         run->set = step.after;
@@ -68,7 +76,7 @@ static double communication_step(struct run *run, double from, double to,
         within = ball_sum(within, step.length);
         remaining = ball_difference(remaining, step.length);
     }
-    return to;
+    return true;
 }
 
 static int wrong(const char *message) {
@@ -79,7 +87,7 @@ static int wrong(const char *message) {
 static int enclose(struct run *run) {
     char message[MESSAGE_LENGTH];
     struct effort efforts[EFFORTS];
-    double to;
+    double to, reached;
     if (!text_read_problem(stdin, &run->problem, message)) {
         return wrong(message);
     }
@@ -91,8 +99,7 @@ static int enclose(struct run *run) {
         if (!(to > from)) {
             return wrong("times do not increase");
         }
-        const double reached = communication_step(run, from, to, efforts);
-        if (reached < to) {
+        if (!communication_step(run, from, to, efforts, &reached)) {
             printf("stopped %a\n", reached);
             return STOPPED;
         }

@@ -1,0 +1,152 @@
+"""Problems, answers and certificates of `prove` (README.md), read into rational numbers."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+from flint import arb, fmpq
+
+STATES = 4
+NOTHING = fmpq(0)
+
+
+class WrongClaim(Exception):
+    """A claim that does not hold, or that cannot be confirmed."""
+
+
+@dataclass(frozen=True)
+class Ball:
+    """All x with |x - middle| <= radius."""
+
+    middle: fmpq
+    radius: fmpq
+
+    @property
+    def arb(self) -> arb:
+        """An interval that contains it."""
+        return arb(self.middle) + arb(0, 1) * arb(self.radius)
+
+    def contains(self, x: arb) -> bool:
+        """Whether all of an interval is in it."""
+        return bool((x - arb(self.middle)).abs_upper() <= arb(self.radius))
+
+    def holds(self, middle: fmpq, radius: fmpq = NOTHING) -> bool:
+        """Whether another ball is in it."""
+        return abs(middle - self.middle) + radius <= self.radius
+
+
+@dataclass
+class Problem:
+    """What `prove` was asked.
+
+    Attributes
+    ----------
+    sines : list of tuple
+        Effort (0 or 1), amplitude, frequency in Hz, phase in rad.
+    steps : list of tuple
+        End of each communication step in s; value and derivatives of each effort at its begin.
+    """
+
+    parameters: list[Ball] = field(default_factory=list)
+    states: list[Ball] = field(default_factory=list)
+    sines: list[tuple[int, fmpq, fmpq, fmpq]] = field(default_factory=list)
+    start: fmpq = NOTHING
+    steps: list[tuple[fmpq, tuple[list[fmpq], list[fmpq]]]] = field(default_factory=list)
+
+
+@dataclass
+class Set:
+    """States centre + spread s + frame c, |s| <= what the problem says, |c| <= radii."""
+
+    centre: list[fmpq]
+    spread: list[list[fmpq]]
+    frame: list[list[fmpq]]
+    radii: list[fmpq]
+
+
+@dataclass
+class Step:
+    """The claims of one step."""
+
+    order: int
+    times: list[Ball]
+    balls: dict[str, list[Ball]]
+    jacobian: list[list[Ball]]
+    deviation: fmpq
+    after: Set
+
+
+def exactly(text: str) -> fmpq:
+    """A hexadecimal number."""
+    numerator, denominator = float.fromhex(text).as_integer_ratio()
+    return fmpq(numerator, denominator)
+
+
+def _numbers(words: Iterable[str]) -> list[fmpq]:
+    try:
+        return [exactly(word) for word in words]
+    except (ValueError, OverflowError) as error:
+        raise WrongClaim(f"a number is not finite: {error}") from error
+
+
+def balls_of(words: Sequence[str]) -> list[Ball]:
+    """From hi, lo and radius of each."""
+    numbers = _numbers(words)
+    found = [Ball(numbers[i] + numbers[i + 1], numbers[i + 2]) for i in range(0, len(numbers), 3)]
+    if any(ball.radius < 0 for ball in found):
+        raise WrongClaim("a radius is negative")
+    return found
+
+
+def of_states(words: Sequence[str]) -> list[Ball]:
+    """Balls of all states, no more and no fewer."""
+    found = balls_of(words)
+    if len(found) != STATES:
+        raise WrongClaim(f"{len(found)} balls for {STATES} states")
+    return found
+
+
+def read_problem(lines: Iterable[str]) -> Problem:
+    """Read what `prove` was given."""
+    problem = Problem()
+    for name, *words in map(str.split, lines):
+        if name in ("parameters", "states"):
+            numbers = _numbers(words)
+            pairs = [Ball(*numbers[i : i + 2]) for i in range(0, len(numbers), 2)]
+            setattr(problem, name, pairs)
+        elif name == "sine":
+            effort, *numbers = words
+            problem.sines.append((int(float.fromhex(effort)), *_numbers(numbers)))
+        elif name == "start":
+            (problem.start,) = _numbers(words)
+        else:
+            end, *numbers = _numbers(words)
+            problem.steps.append((end, (numbers[:4], numbers[4:])))
+    return problem
+
+
+def read_certificate(lines: Iterable[str]) -> Iterator[Step | fmpq]:
+    """Steps, and after those of each communication step the time of its end."""
+    rows = map(str.split, lines)
+
+    def take(name: str) -> list[str]:
+        found, *words = next(rows, [""])
+        if found != name:
+            raise WrongClaim(f"expected {name}, found {found!r}")
+        return words
+
+    for name, *words in rows:
+        if name == "point":
+            yield exactly(words[0])
+            continue
+        times = balls_of(take("times"))
+        names = ("hull", "box", "remainder", "endpoint")
+        balls = {name: of_states(take(name)) for name in names}
+        jacobian = [balls_of(take("jacobian")) for _ in range(STATES)]
+        (deviation,) = _numbers(take("deviation"))
+        centre = of_states(take("centre"))
+        if any(ball.radius != 0 for ball in centre):
+            raise WrongClaim("a centre has a radius")
+        spread = [_numbers(take("spread")) for _ in range(STATES)]
+        frame = [_numbers(take("frame")) for _ in range(STATES)]
+        after = Set([x.middle for x in centre], spread, frame, _numbers(take("radii")))
+        yield Step(int(words[0]), times, balls, jacobian, deviation, after)
