@@ -216,8 +216,8 @@ class Scenario:
                 raise UserError(f"{self.path}: the proof holds up to {enclosure.stopped!r} s only")
             used = method or opened.model.method(loaded.parameters)
             (used,) = proven.methods(opened, used)
-            found = proven.errors(opened, loaded, enclosure, used, tolerance or loaded.tolerance)
-        return {name: each.error for name, each in found.items()}
+            found = proven.bounds(opened, loaded, enclosure, used, tolerance or loaded.tolerance)
+        return dict(zip(enclosure.states, found.max(axis=0).tolist(), strict=True))
 
     @contextmanager
     def _opened(self, fmi: int) -> Iterator[tuple[Fmu, scenarios.Scenario]]:

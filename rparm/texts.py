@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Sequence, Sized
+from decimal import ROUND_CEILING, Context
 
 SMALLEST = 1e-99  # number that is written as it is
 GAP = ".."  # in a text that is shortened
@@ -18,6 +19,12 @@ def short(number: float, digits: int | None = None) -> str:
     if digits is None:
         mantissa = mantissa.rstrip("0").rstrip(".")
     return f"{mantissa}e{int(exponent)}"
+
+
+def rounded_up(value: float, digits: int) -> str:
+    """1.3e-08 for 1.21e-8 and one digit behind the point: an upper bound, rounded up."""
+    upwards = Context(prec=digits + 1, rounding=ROUND_CEILING)
+    return f"{float(upwards.create_decimal_from_float(value)):.{digits}e}"
 
 
 def shortened(text: str, width: int) -> str:

@@ -1,23 +1,28 @@
 """`prove`: how far runs and references are from the exact motion at most, by theorem."""
 
 import argparse
+import shlex
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+
+import numpy as np
 
 from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.fmi.fmu_file import Fmu
-from rparm.options import add_document, relative_tolerance
+from rparm.options import add_report, relative_tolerance
 from rparm.output import console
 from rparm.output.progress import Progress
+from rparm.output_files import check_writable, from_here, written
 from rparm.proof import proven, prover
 from rparm.proof.proven import ASSUMED
 from rparm.proof.prover import Enclosure, Prover
+from rparm.report import proof_page
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import counted
+from rparm.texts import counted, rounded_up
 from rparm.units import typed_quantity
 
 DESCRIPTION = (
@@ -25,6 +30,7 @@ DESCRIPTION = (
     "how far the states in a run of the FMU are from it at most, for each method of integration. "
     f"Without a scenario, does so for all references. Assumed are {ASSUMED}."
 )
+COLUMNS = {"values": 8, "nearest doubles": 8, "error beyond": 9, "interval": 9}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="check every step of the proof by a second program, in other arithmetic",
     )
-    add_document(parser)
+    add_report(parser)
 
 
 def run(options: argparse.Namespace) -> Ended:
@@ -59,6 +65,7 @@ def run(options: argparse.Namespace) -> Ended:
             if getattr(options, option) is not None:
                 raise UserError(f"--{option}: expected a scenario with it")
         return _references(options)
+    check_writable(options.report)
     own = Path(options.name).suffix.lower() == ".toml"
     path = Path(options.name) if own else project.scenario_file(options.name)
     program = prover.of_scenario(path)
@@ -70,16 +77,33 @@ def run(options: argparse.Namespace) -> Ended:
         if enclosure.stopped is not None:
             return Ended(
                 1,
-                f"failed: the proof holds up to {enclosure.stopped:.6g} s, no further",
+                f"failed: the proof holds up to {enclosure.stopped!r} s, no further",
                 {"holds_up_to": enclosure.stopped},
             )
-        found = _runs(fmu, scenario, enclosure, methods, options.tolerance)
+        found, courses = _runs(fmu, scenario, enclosure, methods, options.tolerance)
+        with written(options.report):
+            page = proof_page.write(
+                options.report, scenario, fmu.model, enclosure, courses, _command(options)
+            )
+    print(f"page: {from_here(page)}")
     checked = _checked(program, {scenario: enclosure}) if options.check else {}
     largest = max(e.error for errors in found.values() for e in errors.values())
     document = {
         "methods": {m: {n: asdict(e) for n, e in errors.items()} for m, errors in found.items()}
     }
-    return Ended(0, f"largest proven error: {largest:.2e}", document | checked)
+    document |= {"page": page.absolute()}
+    return Ended(
+        0, f"largest proven error: {rounded_up(largest, 2)}", document | checked, page=page
+    )
+
+
+def _command(options: argparse.Namespace) -> str:
+    """What to type for the same again."""
+    parts = [project.PROGRAM, "prove", *([options.name] if options.name else [])]
+    for option in ("method", "tolerance", "within"):
+        given = getattr(options, option)
+        parts += [] if given is None else [f"--{option}", str(given)]
+    return shlex.join(parts)
 
 
 def _within(given: str | None, program: Prover, fmu: Fmu) -> dict[str, float]:
@@ -115,36 +139,36 @@ def _runs(
     enclosure: Enclosure,
     methods: list[str],
     tolerance: float | None,
-) -> dict[str, dict[str, proven.ProvenError]]:
-    """Run with each method; prints the largest errors, and where they are."""
+) -> tuple[dict[str, dict[str, proven.ProvenError]], dict[str, np.ndarray]]:
+    """Run with each method; prints the largest errors, and where they are.
+
+    Returns the largest errors by method, and all of them by what the table calls the run.
+    """
     units = [fmu.model.variables[name].unit for name in enclosure.states]
     heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.states, units, strict=True)}
     print(f"{scenario.name}: largest distance from the exact motion at communication points")
     names = [f"{m} at {proven.tolerance_of(m, tolerance or scenario.tolerance):g}" for m in methods]
     table = console.Table("method", [*names, "interval"], heads, result=0)
-    found = {}
+    found, courses = {}, {}
     for method, name in zip(methods, names, strict=True):
         with Progress(f"{scenario.name}, {method}", len(scenario.times) - 1) as progress:
-            errors = dict(
-                proven.errors(
-                    fmu, scenario, enclosure, method, tolerance or scenario.tolerance, progress
-                )
-            )
-        table.row(name, [f"{e.error:.2e}" for e in errors.values()])
+            used = tolerance or scenario.tolerance
+            courses[name] = proven.bounds(fmu, scenario, enclosure, method, used, progress)
+        errors = proven.largest(courses[name], enclosure)
+        table.row(name, [rounded_up(e.error, 2) for e in errors.values()])
         table.row("  at", [f"{e.at:.4g} s" for e in errors.values()])
         found[method] = errors
-    table.row("interval", [f"{e.radius:.1e}" for e in errors.values()])
-    return found
+    table.row("interval", [rounded_up(e.radius, 1) for e in errors.values()])
+    return found, courses
 
 
 def _references(options: argparse.Namespace) -> Ended:
     """How good the references of all models with a prover are."""
-    found = {}
-    everything = {}
+    check_writable(options.report)
+    found, everything, rows = {}, {}, []
     for program in prover.provers().values():
         files = [x for x in project.scenario_files().values() if x.parents[1] == program.folder]
-        columns = {"values": 8, "nearest doubles": 8, "error beyond": 9, "interval": 9}
-        table = console.Table("reference", [x.stem for x in files], columns, result=0)
+        table = console.Table("reference", [x.stem for x in files], COLUMNS, result=0)
         with Fmu(project.built(program.folder, ".fmu")) as fmu:
             proofs = {}
             for scenario in [scenarios.load(path, fmu.model) for path in files]:
@@ -153,8 +177,14 @@ def _references(options: argparse.Namespace) -> Ended:
                     raise UserError(f"{scenario.path}: proven up to {enclosure.stopped} s only")
                 good = proven.of_reference(fmu, scenario, enclosure)
                 share = f"{100 * good.nearest / good.values:.1f} %"
-                cells = [str(good.values), share, f"{good.error:.1e}", f"{good.radius:.1e}"]
+                cells = [
+                    str(good.values),
+                    share,
+                    rounded_up(good.error, 1),
+                    rounded_up(good.radius, 1),
+                ]
                 table.row(scenario.name, cells)
+                rows.append((scenario.name, *cells))
                 found[scenario.name] = asdict(good)
         if options.check:
             everything |= _checked(program, proofs)
@@ -162,7 +192,13 @@ def _references(options: argparse.Namespace) -> Ended:
         "nearest doubles: of the states, proven; error beyond: more than half a unit in the last "
         "place; interval: the widest one that contains an exact state"
     )
-    return Ended(0, f"proven: {counted(found, 'reference')}", {"references": found} | everything)
+    with written(options.report):
+        page = proof_page.write_references(
+            options.report, ("reference", *COLUMNS), rows, _command(options)
+        )
+    print(f"page: {from_here(page)}")
+    document = {"references": found, "page": page.absolute()} | everything
+    return Ended(0, f"proven: {counted(found, 'reference')}", document, page=page)
 
 
 def _checked(program: Prover, proofs: Mapping[Scenario, Enclosure]) -> dict[str, dict[str, int]]:

@@ -53,22 +53,23 @@ def tolerance_of(method: str, tolerance: float) -> float:
     return max(tolerance, SMALLEST_TOLERANCES.get(method, 0.0))
 
 
-def errors(
+def bounds(
     fmu: Fmu,
     scenario: Scenario,
     enclosure: Enclosure,
     method: str,
     tolerance: float,
     progress: Callable[[int], object] | None = None,
-) -> Mapping[str, ProvenError]:
-    """Proven errors of all states in a run, by name."""
+) -> np.ndarray:
+    """Proven errors in a run, shape (communication points, states), in the states' units."""
     run = replace(
         scenario,
         parameters=scenario.parameters | {METHOD: fmu.model.variables[METHOD].items[method]},
         reference_every=1,
     )
     result = simulation.simulate(fmu, run, tolerance_of(method, tolerance), progress)
-    return _largest(result, enclosure, np.arange(len(enclosure.times)))
+    values = _columns(result.names, result.values, enclosure.states)
+    return distances(values, enclosure, np.arange(len(enclosure.times)))
 
 
 def of_run(
@@ -88,19 +89,28 @@ def of_run(
         return None
     if enclosure.stopped is not None:
         return None
-    return _largest(result, enclosure, scenario.reference_rows)
-
-
-def _largest(result: Result, enclosure: Enclosure, rows: np.ndarray) -> dict[str, ProvenError]:
-    """Largest distances of the recorded states; they are those of the points `rows`."""
+    rows = scenario.reference_rows
     values = _columns(result.names, result.values, enclosure.states)
-    bounds = distances(values[: len(rows)], enclosure, rows)
-    worst = np.argmax(bounds, axis=0)
+    rows = rows[: len(values)]
+    return largest(distances(values[: len(rows)], enclosure, rows), enclosure, rows)
+
+
+def largest(
+    errors: np.ndarray, enclosure: Enclosure, rows: np.ndarray | None = None
+) -> dict[str, ProvenError]:
+    """Largest proven errors of all states, by name.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (points, states)
+    rows : ndarray of int, shape (points,), optional
+        Communication points of the errors; default: all.
+    """
+    times = enclosure.times if rows is None else enclosure.times[rows]
+    worst = np.argmax(errors, axis=0)
     return {
         name: ProvenError(
-            float(bounds[worst[i], i]),
-            float(enclosure.times[rows[worst[i]]]),
-            float(enclosure.radius[:, i].max()),
+            float(errors[worst[i], i]), float(times[worst[i]]), float(enclosure.radius[:, i].max())
         )
         for i, name in enumerate(enclosure.states)
     }

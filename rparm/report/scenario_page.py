@@ -20,7 +20,7 @@ from rparm.runs.comparison import Failure, Run, estimated_from
 from rparm.runs.measured import comparisons
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
-from rparm.texts import bits, milliseconds, number, ordinal, sentence, short, unit
+from rparm.texts import bits, milliseconds, number, ordinal, rounded_up, sentence, short, unit
 
 DIGITS = 12  # of values; the references of the project have more, users' files have none
 
@@ -242,7 +242,9 @@ def _facts(run: Run) -> list[tuple[str, str]]:
 
 def _proven(proof: Mapping[str, ProvenError], model: Model) -> list[tuple[str, str]]:
     """How far each state is from the exact motion at most."""
-    texts = [f"{n} {e.error:.1e} {unit(model.variables[n].unit)}" for n, e in proof.items()]
+    texts = [
+        f"{n} {rounded_up(e.error, 1)} {unit(model.variables[n].unit)}" for n, e in proof.items()
+    ]
     return [("proven error at most", ", ".join(texts))] if texts else []
 
 

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.proof import proven, prover
 from rparm.scenarios import scenario as scenarios
+from rparm.texts import rounded_up
 
 PROVER = prover.provers()["rp_manipulator"]
 STATES = {"q1", "q2", "dq1", "dq2"}
@@ -40,7 +42,8 @@ def own(tmp_path: Path) -> Path:
 
 
 def document(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict:
-    main(["prove", *arguments, "--json"])
+    with TemporaryDirectory() as folder:
+        main(["prove", "--output", folder, *arguments, "--json"])
     return json.loads(capsys.readouterr().out)
 
 
@@ -60,9 +63,8 @@ def test_proven_error_is_what_a_run_and_the_interval_say(own: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(own, fmu.model)
         enclosure = PROVER.enclose(scenario)
-        (error,) = [
-            e for n, e in proven.errors(fmu, scenario, enclosure, "erk", 1e-8).items() if n == "q1"
-        ]
+        bounds = proven.bounds(fmu, scenario, enclosure, "erk", 1e-8)
+        error = proven.largest(bounds, enclosure)["q1"]
     own.write_text(OWN + '[parameters]\nsolver_method = "erk"\n')
     run = rparm.Scenario(own).run()
     apart = np.abs(run["q1"] - enclosure.high[:, 0])
@@ -85,8 +87,8 @@ def test_start_within_an_interval(own: Path, capsys: pytest.CaptureFixture[str])
 def test_taylor_is_proven_to_1e_13_in_all_scenarios(path: Path) -> None:
     with Fmu(rparm.fmu("rp_manipulator")) as fmu:
         scenario = scenarios.load(path, fmu.model)
-        errors = proven.errors(fmu, scenario, PROVER.enclose(scenario), "taylor", 1e-13)
-    assert max(error.error for error in errors.values()) <= 1e-13
+        errors = proven.bounds(fmu, scenario, PROVER.enclose(scenario), "taylor", 1e-13)
+    assert errors.max() <= 1e-13
 
 
 def test_references(capsys: pytest.CaptureFixture[str]) -> None:
@@ -196,6 +198,25 @@ def test_halves_cover_a_start() -> None:
     assert ends[0][0] - ends[0][1] <= Fraction(0.1) - Fraction(0.3)
     assert ends[0][0] + ends[0][1] >= ends[1][0] - ends[1][1]
     assert ends[1][0] + ends[1][1] >= Fraction(0.1) + Fraction(0.3)
+
+
+def test_the_page_of_a_proof(own: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One plot a state, one curve a method: its table has what is printed."""
+    found = document(capsys, str(own), "--output", str(tmp_path))
+    page = (tmp_path / "proofs" / "own.html").read_text()
+    assert Path(found["page"]).samefile(tmp_path / "proofs" / "own.html")
+    assert "The proof assumes the equations of motion" in page
+    for name, error in found["methods"]["taylor"].items():
+        assert f"proven error of {name}" in page
+        assert f"{rounded_up(error['error'], 2)} at {error['at']:.4g} s" in page
+    main(["prove", str(own), "--within", "1mrad", "--method", "erk", "--output", str(tmp_path)])
+    assert "--within</span> 1mrad" in (tmp_path / "proofs" / "own.html").read_text()
+
+
+@pytest.mark.parametrize("value", [1.21e-8, 1.2e-8, 9.99e-14, 1.0, 0.0, 2.0**-1074])
+def test_bounds_are_printed_rounded_up(value: float) -> None:
+    for digits in (1, 2):
+        assert value <= float(rounded_up(value, digits)) <= value * (1 + 10.0**-digits) + 1e-323
 
 
 def test_the_page_of_a_scenario_says_what_is_proven(tmp_path: Path) -> None:

@@ -1,0 +1,109 @@
+"""The page of proven errors."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from rparm.fmi.model import Model
+from rparm.proof import proven
+from rparm.proof.prover import Enclosure
+from rparm.report import assets
+from rparm.report.overview import PASSED
+from rparm.report.pages import INDEX, RunPage, Table, write_run
+from rparm.report.run_data import Curve, Plot, RunData, thinned
+from rparm.scenarios.scenario import Scenario
+from rparm.texts import SMALLEST, counted, number, rounded_up, unit
+
+FOLDER = "proofs"  # of the report
+ASSUMES = f"The proof assumes {proven.ASSUMED}."
+
+
+def write(
+    report: Path,
+    scenario: Scenario,
+    model: Model,
+    enclosure: Enclosure,
+    errors: Mapping[str, np.ndarray],
+    again: str,
+) -> Path:
+    """Write the page of a scenario; return its path.
+
+    Parameters
+    ----------
+    errors : mapping of str to ndarray of shape (communication points, states)
+        Proven errors of a run, by what it is called: its method and tolerance.
+    again : str
+        Command that proves it again.
+    """
+    plots = [
+        Plot(
+            f"proven error of {name}",
+            unit(model.variables[name].unit),
+            [Curve(run, _drawn(course[:, i])) for run, course in errors.items()],
+            log=True,
+            note=f"The exact {name} is no farther than this from the run.",
+        )
+        for i, name in enumerate(enclosure.states)
+    ]
+    rows = thinned([values for plot in plots for values in plot.columns])
+    title = f"{scenario.title}: proven errors"
+    shown = [plot.at(rows) for plot in plots]
+    facts = [
+        ("model", model.name),
+        ("time", f"{number(scenario.start)} to {number(scenario.stop)} s"),
+        ("communication points", str(len(enclosure.times))),
+        ("widest interval", rounded_up(enclosure.radius.max(), 1)),
+    ]
+    if len(enclosure.starts) > 1:
+        facts.append(("start", f"in {counted(enclosure.starts, 'piece')}"))
+    page = RunPage(
+        title=title,
+        description=scenario.description,
+        status=PASSED,
+        facts=facts,
+        data=RunData(scenario.name, title, enclosure.times[rows], shown),
+        tables=[_largest(model, enclosure, errors)],
+        notes=[ASSUMES],
+        again=again,
+    )
+    return _write(report, scenario.name, page)
+
+
+def write_references(report: Path, head: Sequence[str], rows: Sequence, again: str) -> Path:
+    """Write the page of the references; return its path. `head` and `rows` are of its table."""
+    page = RunPage(
+        title="References: proven accuracy",
+        description="How many values of each reference are the doubles nearest to the exact ones.",
+        status=PASSED,
+        facts=[("references", str(len(rows)))],
+        data=None,
+        tables=[Table("References", head, rows)],
+        notes=[ASSUMES],
+        again=again,
+    )
+    return _write(report, "references", page)
+
+
+def _write(report: Path, name: str, page: RunPage) -> Path:
+    assets.write(report)
+    (report / FOLDER).mkdir(parents=True, exist_ok=True)
+    with_overview = (report / INDEX).exists()
+    return write_run(report / FOLDER / f"{name}.html", replace(page, overview=with_overview))
+
+
+def _drawn(course: np.ndarray) -> np.ndarray:
+    """0 where a run is exact but for what stands for underflows, as at the start."""
+    return np.where(course < SMALLEST, 0.0, course)
+
+
+def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:
+    """Largest error of each state in each run, and when."""
+    heads = [f"{n} in {unit(model.variables[n].unit)}" for n in enclosure.states]
+    found = {run: proven.largest(course, enclosure).values() for run, course in errors.items()}
+    rows = [
+        (run, *(f"{rounded_up(e.error, 2)} at {e.at:.4g} s" for e in largest))
+        for run, largest in found.items()
+    ]
+    return Table("Largest proven errors", ("run", *heads), rows)
