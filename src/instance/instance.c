@@ -148,9 +148,8 @@ static enum status setup(struct instance *instance) {
         return STATUS_OUT_OF_MEMORY;
     }
     instance->second_derivatives = instance->first_derivatives + values_size;
-    instance->nodes = instance->u + input_count;
-    instance->input_series =
-        (double(*)[SERIES_INPUT_LENGTH])(instance->nodes + POLYNOMIAL_NODES * input_count);
+    instance->input_series = (double(*)[SERIES_INPUT_LENGTH])(instance->u + input_count);
+    instance->nodes = instance->u + (1 + SERIES_INPUT_LENGTH) * input_count;
     memory->next_inputs = (struct polynomial *)(void *)memory->block;
     memory->current_inputs = memory->next_inputs + input_count;
     memory->active_inputs = memory->current_inputs + input_count;

@@ -26,16 +26,17 @@ struct step_polynomial {
 };
 
 struct location {
-    const struct ode *ode;
+    double time; /* of the event, s since the restart; INFINITY: none. With the indicators, all that
+                    a step without them reads */
     const struct indicator *indicators; /* since the restart; NULL: none is searched */
-    size_t *used;                       /* those of them that are not INDICATOR_UNUSED */
+    const struct ode *ode;
+    size_t *used; /* those of them that are not INDICATOR_UNUSED */
     size_t used_count;
     const double *tolerances;            /* absolute ones, of the states */
     bool *is_armed;                      /* by indicator: it has been above 0 since the restart */
     double *noise;                       /* by indicator of a state: one that is 0 at the restart
                                             may have either sign as long as it is within this */
     bool *triggered;                     /* by indicator: it is at 0 at `time` */
-    double time;                         /* of the event, s since the restart; INFINITY: none */
     struct step_polynomial step;         /* the last one; methods write it */
     double (*rows)[SERIES_LENGTH];       /* by state: room for its rows */
     double *x;                           /* at one point */

@@ -29,9 +29,8 @@ struct taylor {
     bool is_searched;     /* for events, since the restart */
     double longest_scale; /* s: of the next step of the running advance */
     double last_length;   /* s: of the last step, or the one that a restart gave; 0: none */
-    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step */
-    double *end_x;                    /* the state there */
-    double *end_dx;                   /* the derivative of the polynomial there, by its argument */
+    double *end_x;        /* the state there */
+    double *end_dx;       /* the derivative of the polynomial there, by its argument */
     double passed; /* s since the restart: where the step ended that goes past requested times;
                       -INFINITY: there is none */
 };
@@ -39,15 +38,13 @@ struct taylor {
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 static size_t memory_size(const struct ode *ode) {
-    const size_t padding = 3 * _Alignof(max_align_t);
+    const size_t padding = 2 * _Alignof(max_align_t);
     return sizeof(struct taylor) + padding + taylor_series_memory_size(ode) +
-           2 * ode->state_count * sizeof(double) +
-           ode->series_row_count * sizeof(double[SERIES_LENGTH]);
+           2 * ode->state_count * sizeof(double);
 }
 
 static void destroy(void *memory) {
     struct taylor *taylor = memory;
-    workspace_free(taylor->end_row);
     workspace_free(taylor->end_x);
     taylor_series_destroy(&taylor->series);
     workspace_free(taylor);
@@ -60,10 +57,9 @@ static enum status create(struct problem *problem, void **memory) {
         return STATUS_OUT_OF_MEMORY;
     }
     const size_t n = problem->ode.state_count;
-    const bool has_series = taylor_series_create(problem, &taylor->series);
     taylor->end_x = workspace_calloc(2 * n, sizeof *taylor->end_x);
-    taylor->end_row = workspace_calloc(problem->ode.series_row_count, sizeof *taylor->end_row);
-    if (!has_series || taylor->end_x == NULL || taylor->end_row == NULL) {
+    const bool has_series = taylor_series_create(problem, &taylor->series);
+    if (!has_series || taylor->end_x == NULL) {
         destroy(taylor);
         return STATUS_OUT_OF_MEMORY;
     }
@@ -87,42 +83,14 @@ static enum status restart(void *memory, const double x[]) {
 
 /* ---- Check ---------------------------------------------------------------------------------- */
 
-/* Writes the state at begin + s * time_scale to end_x, and by how much the polynomial misses the
- * equations there: the difference of its derivative from theirs, in tolerances per step. That is
- * about the order of the first term left out times its size. Small terms prove nothing, because
- * orders of a series may vanish: a motion from rest can have the orders 3, 4, 11, 12, 19 ... and
- * none between.
- */
-static enum status measure_defect(struct taylor *taylor, double s, double *defect) {
-    const struct taylor_series *series = &taylor->series;
-    const size_t n = series->problem->ode.state_count;
-    taylor_series_evaluate(series, s, taylor->end_x, taylor->end_dx);
-    for (size_t i = 0; i < n; i++) {
-        taylor->end_row[i][0] = taylor->end_x[i];
-    }
-    const enum status status =
-        problem_series(series->problem, series->begin + s * series->time_scale, series->time_scale,
-                       0, 1, taylor->end_row);
-    if (status != STATUS_OK) {
-        return status;
-    }
-    *defect = 0.0;
-    for (size_t i = 0; i < n; i++) {
-        const double derivative = taylor->end_dx[i];
-        const double rounding = 64.0 * DBL_EPSILON * fabs(derivative);
-        const double missed = fabs(taylor->end_row[i][1] - derivative) - rounding;
-        *defect += missed <= 0.0 ? 0.0 : s * missed * series->weight[i];
-    }
-    return STATUS_OK;
-}
-
 /* Makes the polynomial fit the equations at the end of the step: adds orders, or shortens it. */
 static enum status fit_step(struct taylor *taylor, bool is_long, double *step,
                             struct method_work *work) {
     struct taylor_series *series = &taylor->series;
     for (;;) {
         double defect;
-        enum status status = measure_defect(taylor, *step, &defect);
+        enum status status =
+            taylor_series_measure_defect(series, *step, taylor->end_x, taylor->end_dx, &defect);
         if (status != STATUS_OK || defect <= series->order + 1) {
             return status;
         }
@@ -299,12 +267,12 @@ static double begin_advance(struct taylor *taylor, const double begin_x[], doubl
     return begin;
 }
 
-static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
-                           double *stopped_at, double x[], struct method_work *work) {
-    struct taylor *taylor = memory;
+/* is_long: of the first step. */
+static enum status take_steps(struct taylor *taylor, double t, int64_t max_steps, bool is_long,
+                              const double begin_x[], double *stopped_at, double x[],
+                              struct method_work *work) {
     const struct problem *problem = taylor->series.problem;
     const bool is_searched = taylor->is_searched;
-    bool is_long = problem->reached == 0.0 ? problem->continues : is_searched;
     *stopped_at = begin_advance(taylor, begin_x, x);
     work->internal = *stopped_at;
     while (*stopped_at < t) {
@@ -343,6 +311,24 @@ static enum status advance(void *memory, double t, int64_t max_steps, const doub
         }
     }
     return STATUS_OK;
+}
+
+static enum status advance(void *memory, double t, int64_t max_steps, const double begin_x[],
+                           double *stopped_at, double x[], struct method_work *work) {
+    struct taylor *taylor = memory;
+    struct taylor_series *series = &taylor->series;
+    const struct problem *problem = series->problem;
+    const bool is_long = problem->reached == 0.0 ? problem->continues : taylor->is_searched;
+    // only what goes past requested times, or is searched, is read later
+    const bool is_kept =
+        is_long || taylor->is_searched || !taylor_series_has_few_rows(&problem->ode);
+    double few_rows[TAYLOR_FEW_ROWS][SERIES_LENGTH];
+    double(*const kept)[SERIES_LENGTH] = series->row;
+    series->row = is_kept ? kept : few_rows;
+    const enum status status =
+        take_steps(taylor, t, max_steps, is_long, begin_x, stopped_at, x, work);
+    series->row = kept;
+    return status;
 }
 
 static bool interpolate(void *memory, double t, double x[]) {

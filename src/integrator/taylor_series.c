@@ -2,6 +2,7 @@
 
 #include "workspace.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -14,19 +15,24 @@ static const double safety = 0.9;
 /* ---- Life ----------------------------------------------------------------------------------- */
 
 size_t taylor_series_memory_size(const struct ode *ode) {
-    const size_t padding = 2 * _Alignof(max_align_t);
+    const size_t padding = 3 * _Alignof(max_align_t);
     return padding + ode->state_count * sizeof(double) +
-           ode->series_row_count * sizeof(double[SERIES_LENGTH]);
+           2 * ode->series_row_count * sizeof(double[SERIES_LENGTH]);
 }
 
 bool taylor_series_create(struct problem *problem, struct taylor_series *series) {
     *series = (struct taylor_series){.problem = problem};
     series->weight = workspace_calloc(problem->ode.state_count, sizeof *series->weight);
     series->row = workspace_calloc(problem->ode.series_row_count, sizeof *series->row);
-    return series->weight != NULL && series->row != NULL;
+    if (taylor_series_has_few_rows(&problem->ode)) {
+        return series->weight != NULL && series->row != NULL;
+    }
+    series->end_row = workspace_calloc(problem->ode.series_row_count, sizeof *series->end_row);
+    return series->weight != NULL && series->row != NULL && series->end_row != NULL;
 }
 
 void taylor_series_destroy(struct taylor_series *series) {
+    workspace_free(series->end_row);
     workspace_free(series->row);
     workspace_free(series->weight);
 }
@@ -129,5 +135,31 @@ enum status taylor_series_expand(struct taylor_series *series, double t, double 
     }
     const double size[2] = {size_of_terms(series, last - 1), size_of_terms(series, last)};
     series->step = step_of_last_terms(size, last, longest);
+    return STATUS_OK;
+}
+
+/* ---- Check ---------------------------------------------------------------------------------- */
+
+enum status taylor_series_measure_defect(struct taylor_series *series, double s, double end_x[],
+                                         double end_dx[], double *defect) {
+    const size_t n = series->problem->ode.state_count;
+    double few_rows[TAYLOR_FEW_ROWS][SERIES_LENGTH];
+    double(*end_row)[SERIES_LENGTH] = series->end_row != NULL ? series->end_row : few_rows;
+    taylor_series_evaluate(series, s, end_x, end_dx);
+    for (size_t i = 0; i < n; i++) {
+        end_row[i][0] = end_x[i];
+    }
+    const enum status status = problem_series(
+        series->problem, series->begin + s * series->time_scale, series->time_scale, 0, 1, end_row);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    *defect = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        const double derivative = end_dx[i];
+        const double rounding = 64.0 * DBL_EPSILON * fabs(derivative);
+        const double missed = fabs(end_row[i][1] - derivative) - rounding;
+        *defect += missed <= 0.0 ? 0.0 : s * missed * series->weight[i];
+    }
     return STATUS_OK;
 }

@@ -8,17 +8,26 @@
 
 #include "problem.h"
 
+/* At most so many rows are on the stack where no later call reads them: there they are in a cache
+ * although many instances are stepped in turn. */
+enum { TAYLOR_FEW_ROWS = 8 };
+
+static inline bool taylor_series_has_few_rows(const struct ode *ode) {
+    return ode->series_row_count <= TAYLOR_FEW_ROWS;
+}
+
 struct taylor_series {
     struct problem *problem;
     int largest_order;
     int order;
-    int expected_order;           /* which a step that lands is expanded to at first; its result
-                                     does not depend on it */
-    double begin;                 /* s since the restart */
-    double time_scale;            /* s */
-    double step;                  /* for which the series is good; NaN: a term is not finite */
-    double (*row)[SERIES_LENGTH]; /* the coefficients */
-    double *weight;               /* of each state: 1 over its tolerance */
+    int expected_order;               /* which a step that lands is expanded to at first; its result
+                                         does not depend on it */
+    double begin;                     /* s since the restart */
+    double time_scale;                /* s */
+    double step;                      /* for which the series is good; NaN: a term is not finite */
+    double (*row)[SERIES_LENGTH];     /* the coefficients */
+    double (*end_row)[SERIES_LENGTH]; /* orders 0 and 1 at the end of a step; NULL: few rows */
+    double *weight;                   /* of each state: 1 over its tolerance */
 };
 
 /* Bytes that create allocates at most. */
@@ -90,5 +99,14 @@ static inline void taylor_series_evaluate(const struct taylor_series *series, do
         }
     }
 }
+
+/* Writes the state at s to end_x, the derivative of the polynomial there, by s, to end_dx, and by
+ * how much the polynomial misses the equations there: the difference of its derivative from theirs,
+ * in tolerances per step. That is about the order of the first term left out times its size. Small
+ * terms prove nothing, because orders of a series may vanish: a motion from rest can have the
+ * orders 3, 4, 11, 12, 19 ... and none between. */
+MUST_CHECK NONNULL enum status taylor_series_measure_defect(struct taylor_series *series, double s,
+                                                            double end_x[], double end_dx[],
+                                                            double *defect);
 
 #endif

@@ -103,6 +103,7 @@ static inline void activate_values(struct instance *instance, struct clock_time 
         activate_bytes(instance, model->events->discrete_inputs);
         activate_bytes(instance, model->events->modes);
     }
+    instance->parameters_are_active = true;
     activate(instance, model->inputs);
     activate(instance, model->states);
     memcpy(memory->active_inputs, inputs, count_of(model->inputs) * sizeof *inputs);

@@ -76,6 +76,7 @@ enum status instance_save(struct instance *instance, unsigned tag,
 static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
+    instance->parameters_are_active = false;
     instance->history_is_lost = true;
     instance_update_tolerance(instance);
     if (!instance_has_integrator(instance)) {

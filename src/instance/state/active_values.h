@@ -29,8 +29,9 @@ static inline bool instance_range_is_active(const struct instance *instance, str
 /* The same for parameters and Boolean inputs. */
 static inline bool instance_parameters_are_active(const struct instance *instance) {
     const struct model_events *events = instance->model->events;
-    return instance_range_is_active(instance, instance->model->parameters) &&
-           (events == NULL || instance_range_is_active(instance, events->discrete_inputs));
+    return instance->parameters_are_active ||
+           (instance_range_is_active(instance, instance->model->parameters) &&
+            (events == NULL || instance_range_is_active(instance, events->discrete_inputs)));
 }
 
 static inline bool instance_values_are_active(const struct instance *instance) {

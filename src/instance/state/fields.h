@@ -49,6 +49,7 @@ static inline void instance_write_field(struct instance *instance, const struct 
         *(double *)field = value;
         return;
     }
+    instance->parameters_are_active = false;
     instance->parameters_are_valid &= variable->causality != CAUSALITY_PARAMETER;
     if (variable->type == VARIABLE_FLOAT64) {
         *(double *)field = value;

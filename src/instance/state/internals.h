@@ -73,25 +73,32 @@ struct instance_real {
     bool is_calculated;  /* by the outputs of the model: it has to be brought up to date */
 };
 
+/* What each step reads or writes stands first: of many instances stepped in turn, few lines of a
+ * cache each are used. */
 struct instance {
     const struct model_description *description;
     const struct model *model;
-    struct message_sink sink;
     struct instance_state state;
     struct instance_memory memory;
 
     struct instance_real *reals; /* by value reference */
 
     bool is_integrated_outside;
-    bool states_are_settable;  /* in event mode, too */
-    bool step_met_event;       /* the last one */
-    bool outputs_are_valid;    /* the calculated values belong to the others */
-    bool parameters_are_valid; /* they are consistent; false: not known */
-    bool history_is_lost;      /* the integrator is not where state says: replay first */
-    struct ode ode;
-    struct integrator *integrator;         /* NULL: the model has no states */
+    bool states_are_settable;   /* in event mode, too */
+    bool step_met_event;        /* the last one */
+    bool outputs_are_valid;     /* the calculated values belong to the others */
+    bool parameters_are_valid;  /* they are consistent; false: not known */
+    bool parameters_are_active; /* as in active_values.h; false: not known */
+    bool history_is_lost;       /* the integrator is not where state says: replay first */
+    bool inputs_move;           /* since the last restart; false: u has their constant values */
+    double *u;                  /* one value per input, as the right-hand side sees them */
+    double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
+    struct integrator *integrator;               /* NULL: the model has no states */
     struct integrator_settings configured; /* what the integrator was configured with, without the
                                               tolerances of the states */
+
+    struct message_sink sink;
+    struct ode ode;
     double *absolute_tolerances;  /* one per state, as the integrator has them; NULL: the model has
                                      no events */
     double *tolerances;           /* one per state, at its value at the last event */
@@ -99,9 +106,6 @@ struct instance {
     double *du;                   /* derivative of each input by the time */
     double *z;                    /* two per indicator */
     bool *triggered;              /* one per indicator: it falls to 0; last: a time event */
-    bool inputs_move;             /* since the last restart; false: u has their constant values */
-    double *u;                    /* one value per input, as the right-hand side sees them */
-    double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */
     double *nodes;           /* POLYNOMIAL_NODES values per input, of the step that asks for them */
     char *first_derivatives; /* value structures, along a curve (struct model) */
     char *second_derivatives;
