@@ -53,6 +53,11 @@ static bool is_stuck(const struct series_motion *m, int joint) {
     return m->modes.joint[joint] == RP_PLANT_STUCK;
 }
 
+/* Joint 1 does not turn: w and P are 0 in all orders. */
+static bool stands_still(const struct series_motion *m, double row[][SERIES_LENGTH]) {
+    return is_stuck(m, 0) && row[W][0] == 0.0;
+}
+
 static bool has_breakaway(const struct rp_plant_parameters *p, int joint) {
     return p->breakaway_friction[joint] > p->coulomb_friction[joint];
 }
@@ -174,7 +179,10 @@ static inline struct next next_order(const struct series_motion *m, int n,
     if (m->has_wrench) {
         series_add_wrench(m, n, row, next.effort);
     }
-    const struct products sum = products_of_order(row, next.L, n);
+    struct products sum = {.L_c = row[L][n] * row[C][0]};
+    if (!stands_still(m, row)) {
+        sum = products_of_order(row, next.L, n);
+    }
     const double L0 = row[L][0];
     next.s = h * sum.w_c;
     next.c = -h * sum.w_s;
@@ -215,7 +223,8 @@ static void write_indicators(const struct series_motion *m, int k, const struct 
                              double row[][SERIES_LENGTH]) {
     const double rate = (k + 1) / m->origin->time_scale;
     const double a_m2 = m->a * m->m2;
-    const double coriolis = 2.0 * m->m2 * jet_product(row[P], row[V], k);
+    const double P_v = stands_still(m, row) ? 0.0 : jet_product(row[P], row[V], k);
+    const double coriolis = 2.0 * m->m2 * P_v;
     const double fall = m->g * row[S][k];
     const double reaction[2] = {
         next->effort[0] - coriolis - next->weight + a_m2 * (fall + rate * next->v),
