@@ -78,55 +78,61 @@ static void differentiate(const struct rising *p, int order, struct rising *deri
 
 /* ---- How many roots ------------------------------------------------------------------------- */
 
+/* A polynomial a little below p and one a little above it, by more than all rounding here and in
+ * Horner's scheme. Coefficients side by side: the processor adds both at once. */
+enum { BELOW, ABOVE, BOUNDS };
+
 /* Coefficients of s^k become those of s^k (1 - s)^(degree - k), which are x^degree p(1 / x) with
  * x + 1 for x. */
-static void move_to_ends(double c[ROOTS_LENGTH], int degree) {
+static void move_to_ends(double c[ROOTS_LENGTH][BOUNDS], int degree) {
     for (int i = 0; i < degree; i++) {
-        double sum = c[0];
+        double below = c[0][BELOW];
+        double above = c[0][ABOVE];
         for (int k = 1; k <= degree - i; k++) {
-            sum += c[k];
-            c[k] = sum;
+            below += c[k][BELOW];
+            above += c[k][ABOVE];
+            c[k][BELOW] = below;
+            c[k][ABOVE] = above;
         }
     }
 }
 
-/* A little above p, or with a slack < 0 below it: by more than all rounding here and in Horner's
- * scheme. Written as coefficients of s^k (1 - s)^(degree - k). */
-static void shift_to_ends(const struct rising *p, double slack, double shifted[ROOTS_LENGTH]) {
+/* Writes both as coefficients of s^k (1 - s)^(degree - k). */
+static void bound(const struct rising *p, double bounds[ROOTS_LENGTH][BOUNDS]) {
+    const double slack = 0x1p-45;
     for (int k = 0; k <= p->degree; k++) {
-        shifted[k] = p->c[k] + slack * fabs(p->c[k]);
+        bounds[k][BELOW] = p->c[k] - slack * fabs(p->c[k]);
+        bounds[k][ABOVE] = p->c[k] + slack * fabs(p->c[k]);
     }
-    move_to_ends(shifted, p->degree);
+    move_to_ends(bounds, p->degree);
 }
 
 /* Descartes' rule: 0 or 1 where p has as many roots on (0, 1] and is else beyond its rounding, to
  * which its value at 1 may be an exception; 2: it can be more. */
 static int most_roots(const struct rising *p) {
-    double above[ROOTS_LENGTH];
-    double below[ROOTS_LENGTH];
-    shift_to_ends(p, -0x1p-45, below);
+    double c[ROOTS_LENGTH][BOUNDS];
+    bound(p, c);
     int positive = 0;
-    while (positive <= p->degree && below[positive] > 0.0) {
+    while (positive <= p->degree && c[positive][BELOW] > 0.0) {
         positive++;
     }
     if (positive > p->degree) {
         return 0;
     }
-    shift_to_ends(p, 0x1p-45, above);
 
     int changes = 0;
     int unknown = 0; // signs since the last one that is known
     int sign = 1;
     for (int k = positive; k <= p->degree; k++) {
-        if (above[k] < 0.0 || below[k] > 0.0) {
-            const int next = above[k] < 0.0 ? -1 : 1;
+        if (c[k][ABOVE] < 0.0 || c[k][BELOW] > 0.0) {
+            const int next = c[k][ABOVE] < 0.0 ? -1 : 1;
             changes += next != sign;
             if (unknown > (next != sign)) {
                 return 2;
             }
             unknown = 0;
             sign = next;
-        } else if (above[k] != 0.0 || below[k] != 0.0) {
+        } else if (c[k][ABOVE] != 0.0 || c[k][BELOW] != 0.0) {
             unknown++;
         }
     }
