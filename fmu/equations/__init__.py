@@ -8,8 +8,10 @@ A module each; a module imports only from lines above its own:
     c_code        a graph as statements in C
     guards        when a relation matters
     c_series      the Taylor series of the states
-    c_events      modes and events; c_events_text: what those of all models have in common
+    c_events      modes and events
     c_model       equations.h and equations.c: a struct model (src/model/model.h)
     declaration   variables.toml and the page
     building      FMUs
+
+The C that all models share is in the files *.in.
 """

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from string import Template
 
-from equations.graph import LEAVES, Graph, Value, is_function, ordered
-from rparm.expressions.tree import RELATIONS
+from equations.graph import CONDITIONS, LEAVES, Value
+from rparm.expressions.tree import RELATIONS, in_order
 
-CONDITIONS = ("mode", "and", "or", "not", *RELATIONS)
-ZERO = "0.0"  # derivative of what never changes
-OPERATORS = {"and": "&&", "or": "||"}
+# what a formula of C is made of; that of a function is its call
+FORMULAS = {op: f"{{}} {op} {{}}" for op in ("+", "-", "*", "/", *RELATIONS)}
+FORMULAS |= {"and": "{} && {}", "or": "{} || {}", "not": "!{}"}
+FORMULAS |= {"negative": "-{}", "if": "{} ? {} : {}"}
 
-References = dict[Value, str]  # C expressions without operators, by value
+Leaves = Mapping[tuple[str, str], str]  # where C has a leaf, by its operation and name
 
 
 def number(value: float) -> str:
@@ -29,120 +33,72 @@ def _character(byte: int) -> str:
     return chr(byte) if plain else f"\\{byte:03o}"
 
 
-def operation(value: Value, references: Mapping[Value, str]) -> str:
-    """The operation on its arguments."""
-    given = [references[argument] for argument in value.arguments]
-    if value.op == "negative":
-        return f"-{given[0]}"
-    if value.op == "not":
-        return f"!{given[0]}"
-    if value.op == "if":
-        return f"{given[0]} ? {given[1]} : {given[2]}"
-    if is_function(value):
-        return f"{value.op}({', '.join(given)})"
-    return f"{given[0]} {OPERATORS.get(value.op, value.op)} {given[1]}"
+def formula(op: str, *given: str) -> str:
+    """An operation on C expressions without operators."""
+    return FORMULAS[op].format(*given) if op in FORMULAS else f"{op}({', '.join(given)})"
 
 
-def calculated(
-    roots: Iterable[Value], leaf: Callable[[Value], str]
-) -> tuple[list[str], References]:
-    """Statements that calculate the roots, and how to refer to each value.
+class Code:
+    """Statements, to which each value that is asked for is added once.
 
-    leaf: the C expression of a leaf.
+    With an `outer` code, values that do not move are calculated there.
     """
-    lines: list[str] = []
-    references: References = {}
-    for value in ordered(roots):
+
+    def __init__(self, leaves: Leaves, prefix: str = "n", outer: Code | None = None) -> None:
+        self.leaves, self.prefix, self.outer = leaves, prefix, outer
+        self.lines: list[str] = []
+        self._known: dict[Value, str] = {}
+
+    def of(self, root: Value) -> str:
+        """C expression of a value, without operators."""
+        if self.outer and not root.moves:
+            return self.outer.of(root)
+        for value in in_order([root], self._known):
+            self._known[value] = self._expression(value)
+        return self._known[root]
+
+    def _expression(self, value: Value) -> str:
         if value.op == "number":
-            references[value] = number(value.number)
-        elif value.op in LEAVES:
-            references[value] = leaf(value)
-        else:
-            references[value] = f"n{len(lines)}"
-            c_type = "int" if value.op in CONDITIONS else "double"
-            lines.append(f"const {c_type} n{len(lines)} = {operation(value, references)};")
-    return lines, references
-
-
-def along_curve(
-    graph: Graph,
-    values: list[Value],
-    references: Mapping[Value, str],
-    lower: Mapping[Value, str],
-    leaf: Callable[[Value], str],
-    order: int,
-) -> tuple[list[str], References]:
-    """Statements for the first or second derivative of values along a curve.
-
-    Parameters
-    ----------
-    values : list
-        With the partial derivatives of all functions among them, arguments first.
-    references : mapping
-        The values.
-    lower : mapping
-        Their first derivatives, if order is 2.
-    leaf : function
-        The C expression of a leaf's derivative.
-    order : int
-        1 or 2.
-    """
-    lines: list[str] = []
-    found: References = {}
-    for value in values:
-        if value.op in CONDITIONS:
-            continue
+            return number(value.number)
         if value.op in LEAVES:
-            found[value] = leaf(value)
-        elif not value.leaves:
-            found[value] = ZERO
+            return self.leaves[value.op, value.name]
+        if self.outer and not value.moves:
+            return self.outer.of(value)
+        c_type = "int" if value.op in CONDITIONS else "double"
+        given = [self._known[argument] for argument in value.arguments]
+        return self.constant(formula(value.op, *given), c_type)
+
+    def constant(self, of: str, c_type: str = "double") -> str:
+        """Name of a new constant."""
+        name = f"{self.prefix}{len(self.lines)}"
+        self.lines.append(f"const {c_type} {name} = {of};")
+        return name
+
+    def assign(self, values: Mapping[str, Value]) -> Code:
+        """Give lvalues their values, after all of them have been calculated."""
+        found = [f"{target} = {self.of(value)};" for target, value in values.items()]
+        self.lines += found
+        return self
+
+
+def indented(lines: list[str]) -> list[str]:
+    """Lines of a block."""
+    return [f"    {line}" for line in lines]
+
+
+@cache
+def _template(name: str) -> list[str]:
+    return (Path(__file__).parent / name).read_text(encoding="utf-8").splitlines()
+
+
+def filled(template: str, **parts: object) -> list[str]:
+    """Lines of a file of this folder; a line that is only $NAME becomes those of that part."""
+    lines = []
+    for line in _template(template):
+        before, _, name = line.partition("$")
+        part = parts.get(name)
+        if isinstance(part, list) and not before.strip():
+            lines += [before + inner for inner in part]
         else:
-            found[value] = f"{'fs'[order - 1]}{len(lines)}"
-            formula = _rule(graph, value, references, found, lower if order == 2 else None)
-            lines.append(f"const double {found[value]} = {formula};")
-    return lines, found
-
-
-def _rule(
-    graph: Graph,
-    value: Value,
-    at: Mapping[Value, str],
-    d: Mapping[Value, str],
-    first: Mapping[Value, str] | None,
-) -> str:
-    """Derivative of an operation; first: where it is the second one."""
-    arguments = value.arguments
-    if value.op == "negative":
-        return f"-{d[arguments[0]]}"
-    if value.op in ("+", "-"):
-        return f"{d[arguments[0]]} {value.op} {d[arguments[1]]}"
-    if value.op == "if":
-        return f"{at[arguments[0]]} ? {d[arguments[1]]} : {d[arguments[2]]}"
-    if value.op in ("*", "/"):
-        return _rule_of_product(value, at, d, first)
-    terms = []
-    for partial, x in zip(graph.partials(value), arguments, strict=True):
-        if not x.leaves:
-            continue
-        terms.append(f"{at[partial]} * {d[x]}")
-        if first:
-            terms.append(f"{first[partial]} * {first[x]}")
-    return " + ".join(terms) or ZERO
-
-
-def _rule_of_product(
-    value: Value,
-    at: Mapping[Value, str],
-    d: Mapping[Value, str],
-    first: Mapping[Value, str] | None,
-) -> str:
-    a, b = value.arguments
-    if not b.leaves:
-        return f"{d[a]} {value.op} {at[b]}"
-    if value.op == "*":
-        if not a.leaves:
-            return f"{at[a]} * {d[b]}"
-        between = f" + 2.0 * {first[a]} * {first[b]}" if first else ""
-        return f"{d[a]} * {at[b]}{between} + {at[a]} * {d[b]}"
-    between = f" - 2.0 * {first[value]} * {first[b]}" if first else ""
-    return f"({d[a]}{between} - {at[value]} * {d[b]}) / {at[b]}"
+            lines.append(Template(line).substitute(parts) if name else line)
+    return lines

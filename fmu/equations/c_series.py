@@ -7,194 +7,141 @@ y' = g x' with g = dy/dx, so that k y_k is the sum over i = 1 .. k of i x_i g_(k
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 
-from equations.c_code import References, calculated, number, operation
-from equations.graph import LEAVES, LINEAR, Graph, Value, is_function, with_partials
+from equations.c_code import Code, Leaves, formula
+from equations.graph import DERIVATIVES, Graph, Value, unsigned, with_partials
 
 
-@dataclass
 class Series:
-    """What the rows of a series hold, and the statements that write them."""
+    """The rows of a series, and the parts of the C function that writes them.
 
-    graph: Graph
-    states: list[str]
-    inputs: list[str]
-    derivatives: list[Value]
-    followed: list[Value]  # further values that need a row
-    leaf: Callable[[Value], str]  # the C expression of a parameter or mode
-    values: list[Value] = field(default_factory=list)  # that move, arguments first
-    scalars: References = field(default_factory=dict)
-    rows: dict[Value, int] = field(default_factory=dict)
-    head: list[str] = field(default_factory=list)  # statements for what does not move
+    rates: the derivative of each state; followed: further values that need a row.
+    """
 
-    def __post_init__(self) -> None:
-        for index, name in enumerate(self.states):
-            self.rows[self.graph.value("state", name=name)] = index
-        roots = [*self.derivatives, *self.followed]
-        closure = with_partials(self.graph, roots, lambda value: value.moves)
-        self.values = [value for value in closure if value.moves]
-        needed = {argument for value in closure for argument in value.arguments}
-        still = [value for value in [*needed, *closure] if not value.moves]
-        self.head, self.scalars = calculated(dict.fromkeys(still), self.leaf)
-        self._place_rows()
-
-    def _place_rows(self) -> None:
-        """Rows for leaves, for what is not linear and for all that sums and integrals read."""
-        read = {value for value in (*self.derivatives, *self.followed) if value.moves}
+    def __init__(
+        self, graph: Graph, rates: Mapping[Value, Value], followed: list[Value], leaves: Leaves
+    ) -> None:
+        self.graph, self.leaves = graph, leaves
+        roots = [*rates.values(), *followed]
+        self.values = [value for value in with_partials(graph, roots) if value.moves]
+        read = {*roots, *(factor for value in self.values for factor in self._read(value))}
+        needed = [value for value in self.values if value in read and value not in rates]
+        self.rows = {value: i for i, value in enumerate([*rates, *needed])}
+        self.still = Code(leaves)  # what does not move
+        self.first = Code(self._own_leaves("0"), "v", self.still)
+        self.first.assign({f"row[{self.rows[value]}][0]": value for value in needed})
+        self.later = Code(self._own_leaves("k"), "c", self.still)
+        self.sums: list[str] = []  # term i of each
+        self.integrals = ["const double h = origin->time_scale / k;"] if rates else []
+        self._coefficients: dict[Value, str] = {}
         for value in self.values:
-            if value.op in LINEAR or self._is_scaled(value):
-                continue
-            read.add(value)
-            read |= {argument for argument in value.arguments if argument.moves}
-            if is_function(value):
-                read |= {partial for partial in self.graph.partials(value) if partial.moves}
-        for value in self.values:
-            if value in read and value not in self.rows:
-                self.rows[value] = len(self.rows)
-
-    def _is_scaled(self, value: Value) -> bool:
-        """A product or quotient with a factor that does not move."""
-        if value.op == "*":
-            return not all(argument.moves for argument in value.arguments)
-        return value.op == "/" and not value.arguments[1].moves
-
-    # ---- Text ----------------------------------------------------------------------------------
-
-    def statements(self) -> list[str]:
-        """The body of extend."""
-        sums, add, orders = self._orders()
-        integrals = [
-            f"row[{index}][k] = {self._integral(derivative)};"
-            for index, derivative in enumerate(self.derivatives)
-        ]
-        loop = ["for (int i = 1; i < k; i++) {", *_indented(add), "}"] if add else []
-        return [
-            *self.head,
-            "for (int k = first; k <= last; k++) {",
-            "    if (k == 0) {",
-            *_indented(self._values(), 2),
-            "        continue;",
-            "    }",
-            *_indented([*integrals, *sums, *loop, *orders]),
-            "}",
-            "return STATUS_OK;",
-        ]
-
-    def _integral(self, derivative: Value) -> str:
-        if derivative.moves:
-            return f"origin->time_scale / k * row[{self.rows[derivative]}][k - 1]"
-        return f"k == 1 ? origin->time_scale * {self.scalars[derivative]} : 0.0"
-
-    def _values(self) -> list[str]:
-        """Statements for the order 0."""
-        lines, at = [], dict(self.scalars)
-        for count, value in enumerate(self.values):
-            if value.op == "state":
-                at[value] = f"row[{self.rows[value]}][0]"
-                continue
-            text = self._leaf_coefficient(value, "0")
-            formula = text if value.op in LEAVES else operation(value, at)
-            if value in self.rows:
-                at[value] = f"row[{self.rows[value]}][0]"
-                lines.append(f"{at[value]} = {formula};")
+            self._coefficients[value] = self._coefficient(value)
+        for i, rate in enumerate(rates.values()):
+            if rate.moves:
+                last = f"h * row[{self.rows[rate]}][k - 1]"
             else:
-                at[value] = f"v{count}"
-                lines.append(f"const double v{count} = {formula};")
-        return lines
+                last = f"k == 1 ? h * {self.still.of(rate)} : 0.0"
+            self.integrals.append(f"row[{i}][k] = {last};")
 
-    def _leaf_coefficient(self, value: Value, k: str) -> str:
+    def parts(self) -> dict[str, list[str]]:
+        """What equations.c.in has blocks for."""
+        terms = [f"s{i} += {term};" for i, term in enumerate(self.sums)]
+        return {
+            "still": self.still.lines,
+            "first": self.first.lines,
+            "integrals": self.integrals,
+            "sums": [f"double s{i} = 0.0;" for i in range(len(terms))],
+            "terms": [
+                "for (int i = 1; i < k; i++) {", *(f"    {term}" for term in terms), "}"
+            ] if terms else [],
+            "later": self.later.lines,
+        }  # fmt: skip
+
+    def _own_leaves(self, k: str) -> Leaves:
+        """Coefficient k of all leaves."""
+        inputs = [key for key in self.leaves if key[0] == "input"]
+        own = {(s.op, s.name): f"row[{i}][{k}]" for s, i in self.rows.items() if s.op == "state"}
+        own |= {key: f"origin->inputs[{i}][{k}]" for i, key in enumerate(inputs)}
+        return {**self.leaves, **own, ("time", ""): "origin->t"}
+
+    def _pairs(self, value: Value) -> list[tuple[Value, Value, str]]:
+        """Arguments of a function that move, its derivatives by them, and the signs of these."""
+        found = []
+        for x, partial in zip(value.arguments, self.graph.partials(value), strict=True):
+            if x.moves:
+                found.append((x, unsigned(partial), "-" * (partial.op == "negative")))
+        return found
+
+    def _read(self, value: Value) -> list[Value]:
+        """Of what its sum is made."""
+        a, b = (*value.arguments, value, value)[:2]
+        if value.op in DERIVATIVES:
+            return [v for x, partial, _ in self._pairs(value) for v in (x, partial)]
+        if value.op == "*" and a.moves and b.moves:
+            return [a, b]
+        return [b, value] if value.op == "/" and b.moves else []
+
+    def _sum(self, term: str) -> str:
+        """Name of the sum over i = 1 .. k - 1."""
+        self.sums.append(term)
+        return f"s{len(self.sums) - 1}"
+
+    def _at(self, value: Value) -> str:
+        """Coefficient k, in a sum or choice."""
+        return self._coefficients[value] if value.moves else "0.0"
+
+    def _start(self, value: Value) -> str:
+        """Coefficient 0 of what has a row or does not move."""
+        return f"row[{self.rows[value]}][0]" if value.moves else self.still.of(value)
+
+    def _coefficient(self, value: Value) -> str:
+        """C expression of coefficient k > 0; writes it to its row."""
+        leaf = self.later.leaves.get((value.op, value.name), "")
+        if value.op == "state":
+            return leaf
         if value.op == "input":
-            index = self.inputs.index(value.name)
-            wide = f"{k} < SERIES_INPUT_LENGTH ? origin->inputs[{index}][{k}] : 0.0"
-            return f"origin->inputs[{index}][0]" if k == "0" else wide
-        if value.op == "time":
-            return "origin->t" if k == "0" else f"{k} == 1 ? origin->time_scale : 0.0"
-        return ""
+            found = f"k < SERIES_INPUT_LENGTH ? {leaf} : 0.0"
+        elif value.op == "time":
+            found = "k == 1 ? origin->time_scale : 0.0"
+        elif value.op in DERIVATIVES:
+            found = self._of_function(value)
+        else:
+            found = self._of_operation(value)
+        if value not in self.rows:
+            return self.later.constant(found)
+        target = f"row[{self.rows[value]}][k]"
+        self.later.lines.append(f"{target} = {found};")
+        return target
 
-    def _orders(self) -> tuple[list[str], list[str], list[str]]:
-        """Statements for an order k > 0: sums, terms of their loop, coefficients."""
-        sums, add, orders = [], [], []
-        at: References = {}
-        for count, value in enumerate(self.values):
-            if value.op == "state":
-                at[value] = f"row[{self.rows[value]}][k]"
-                continue
-            if value.op in LEAVES:
-                formula = self._leaf_coefficient(value, "k")
-            elif value.op in LINEAR or self._is_scaled(value):
-                formula = self._linear(value, at)
-            else:
-                terms = self._terms(value)
-                if terms:
-                    sums.append(f"double s{count} = 0.0;")
-                    add.append(f"s{count} += {' + '.join(terms)};")
-                formula = self._nonlinear(value, at, f"s{count}" if terms else "0.0")
-            if value in self.rows:
-                at[value] = f"row[{self.rows[value]}][k]"
-                orders.append(f"{at[value]} = {formula};")
-            else:
-                at[value] = f"c{count}"
-                orders.append(f"const double c{count} = {formula};")
-        return sums, add, orders
+    def _of_function(self, value: Value) -> str:
+        pairs, terms, ends = self._pairs(value), "", ""
+        for x, g, sign in pairs:
+            relative = "+" if sign == pairs[0][2] else "-"
+            if g.moves:
+                terms += f" {relative} i * row[{self.rows[x]}][i] * row[{self.rows[g]}][k - i]"
+            ends += f" {relative} k * {self._at(x)} * {self._start(g)}"
+        total = self._sum(terms.removeprefix(" + ")) if terms else ""
+        return f"{pairs[0][2]}({(total + ends).removeprefix(' + ')}) / k"
 
-    def _linear(self, value: Value, at: References) -> str:
-        """Coefficient k of a sum, a choice or a multiple."""
-        if value.op in ("*", "/"):
-            return operation(value, self.scalars | at)
-        given = [at.get(argument, "0.0") for argument in value.arguments]
-        if value.op == "negative":
-            return f"-{given[0]}"
-        if value.op == "if":
-            return f"{self.scalars[value.arguments[0]]} ? {given[1]} : {given[2]}"
-        a, b = value.arguments
-        if not b.moves:
-            return given[0]
-        if not a.moves:
-            return given[1] if value.op == "+" else f"-{given[1]}"
-        return f"{given[0]} {value.op} {given[1]}"
-
-    def _pairs(self, value: Value) -> list[tuple[Value, Value]]:
-        """Arguments of a function that move, with its derivatives by them."""
-        pairs = zip(value.arguments, self.graph.partials(value), strict=True)
-        return [pair for pair in pairs if pair[0].moves]
-
-    def _terms(self, value: Value) -> list[str]:
-        """Term i of the sum over lower orders."""
+    def _of_operation(self, value: Value) -> str:
+        a, b = value.arguments[0], value.arguments[-1]
         rows = self.rows
-        if value.op in ("*", "/"):
-            a, b = value.arguments
-            other = value if value.op == "/" else a
-            return [f"row[{rows[b]}][i] * row[{rows[other]}][k - i]"]
-        return [
-            f"i * row[{rows[x]}][i] * row[{rows[partial]}][k - i]"
-            for x, partial in self._pairs(value)
-            if partial.moves
-        ]
-
-    def _nonlinear(self, value: Value, at: References, total: str) -> str:
-        """Coefficient k with the sum of the terms 1 to k - 1."""
-        if value.op == "*":
-            a, b = value.arguments
-            first, last = (self._first(argument) for argument in (a, b))
-            return f"{total} + ({first} * {at[b]} + {at[a]} * {last})"
-        if value.op == "/":
-            a, b = value.arguments
-            divided = at.get(a, "0.0")
-            own = f"row[{self.rows[value]}][0]"
-            return f"({divided} - {total} - {at[b]} * {own}) / {self._first(b)}"
-        ends = " + ".join(
-            f"k * {at[x]} * {self._first(partial)}" for x, partial in self._pairs(value)
-        )
-        return f"({total} + {ends}) / k"
-
-    def _first(self, value: Value) -> str:
-        """Coefficient 0."""
-        if value.moves:
-            return f"row[{self.rows[value]}][0]"
-        return number(value.number) if value.op == "number" else self.scalars[value]
-
-
-def _indented(lines: list[str], levels: int = 1) -> list[str]:
-    return ["    " * levels + line for line in lines]
+        match value.op:
+            case "if":
+                chosen = map(self._at, value.arguments[1:])
+                return formula("if", self.still.of(a), *chosen)
+            case "+" | "-" if not b.moves:
+                return self._at(a)
+            case "+" | "-" if not a.moves:
+                return f"{value.op} {self._at(b)}".removeprefix("+ ")
+            case "*" if a.moves and b.moves:
+                total = self._sum(f"row[{rows[b]}][i] * row[{rows[a]}][k - i]")
+                ends = f"{self._start(a)} * {self._at(b)} + {self._at(a)} * {self._start(b)}"
+                return f"{total} + ({ends})"
+            case "/" if b.moves:
+                total = self._sum(f"row[{rows[b]}][i] * row[{rows[value]}][k - i]")
+                rest = f"{self._at(a)} - {total} - {self._at(b)} * {self._start(value)}"
+                return f"({rest}) / {self._start(b)}"
+        given = [self._at(x) if x.moves else self.still.of(x) for x in value.arguments]
+        return formula(value.op, *given)

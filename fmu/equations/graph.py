@@ -8,15 +8,37 @@ have become others.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from rparm.expressions.parser import parse
 from rparm.expressions.tree import RELATIONS, Node, in_order
 
-LEAVES = ("parameter", "input", "state", "time", "mode")
+# along a curve, "first" and "second" are the derivatives of the other leaves
+LEAVES = ("parameter", "input", "state", "time", "mode", "first", "second")
 MOVING = ("input", "state", "time")
-LINEAR = ("+", "-", "negative", "if")
+CONDITIONS = ("mode", "and", "or", "not", *RELATIONS)
 PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
+# derivatives of y = f(x) or f(x, z) by each argument
+DERIVATIVES = {
+    function: [parse(rule) for rule in rules]
+    for function, *rules in (
+        ("sin", "cos(x)"),
+        ("cos", "-sin(x)"),
+        ("tan", "1 + y * y"),
+        ("asin", "1 / sqrt(1 - x * x)"),
+        ("acos", "-1 / sqrt(1 - x * x)"),
+        ("atan", "1 / (1 + x * x)"),
+        ("atan2", "z / (x * x + z * z)", "-(x / (x * x + z * z))"),
+        ("sinh", "cosh(x)"),
+        ("cosh", "sinh(x)"),
+        ("tanh", "1 - y * y"),
+        ("exp", "y"),
+        ("log", "1 / x"),
+        ("sqrt", "0.5 / y"),
+        ("pow", "z * (y / x)", "y * log(x)"),
+    )
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -43,6 +65,22 @@ class Relation:
     includes_zero: bool
     limit: Value | None  # the side that does not move
     time: Value | None  # where the time is compared with what does not move: that
+    mode: Value | None = field(default=None, compare=False)  # whether it holds
+
+    @property
+    def name(self) -> str:
+        """The name of its mode."""
+        return self.mode.name
+
+    @property
+    def is_of_inputs(self) -> bool:
+        """It follows from inputs and parameters only."""
+        return not {op for op, _ in self.distance.leaves} & {"state", "time", "mode"}
+
+    @property
+    def rises(self) -> bool:
+        """It is timed and holds after its time."""
+        return self.time is not None and self.distance.arguments[0].op == "time"
 
 
 @dataclass
@@ -121,10 +159,12 @@ class Graph:
             limit=still[0] if still else None,
             time=still[0] if still and other.op == "time" else None,
         )
-        same = [name for name, known in self.relations.items() if known == relation]
-        name = same[0] if same else f"{len(self.relations) + 1}"
-        self.relations.setdefault(name, relation)
-        return self.value("mode", name=name)
+        for known in self.relations.values():
+            if known == relation:
+                return known.mode
+        mode = self.value("mode", name=f"{len(self.relations) + 1}")
+        self.relations[mode.name] = replace(relation, mode=mode)
+        return mode
 
     def _power(self, base: Value, exponent: Value) -> Value:
         whole = exponent.op == "number" and exponent.number in range(1, PRODUCTS_UP_TO + 1)
@@ -135,106 +175,66 @@ class Graph:
             result = self.value("*", result, base)
         return result
 
-    # ---- What derivatives consist of: with 0 and 1 they are simpler ----------------------------
+    # ---- Derivatives -------------------------------------------------------------------------
 
-    def plus(self, a: Value, b: Value) -> Value:
-        """a + b."""
-        if is_number(a, 0.0):
-            return b
-        return a if is_number(b, 0.0) else self.value("+", a, b)
-
-    def minus(self, a: Value, b: Value) -> Value:
-        """a - b."""
-        if is_number(a, 0.0):
-            return self.negative(b)
-        return a if is_number(b, 0.0) else self.value("-", a, b)
+    def simple(self, op: str, a: Value, b: Value) -> Value:
+        """The operation in a derivative, where 0 and 1 are frequent."""
+        match op:
+            case "+" | "-" if is_number(b, 0.0):
+                return a
+            case "+" if is_number(a, 0.0):
+                return b
+            case "-" if is_number(a, 0.0):
+                return self.negative(b)
+            case "*" | "/" if is_number(a, 0.0) or is_number(b, 1.0):
+                return a
+            case "*" if is_number(b, 0.0) or is_number(a, 1.0):
+                return b
+        return self.value(op, a, b)
 
     def negative(self, a: Value) -> Value:
         """-a."""
         return a if is_number(a, 0.0) else self.value("negative", a)
 
-    def times(self, a: Value, b: Value) -> Value:
-        """A product a b."""
-        if is_number(a, 0.0) or is_number(b, 1.0):
-            return a
-        return b if is_number(b, 0.0) or is_number(a, 1.0) else self.value("*", a, b)
-
-    def quotient(self, a: Value, b: Value) -> Value:
-        """a / b."""
-        return a if is_number(a, 0.0) or is_number(b, 1.0) else self.value("/", a, b)
-
-    # ---- Derivatives ---------------------------------------------------------------------------
-
     def partials(self, y: Value) -> list[Value]:
-        """Derivatives of a function or power by each of its arguments."""
-        one, x = self.number(1.0), y.arguments[0]
-        if y.op == "pow":
-            return self._partials_of_power(y)
-        if y.op == "atan2":
-            a, b = y.arguments
-            square = self.value("+", self.value("*", a, a), self.value("*", b, b))
-            return [self.value("/", b, square), self.value("negative", self.value("/", a, square))]
-        rules: dict[str, Callable[[], Value]] = {
-            "sin": lambda: self.value("cos", x),
-            "cos": lambda: self.value("negative", self.value("sin", x)),
-            "tan": lambda: self.value("+", one, self.value("*", y, y)),
-            "asin": lambda: self.quotient(one, self._root_of_rest(x)),
-            "acos": lambda: self.quotient(self.number(-1.0), self._root_of_rest(x)),
-            "atan": lambda: self.quotient(one, self.value("+", one, self.value("*", x, x))),
-            "sinh": lambda: self.value("cosh", x),
-            "cosh": lambda: self.value("sinh", x),
-            "tanh": lambda: self.value("-", one, self.value("*", y, y)),
-            "exp": lambda: y,
-            "log": lambda: self.quotient(one, x),
-            "sqrt": lambda: self.quotient(self.number(0.5), y),
-        }
-        return [rules[y.op]()]
+        """Derivatives of a function by each of its arguments."""
+        x, z = y.arguments[0], y.arguments[-1]
+        if y.op == "pow" and z.op == "number":  # of whole exponents it is defined at x = 0, too
+            is_whole = z.number in range(WHOLE_UP_TO + 1)
+            lower = self._power(x, self.number(z.number - 1.0)) if is_whole else None
+            by_base = self.simple("*", z, lower or self.value("/", y, x))
+            return [by_base, self.number(0.0)]
+        names = {"x": x, "y": y, "z": z}
+        return [self.of_tree(rule, names) for rule in DERIVATIVES[y.op]]
 
-    def _root_of_rest(self, x: Value) -> Value:
-        one = self.number(1.0)
-        return self.value("sqrt", self.value("-", one, self.value("*", x, x)))
-
-    def _partials_of_power(self, y: Value) -> list[Value]:
-        """c x^(c-1) and y log x. Of whole exponents the first is defined at x = 0, too."""
-        x, c = y.arguments
-        if c.op == "number" and c.number in range(WHOLE_UP_TO + 1):
-            lower = self._power(x, self.number(c.number - 1.0)) if c.number else x
-            by_base = self.times(c, lower)
-        else:
-            by_base = self.times(c, self.value("/", y, x))
-        zero = self.number(0.0)
-        return [by_base, zero if c.op == "number" else self.value("*", y, self.value("log", x))]
-
-    def derivative(self, root: Value, seeds: Mapping[Value, Value]) -> Value:
-        """Derivative where each leaf has its derivative in `seeds`, or 0 if it is not there."""
-        zero = self.number(0.0)
+    def derivatives(self, roots: Iterable[Value], seeds: Mapping[Value, Value]) -> list[Value]:
+        """Derivatives where each leaf has its own in `seeds`, or 0 if it is not there."""
+        roots, zero = list(roots), self.number(0.0)
         moving = {(leaf.op, leaf.name) for leaf in seeds}
         found: dict[Value, Value] = {}
-        for y in ordered([root]):
-            if not y.leaves & moving:
+        for y in in_order(roots):
+            if not y.leaves & moving or y.op in CONDITIONS:
                 found[y] = zero
             elif y in seeds:
                 found[y] = seeds[y]
             else:
                 found[y] = self._chain(y, [found[argument] for argument in y.arguments])
-        return found[root]
+        return [found[root] for root in roots]
 
     def _chain(self, y: Value, d: list[Value]) -> Value:
         if y.op in ("+", "-"):
-            return (self.plus if y.op == "+" else self.minus)(*d)
+            return self.simple(y.op, *d)
         if y.op == "negative":
             return self.negative(d[0])
         if y.op == "if":
             return d[1] if d[1] is d[2] else self.value("if", y.arguments[0], *d[1:])
-        if y.op == "*":
-            a, b = y.arguments
-            return self.plus(self.times(d[0], b), self.times(a, d[1]))
         if y.op == "/":
-            b = y.arguments[1]
-            return self.quotient(self.minus(d[0], self.times(y, d[1])), b)
+            rest = self.simple("-", d[0], self.simple("*", y, d[1]))
+            return self.simple("/", rest, y.arguments[1])
+        partials = y.arguments[::-1] if y.op == "*" else self.partials(y)
         total = self.number(0.0)
-        for partial, of_argument in zip(self.partials(y), d, strict=True):
-            total = self.plus(total, self.times(partial, of_argument))
+        for partial, of_argument in zip(partials, d, strict=True):
+            total = self.simple("+", total, self.simple("*", partial, of_argument))
         return total
 
 
@@ -243,39 +243,21 @@ def is_number(value: Value, number: float) -> bool:
     return value.op == "number" and value.number == number
 
 
-def is_function(value: Value) -> bool:
-    """Whether the chain rule with `Graph.partials` holds: no arithmetic, leaf or condition."""
-    arithmetic = ("number", "*", "/", "and", "or", "not", *LINEAR, *LEAVES, *RELATIONS)
-    return value.op not in arithmetic
+def unsigned(value: Value) -> Value:
+    """The value, without the minus in front."""
+    return value.arguments[0] if value.op == "negative" else value
 
 
-def ordered(roots: Iterable[Value]) -> list[Value]:
-    """All values that the roots follow from and the roots, arguments first."""
-    done: dict[Value, None] = {}
-    todo = list(roots)[::-1]
-    while todo:
-        left = [argument for argument in todo[-1].arguments if argument not in done]
-        if left:
-            todo += left[::-1]
-        else:
-            done.setdefault(todo.pop())
-    return list(done)
-
-
-def with_partials(
-    graph: Graph, roots: Iterable[Value], changes: Callable[[Value], object]
-) -> list[Value]:
-    """All values that the roots and their derivatives of any order along a curve follow from.
-
-    changes: whether a value changes along the curve.
-    """
+def with_partials(graph: Graph, roots: Iterable[Value]) -> list[Value]:
+    """All values that the roots and their derivatives of any order by the time follow from."""
     done: dict[Value, None] = {}
     todo = list(roots)
     while todo:
-        new = [value for value in ordered(todo) if value not in done]
+        new = in_order(todo, done)
         done |= dict.fromkeys(new)
         todo = [
-            partial for value in new if is_function(value) and changes(value)
-            for partial in graph.partials(value)
+            unsigned(partial)
+            for value in new if value.moves and value.op in DERIVATIVES
+            for x, partial in zip(value.arguments, graph.partials(value), strict=True) if x.moves
         ]  # fmt: skip
     return list(done)

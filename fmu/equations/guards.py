@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from equations.graph import Graph, Value, ordered
+from equations.graph import Graph, Value
+from rparm.expressions.tree import in_order
 
 
 def guards(graph: Graph, roots: Iterable[Value]) -> dict[Value, Value | None]:
     """Condition under which each switch is read, of those that are; None: always."""
     roots = list(roots)
     found: dict[Value, Value | None] = dict.fromkeys(roots)
-    for value in reversed(ordered(roots)):
+    for value in reversed(in_order(roots)):
         own = found[value]
         if value.op == "if":
             condition, chosen, otherwise = value.arguments

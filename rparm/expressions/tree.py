@@ -1,7 +1,8 @@
 """What an expression consists of, in the order of operations of its text."""
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 # functions, with the number of their arguments; None: two or more
 FUNCTIONS: dict[str, int | None] = dict.fromkeys(
@@ -14,6 +15,9 @@ CONSTANTS = ("pi",)
 # what cannot be a name: operators, and words that other languages execute or give a value
 WORDS = ("and", "or", "not", "if", "else")
 NO_NAMES = (*WORDS, "True", "False", "None", "lambda")
+
+
+Item = TypeVar("Item", bound=Any)  # hashable, with `arguments` of its own kind
 
 
 class ExpressionError(ValueError):
@@ -39,12 +43,12 @@ class Node:
     name: str = ""
 
 
-def in_order(roots: Iterable[Node]) -> list[Node]:
-    """All nodes below and with `roots`, each once, arguments first, as the text has them."""
-    done: dict[Node, None] = {}
-    todo = list(roots)[::-1]
+def in_order(roots: Iterable[Item], known: Container[Item] = ()) -> list[Item]:
+    """All below and with `roots` that are not `known`, each once, arguments first."""
+    done: dict[Item, None] = {}
+    todo = [root for root in roots if root not in known][::-1]
     while todo:
-        left = [argument for argument in todo[-1].arguments if argument not in done]
+        left = [a for a in todo[-1].arguments if a not in done and a not in known]
         if left:
             todo += left[::-1]
         else:

@@ -62,10 +62,11 @@ for _symbol, _product in DERIVED.items():
     SYMBOLS[_symbol] = exponents(_product)
 
 
-def shown(unit: Unit) -> str:
-    """A unit as a message names it: kg.m/s2."""
-    above = [f"{b}{e if e != 1 else ''}" for b, e in zip(BASE, unit, strict=True) if e > 0]
-    below = [f"{b}{-e if e != -1 else ''}" for b, e in zip(BASE, unit, strict=True) if e < 0]
+def shown(unit: Unit | Mapping[str, int]) -> str:
+    """A unit, or exponents, as a message names it: kg.m/s2."""
+    exponents = unit if isinstance(unit, Mapping) else dict(zip(BASE, unit, strict=True))
+    above = [f"{b}{e if e != 1 else ''}" for b, e in exponents.items() if e > 0]
+    below = [f"{b}{-e if e != -1 else ''}" for b, e in exponents.items() if e < 0]
     text = ".".join(above) or "1"
     if not below:
         return text

@@ -63,6 +63,7 @@ static enum status update(struct instance *instance, const bool *triggered) {
         .is_timed = is_timed(instance, triggered),
         .du = instance->du,
         .tolerance = instance->tolerances,
+        .max_events = instance->state.own.max_events,
         .reason = reason,
         .reason_size = sizeof reason,
     };
