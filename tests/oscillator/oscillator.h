@@ -1,5 +1,4 @@
-/* A mass on a spring, x'' = -omega^2 x + gain u: the smallest model. Copy this file, oscillator.c
- * and variables.toml to begin one. */
+/* A mass on a spring, x'' = -omega^2 x + gain u: the smallest model, without the generator. */
 #ifndef OSCILLATOR_H
 #define OSCILLATOR_H
 

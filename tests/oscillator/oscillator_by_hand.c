@@ -1,6 +1,5 @@
 /* The oscillator's table of variables, written by hand, and its solution: for the tests of src/,
- * which must not depend on the generator. No model has such a file; its table is made from
- * variables.toml. */
+ * which must not depend on the generator. */
 #include "oscillator_by_hand.h"
 
 #include <math.h>
