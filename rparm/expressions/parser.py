@@ -59,7 +59,8 @@ def _tokens(text: str) -> list[Token]:
         found = TOKEN.match(text, at)
         if found is None:
             piece = text[at : at + SHOWN].split()[0]
-            raise ExpressionError(at + 1, f"{piece!r} is no number, name or operator")
+            hint = ": powers are written **" if piece.startswith("^") else ""
+            raise ExpressionError(at + 1, f"{piece!r} is no number, name or operator{hint}")
         kind = "operator" if found[0] in WORDS else str(found.lastgroup)
         tokens.append(Token(kind, found[0], at + 1))
         at = SPACE.match(text, found.end()).end()

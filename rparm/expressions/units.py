@@ -51,7 +51,9 @@ def exponents(text: str) -> dict[str, int]:
         for factor in part.split(".") if part and part != "1" else ():
             symbol = FACTOR.fullmatch(factor)
             if symbol is None or symbol[1] not in SYMBOLS:
-                raise ValueError(f"unit {text!r}: {factor!r} is no SI symbol with an exponent")
+                raise ValueError(
+                    f"unit {text!r}: {factor!r} is no SI symbol with an exponent, such as s2"
+                )
             power = sign * int(symbol[2] or 1)
             for base, exponent in SYMBOLS[symbol[1]].items():
                 found[base] = found.get(base, 0) + power * exponent

@@ -52,6 +52,8 @@ MISTAKES = {
         HEAD + '[states]\nx = { derivative = "2 x" }',
         "[states]: x: derivative: column 3: expected",
     ),
+    "power": (STATE + '[where]\na = "x^2"', "column 2: '^2' is no number, name or operator: p"),
+    "exponent": (STATE + '[inputs]\na = { unit = "m/s^2" }', "'s^2' is no SI symbol with an"),
     "condition": (STATE + '[where]\na = "x < 1"', "a: value: column 3: expected a number"),
     "loop": (
         STATE + '[where]\na = "b + x"\nb = "c"\nc = "2 * a"', "algebraic loop 'a -> b -> c -> a'",
