@@ -40,8 +40,8 @@ def test_the_workflow_calls_what_there_is() -> None:
     scripts = set(re.findall(r"\./(\w+\.sh)", text))
     assert scripts == {"test.sh", "release.sh"}
     assert all((ROOT / script).is_file() for script in scripts)
-    commands = set(re.findall(r"-m rparm (\w+)", text))
-    assert commands == {"list", "run"} and commands <= set(COMMANDS)
+    commands = set(re.findall(r"-m rparm ([\w-]+)", text))
+    assert commands == {"build", "list", "new-model", "run"} and commands <= set(COMMANDS)
 
 
 def test_the_workflow_may_only_read() -> None:
