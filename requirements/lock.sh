@@ -31,7 +31,8 @@ for name in run campaign federation control release dev; do
   above=() others=()
   if [ "$name" != run ]; then
     above=("-r run.txt")
-    mapfile -t others < <(sed -n 's/^\([a-z0-9-]*\)==.*/--no-emit-package=\1/p' requirements/run.txt)
+    # not those that run.txt has for some systems only: the others may need them everywhere
+    mapfile -t others < <(sed -n 's/^\([a-z0-9-]*\)==[^;]*$/--no-emit-package=\1/p' requirements/run.txt)
   fi
   rm -f "$work/solution.txt"
   solve "$work/solution.txt" --constraints "$work/all.txt" "${others[@]}" "requirements/$name.in"

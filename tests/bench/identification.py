@@ -3,8 +3,8 @@
     build/venv/bin/python -m tests.bench.identification
 
 The arm with damping, 10 s at 1 kHz; all starts are 20 % off. mujoco.sysid runs each log in one go
-from its first row, as its examples do, with its own optimizer and its classical intervals. It needs
-what `pip install "mujoco[sysid]"` installs.
+from its first row, as its examples do, with its own optimizer and its classical intervals. What
+it imports is in requirements/dev.in.
 """
 
 import time
