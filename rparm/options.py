@@ -1,11 +1,12 @@
 """Options that several commands have, and the values that they take."""
 
 import argparse
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from rparm import project
-from rparm.errors import WrongValueError
+from rparm.errors import UserError, WrongValueError
 from rparm.project import VERSIONS
 from rparm.units import SECONDS, typed_quantity
 
@@ -95,6 +96,19 @@ def count(text: str) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= 10_000:
         raise argparse.ArgumentTypeError(f"expected a number from 1 to 10000, got {text!r}")
     return int(text)
+
+
+def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
+    """Names and texts of values "NAME=VALUE"; UserError if one has another form or comes twice."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise UserError(f"{option}: expected NAME=VALUE, got {text!r}")
+        if name in found:
+            raise UserError(f"{option}: {name} is given twice")
+        found[name] = value
+    return found
 
 
 def relative_tolerance(text: str) -> float:

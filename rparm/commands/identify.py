@@ -10,7 +10,7 @@ from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, placed
 from rparm.input_files import number_in
-from rparm.options import add_report
+from rparm.options import add_report, pairs
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
@@ -25,6 +25,8 @@ DESCRIPTION = (
 )
 PART = "identify"
 SEGMENT = "0.4"  # s
+SEVERAL = "parameters", "inputs", "measured", "set", "start", "columns", "units"
+GIVEN = *SEVERAL, "delay", "validate"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -92,8 +94,7 @@ def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, floa
     from rparm.identification.request import Request
 
     if options.demo:
-        if options.fmu or options.parameters or options.measured:
-            raise UserError("--demo: has a log, an FMU and parameters of its own")
+        _refuse_others(options)
         console.stage("making a log")
         folder = options.report
         with written(folder):
@@ -112,13 +113,22 @@ def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, floa
         measured=_names(options.measured),
         settings=_values("--set", options.set),
         starts=_values("--start", options.start),
-        columns=_pairs("--columns", options.columns),
-        units=_pairs("--units", options.units),
+        columns=pairs("--columns", options.columns),
+        units=pairs("--units", options.units),
         with_delay=options.delay,
         validation=options.validate,
         segment=segment,
     )
     return _fmu(options.fmu), request, {}
+
+
+def _refuse_others(options: argparse.Namespace) -> None:
+    """Refuse what the demo would ignore: it brings its own FMU, log and settings."""
+    others = [f"--{name}" for name in GIVEN if getattr(options, name)]
+    others += ["an FMU"] if options.fmu else []
+    others += ["--segment"] if options.segment != SEGMENT else []
+    if others:
+        raise UserError(f"--demo: brings its own FMU, log and settings, got {', '.join(others)}")
 
 
 def _fmu(given: str) -> Path:
@@ -134,7 +144,7 @@ def _again(options: argparse.Namespace) -> str:
     parts = [project.PROGRAM, "identify"]
     files = [options.fmu, *options.logs] if options.fmu else []
     parts += [str(project.from_root(Path(file))) for file in files]
-    for name in ("parameters", "inputs", "measured", "set", "start", "columns", "units"):
+    for name in SEVERAL:
         given = getattr(options, name)
         parts += [f"--{name}", *given] if given else []
     if options.validate is not None:
@@ -149,20 +159,8 @@ def _names(given: Sequence[str]) -> list[str]:
     return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
-def _pairs(option: str, given: Sequence[str]) -> dict[str, str]:
-    found: dict[str, str] = {}
-    for text in given:
-        name, equals, value = text.partition("=")
-        if not (name and equals and value):
-            raise UserError(f"{option}: expected NAME=VALUE, got {text!r}")
-        if name in found:
-            raise UserError(f"{option}: {name!r} is there twice")
-        found[name] = value
-    return found
-
-
 def _values(option: str, given: Sequence[str]) -> dict[str, Any]:
-    return {name: _value(text) for name, text in _pairs(option, given).items()}
+    return {name: _value(text) for name, text in pairs(option, given).items()}
 
 
 def _value(text: str) -> float | bool | str:

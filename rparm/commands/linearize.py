@@ -7,7 +7,7 @@ from pathlib import Path
 from rparm import project
 from rparm.commands import Ended
 from rparm.errors import WrongValueError
-from rparm.options import add_fmi, add_report
+from rparm.options import add_fmi, add_report, pairs
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
@@ -50,7 +50,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Ended:
     """Linearize, print the tables, write page and files."""
-    from rparm.linearization import explained, page, point, saving
+    from rparm.linearization import explained, page, saving
     from rparm.linearization.study import Request, study
 
     for path in options.save:
@@ -58,10 +58,12 @@ def run(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     console.stage(f"linearizing {options.what}")
     request = Request(
-        options.what, point.parsed(options.at), options.time, options.trim or (), options.inputs,
+        options.what, pairs("--at", options.at), options.time, options.trim or (), options.inputs,
         options.outputs, options.variant, options.cut, options.without or (), options.fmi,
     )  # fmt: skip
     found = study(request)
+    if options.step is not None:
+        found.linear.sampled(options.step)  # a step that is too long is refused before the tables
     tables = [(explained.poles(found), explained.POLES)]
     if found.linear.intervals:
         tables.insert(0, (explained.intervals(found), explained.INTERVALS))

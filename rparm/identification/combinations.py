@@ -20,7 +20,7 @@ TAKES_PART = 1e-4  # weight of a column in a combination of columns of length 1
 
 @dataclass(frozen=True, eq=False)
 class Combination:
-    """Parameters that cannot be told apart, or one without effect."""
+    """Parameters of which the log shows the joint effect only, or one without effect."""
 
     names: tuple[str, ...]
     effects: np.ndarray | None  # (names,) of each a unit, relative: their sum is known; or None
@@ -72,7 +72,7 @@ class Effects:
     def basis(self) -> np.ndarray:
         """Indices of as many parameters as can be known if the others are."""
         found: list[int] = []
-        # the strongest first, so that each is told apart as well as can be
+        # the strongest first: those with clear effects are chosen before weak ones
         for i in sorted(np.flatnonzero(self.there), key=lambda i: -self.lengths[i]):
             if not self.depend([*found, int(i)]):
                 found.append(int(i))

@@ -38,7 +38,7 @@ class Recording:
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """Consecutive rows of a recording, simulated from a start state of their own."""
+    """Consecutive rows of a recording, simulated from their own start state."""
 
     times: np.ndarray  # (rows,)
     inputs: np.ndarray  # (rows, Real inputs)
@@ -80,7 +80,7 @@ def read(
         if np.ptp(values) == 0:
             column = outputs[name].name
             raise UserError(
-                f"{path}: column {column!r} is constant, {values[0]:g}: it tells nothing"
+                f"{path}: column {column!r} is constant ({values[0]:g}), nothing follows from it"
             )
     for name, values in zip(switches, on.T, strict=True):
         if not np.isin(values, (0, 1)).all():

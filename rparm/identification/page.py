@@ -29,7 +29,7 @@ def write(
     logs = ", ".join(recording.path.name for recording in found.recordings)
     page = RunPage(
         title=f"{found.model}: identified parameters",
-        description=f"Fitted to {logs}: multiple shooting, a start state of its own each segment.",
+        description=f"Fitted to {logs}: multiple shooting, with a start state for each segment.",
         status=RAN if found.has_converged else FAILED,
         facts=[
             ("model", found.model),

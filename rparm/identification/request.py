@@ -99,6 +99,7 @@ def _check_names(request: Request) -> None:
         ([name.partition(ABOVE)[0] for name in request.parameters], "parameters"),
         (request.inputs, "inputs"),
         (request.measured, "measured"),
+        ([str(Path(log).absolute()) for log in request.logs], "logs"),
     ):
         twice = [name for i, name in enumerate(given) if name in given[:i]]
         if twice:
@@ -107,10 +108,20 @@ def _check_names(request: Request) -> None:
         raise UserError("expected at least one of parameters and one of measured")
     if not 0 < request.segment < float("inf"):
         raise UserError(f"segment: expected a length above 0 s, got {request.segment!r}")
+    for text in request.parameters:
+        name, sign, above = text.partition(ABOVE)
+        if sign and above in ("", name):
+            raise UserError(f"parameters: {text!r}: expected another parameter after {ABOVE}")
+    for name in request.starts:
+        if name in request.measured:
+            raise UserError(f"start: {name!r} is measured: the log says where it starts")
     used = [*request.inputs, *request.measured]
-    for name in (*request.columns, *request.units):
-        if name not in (*used, "time"):
-            raise UserError(f"columns: {name!r} is not used{hint(name, used)}")
+    if "time" in request.units:
+        raise UserError("units: the times of a log are in s")
+    for option, given in (("columns", request.columns), ("units", request.units)):
+        for name in given:
+            if name not in (*used, "time"):
+                raise UserError(f"{option}: {name!r} is not used{hint(name, used)}")
 
 
 def _settings(request: Request, model: Model) -> dict[str, Value]:

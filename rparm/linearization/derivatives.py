@@ -120,8 +120,8 @@ def next_event(instance: Instance) -> float | None:
 
 
 SAMPLED = (
-    "is sampled, and its outputs do not follow inputs between two samples: it has no linear model "
-    "in continuous time"
+    "is sampled, which no linear model in continuous time can be: set its sample time to 0 if it "
+    "has one"
 )
 
 

@@ -67,8 +67,16 @@ class Linear:
 
     def zoh(self, step: float) -> "StateSpace":
         """The model from one sample to the next, `step` s apart, for inputs held in between."""
-        transition, forced, _ = hold(self.A, self.B, step)
+        transition, forced = self.sampled(step)
         return _state_space(transition, forced, self.C, self.D, step, **self._labels)
+
+    def sampled(self, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """A and B of `zoh`; UserError if deviations grow beyond what a double holds."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            transition, forced, _ = hold(self.A, self.B, step)
+        if not (np.isfinite(transition).all() and np.isfinite(forced).all()):
+            raise UserError(f"step: deviations overflow in {step:g} s, expected a shorter one")
+        return transition, forced
 
     @property
     def _labels(self) -> dict[str, list[str]]:
@@ -144,7 +152,9 @@ def _state_space(*arguments: object, **names: object) -> "StateSpace":
 
 
 def _places(known: Sequence[str], wanted: Sequence[str] | None, option: str) -> list[int]:
-    for name in wanted or ():
+    for i, name in enumerate(wanted or ()):
         if name not in known:
             raise UserError(f"{option}: no {option[:-1]} {name!r} to linearize{hint(name, known)}")
+        if name in wanted[:i]:
+            raise UserError(f"{option}: {name} is given twice")
     return [known.index(name) for name in (known if wanted is None else wanted)]

@@ -1,6 +1,6 @@
-"""The point of a linear model, as users give it: "name=value" with units, or numbers."""
+"""The point of a linear model, as users give it: texts with units, or numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,19 +22,6 @@ class Subject(Protocol):
     def at(self, values: Mapping[str, Value]) -> Linear:
         """The linear model where parameters, states and inputs have these values."""
         ...
-
-
-def parsed(pairs: Sequence[str], option: str = "--at") -> dict[str, str]:
-    """Names and texts of pairs "name=value"."""
-    found: dict[str, str] = {}
-    for pair in pairs:
-        name, equals, text = pair.partition("=")
-        if not (name and equals and text):
-            raise UserError(f"{option}: expected NAME=VALUE, got {pair!r}")
-        if name in found:
-            raise UserError(f"{option}: {name} is given twice")
-        found[name] = text
-    return found
 
 
 def checked(

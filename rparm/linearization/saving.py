@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rparm.errors import UserError, reason
-from rparm.linearization.linear import Linear, hold
+from rparm.linearization.linear import Linear
 from rparm.linearization.study import Study
 from rparm.output_files import whole
 
@@ -31,7 +31,7 @@ def document(found: Study, step: float | None) -> Document:
         "intervals": {name: list(ends) for name, ends in linear.intervals.items()},
     }
     if step is not None:
-        transition, forced, _ = hold(linear.A, linear.B, step)
+        transition, forced = linear.sampled(step)
         result["zoh"] = {
             "step": step,
             "A": transition.tolist(),

@@ -168,7 +168,7 @@ class SystemSubject:
             bypassed(self.ssp, self.connections, name)
         except UserError:
             return ""
-        return f"; --without {name} takes it as ideal"
+        return f", or take it as ideal by --without {name}"
 
     def _is_real(self, component: str, output: str) -> bool:
         return self.ssp.models[component].variables[output].type == "Real"

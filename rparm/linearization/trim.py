@@ -78,9 +78,11 @@ class _Problem:
         self.free, self.targets = list(free), dict(targets)
         first = subject.at(values)
         known = (*first.states, *first.inputs)
-        for name in free:
+        for i, name in enumerate(free):
             if name not in known:
                 raise UserError(f"--trim: {name} is no state and no input{hint(name, known)}")
+            if name in free[:i]:
+                raise UserError(f"--trim: {name} is given twice")
         self.columns = [known.index(name) for name in free]
         self.rows = [first.outputs.index(name) for name in targets]
         self.equations = [*first.states, *targets]
@@ -109,7 +111,7 @@ class _Problem:
         return left, responses[:, self.columns], np.maximum(size, 1.0)
 
     def _is_given_velocity(self, found: Linear) -> np.ndarray:
-        """Which derivatives are states that are not free: what moves as it is told to."""
+        """Which derivatives are states that are not free: the velocity is prescribed."""
         n = len(found.states)
         one = (np.count_nonzero(found.A, axis=1) == 1) & ~found.B.any(axis=1)
         given = np.ones(n, bool)

@@ -142,6 +142,10 @@ def test_the_demo_finds_its_machine(tmp_path: Path, capsys: pytest.CaptureFixtur
         (["--parameters", "m2", "--segment", "1ms"], "20 rows"),
         (["--parameters", "m2", "--segment", "1m"], "--segment: unknown unit 'm'"),
         (["--parameters", "m2>m9"], "no variable 'm9'"),
+        (["--parameters", "m2>"], "'m2>': expected another parameter after >"),
+        (["--parameters", "m2>m2"], "'m2>m2': expected another parameter after >"),
+        (["--parameters", "m2", "--start", "q1=1"], "'q1' is measured: the log says where"),
+        (["--parameters", "m2", "--units", "time=ms"], "units: the times of a log are in s"),
         (["--parameters", "m2", "--validate", "/nowhere.csv"], "/nowhere.csv: no such file"),
     ],
 )
@@ -209,8 +213,16 @@ def test_short_and_constant_logs_are_refused(identify, log: Path, tmp_path: Path
         assert_one_line(error)
 
 
+def test_a_log_counts_once(identify, log: Path) -> None:
+    # a copy would make the intervals too narrow
+    code, _, error = identify("--parameters", "m2", given=(str(log), *GIVEN))
+    assert code == 2 and "is there twice" in error
+    assert_one_line(error)
+
+
 def test_fmu_and_log_are_needed(capsys: pytest.CaptureFixture[str], log: Path) -> None:
-    for arguments in ((), (FMUS["rp_manipulator"],), ("--demo", FMUS["rp_manipulator"])):
+    demo = ("--demo", FMUS["rp_manipulator"]), ("--demo", "--set", "m2=1")
+    for arguments in ((), (FMUS["rp_manipulator"],), *demo):
         code, _, error = call(capsys, "identify", *arguments)
         assert code == 2
         assert_one_line(error)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rparm.models.closed_loop.experiment import STOP
 
-from rparm import trajectory_csv
+from rparm import project, trajectory_csv
 from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
@@ -146,7 +146,10 @@ def _check(path: Path, loop: ClosedLoop) -> None:
     """Check that a system is the closed loop that the study knows."""
     for component, names in NEEDED.items():
         if component not in loop.fmus:
-            raise UserError(f"{path}: has no component {component!r}, which the study needs")
+            raise UserError(
+                f"{path}: has no component {component!r}, which the study needs; "
+                f"`{project.PROGRAM} linearize` finds largest stable steps of any system"
+            )
         for name in names:
             if name not in loop.fmus[component].model.variables:
                 raise UserError(
