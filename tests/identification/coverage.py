@@ -80,6 +80,8 @@ def main() -> int:
     parser.add_argument("logs", type=int, help="of each case")
     parser.add_argument("cases", nargs="*", default=list(CASES), help="some of the cases")
     options = parser.parse_args()
+    if unknown := set(options.cases) - set(CASES):
+        parser.error(f"no case {unknown.pop()!r} (known: {', '.join(CASES)})")
     print("| case | logs | found | by scatter | classical | s |\n|---|--:|--:|--:|--:|--:|")
     failed = False
     for name in options.cases:
