@@ -20,7 +20,7 @@ from tests.fmu.symbols import libm, listed, standard
 from tests.rp_manipulator.random_motions import random_case, simulate
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.missing import missing
-from tests.support.paths import FOLDERS, NAMES, ROOT
+from tests.support.paths import EVERY, FOLDERS, ROOT
 from tests.support.rparm_project import load
 
 TAYLOR = {"RPManipulator"}  # compared with the Taylor method, too
@@ -51,9 +51,9 @@ def run(*command: object, folder: Path | None = None, **environment: str) -> str
 @pytest.fixture(scope="module")
 def releases(fmu: Path) -> dict[str, Path]:
     """Folders with sources/ and the description of each FMU, made by the build."""
-    targets = [f"{name}_sources" for name in NAMES]
+    targets = [f"{name}_sources" for name in EVERY]
     run("cmake", "--build", fmu.parent, "--target", *targets)
-    return {name: fmu.parent / "fmu" / name / "release" for name in NAMES}
+    return {name: fmu.parent / "fmu" / name / "release" for name in EVERY}
 
 
 def scenarios_of(loaded: LoadedFmu) -> list[str]:
@@ -106,7 +106,7 @@ def assert_same_bits(built: LoadedFmu, rebuilt: LoadedFmu) -> None:
 def built(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, LoadedFmu]:
     """The FMUs of the build."""
     folder = tmp_path_factory.mktemp("built")
-    return {name: LoadedFmu(fmu.with_name(f"{name}.fmu"), folder / name) for name in NAMES}
+    return {name: LoadedFmu(fmu.with_name(f"{name}.fmu"), folder / name) for name in EVERY}
 
 
 def test_fmpy_compiles_an_fmu_without_binaries(
@@ -321,7 +321,7 @@ def test_fast_math_is_refused(releases: dict[str, Path], tmp_path: Path) -> None
 # ---- The description ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EVERY)
 def test_the_description_names_the_files_and_differs_in_nothing_else(
     releases: dict[str, Path], fmu: Path, tmp_path: Path, name: str
 ) -> None:
@@ -341,7 +341,7 @@ def test_the_description_names_the_files_and_differs_in_nothing_else(
     assert found == expected
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EVERY)
 def test_no_file_names_a_path_of_the_machine(
     releases: dict[str, Path], fmu: Path, name: str
 ) -> None:

@@ -136,7 +136,9 @@ def accesses(script: Refusals) -> None:
     number = first(model, kind="Enumeration")
     fixed = first(model, kind="Real", causality="parameter", variability="fixed")
     assert parameter and calculated
-    for reference in (9, 4711, 2_000_000_000):
+    known = {variable.reference for variable in model.variables}
+    gap = next(n for n in range(100) if n not in known)
+    for reference in (gap, 4711, 2_000_000_000):
         script.refuse("SetReal", reference, bits(1.0))
         script.in_initialization("GetReal", reference)
     if number:
@@ -276,7 +278,7 @@ def exchange(script: Refusals) -> None:
     script.at_step("DoStep", bits(0.0), bits(0.1))
     script.at_step("CompletedIntegratorStep")
     script.at_step("GetContinuousStates", model.states + 1)
-    script.at_step("GetEventIndicators", 1)
+    script.at_step("GetEventIndicators", model.indicators + 1)
     for digits in NOT_FINITE:
         script.at_step("SetTime", digits, expect="Discard")
     if model.states:

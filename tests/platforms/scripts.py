@@ -12,7 +12,8 @@ from pathlib import Path
 
 MODEL_EXCHANGE, CO_SIMULATION = 0, 1
 METHODS = (1, 2, 3, 4)  # cvode_adams, cvode_bdf, erk, taylor
-WITH_SERIES = ("RPManipulator", "RPPlant")  # the models that taylor, the last method, can integrate
+# the models that taylor, the last method, can integrate
+WITH_SERIES = ("RPManipulator", "RPPlant", "BouncingBall", "DcMotor")
 STEPS = 200
 
 
@@ -166,6 +167,8 @@ CHANGED: dict[str, dict[str, float | list[int]]] = {
         "noise1": 0.01, "sample_time": 0.003, "resolution1": 1e-4, "latency": [0, 1, 2, 3],
         "seed": [7, -8, 9, 10],
     },
+    "BouncingBall": {"e": 0.8, "h": 0.5, "solver_method": [1, 2, 3, 4]},
+    "DcMotor": {"R": 1.5, "i": 0.5, "solver_method": [1, 2, 3, 4]},
     "RPEnvironment": {"position": 0.5, "tip_x": 0.1, "stiffness": 2000.0},
     # falls onto its stops, rigid or compliant ones, slides and is held
     "RPPlant": {
