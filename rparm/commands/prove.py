@@ -38,6 +38,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
     )
+    parser.add_argument("--all", action="store_true", help="all references, as without a scenario")
     parser.add_argument("--method", metavar="NAME", help="only this method of integration")
     parser.add_argument(
         "--tolerance",
@@ -65,6 +66,8 @@ def run(options: argparse.Namespace) -> Ended:
             if getattr(options, option) is not None:
                 raise UserError(f"--{option}: expected a scenario with it")
         return _references(options)
+    if options.all:
+        raise UserError(f"--all: expected no scenario with it, got {options.name!r}")
     check_writable(options.report)
     own = Path(options.name).suffix.lower() == ".toml"
     path = Path(options.name) if own else project.scenario_file(options.name)

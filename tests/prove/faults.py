@@ -179,16 +179,16 @@ def built(folder: Path, file: str, source: str) -> Path | None:
 
 def noticed(program: Path) -> str | None:
     """How the checkers notice that something is wrong; None: they do not."""
+    for name, problem in SMALL.items():
+        answer, wrong = certified(problem, program)
+        if answer != 0 or wrong:
+            return f"{name}: {wrong or 'no certificate'}"
     try:
         check_operations.check(program)
     except check_operations.WrongAnswer as error:
         return f"operation {str(error)[:60]}"
     except subprocess.TimeoutExpired:
         return "no answer"
-    for name, problem in SMALL.items():
-        answer, wrong = certified(problem, program)
-        if answer != 0 or wrong:
-            return f"{name}: {wrong or 'no certificate'}"
     if not enclosures(SMALL["free"].text, program)[:, :, 2].max() < WIDEST:
         return "free: too wide"
     answer, wrong = certified(TOO_BROAD, program)

@@ -135,6 +135,7 @@ def test_where_the_proof_ends(own: Path, capsys: pytest.CaptureFixture[str]) -> 
         (["coasting", "--within", "1 kg"], "--within: unknown unit 'kg'"),
         (["coasting", "--within=-1"], "--within: expected 0 or more, got -1"),
         (["--method", "taylor"], "--method: expected a scenario with it"),
+        (["--all", "coasting"], "--all: expected no scenario with it, got 'coasting'"),
     ],
 )
 def test_mistakes(arguments: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:

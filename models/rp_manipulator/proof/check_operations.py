@@ -10,8 +10,9 @@ import math
 import random
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import flint
@@ -328,17 +329,17 @@ KINDS = {
 }  # fmt: skip
 
 
-def questions(draw: random.Random, rounds: int) -> Iterator[Question]:
-    for kind, count in KINDS.items():
-        for _ in range(count * rounds):
-            yield kind(draw)
+@cache
+def questions(seed: int, rounds: int) -> Sequence[Question]:
+    draw = random.Random(seed)
+    return [kind(draw) for kind, count in KINDS.items() for _ in range(count * rounds)]
 
 
 def check(program: Path, rounds: int = 1, seed: int = 1) -> int:
     """Ask the program and check all answers; how many. WrongAnswer names the first wrong one."""
     precision, flint.ctx.prec = flint.ctx.prec, BITS
     try:
-        asked = list(questions(random.Random(seed), rounds))
+        asked = questions(seed, rounds)
         lines = "".join(f"{question.line}\n" for question in asked)
         run = subprocess.run(
             [program, "--operations"],
