@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any
 
 from rparm.errors import WrongValueError, did_you_mean
+from rparm.expressions import numbers
 from rparm.input_files import show
 
 PREFIXES = {"m": Fraction(1000), "c": Fraction(100), "k": Fraction(1, 1000)}
@@ -103,15 +104,10 @@ RADIANS = units_of(ANGLE, {ANGLE: {"deg": Unit(DEGREE)}})
 
 def finite_number(given: Any) -> float:
     """`given` as a float; WrongValueError if it is not a finite number."""
-    if isinstance(given, bool) or not isinstance(given, int | float):
-        raise WrongValueError(f"expected a number, got {show(given)}")
     try:
-        number = float(given)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise WrongValueError(f"expected a finite number, got {show(given)}")
-    return number
+        return numbers.finite_number(given)
+    except ValueError as error:
+        raise WrongValueError(f"{error}, got {show(given)}") from None
 
 
 def quantity(given: Any, known: Units, is_difference: bool = False) -> float:

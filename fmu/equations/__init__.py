@@ -3,7 +3,8 @@
 A module each; a module imports only from lines above its own:
 
     graph         operations on values and conditions, and their derivatives
-    model_file    reads and checks the file; what it says as a graph
+    file_tables   what the file says, table by table
+    model_file    reads the file and checks its expressions; what they mean as a graph
     lock          value references that stay
     c_code        a graph as statements in C
     guards        when a relation matters

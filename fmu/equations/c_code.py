@@ -47,15 +47,15 @@ class Code:
     def __init__(self, leaves: Leaves, prefix: str = "n", outer: Code | None = None) -> None:
         self.leaves, self.prefix, self.outer = leaves, prefix, outer
         self.lines: list[str] = []
-        self._known: dict[Value, str] = {}
+        self.known: dict[Value, str] = {}
 
     def of(self, root: Value) -> str:
         """C expression of a value, without operators."""
         if self.outer and not root.moves:
             return self.outer.of(root)
-        for value in in_order([root], self._known):
-            self._known[value] = self._expression(value)
-        return self._known[root]
+        for value in in_order([root], self.known):
+            self.known[value] = self._expression(value)
+        return self.known[root]
 
     def _expression(self, value: Value) -> str:
         if value.op == "number":
@@ -65,7 +65,7 @@ class Code:
         if self.outer and not value.moves:
             return self.outer.of(value)
         c_type = "int" if value.op in CONDITIONS else "double"
-        given = [self._known[argument] for argument in value.arguments]
+        given = [self.known[argument] for argument in value.arguments]
         return self.constant(formula(value.op, *given), c_type)
 
     def constant(self, of: str, c_type: str = "double") -> str:

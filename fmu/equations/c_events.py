@@ -8,9 +8,9 @@ comes to hold in its modes. The functions are in events.c.in.
 from __future__ import annotations
 
 from equations.c_code import Code, Leaves, filled, indented, text
+from equations.file_tables import Event, ModelFile
 from equations.graph import MOVING, Relation, Value
 from equations.guards import guards
-from equations.model_file import EventValues, ModelFile
 
 FIELD = "v_{}"
 MODE = "m_{}"
@@ -42,15 +42,11 @@ class Events:
     def __init__(self, file: ModelFile) -> None:
         self.file, self.graph = file, file.graph
         graph, self.relations = file.graph, list(file.graph.relations.values())
-        read = [v.value for v in file.of("states", "where", "outputs")]
-        read += [relation.distance for relation in self.relations]
-        read += [event.during for event in file.events if event.during is not None]
-        used = guards(graph, read)
+        read = [(v.value, None) for v in file.of("states", "where", "outputs")]
         for event in file.events:
-            guard = used.get(event.when, event.during)
-            if guard is not event.during and guard is not None:
-                guard = graph.value("or", guard, event.during) if event.during else None
-            used[event.when] = guard
+            during = event.during and event.during.value
+            read += [(event.when.value, during), *([(during, None)] if during else [])]
+        used = guards(graph, read)
         # condition under which each matters; None: always
         self.used = [used.get(relation.mode, graph.number(0.0)) for relation in self.relations]
         self.located = [relation for relation in self.relations if relation.time is None]
@@ -150,16 +146,18 @@ class Events:
         """Whether each event of the file is due."""
         code = Code(leaves(self.file))
         for i, event in enumerate(self.file.events):
-            during = "" if event.during is None else f" && {code.of(event.during)}"
-            code.lines.append(f"due[{i}] = {code.of(event.when)}{during};")
+            during = "" if event.during is None else f" && {code.of(event.during.value)}"
+            code.lines.append(f"due[{i}] = {code.of(event.when.value)}{during};")
         return code.lines
 
-    def _change(self, index: int, event: EventValues) -> list[str]:
+    def _change(self, index: int, event: Event) -> list[str]:
         """What an event of the file does."""
         states = [state.name for state in self.file.of("states")]
         code = Code(leaves(self.file))
-        new = {f"values->{FIELD.format(n)}": code.of(v) for n, v in event.reinit.items()}
-        new |= {f"values->{MODE.format(n)}": f"{code.of(v)} != 0" for n, v in event.set.items()}
+        new = {f"values->{FIELD.format(n)}": code.of(e.value) for n, e in event.reinit.items()}
+        new |= {
+            f"values->{MODE.format(n)}": f"{code.of(e.value)} != 0" for n, e in event.set.items()
+        }
         lines = [f"{target} = {value};" for target, value in new.items()]
         lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in event.reinit]
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]

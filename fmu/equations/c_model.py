@@ -5,8 +5,8 @@ from __future__ import annotations
 from equations.c_code import Code, filled, indented, text
 from equations.c_events import FIELD, Events, arrays, leaves
 from equations.c_series import Series
+from equations.file_tables import ModelFile
 from equations.graph import Value
-from equations.model_file import ModelFile
 
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"
@@ -85,7 +85,7 @@ def _series(file: ModelFile, events: Events) -> dict[str, object]:
     rates = {file.graph.value("state", name=v.name): v.value for v in file.of("states")}
     followed = [events.signed(relation) for relation in events.located]
     series = Series(file.graph, rates, followed, leaves(file))
-    rows = [str(series.rows.get(value, 0)) for value in followed]
+    rows = [str(row) for row in series.row_of_followed]
     return {
         **series.parts(),
         "row_count": len(series.rows),
@@ -131,7 +131,7 @@ def _checks(file: ModelFile) -> list[str]:
         (f"isfinite(values->{FIELD.format(v.name)})", f"{v.name} is not finite")
         for v in file.of("parameters")
     ]
-    conditions += [(code.of(condition), message) for message, condition in file.checks]
+    conditions += [(code.of(e.value), message) for message, e in file.checks.items()]
     refused = [
         line
         for condition, message in conditions

@@ -11,9 +11,9 @@ from declaration.load import UNITS
 
 from equations import c_model
 from equations.c_events import FIELD, INDICATOR, MODE, Events
+from equations.file_tables import NUMBERS, ModelFile, Variable, placed
 from equations.graph import MOVING, Value
 from equations.lock import Key
-from equations.model_file import NUMBERS, ModelFile, Variable, placed
 from rparm.expressions.units import BASE, shown
 
 INSTANCE = UNITS.parents[2] / "src" / "instance"

@@ -7,31 +7,38 @@ from collections.abc import Iterable
 from equations.graph import Graph, Value
 from rparm.expressions.tree import in_order
 
+Guards = dict[Value, Value | None]  # conditions; None: always
 
-def guards(graph: Graph, roots: Iterable[Value]) -> dict[Value, Value | None]:
-    """Condition under which each switch is read, of those that are; None: always."""
-    roots = list(roots)
-    found: dict[Value, Value | None] = dict.fromkeys(roots)
-    for value in reversed(in_order(roots)):
-        own = found[value]
+
+def guards(graph: Graph, roots: Iterable[tuple[Value, Value | None]]) -> Guards:
+    """Condition under which each mode is read, of those that are.
+
+    roots: what is needed, with the condition under which it is.
+    """
+    found: Guards = {}
+    modes: dict[Value, list[Value]] = {}  # by the distance that they follow from
+    for relation in graph.relations.values():
+        modes.setdefault(relation.distance, []).append(relation.mode)
+    for value, guard in roots:
+        _widen(graph, found, value, guard)
+    for value in reversed(in_order([*modes, *found])):  # each before what it reads
+        for mode in modes.get(value, []):
+            if mode in found:
+                _widen(graph, found, value, found[mode])
+        if value not in found:
+            continue
+        conditions = [found[value]] * len(value.arguments)
         if value.op == "if":
-            condition, chosen, otherwise = value.arguments
-            _widen(graph, found, condition, own)
-            _widen(graph, found, chosen, _both(graph, own, condition))
-            _widen(graph, found, otherwise, _both(graph, own, graph.value("not", condition)))
-        else:
-            for argument in value.arguments:
-                _widen(graph, found, argument, own)
-    return {value: guard for value, guard in found.items() if value.name in graph.relations}
+            condition = value.arguments[0]
+            for i, chosen in enumerate((condition, graph.value("not", condition)), 1):
+                own = found[value]
+                conditions[i] = chosen if own is None else graph.value("and", own, chosen)
+        for argument, guard in zip(value.arguments, conditions, strict=True):
+            _widen(graph, found, argument, guard)
+    return {value: guard for value, guard in found.items() if value.op == "mode"}
 
 
-def _both(graph: Graph, guard: Value | None, condition: Value) -> Value:
-    return condition if guard is None else graph.value("and", guard, condition)
-
-
-def _widen(
-    graph: Graph, found: dict[Value, Value | None], value: Value, guard: Value | None
-) -> None:
+def _widen(graph: Graph, found: Guards, value: Value, guard: Value | None) -> None:
     """Let a value matter under this condition, too."""
     if value not in found:
         found[value] = guard

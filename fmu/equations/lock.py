@@ -9,7 +9,7 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-from equations.model_file import NAME, ModelFileError
+from equations.file_tables import NAME, ModelFileError
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 9999

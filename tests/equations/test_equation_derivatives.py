@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -120,3 +121,24 @@ def test_series_fits_the_equations(case: tuple) -> None:
             expected = mpmath.taylor(side, 0, order - 1)
             for k in range(order):
                 close((k + 1) * polynomials[name][k + 1], expected[k])
+
+
+def test_a_branch_that_is_not_taken_may_be_undefined(tmp_path: Path) -> None:
+    """Where p = 0 all derivatives are those of the other branch."""
+    found = []
+    for name, rate in (
+        ("branch", "x / p + log(p) * x**p + sqrt(p - x) if p > 0 else -x"),
+        ("x", "-x"),
+    ):
+        (tmp_path / name).mkdir()
+        head = 'name = "M"\n[parameters]\np = { start = 0 }\n'
+        model = Model(tmp_path / name, f'{head}[states]\nx = {{ derivative = "{rate}" }}\n')
+        values = model.values(x=0.7, p=0.0)
+        first, second = (model.values(x=x, p=0.3) for x in (0.2, -0.4))
+        model.outputs(values, 0.0)
+        model.propagate(values, 0.0, 1.0, first, second)
+        series = model.series(values, 0.0, 0.5, np.zeros((1, 4)), 20)
+        found.append([values, first, second, model.jacobian(values, 0.0), series])
+    for branch, alone in zip(*found, strict=True):
+        np.testing.assert_array_equal(branch, alone)
+        assert np.all(np.isfinite(branch))

@@ -119,6 +119,27 @@ def test_a_one_sided_spring_swings_in_two_halves(spring: Path, method: int) -> N
     assert run["event_count"][-1] == crossings
 
 
+BRANCHES = """
+[parameters]
+p = { start = 1 }
+[states]
+x = { start = 1, derivative = "v" }
+v = { derivative = "-x if p > 0 else -max(0, x)" }
+y = { derivative = "1 if v < 5 else min(0.5, abs(x))" }
+"""
+
+
+@EACH_METHOD
+def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, method: int) -> None:
+    fmu = made(folder / f"branches{method}", BRANCHES)
+    run = simulated(
+        fmu, 12.0, 0.5, {"solver_method": method}, relative_tolerance=1e-10, also=["event_count"]
+    )
+    assert run["event_count"][-1] == 0
+    np.testing.assert_allclose(run["x"], np.cos(run["time"]), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(run["y"], run["time"], rtol=0, atol=1e-12)
+
+
 PULSE = """
 [parameters]
 T = { start = 0.73 }
@@ -203,6 +224,20 @@ def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-12)
     at_once = simulated(fmu, 0.5, 0.5, {"limit": 1.0, "solver_method": method})
     assert at_once["n"][0] == 12
+
+
+@pytest.mark.parametrize("most", [3, 4])
+def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> None:
+    """Four of them do, each because of the one before."""
+    text = '[states]\nx = { start = 0, derivative = "0" }\n'
+    for i in range(4, 0, -1):
+        text += f'[events.e{i}]\nwhen = "x > {i}.5"\nreinit = {{ x = "{i + 1}.75" }}\n'
+    fmu = made(folder / f"four{most}", text)
+    if most < 4:
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})
+    else:
+        assert simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})["x"][-1] == 5.75
 
 
 def test_events_without_end_are_an_error(folder: Path) -> None:

@@ -1,6 +1,7 @@
 """Files with equations: what is refused and how, value references, units."""
 
 import random
+import re
 import time
 import tomllib
 from pathlib import Path
@@ -46,7 +47,7 @@ MISTAKES = {
     "solver": (HEAD + "[inputs]\nmax_step = {}", "[inputs]: max_step: this name is reserved"),
     "der": (HEAD + "[inputs]\nder_x = {}", "[inputs]: der_x: this name is reserved"),
     "name of it": (HEAD + '[inputs]\n"a b" = {}', "[inputs]: 'a b': expected a name"),
-    "unknown": (STATE + '[where]\na = "x + y"', "[where]: a: value: unknown name 'y'"),
+    "unknown": (STATE + '[where]\na = "x + y"', "line 5: [where]: a: unknown name 'y'"),
     "syntax": (STATE + '[where]\na = "x + "', "[where]: a: column 5: expected a number"),
     "syntax below": (
         HEAD + '[states]\nx = { derivative = "2 x" }',
@@ -54,13 +55,13 @@ MISTAKES = {
     ),
     "power": (STATE + '[where]\na = "x^2"', "column 2: '^2' is no number, name or operator: p"),
     "exponent": (STATE + '[inputs]\na = { unit = "m/s^2" }', "'s^2' is no SI symbol with an"),
-    "condition": (STATE + '[where]\na = "x < 1"', "a: value: column 3: expected a number"),
+    "condition": (STATE + '[where]\na = "x < 1"', "line 5: [where]: a: column 3: expected a"),
     "loop": (
         STATE + '[where]\na = "b + x"\nb = "c"\nc = "2 * a"', "algebraic loop 'a -> b -> c -> a'",
     ),
     "loop of one": (STATE + '[where]\na = "a"', "[where]: a: algebraic loop 'a -> a'"),
     "modes": ("modes = 3\n" + STATE, "modes: expected a list of names"),
-    "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: 'a': is there twice"),
+    "mode twice": ('modes = ["a", "a"]\n' + STATE, "modes: 'a': this name is in modes"),
     "mode as number": (
         'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
     ),
@@ -107,8 +108,20 @@ MISTAKES = {
     "control": (STATE.replace("[", 'description = "\\u0001"\n[', 1), "description: has a control"),
     "deep": (STATE + f'[where]\na = "{"(" * 200}"', "a: column 102: more than 100 levels"),
     "many": (
-        HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "1001 variables",
+        HEAD + "[inputs]\n" + "".join(f"u{i} = {{}}\n" for i in range(1001)), "u1000: has more",
     ),
+    "array": (STATE + '[where]\na = "x[1]"', "'[1]' is no number, name or operator; arrays"),
+    "array of starts": (
+        HEAD + "[parameters]\np = { start = [1, 2] }", "[1, 2]; arrays are not supported: give",
+    ),
+    "implicit": (
+        STATE + '[where]\na = "x == 1"', "equations in implicit form are not supported: solve them",
+    ),
+    "residuals": (STATE + "[algebraic]\n", "equations in implicit form are not supported: solve"),
+    "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are not supported: set an input"),
+    "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
+    "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
+    "line of a table": (STATE + "[inputs.u]\nmin = 1", "model.toml: [inputs]: u: start = 0"),
     "large": ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
 }  # fmt: skip
 
@@ -193,7 +206,10 @@ def read_mutations(folder: Path, seed: int, count: int) -> int:
             assert c_model.header(file) and c_model.source(file) and declared(file)
             accepted += 1
         except ModelFileError as error:
-            assert "\n" not in str(error) and len(str(error)) < 1000
+            message = str(error)
+            assert "\n" not in message and len(message) < 1000
+            # what is not in the file at all has no line
+            assert re.search(r"line [0-9]+|end of|unknown section|has no|name: expected", message)
         assert time.process_time() - began < 2, text
     return accepted
 
