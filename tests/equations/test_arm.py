@@ -1,4 +1,4 @@
-"""The arm from a file with equations against the one that is written by hand, bit for bit."""
+"""Models from files with equations against those that are written by hand: the arm, the spring."""
 
 from pathlib import Path
 from shutil import copy
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
+from tests.equations.examples import FOLDER as EXAMPLES
 from tests.equations.examples import METHODS, build, simulated
-from tests.support.paths import ROOT
 
+FOLDER = Path(__file__).parent
 POINTS = 500
 STATES = ["q1", "q2", "dq1", "dq2"]
 GIVEN = ["m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g", *STATES, "tau1", "f2"]
@@ -49,7 +50,7 @@ class Opened:
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("arm")
-    return build(copy(ROOT / "tests" / "equations" / "arm.toml", folder), folder)
+    return build(copy(FOLDER / "arm.toml", folder), folder)
 
 
 def test_values_and_directional_derivatives_have_the_same_bits(
@@ -73,3 +74,31 @@ def test_motions_are_the_same(arm: Path, fmu: Path, method: int) -> None:
     bound = 0.0 if method == METHODS["erk"] else 1e-11 if method == METHODS["taylor"] else 1e-8
     for name in STATES:
         assert np.max(np.abs(runs[0][name] - runs[1][name])) <= bound
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_the_spring_is_that_by_hand(fmu: Path, tmp_path: Path, method: int) -> None:
+    """And both are the closed form."""
+    own = build(copy(FOLDER / "oscillator.toml", tmp_path), tmp_path)
+    hand = fmu.parent / "tests" / "oscillator" / "Oscillator.fmu"
+    start = {"omega": 3.0, "gain": 2.0, "x": 0.2, "v": -1.0, "u": 5.0, "solver_method": method}
+    runs = [simulated(path, 4.0, 0.01, start, relative_tolerance=1e-10) for path in (own, hand)]
+    t, middle = runs[0]["time"], 2.0 * 5.0 / 9.0
+    exact = middle + (0.2 - middle) * np.cos(3 * t) - np.sin(3 * t) / 3
+    for run in runs:
+        np.testing.assert_allclose(run["x"], exact, rtol=0, atol=1e-8)
+    for name in ("x", "v", "a", "energy"):
+        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("path", "most"),
+    [
+        (FOLDER / "oscillator.toml", 15),
+        (EXAMPLES / "bouncing_ball.toml", 20),
+        (FOLDER / "arm.toml", 50),
+    ],
+    ids=lambda value: getattr(value, "stem", ""),
+)
+def test_a_model_is_short(path: Path, most: int) -> None:
+    assert len(path.read_text().splitlines()) <= most
