@@ -102,6 +102,7 @@ class Events:
             relations=len(self.relations),
             events=len(file.events),
             states=len(states),
+            has_inputs=int(any(r.is_of_inputs for r in self.relations)),
             modes=2 + len(self.relations) + len(file.events) + len(file.modes),
             located=len(self.located),
             next_time="next_time" if timed else "NULL",
@@ -154,11 +155,10 @@ class Events:
         """What an event of the file does."""
         states = [state.name for state in self.file.of("states")]
         code = Code(leaves(self.file))
-        new = {f"values->{FIELD.format(n)}": code.of(e.value) for n, e in event.reinit.items()}
-        new |= {
-            f"values->{MODE.format(n)}": f"{code.of(e.value)} != 0" for n, e in event.set.items()
-        }
-        lines = [f"{target} = {value};" for target, value in new.items()]
+        new = {FIELD.format(n): code.constant(code.of(e.value)) for n, e in event.reinit.items()}
+        for name, condition in event.set.items():
+            new[MODE.format(name)] = code.constant(f"{code.of(condition.value)} != 0", "int")
+        lines = [f"values->{field} = {value};" for field, value in new.items()]
         lines += [f"tolerance[{states.index(name)}] = 0.0;" for name in event.reinit]
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]
 

@@ -99,18 +99,12 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     fields = {RATE.format(state.name): state.value for state in file.of("states")}
     fields |= {FIELD.format(v.name): v.value for v in file.of("where", "outputs")}
     fields |= events.indicators()
-    names = [("time", "")]
-    names += [
-        (op, v.name)
-        for op, section in (("parameter", "parameters"), ("input", "inputs"), ("state", "states"))
-        for v in file.of(section)
-    ]
     seeds: dict[Value, Value] = {}
-    for op, name in names:
-        first = graph.value("first", name=name)
-        seeds[graph.value(op, name=name)] = first
-        if name:
-            seeds[first] = graph.value("second", name=name)
+    for op, name in leaves(file):
+        if op in ("parameter", "input", "state", "time"):
+            first = seeds[graph.value(op, name=name)] = graph.value("first", name=name)
+            if name:  # the time has no second derivative
+                seeds[first] = graph.value("second", name=name)
     firsts = graph.derivatives(fields.values(), seeds)
     seconds = graph.derivatives(firsts, seeds)
     curve = Code(leaves(file))

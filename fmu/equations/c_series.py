@@ -160,7 +160,7 @@ class Series:
             case "+" | "-" if not b.moves:
                 return self._at(a)
             case "+" | "-" if not a.moves:
-                return self._at(b) if value.op == "+" else f"- {self._at(b)}"
+                return self._at(b) if value.op == "+" else f"-{self._at(b)}"
             case "*" if a.moves and b.moves:
                 ends = f"{self.start.of(a)} * {self._at(b)} + {self._at(a)} * {self.start.of(b)}"
                 return f"{self._sum(a, b)} + ({ends})"

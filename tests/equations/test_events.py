@@ -226,6 +226,14 @@ def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
     assert at_once["n"][0] == 12
 
 
+def test_right_sides_of_an_event_see_the_values_before_it(folder: Path) -> None:
+    text = 'modes = ["a", "b"]\n[states]\nx = { start = 1, derivative = "0" }\n'
+    text += 'y = { start = 2, derivative = "0" }\n[events.e]\nwhen = "time >= 0.25"\n'
+    text += 'reinit = { x = "y", y = "x" }\nset = { a = "not b", b = "a" }\n'
+    run = simulated(made(folder / "swap", text), 0.5, 0.5, {}, also=["a", "b"])
+    assert [run[name][-1] for name in ("x", "y", "a", "b")] == [2.0, 1.0, True, False]
+
+
 @pytest.mark.parametrize("most", [3, 4])
 def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> None:
     """Four of them do, each because of the one before."""
