@@ -1,5 +1,5 @@
-/* Steps of an FMU for callgrind: steps LIBRARY GUID METHOD then value references of the method, four
- * states and two inputs. */
+/* Steps of an FMU for callgrind: steps LIBRARY GUID METHOD then value references of the method,
+ * four states and two inputs. */
 #include "fmi2FunctionTypes.h"
 
 #include <dlfcn.h>
@@ -36,8 +36,7 @@ int main(int count, char *arguments[]) {
     fmi2ExitInitializationModeTYPE *leave =
         (fmi2ExitInitializationModeTYPE *)dlsym(library, "fmi2ExitInitializationMode");
     fmi2DoStepTYPE *step = (fmi2DoStepTYPE *)dlsym(library, "fmi2DoStep");
-    fmi2Component c =
-        instantiate("steps", fmi2CoSimulation, arguments[2], "", &callbacks, 0, 0);
+    fmi2Component c = instantiate("steps", fmi2CoSimulation, arguments[2], "", &callbacks, 0, 0);
     if (c == NULL || choose(c, references, 1, &method) != fmi2OK ||
         set(c, references + 1, 4, start) != fmi2OK ||
         setup(c, fmi2True, 1e-9, 0.0, fmi2False, 0.0) != fmi2OK || enter(c) != fmi2OK ||
