@@ -85,7 +85,7 @@ def test_an_algebraic_loop_is_refused_with_its_path() -> None:
     "options, message",
     [
         ({"variant": "pick_and_place"}, "component 'controller' is sampled"),
-        ({"variant": "wall_contact"}, "component 'sensor' is sampled.*--without sensor takes it"),
+        ({"variant": "wall_contact"}, "component 'sensor' is sampled.*by --without sensor"),
         ({"variant": "wall_contact", "without": ["plant"]}, "has nothing to be fed by"),
         ({"variant": "wall_contact", "without": ["sensors"]}, "did you mean 'sensor'"),
         ({"variant": "wall"}, "no variant 'wall', did you mean 'wall_contact'"),
