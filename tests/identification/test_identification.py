@@ -77,21 +77,6 @@ def test_missing_rows_and_irregular_times(tmp_path: Path) -> None:
         assert abs(estimate.value - true) < estimate.high - estimate.low
 
 
-def test_a_delay_is_found(tmp_path: Path) -> None:
-    machine = replace(PLANT, late=1.4e-3, noise=(2e-5, 2e-5))
-    log = write(machine, tmp_path / "log.csv", 8)
-    found = identified(machine, log, 8, delay=True)
-    late = found.estimates["delay"]
-    assert late.low < 1.4e-3 < late.high < 1.5e-3
-    ignored = identified(machine, log, 8)
-    wrong = [
-        name
-        for name, true in machine.true.items()
-        if not ignored.estimates[name].low < true < ignored.estimates[name].high
-    ]
-    assert wrong and ignored.warnings  # what is left out is seen
-
-
 def test_joints_that_start_at_a_stop(tmp_path: Path) -> None:
     # the slide strikes its stops and rests there: measured a hair beyond
     settings = {"stops2": "rigid", "restitution2": 0.3, "lower2": -0.3, "upper2": 0.3}

@@ -105,18 +105,6 @@ def test_columns_may_have_other_names_and_units(identify, log: Path, tmp_path: P
     assert values[0] == pytest.approx(values[1], rel=1e-9)
 
 
-def test_the_demo_finds_its_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from rparm.models.machine.identification import LATE, TRUE
-
-    code, out, _ = call(capsys, "identify", "--demo", "--json", "--output", tmp_path)
-    found = json.loads(out)
-    assert code == 0 and found["warnings"] == []
-    for name, true in {**TRUE, "delay": LATE}.items():
-        estimate = found["parameters"][name]
-        assert abs(estimate["value"] - true) < estimate["high"] - estimate["low"] < 0.01 * true
-    assert 0.9 < found["validation"]["chi2"] < 1.1
-
-
 # ---- mistakes ------------------------------------------------------------------------------------
 
 

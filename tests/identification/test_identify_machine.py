@@ -1,0 +1,37 @@
+"""Slow fits: the machine of the demo, and what a delay that is left out does."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.identification.synthetic import PLANT, identified, write
+from tests.support.rparm_project import call
+
+
+def test_the_demo_finds_its_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from rparm.models.machine.identification import LATE, TRUE
+
+    code, out, _ = call(capsys, "identify", "--demo", "--json", "--output", tmp_path)
+    found = json.loads(out)
+    assert code == 0 and found["warnings"] == []
+    for name, true in {**TRUE, "delay": LATE}.items():
+        estimate = found["parameters"][name]
+        assert abs(estimate["value"] - true) < estimate["high"] - estimate["low"] < 0.01 * true
+    assert 0.9 < found["validation"]["chi2"] < 1.1
+
+
+def test_a_delay_is_found(tmp_path: Path) -> None:
+    machine = replace(PLANT, late=1.4e-3, noise=(2e-5, 2e-5))
+    log = write(machine, tmp_path / "log.csv", 8)
+    found = identified(machine, log, 8, delay=True)
+    late = found.estimates["delay"]
+    assert late.low < 1.4e-3 < late.high < 1.5e-3
+    ignored = identified(machine, log, 8)
+    wrong = [
+        name
+        for name, true in machine.true.items()
+        if not ignored.estimates[name].low < true < ignored.estimates[name].high
+    ]
+    assert wrong and ignored.warnings  # what is left out is seen
