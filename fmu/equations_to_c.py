@@ -11,7 +11,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from equations import c_model, declaration, lock
+from equations import declaration, lock
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
 
@@ -32,12 +32,8 @@ def main() -> int:
             if (name, kind) not in references and name not in hidden:
                 raise ModelFileError(f"{lock_file}: has no {name}: build the model by rparm build")
         terminals = arguments.terminals.read_text(encoding="utf-8") if arguments.terminals else ""
-        texts = {
-            "equations.h": c_model.header(file),
-            "equations.c": c_model.source(file),
-            "variables.toml": declaration.variables_toml(file, references) + terminals,
-            "README.md": declaration.page(file),
-        }
+        texts = declaration.generated(file, references)
+        texts["variables.toml"] += terminals
         arguments.output.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
             write_if_changed(arguments.output / name, text)

@@ -42,6 +42,11 @@ def add_fmi(parser: argparse._ActionsContainer, default: str | None, text: str) 
     parser.add_argument("--fmi", type=_version, metavar="{2,3}", default=default, help=text)
 
 
+def add_tolerance(parser: argparse.ArgumentParser, text: str) -> None:
+    """The tolerance of the integrator."""
+    parser.add_argument("--tolerance", type=relative_tolerance, metavar="X", help=text)
+
+
 def add_report(parser: argparse.ArgumentParser, part: str = "") -> None:
     """Where pages and results go."""
     folder = project.report_folder(part)

@@ -17,7 +17,7 @@ from generate import release_files
 from provenance import Provenance
 from source_code import Library, collect, write
 
-from equations import c_model, declaration, lock
+from equations import declaration, lock
 from equations.model_file import ModelFile
 from equations.runtime import Runtime
 
@@ -27,13 +27,7 @@ PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output
 
 def write_c(file: ModelFile, references: dict[lock.Key, int], folder: Path) -> Declaration:
     """Write all files that the FMUs are made of; its declaration."""
-    texts = {
-        "equations.h": c_model.header(file),
-        "equations.c": c_model.source(file),
-        "variables.toml": declaration.variables_toml(file, references),
-        "README.md": declaration.page(file),
-    }
-    _write(folder, texts)
+    _write(folder, declaration.generated(file, references))
     declared = load_declaration(folder / "variables.toml")
     tables = {"variables.c": variable_table, "value_references.h": value_references}
     _write(folder, {name: table(declared) for name, table in tables.items()})

@@ -57,6 +57,16 @@ def indicator_names(file: ModelFile) -> list[str]:
     return found
 
 
+def generated(file: ModelFile, references: dict[Key, int]) -> dict[str, str]:
+    """Texts of all files that are written of a model, by their names."""
+    return {
+        "equations.h": c_model.header(file),
+        "equations.c": c_model.source(file),
+        "variables.toml": variables_toml(file, references),
+        "README.md": page(file),
+    }
+
+
 def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
     """Text of variables.toml."""
     events, units, states = Events(file), _Units(file), file.of("states")

@@ -12,7 +12,7 @@ from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.fmi.fmu_file import Fmu
-from rparm.options import add_report, relative_tolerance
+from rparm.options import add_report, add_tolerance
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import check_writable, from_here, written
@@ -40,12 +40,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="all references, as without a scenario")
     parser.add_argument("--method", metavar="NAME", help="only this method of integration")
-    parser.add_argument(
-        "--tolerance",
-        type=relative_tolerance,
-        metavar="X",
-        help="relative tolerance of the runs (default: that of the scenario)",
-    )
+    add_tolerance(parser, "relative tolerance of the runs (default: that of the scenario)")
     parser.add_argument(
         "--within",
         metavar="VALUE",

@@ -16,7 +16,7 @@ from rparm.commands import list as scenario_list
 from rparm.errors import UserError, did_you_mean, placed, together
 from rparm.fmi.fmu_file import Fmu
 from rparm.input_files import missing
-from rparm.options import add_fmi, add_report, relative_tolerance
+from rparm.options import add_fmi, add_report, add_tolerance
 from rparm.output import console, results
 from rparm.output.progress import Progress
 from rparm.output.result_tables import RunTable, SweepTable, measured
@@ -62,12 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_fmi(parser, None, "run only FMUs of this version of FMI")
     add_report(parser)
-    parser.add_argument(
-        "--tolerance",
-        type=relative_tolerance,
-        metavar="X",
-        help="run at this relative tolerance only, without the sweep",
-    )
+    add_tolerance(parser, "run at this relative tolerance only, without the sweep")
 
 
 def run(options: argparse.Namespace) -> Ended:

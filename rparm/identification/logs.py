@@ -143,7 +143,7 @@ def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Seg
         rows[-1] = end
         for first, last in zip(rows[:-1], rows[1:], strict=True):
             start = int(np.searchsorted(times, times[first] - lead - 1e-9 * span))
-            segment = _segment(recording, max(start, begin), int(first), int(last))
+            segment = segment_of(recording, max(start, begin), int(first), int(last))
             if np.count_nonzero(segment.counts) >= FEWEST_ROWS:
                 found.append(segment)
     if not found:
@@ -155,7 +155,8 @@ def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Seg
     return found
 
 
-def _segment(recording: Recording, start: int, first: int, last: int) -> Segment:
+def segment_of(recording: Recording, start: int, first: int, last: int) -> Segment:
+    """The rows from `start` up to `last`, of which those from `first` on are compared."""
     rows = slice(start, last)
     return Segment(
         np.ascontiguousarray(recording.times[rows]),

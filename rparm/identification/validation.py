@@ -81,11 +81,4 @@ def _whole(recording: Recording, first: Segment) -> Segment:
     start = int(np.searchsorted(recording.times, first.times[0]))
     gaps = np.flatnonzero(np.diff(recording.times) > 10 * recording.step)
     end = next((int(gap) + 1 for gap in gaps if gap >= start), len(recording.times))
-    rows = slice(start, end)
-    return Segment(
-        np.ascontiguousarray(recording.times[rows]),
-        np.ascontiguousarray(recording.inputs[rows]),
-        np.ascontiguousarray(recording.switches[rows]),
-        recording.measured[rows],
-        0,
-    )
+    return logs.segment_of(recording, start, start, end)
