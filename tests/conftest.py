@@ -1,6 +1,7 @@
 """What the Python tests share."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
     from tests.support.browser import Browser
     from tests.support.hosts import Network
     from tests.support.instances import LoadedFmu
+
+
+# A shell that starts the tests in the background lets them, and all that they start, ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

@@ -255,7 +255,6 @@ sys.exit(cli._as_program())
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         timeout=60,
     )
     assert (done.returncode, done.stderr) == (code, said)

@@ -2,7 +2,6 @@
 remembers it: nothing is left."""
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -51,7 +50,6 @@ def stopped(folder: Path, stop: str, kind: str, number: int, *command: str) -> s
         text=True,
         check=False,
         timeout=60,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     expected = {"SIGINT": (130, "interrupted\n"), "SIGTERM": (143, "")}
     assert (done.returncode, done.stderr) == expected[stop]
