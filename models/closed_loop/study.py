@@ -9,13 +9,14 @@ from rparm.models.closed_loop.experiment import START, STEPS_PER_SECOND, STOP
 from rparm.models.closed_loop.motion_figure import ARM, figure
 from rparm.models.system_figure import tracking_error
 
-from rparm.system.study import Diagram
+from rparm.system.study import Diagram, Rest
 
 __all__ = [
     "COUPLING_PICTURE",
     "DIAGRAMS",
     "EXPERIMENT",
     "MEASURES",
+    "REST",
     "figure",
     "study_coupling",
 ]
@@ -38,6 +39,16 @@ DIAGRAMS = (
         {"arm.ee_x": "trajectory.ee_x_ref", "arm.ee_y": "trajectory.ee_y_ref"},
     ),
     Diagram("energy of the arm", ["arm.kinetic_energy", "arm.potential_energy"]),
+)
+
+
+# the arm waits at the start of its motion; the controller steps first, as coupling.md advises
+REST = Rest(
+    "nominal",
+    ["arm.q1", "arm.q2"],
+    ["arm.q1", "arm.q2", "arm.dq1", "arm.dq2"],
+    {"trajectory.start_time": 1e4},
+    sequence=["controller", "arm", "trajectory"],
 )
 
 

@@ -9,9 +9,9 @@ from rparm.models.machine.machine_figure import ARM, figure
 from rparm.models.system_figure import tracking_error
 
 from rparm.system.comparison import Outcome
-from rparm.system.study import Diagram, Measure
+from rparm.system.study import Diagram, Measure, Rest
 
-__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "figure"]
+__all__ = ["DIAGRAMS", "EXPERIMENT", "MEASURES", "REST", "figure"]
 
 EXPERIMENT = (START, STOP, 1 / STEPS_PER_SECOND)
 
@@ -48,4 +48,14 @@ DIAGRAMS = (
     Diagram("force of the wall", ["environment.wall_force"]),
     Diagram("wrench at the end effector", ["environment.ee_fx", "environment.ee_fy"]),
     Diagram("payload attached", ["trajectory.payload_attached"]),
+)
+
+# friction would hold it
+REST = Rest(
+    "wall_contact",
+    ["plant.q1", "plant.q2"],
+    ["plant.q1", "plant.q2", "plant.dq1", "plant.dq2"],
+    {"trajectory.start_time": 1e4}
+    | {f"plant.{k}_friction{i}": 0.0 for k in ("coulomb", "breakaway") for i in (1, 2)},
+    without=["sensor"],
 )

@@ -4,6 +4,7 @@ import argparse
 
 from rparm import project
 from rparm.commands import Ended
+from rparm.linearization import stable_steps
 from rparm.options import add_report, add_system
 from rparm.output import console
 from rparm.output_files import check_writable
@@ -11,7 +12,8 @@ from rparm.system import study
 
 DESCRIPTION = (
     "Steps the system in several orders, with inputs held and extrapolated and with step-size "
-    "control, and compares it with the solution in continuous time."
+    "control, and compares it with the solution in continuous time; predicts and measures the "
+    "largest stable steps of each system."
 )
 
 
@@ -28,6 +30,10 @@ def run(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     console.stage(f"studying the coupling of {folder.name}")
     parts = known.study_coupling(path, options.report)
+    for other, rest in study.rests().items():
+        if other != folder and not options.ssp:
+            ssp = project.built(other, ".ssp", version=options.fmi)
+            parts[f"largest steps of {other.name}"] = stable_steps.study(ssp, rest)
     failed = [name for name, part in parts.items() if not part["passed"]]
     picture = (options.report / known.COUPLING_PICTURE).absolute()
     verdict = console.verdict_line(failed, parts, "part")

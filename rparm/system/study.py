@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from rparm import project
 from rparm.errors import UserError
@@ -36,6 +36,18 @@ class Diagram:
     title: str
     curves: Sequence[str]
     references: Mapping[str, str] = field(default_factory=dict)  # what a curve should follow
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where a system rests, to find its largest stable steps; names are ``component.variable``."""
+
+    variant: str
+    moved: Sequence[str]  # states to begin a little off
+    signals: Sequence[str]  # that show whether the deviation dies out
+    values: Mapping[str, float] = field(default_factory=dict)  # besides those of the variant
+    without: Sequence[str] = ()  # components to take as ideal
+    sequence: Sequence[str] = ()  # order of stepping; default: that of the SSP
 
 
 class Study(Protocol):
@@ -76,10 +88,20 @@ def of_coupling() -> tuple[Path, CouplingStudy]:
 
     UserError if there is not exactly one.
     """
-    loaded = {folder: load(folder) for folder in project.systems().values()}
-    found = {folder: known for folder, known in loaded.items() if hasattr(known, "study_coupling")}
+    found = _having("study_coupling")
     if len(found) != 1:
         names = ", ".join(folder.name for folder in found) or "none"
         raise UserError(f"expected one system with a study of its coupling, found {names}")
     (folder, known), *_ = found.items()
     return folder, cast(CouplingStudy, known)
+
+
+def rests() -> dict[Path, Rest]:
+    """Where systems rest, by folder, of those that say it: as ``REST``."""
+    return {folder: cast(Rest, known.REST) for folder, known in _having("REST").items()}
+
+
+def _having(name: str) -> dict[Path, Any]:
+    """Modules of systems that have this name, by folder."""
+    loaded = {folder: load(folder) for folder in project.systems().values()}
+    return {folder: known for folder, known in loaded.items() if hasattr(known, name)}

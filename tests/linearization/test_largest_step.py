@@ -1,60 +1,34 @@
 """The largest stable communication step, predicted from linear models, against simulations."""
 
 import math
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rparm.models.closed_loop.study import REST as LOOP
 from rparm.models.machine.stability import Contact, growth
+from rparm.models.machine.study import REST as MACHINE
 from scipy.linalg import expm
 
-from rparm.coupling.master import INPUTS, ORDERS, Master
+from rparm.coupling.master import INPUTS, ORDERS
 from rparm.linearization.largest_step import LargestStep, largest_steps, transition
 from rparm.linearization.linear import Linear
-from rparm.linearization.measured_growth import growth as growth_in_a_run
-from rparm.linearization.system import SystemSubject
-from rparm.system import ssp
+from rparm.linearization.stable_steps import Resting, resting
 from rparm.system.structure import Connection
 from tests.support.paths import ROOT
 
 WAYS = [(order, inputs) for order in ORDERS for inputs in INPUTS]
 NEAR = 0.005  # of the predicted step: where simulations die out and grow
-MOVED = 1e-6  # rad and m, out of equilibrium
-FREE_OF_FRICTION = {f"plant.{k}_friction{i}": 0.0 for k in ("coulomb", "breakaway") for i in (1, 2)}
-# the variant, what is left out, values, and the arm's component
-SYSTEMS = {
-    "ClosedLoop": ("nominal", (), {"trajectory.start_time": 1e4}, "arm"),
-    "Machine": (
-        "wall_contact", ("sensor",), FREE_OF_FRICTION | {"trajectory.start_time": 1e4}, "plant",
-    ),
-}  # fmt: skip
+SYSTEMS = {"ClosedLoop": replace(LOOP, sequence=()), "Machine": MACHINE}
 
 
 @contextmanager
-def opened(fmu: Path, name: str, variant: str = "") -> Iterator[SystemSubject]:
-    usual, without, _, _ = SYSTEMS[name]
-    with ExitStack() as stack:
-        unpacked = stack.enter_context(ssp.unpacked(fmu.with_name(f"{name}.ssp")))
-        yield stack.enter_context(SystemSubject(unpacked, variant or usual, without=without))
-
-
-def predicted(subject: SystemSubject, values: Mapping[str, float], ways: list) -> dict:
-    parts = subject.parts(values)
-    held = subject.held(parts)
-    parts = {name: part.without(held[name]) for name, part in parts.items()}
-    found = largest_steps(parts, subject.connections, ways)
-    return {(x.order, x.inputs): x for x in found}
-
-
-def rate(subject: SystemSubject, values: dict, arm: str, way: tuple[str, str], h: float) -> float:
-    """By how much deviations grow in a step, from eigenvalues of the motion of the arm."""
-    signals = [f"{arm}.{name}" for name in ("q1", "q2", "dq1", "dq2")]
-    with Master(subject.fmus, subject.connections, *way) as master:
-        master.initialize(0.0, None, subject.merged(values))
-        return growth_in_a_run(master, h, signals)
+def opened(fmu: Path, name: str, **changes: object) -> Iterator[Resting]:
+    with resting(fmu.with_name(f"{name}.ssp"), replace(SYSTEMS[name], **changes)) as system:
+        yield system
 
 
 @pytest.mark.parametrize("way", WAYS, ids=", ".join)
@@ -62,30 +36,29 @@ def rate(subject: SystemSubject, values: dict, arm: str, way: tuple[str, str], h
 def test_simulations_die_out_below_and_grow_above(
     fmu: Path, name: str, way: tuple[str, str]
 ) -> None:
-    _, _, values, arm = SYSTEMS[name]
-    with opened(fmu, name) as subject:
-        step = predicted(subject, values, [way])[way].step
-        start = subject.at(values).at
-        moved = values | {f"{arm}.{q}": start[f"{arm}.{q}"] + MOVED for q in ("q1", "q2")}
-        assert rate(subject, moved, arm, way, step * (1 - NEAR)) < 1.0
-        assert rate(subject, moved, arm, way, step * (1 + NEAR)) > 1.0
+    with opened(fmu, name) as system:
+        step = system.predicted(way).step
+        below, above = system.growth(way, step * (1 - NEAR)), system.growth(way, step * (1 + NEAR))
+        assert below < 1.0 < above
+        limit = system.limit(way)
+    assert limit.predicted == step and limit.passed
+    assert limit.measured == pytest.approx(step, rel=NEAR)
 
 
 def test_pages_say_what_is_predicted(fmu: Path) -> None:
-    _, _, values, _ = SYSTEMS["Machine"]
-    with opened(fmu, "Machine") as subject:
-        found = predicted(subject, values, WAYS)
+    with opened(fmu, "Machine") as system:
+        found = {way: system.predicted(way).step for way in WAYS}
     page = (ROOT / "models" / "machine" / "README.md").read_text(encoding="utf-8")
     for order, start in (("jacobi", "| Jacobi |"), ("gauss_seidel", "| Gauss-Seidel, in the")):
         (row,) = [line for line in page.splitlines() if line.startswith(start)]
         for inputs, cell in zip(INPUTS, row.split("|")[2:], strict=False):
-            assert cell.strip() == f"{1e3 * found[order, inputs].step:.3f} ms"
-    loop = SYSTEMS["ClosedLoop"][2]
-    with opened(fmu, "ClosedLoop") as subject:
-        found = predicted(subject, loop, [("jacobi", x) for x in INPUTS])
+            assert cell.strip() == f"{1e3 * found[order, inputs]:.3f} ms"
     page = (ROOT / "models" / "closed_loop" / "coupling.md").read_text(encoding="utf-8")
-    for inputs in INPUTS:
-        assert f"| Jacobi, {inputs} | {1e3 * found['jacobi', inputs].step:.3f} ms |" in page
+    with opened(fmu, "ClosedLoop", sequence=LOOP.sequence) as system:
+        for order, inputs in WAYS:
+            step = system.predicted((order, inputs)).step
+            name = f"{order.replace('_', '-').title()}, {inputs}"
+            assert f"| {name} | {1e3 * step:.3f} ms |" in page
 
 
 def test_the_closed_loop_is_stable_up_to_21_ms_in_jacobi_order(fmu: Path) -> None:
@@ -102,10 +75,10 @@ def test_the_closed_loop_is_stable_up_to_21_ms_in_jacobi_order(fmu: Path) -> Non
         middle = (low + high) / 2
         low, high = (middle, high) if largest(middle) < 1 else (low, middle)
     way = "jacobi", "held"
-    with opened(fmu, "ClosedLoop", "horizontal_plane") as subject:
-        assert predicted(subject, {}, [way])[way].step == pytest.approx(low, rel=1e-9)
-    with opened(fmu, "ClosedLoop") as subject:  # gravity is compensated late, too
-        assert predicted(subject, {}, [way])[way].step == pytest.approx(21.297e-3, abs=1e-6)
+    with opened(fmu, "ClosedLoop", variant="horizontal_plane") as system:
+        assert system.predicted(way).step == pytest.approx(low, rel=1e-9)
+    with opened(fmu, "ClosedLoop") as system:  # gravity is compensated late, too
+        assert system.predicted(way).step == pytest.approx(21.297e-3, abs=1e-6)
 
 
 @pytest.mark.parametrize("way", WAYS, ids=", ".join)
@@ -132,9 +105,10 @@ def test_a_mass_at_a_sampled_wall_grows_as_its_theory_says(
 
 
 def test_an_unstable_system_has_no_stable_step(fmu: Path) -> None:
-    with opened(fmu, "ClosedLoop") as subject:
-        found = predicted(subject, {"controller.Kd1": 0.0, "controller.Kd2": 0.0}, WAYS)
-    assert all(x.step == 0 and math.isnan(x.frequency) for x in found.values())
+    undamped = {"controller.Kd1": 0.0, "controller.Kd2": 0.0}
+    with opened(fmu, "ClosedLoop", values=undamped) as system:
+        found = [system.predicted(way) for way in WAYS]
+    assert all(x.step == 0 and math.isnan(x.frequency) for x in found)
 
 
 def test_without_a_loop_there_is_no_limit() -> None:

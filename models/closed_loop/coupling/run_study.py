@@ -9,12 +9,13 @@ import numpy as np
 from rparm.models.closed_loop.coupling import tables
 from rparm.models.closed_loop.coupling.delays import study_tracking, tracking_passed
 from rparm.models.closed_loop.coupling.figure import figure
-from rparm.models.closed_loop.coupling.largest_steps import study_largest_steps
 from rparm.models.closed_loop.coupling.loop import opened
 from rparm.models.closed_loop.coupling.payload import study_payload
 from rparm.models.closed_loop.coupling.step_doubling import study_doubling
 from rparm.models.closed_loop.coupling.step_errors import StepErrors, study_step_errors
+from rparm.models.closed_loop.study import REST
 
+from rparm.linearization import stable_steps
 from rparm.output_files import from_here, written
 from rparm.report.style import save
 
@@ -38,8 +39,7 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
         _print(tables.payload_lines(payload))
         doubling = study_doubling(loop)
         _print(tables.doubling_lines(doubling))
-        limits = study_largest_steps(loop)
-        _print(tables.limit_lines(limits))
+        limits = stable_steps.study(ssp, REST)
     with written(path):
         save(figure(step_errors, tracking, doubling), path)
     print(f"\npicture: {from_here(path)}")
@@ -67,11 +67,7 @@ def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
             "fixed_steps": [d.fixed_steps for d in doubling],
             "passed": all(d.passed for d in doubling),
         },
-        "largest steps": {
-            "predicted": {x.method.name: x.predicted for x in limits},
-            "measured": {x.method.name: x.measured for x in limits},
-            "passed": all(x.passed for x in limits),
-        },
+        "largest steps": limits,
     }
 
 

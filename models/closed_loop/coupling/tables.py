@@ -2,7 +2,6 @@
 
 import numpy as np
 from rparm.models.closed_loop.coupling.delays import LARGEST_ERROR, Tracking, tracking_passed
-from rparm.models.closed_loop.coupling.largest_steps import Limit
 from rparm.models.closed_loop.coupling.payload import Payload
 from rparm.models.closed_loop.coupling.step_doubling import Doubling
 from rparm.models.closed_loop.coupling.step_errors import StepErrors
@@ -79,14 +78,4 @@ def doubling_lines(doubling: list[Doubling]) -> list[str]:
             f"{short(d.tolerance):>9}  {d.fixed_steps:>11}  {d.fixed_calls:>6}"
             f"  {more[0]:>19.1f}, {more[1]:>5.1f}  {verdict(d.passed)}"
         )
-    return lines
-
-
-def limit_lines(limits: list[Limit]) -> list[str]:
-    """The largest stable step of each method."""
-    head = f"{'largest stable step':<34}  {'predicted':>11}  {'measured':>11}  result"
-    lines = [head, "-" * len(head)]
-    for x in limits:
-        cells = "".join(f"  {1e3 * step:>8.3f} ms" for step in (x.predicted, x.measured))
-        lines.append(f"{x.method.name:<34}{cells}  {verdict(x.passed)}")
     return lines
