@@ -12,6 +12,7 @@ from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
 
+SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
 DESCRIPTION = (
     "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a loop that "
     "is broken, and the largest stable communication step."
@@ -110,6 +111,6 @@ def _seconds(text: str) -> float:
 
 def _positive_seconds(text: str) -> float:
     seconds = _seconds(text)
-    if seconds <= 0:
-        raise argparse.ArgumentTypeError(f"expected a time above 0, got {text!r}")
+    if seconds < SHORTEST:
+        raise argparse.ArgumentTypeError(f"expected {SHORTEST:g} s or more, got {text!r}")
     return seconds

@@ -73,6 +73,8 @@ def read(
 
     first = next(iter(outputs.values()))
     times = log.columns(time, first.name)[0]
+    if len(times) < FEWEST_ROWS:
+        raise UserError(f"{path}: has {len(times)} rows, a segment needs {FEWEST_ROWS}")
     if len(times) > MOST_ROWS:
         raise UserError(f"{path}: has {len(times)} rows, expected at most {MOST_ROWS}")
     measured, on = table(outputs), table(switches)
@@ -92,8 +94,6 @@ def _filled(
     path: Path, times: np.ndarray, inputs: np.ndarray, switches: np.ndarray, measured: np.ndarray
 ) -> Recording:
     """Put rows in where few are missing; inputs are linear there."""
-    if len(times) < FEWEST_ROWS:
-        raise UserError(f"{path}: has {len(times)} rows, a segment needs {FEWEST_ROWS}")
     steps = np.diff(times)
     usual = float(np.median(steps))
     counts = np.ones(len(steps), int)
@@ -130,7 +130,12 @@ def segments(recording: Recording, length: float, lead: float = 0.0) -> list[Seg
     length, lead : float
         s; a segment is simulated from `lead` before its first measured value that counts.
     """
-    times = recording.times
+    times, least = recording.times, (FEWEST_ROWS - 1) * recording.step
+    if length < least * (1 - 1e-9):
+        raise UserError(
+            f"segment: {recording.path} has {FEWEST_ROWS} rows in {least:.4g} s, "
+            f"expected at least that, got {length:g} s"
+        )
     gaps = np.flatnonzero(np.diff(times) > max(GAP * length, 2 * recording.step)) + 1
     found: list[Segment] = []
     for begin, end in zip([0, *gaps], [*gaps, len(times)], strict=True):

@@ -95,15 +95,18 @@ def checked(request: Request, fmu: Fmu) -> Checked:
 
 def _check_names(request: Request) -> None:
     """Refuse names that are there twice or lead nowhere, and a length that is none."""
+    logs = [str(Path(log).absolute()) for log in request.logs]
     for given, option in (
         ([name.partition(ABOVE)[0] for name in request.parameters], "parameters"),
         (request.inputs, "inputs"),
         (request.measured, "measured"),
-        ([str(Path(log).absolute()) for log in request.logs], "logs"),
+        (logs, "logs"),
     ):
         twice = [name for i, name in enumerate(given) if name in given[:i]]
         if twice:
             raise UserError(f"{option}: {twice[0]!r} is there twice")
+    if request.validation and str(Path(request.validation).absolute()) in logs:
+        raise UserError(f"validation: {request.validation} is fitted, expected another log")
     if not request.parameters or not request.measured:
         raise UserError("expected at least one of parameters and one of measured")
     if not 0 < request.segment < float("inf"):

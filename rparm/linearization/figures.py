@@ -29,6 +29,7 @@ SETTLED = 6.0  # time constants of the slowest pole that a step shows
 GROWN = 3.0  # those of the fastest one that grows
 FLATTEST = 0.1  # height of a picture of poles, of its width
 POINTS = 600
+MOST_DOTS = 10 * POINTS  # of samples, on one curve: more would only hide it
 FARTHEST = 3.0  # from the origin that a Nyquist diagram shows
 
 
@@ -122,7 +123,7 @@ def steps(model: Linear, step: float | None) -> Figure:
             for name, color in zip(model.inputs, _colors(), strict=False):
                 one = model.select([name], [output])
                 axes.plot(*_step(one, end / POINTS, end), color=color, label=f"step of {name}")
-                if step is not None:
+                if step is not None and end <= MOST_DOTS * step:
                     axes.plot(*_step(one, step, end), ".", color=color)
             axes.set_ylabel(output)
         every[0].legend(fontsize=8)

@@ -86,6 +86,7 @@ class _Problem:
         self.columns = [known.index(name) for name in free]
         self.rows = [first.outputs.index(name) for name in targets]
         self.equations = [*first.states, *targets]
+        self.count = len(self.equations) - np.count_nonzero(self._is_given_velocity(first))
         self.start = np.array([*first.x, *first.u])[self.columns]
 
     def set_to(self, point: np.ndarray) -> dict[str, Value]:
@@ -146,7 +147,8 @@ class _Problem:
             if name in self.targets
             else f"the derivative of {name} stays at {left[worst]:.6g}"
         )
-        raise UserError(f"--trim: no equilibrium found by {', '.join(self.free)}: {what}")
+        few = f"; free at most {self.count} variables" if len(self.free) > self.count else ""
+        raise UserError(f"--trim: no equilibrium found by {', '.join(self.free)}: {what}{few}")
 
     def interval(self, point: np.ndarray, i: int) -> tuple[float, float] | None:
         """Values of a free variable at which all stays in equilibrium, if there is more than one.

@@ -48,8 +48,9 @@ def changed(log: Path, folder: Path, row: int, column: int, text: str) -> Path:
 # ---- results -------------------------------------------------------------------------------------
 
 
-def test_json_has_what_was_found(identify, log: Path) -> None:
-    code, out, _ = identify("--parameters", "m2", *KNOWN, "--validate", log, "--json")
+def test_json_has_what_was_found(identify, tmp_path: Path) -> None:
+    second = write(replace(ARM, duration=2.0), tmp_path / "second.csv", 2)
+    code, out, _ = identify("--parameters", "m2", *KNOWN, "--validate", second, "--json")
     found = json.loads(out)
     assert code == found["exit_code"] == 0
     m2 = found["parameters"]["m2"]
@@ -190,6 +191,7 @@ def test_short_and_constant_logs_are_refused(identify, log: Path, tmp_path: Path
     path = tmp_path / "log.csv"
     constant = [lines[0], *(",".join([*line.split(",")[:3], "1", "2"]) for line in lines[1:])]
     for content, message in (
+        (lines[:2], "has 1 rows, a segment needs 20"),
         (lines[:10], "has 9 rows, a segment needs 20"),
         (lines[:300], "a segment needs 0.4 s"),
         (constant, "column 'q1' is constant"),
@@ -205,6 +207,16 @@ def test_a_log_counts_once(identify, log: Path) -> None:
     # a copy would make the intervals too narrow
     code, _, error = identify("--parameters", "m2", given=(str(log), *GIVEN))
     assert code == 2 and "is there twice" in error
+    assert_one_line(error)
+    code, _, error = identify("--parameters", "m2", "--validate", log)
+    assert code == 2 and "is fitted, expected another log" in error
+    assert_one_line(error)
+
+
+@pytest.mark.parametrize("length", ["1e-9", "0.018"])
+def test_a_segment_of_few_rows_is_refused_before_the_log_is_cut(identify, length: str) -> None:
+    code, _, error = identify("--parameters", "m2", "--segment", length)
+    assert code == 2 and "has 20 rows in 0.019 s, expected at least that" in error
     assert_one_line(error)
 
 

@@ -129,6 +129,12 @@ def test_a_page_with_pictures_explains_itself(
         assert f"{name}.png" in page and (tmp_path / f"{name}.png").stat().st_size > 5000
 
 
+def test_samples_too_dense_to_be_seen_are_not_drawn() -> None:
+    model = rparm.linearize("RPManipulator").select(["tau1"], ["q1"])
+    counts = [len(figures.steps(model, step).axes[0].lines) for step in (1e-2, 1e-9)]
+    assert counts == [2, 1]
+
+
 def test_a_system_says_its_largest_steps(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -156,7 +162,8 @@ def test_a_system_says_its_largest_steps(
         (["RPPlant", "--break", "arm.tau1"], "--break: is for systems"),
         (["RPPlant", "--outputs", "q1", "q1"], "outputs: q1 is given twice"),
         (["RPPlant", "--trim", "tau1", "tau1"], "--trim: tau1 is given twice"),
-        (["RPPlant", "--step", "0"], "expected a time above 0"),
+        (["RPPlant", "--step", "0"], "expected 1e-09 s or more, got '0'"),
+        (["RPPlant", "--step", "1e-300"], "expected 1e-09 s or more, got '1e-300'"),
         (["RPPlant", "--step", "1e300"], "step: deviations overflow in 1e+300 s"),
         (["RPPlant", "--save", "m.txt"], "--save: m.txt: expected a name that ends with .json"),
         (["RPSensor", "--at", "q1=1"], "is sampled"),

@@ -96,6 +96,7 @@ def test_a_touched_compliant_stop_gives_its_pair(plant: FmuSubject) -> None:
     "free, given, message",
     [
         (["f2"], {"q1": 0.3}, "no equilibrium found by f2: the derivative of dq1 stays"),
+        (["tau1", "f2", "q2"], {"q1": 0.0}, "; free at most 2 variables"),
         (["tau1", "f2", "ee_mz"], {}, "leaves tau1, ee_mz open"),
         (["tau1", "f2", "ee_fx"], {"q1": math.pi / 2, "a": 0.0}, "leaves tau1, ee_fx open"),
         (["tau1", "f2"], {"ee_x": 9.0}, "ee_x stays"),
