@@ -2,7 +2,7 @@
 
 Each relation has a mode: whether it holds. Its indicator is its distance with the sign of that
 mode, and 1 while no value that is needed reads it. An event of the file fires when its relation
-comes to hold in its modes. The functions are in events.c.in.
+comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
 from __future__ import annotations
@@ -102,6 +102,9 @@ class Events:
             relations=len(self.relations),
             events=len(file.events),
             states=len(states),
+            state_offset=f"offsetof(struct equations_values, {FIELD.format(states[0].name)})"
+            if states
+            else "0",
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
             modes=2 + len(self.relations) + len(file.events) + len(file.modes),
             located=len(self.located),
@@ -189,5 +192,6 @@ class Events:
                 code.lines += at_zero.lines
                 place = [v.name for v in self.file.of("states")].index(name)
                 given = [code.of(v) for v in (relation.mode, factor, rate)]
-                return f"of_state({place}, {given[0]}, {given[1]}, {offset}, {given[2]})"
-        return f"of_model({code.of(relation.limit or zero)})"
+                return f"relations_of_state({place}, {given[0]}, {given[1]}, {offset}, {given[2]})"
+        limit = code.of(relation.limit or zero)
+        return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"

@@ -11,6 +11,7 @@ from equations.graph import Value
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"
 SYMBOL = "equations_model"
+FOLLOWED = "relations_followed(&relations, ROOM, values, t, &copy)"
 
 
 def header(file: ModelFile) -> str:
@@ -36,9 +37,7 @@ def source(file: ModelFile) -> str:
             **_series(file, events),
             **_calculated(file, events),
             events=events.functions(),
-            followed=[f"{STRUCTURE} copy;", "values = followed(values, t, &copy);"]
-            if events
-            else [],
+            followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
             checks=_checks(file),
             ranges=[
                 f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"

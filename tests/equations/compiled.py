@@ -57,10 +57,9 @@ class Model:
         library = folder / "model.so"
         warnings = ["-Wall", "-Wextra", "-Wconversion", "-Werror", "-Wno-unused-parameter"]
         command = ["cc", "-std=c17", "-O1", "-ffp-contract=off", "-shared", "-fPIC", *warnings]
-        include = f"-I{ROOT / 'src' / 'model'}"
-        subprocess.run(
-            [*command, include, folder / "equations.c", "-o", library, "-lm"], check=True
-        )
+        shared = ROOT / "src" / "model"
+        sources = [folder / "equations.c", shared / "relations.c"]
+        subprocess.run([*command, f"-I{shared}", *sources, "-o", library, "-lm"], check=True)
         self.library = ctypes.CDLL(str(library))
         self.words = Words.in_dll(self.library, "equations_model")
         text = (folder / "equations.h").read_text()

@@ -1,0 +1,81 @@
+/* Events of a model that is made from its equations (fmu/equations): struct model_events of any
+ * such model.
+ *
+ * A relation compares two values; its mode says whether it holds, and changes at events only. An
+ * event of the model fires when its condition comes to hold. */
+#ifndef RELATIONS_H
+#define RELATIONS_H
+
+#include "events.h"
+
+/* Of a relation what does not change. */
+struct relation {
+    bool includes_zero; /* it holds at its limit */
+    bool is_timed;      /* its time is known before */
+    bool rises;         /* of a timed one: it holds after its time */
+    bool is_of_inputs;  /* it follows from inputs and parameters only */
+    size_t indicator;   /* of one that is not timed */
+};
+
+struct compared {
+    double distance; /* above 0 where it holds */
+    double slope;    /* 1/s: of the distance, while inputs rest */
+    double noise;    /* of the distance, from the error of the states */
+    int used;        /* by a value that is needed */
+};
+
+struct relations {
+    size_t values_size;
+    /* int[]: whether initialization has ended; the mode of each relation; whether each event is
+     * due; further modes of the model */
+    struct range modes;
+    size_t states; /* offset of the states */
+    int relation_count, event_count, state_count;
+    bool has_inputs; /* some relation follows from inputs and parameters only */
+    const struct relation *relation;
+    const double *nominal; /* of each state */
+
+    /* tolerance: of each state, in its unit */
+    void (*compare)(const void *values, double t, const double tolerance[],
+                    struct compared compared[]);
+    /* Of each timed relation, s. */
+    void (*write_times)(const void *values, double times[]);
+    void (*find_due)(const void *values, double t, int due[]);
+    /* An event happens: right sides see the values before it; a state that jumps gets tolerance 0.
+     */
+    void (*change)(void *values, double t, int event, double tolerance[]);
+};
+
+/* Memory for one call. */
+struct relations_room {
+    struct compared *compared; /* one per relation */
+    double *times;             /* one per relation */
+    int *due;                  /* one per event */
+    double *tolerance;         /* one per state */
+};
+
+/* Functions of struct model_events. */
+double relations_next_time(const struct relations *model, struct relations_room room,
+                           const void *values);
+bool relations_are_plausible(const struct relations *model, const void *values);
+enum status relations_update(const struct relations *model, struct relations_room room,
+                             void *values, const struct event *event);
+
+/* The values whose modes have followed inputs and parameters that were set since the last event:
+ * they themselves, or `copy`. */
+const void *relations_followed(const struct relations *model, struct relations_room room,
+                               const void *values, double t, void *copy);
+
+/* An indicator that is offset + factor x[state], before the sign of its mode; rate: of the state.
+ */
+static inline struct indicator relations_of_state(size_t state, int holds, double factor,
+                                                  double offset, double rate) {
+    const double sign = holds ? 1.0 : -1.0;
+    return (struct indicator){.kind = INDICATOR_OF_STATE,
+                              .state = state,
+                              .factor = sign * factor,
+                              .offset = sign * offset,
+                              .rises = sign * factor * rate > 0.0};
+}
+
+#endif
