@@ -49,11 +49,12 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
 
 def _line(text: str, message: str) -> str:
     """In which line the message's section and name are, as far as that is sure."""
-    place = re.match(r"\[([\w.]+)\](?:: ['\"]?(\w+))?|(\w+): ", message)
+    place = re.match(r"(\[.*?\])(?:: ['\"]?(\w+))?|(\w+): ", message)
     lines = text.split("\n")
     begin, key = 0, place and (place[2] or place[3])
     if place and place[1]:
-        heads = [i for i, line in enumerate(lines, 1) if line.strip() == f"[{place[1]}]"]
+        head = _plain(place[1])
+        heads = [i for i, line in enumerate(lines, 1) if _plain(line.partition("#")[0]) == head]
         begin = heads[0] if len(heads) == 1 else len(lines)
     for i, line in enumerate(lines[begin:], begin + 1):
         if line.lstrip().startswith("["):
@@ -61,6 +62,11 @@ def _line(text: str, message: str) -> str:
         if key and re.match(rf"\s*[\"']?{key}\b.*=", line):
             return f"line {i}: "
     return f"line {begin}: " if 0 < begin < len(lines) else ""
+
+
+def _plain(head: str) -> str:
+    """The head of a table without quotes and spaces."""
+    return re.sub(r"[\s\"']", "", head)
 
 
 def _check_names(file: ModelFile) -> None:

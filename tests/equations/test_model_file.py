@@ -122,6 +122,7 @@ MISTAKES = {
     "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
     "line of a table": (STATE + "[inputs.u]\nmin = 1", "model.toml: [inputs]: u: start = 0"),
+    "line of an odd name": (STATE + "[events.0]\nwhen = 'x < 0'", "line 4: [events.'0']: expected a"),
     "large": ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
 }  # fmt: skip
 
