@@ -27,6 +27,7 @@ from rparm.expressions.units import ONE, times, unit_of, unit_of_exponents
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {"parameters": "parameter", "inputs": "input", "states": "state"}
+QUOTES = r"[\s\"']"
 SECOND = unit_of_exponents({"s": 1})
 
 
@@ -53,8 +54,12 @@ def _line(text: str, message: str) -> str:
     lines = text.split("\n")
     begin, key = 0, place and (place[2] or place[3])
     if place and place[1]:
-        head = _plain(place[1])
-        heads = [i for i, line in enumerate(lines, 1) if _plain(line.partition("#")[0]) == head]
+        head = re.sub(QUOTES, "", place[1][1:-1])
+        plain = [re.sub(QUOTES, "", line.partition("#")[0]) for line in lines]
+        # the table itself, else one below it
+        exact, below = f"[{head}]", f"[{head}."
+        heads = [i for i, line in enumerate(plain, 1) if line == exact]
+        heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(below)]
         begin = heads[0] if len(heads) == 1 else len(lines)
     for i, line in enumerate(lines[begin:], begin + 1):
         if line.lstrip().startswith("["):
@@ -62,11 +67,6 @@ def _line(text: str, message: str) -> str:
         if key and re.match(rf"\s*[\"']?{key}\b.*=", line):
             return f"line {i}: "
     return f"line {begin}: " if 0 < begin < len(lines) else ""
-
-
-def _plain(head: str) -> str:
-    """The head of a table without quotes and spaces."""
-    return re.sub(r"[\s\"']", "", head)
 
 
 def _check_names(file: ModelFile) -> None:

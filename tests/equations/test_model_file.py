@@ -121,8 +121,9 @@ MISTAKES = {
     "sampler": (STATE + '[where]\na = "sample(x)"', "samplers are not supported: set an input"),
     "noise": (STATE + '[where]\na = "x + noise()"', "noise is not supported: make it outside and"),
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
-    "line of a table": (STATE + "[inputs.u]\nmin = 1", "model.toml: [inputs]: u: start = 0"),
-    "line of an odd name": (STATE + "[events.0]\nwhen = 'x < 0'", "line 4: [events.'0']: expected a"),
+    "line of a table": (STATE + "[inputs.u]\nmin = 1", "line 4: [inputs]: u: start = 0"),
+    "line of an odd name": (STATE + "[events.0]\nwhen = 'x < 0'", "line 4: [events.'0']: expected"),
+    "line of a deep table": (STATE + "[events.0.1]\na = 2", "line 4: [events.'0']: expected"),
     "large": ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
 }  # fmt: skip
 
