@@ -17,9 +17,10 @@ FOLDER = ROOT / "examples" / "models"
 METHODS = {"cvode_adams": 1, "cvode_bdf": 2, "erk": 3, "taylor": 4}
 
 
-def build(path: Path, output: Path) -> Path:
+def build(path: Path, output: Path, *options: str) -> Path:
     """The FMU of FMI 2.0 of a file."""
     command = [sys.executable, "-P", "-m", "rparm", "build", path, "--output", output, "--json"]
+    command += options
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     ended = subprocess.run(
         command, cwd=ROOT, capture_output=True, text=True, check=False, env=environment

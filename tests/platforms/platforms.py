@@ -13,9 +13,10 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.equations.examples import build
 from tests.platforms.scripts import Model, Script, read_model
 from tests.support.missing import missing
-from tests.support.paths import ROOT
+from tests.support.paths import EXAMPLES, ROOT
 
 BUILD = ROOT / "build"
 NATIVE_HOST = (
@@ -71,6 +72,8 @@ class Missing(Exception):
 
 def archive_with(row: Platform, name: str) -> Path:
     """The FMU with the library of this platform: a release, or a build for this platform only."""
+    if name in EXAMPLES:
+        return example(name)
     places = (BUILD / "release" / f"{name}.fmu", SCRATCH / row.preset / f"{name}.fmu")
     for place in places:
         if place.is_file():
@@ -79,6 +82,18 @@ def archive_with(row: Platform, name: str) -> Path:
                     refuse_older(place)
                     return place
     raise Missing(f"no FMU with a library for {row.name}: ./release.sh builds them")
+
+
+@functools.cache
+def example(name: str) -> Path:
+    """The FMU of an example for all platforms, as users build one."""
+    built = BUILD / "release" / "built.tar.xz"
+    if not built.is_file():
+        raise Missing("what FMUs for other platforms are linked with: ./release.sh builds it")
+    refuse_older(built)
+    output = SCRATCH / "examples" / name
+    output.mkdir(parents=True, exist_ok=True)
+    return build(ROOT / EXAMPLES[name], output, "--platforms")
 
 
 @functools.cache

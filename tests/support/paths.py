@@ -13,7 +13,8 @@ _FMU = re.compile(
 _DECLARED = _FMU.findall(_TEXT)
 
 NAMES = tuple(name for name, _, _ in _DECLARED)
-EVERY = (*NAMES, *re.findall(r"^  add_fmu\((\w+) EQUATIONS", _TEXT, re.M))  # with examples
+EXAMPLES = dict(re.findall(r"^  add_fmu\((\w+) EQUATIONS (\S+)\)", _TEXT, re.M))  # their files
+EVERY = (*NAMES, *EXAMPLES)
 FOLDERS = {name: folder for name, folder, _ in _DECLARED}  # below models/
 CARRIED = {name: scenarios.split() for name, _, scenarios in _DECLARED if scenarios}
 SYSTEMS = tuple(re.findall(r"^add_ssp\((\w+)", _TEXT, re.MULTILINE))
