@@ -18,18 +18,23 @@ static size_t aligned(size_t size) {
     return (size + alignment - 1) / alignment * alignment;
 }
 
-/* Bytes of the value structure up to the last field that is not calculated from others. */
-static size_t written_size(const struct model *model) {
+/* A step writes no parameters, but those of the restart. */
+static void locate_written(const struct model *model, struct instance_memory *memory) {
     const struct model_events events = events_of(model);
-    const struct range ranges[] = {model->parameters,      model->inputs,
-                                   model->states,          events.modes,
+    const struct range ranges[] = {model->inputs, model->states, events.modes,
                                    events.discrete_states, events.discrete_inputs};
-    size_t size = 0;
+    size_t begin = model->values_size;
+    size_t end = 0;
     for (size_t i = 0; i < sizeof ranges / sizeof ranges[0]; i++) {
-        const size_t end = ranges[i].offset + ranges[i].size;
-        size = ranges[i].size > 0 && end > size ? end : size;
+        const size_t own_end = ranges[i].offset + ranges[i].size;
+        begin = ranges[i].size > 0 && ranges[i].offset < begin ? ranges[i].offset : begin;
+        end = ranges[i].size > 0 && own_end > end ? own_end : end;
     }
-    return size;
+    const size_t first = (size_t)((char *)memory->active_inputs - memory->block);
+    const size_t restart = (size_t)(memory->restart_values - memory->block);
+    const size_t values = (size_t)(memory->values - memory->block);
+    memory->written_at_restart = (struct range){first, restart + end - first};
+    memory->written = (struct range){values + begin, end > begin ? end - begin : 0};
 }
 
 static bool lies_in(struct range range, const struct variable *variable) {
@@ -137,7 +142,6 @@ static enum status setup(struct instance *instance) {
     struct instance_memory *memory = &instance->memory;
 
     memory->size = before_values + 2 * values_size;
-    memory->written = written_size(model);
     memory->block = calloc(1, memory->size);
     instance->first_derivatives = calloc(2, values_size);
     instance->u =
@@ -156,6 +160,7 @@ static enum status setup(struct instance *instance) {
     memory->unhandled = (bool *)(void *)(memory->active_inputs + input_count);
     memory->restart_values = memory->block + before_values;
     memory->values = memory->restart_values + values_size;
+    locate_written(model, memory);
     locate_reals(instance);
     if (model->events != NULL && !setup_events(instance)) {
         return STATUS_OUT_OF_MEMORY;
@@ -220,6 +225,7 @@ void instance_destroy(struct instance *instance) {
 void instance_reset(struct instance *instance) {
     memset(instance->memory.block, 0, instance->memory.size);
     instance->state = (struct instance_state){.phase = PHASE_INSTANTIATED};
+    instance->inputs_are_held = false;
     instance->state.own.solver_method = INTEGRATOR_CVODE_ADAMS;
     instance->state.own.max_internal_steps = 100000;
     instance->state.own.max_events = 1000;

@@ -106,8 +106,10 @@ static inline void activate_values(struct instance *instance, struct clock_time 
     instance->parameters_are_active = true;
     activate(instance, model->inputs);
     activate(instance, model->states);
-    memcpy(memory->active_inputs, inputs, count_of(model->inputs) * sizeof *inputs);
-    instance_prepare_inputs(instance);
+    const size_t input_count = count_of(model->inputs);
+    memcpy(memory->active_inputs, inputs, input_count * sizeof *inputs);
+    instance_prepare_inputs(instance, !instance->inputs_are_held &&
+                                          polynomials_move(memory->active_inputs, input_count));
 
     const double target = clock_difference(end, state->time);
     state->horizon = instance_horizon(state, state->time, target, instance->inputs_move);
@@ -151,7 +153,8 @@ enum status instance_replay_history(struct instance *instance) {
     const int64_t steps = state->statistics.steps - state->steps_before_restart;
     double *x = doubles_of(instance->first_derivatives, states);
     double reached;
-    instance_prepare_inputs(instance);
+    instance_prepare_inputs(instance, polynomials_move(instance->memory.active_inputs,
+                                                       count_of(instance->model->inputs)));
     const struct integrator_start start = start_of(instance);
     enum status status = integrator_restart(
         instance->integrator, doubles_of(instance->memory.restart_values, states), &start);

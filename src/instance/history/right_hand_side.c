@@ -10,15 +10,15 @@ static void evaluate_inputs(const struct instance *instance, double t) {
     }
 }
 
-void instance_prepare_inputs(struct instance *instance) {
-    instance->inputs_move = false;
+void instance_prepare_inputs(struct instance *instance, bool moves) {
+    const bool had_moved = instance->inputs_move;
+    instance->inputs_move = moves;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         const struct polynomial *input = &instance->memory.active_inputs[i];
         double *series = instance->input_series[i];
-        instance->inputs_move |= polynomial_moves(input);
         instance->u[i] = input->d[0];
         series[0] = input->d[0]; // all there is, unless inputs move
-        for (int k = 1; k <= POLYNOMIAL_DEGREE; k++) {
+        for (int k = 1; had_moved && k <= POLYNOMIAL_DEGREE; k++) {
             series[k] = 0.0;
         }
     }

@@ -5,8 +5,8 @@
 
 #include "internals.h"
 
-/* After a restart: constant inputs are evaluated once, not at every call. */
-NONNULL void instance_prepare_inputs(struct instance *instance);
+/* After a restart: constant inputs are evaluated once, not at every call; moves: not all are. */
+NONNULL void instance_prepare_inputs(struct instance *instance, bool moves);
 
 /* context: the instance. t: s since the restart. */
 ode_rhs instance_rhs;

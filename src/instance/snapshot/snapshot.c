@@ -77,6 +77,7 @@ static enum status resume(struct instance *instance) {
     instance->outputs_are_valid = false;
     instance->parameters_are_valid = false;
     instance->parameters_are_active = false;
+    instance->inputs_are_held = false;
     instance->history_is_lost = true;
     instance_update_tolerance(instance);
     if (!instance_has_integrator(instance)) {
@@ -100,24 +101,33 @@ enum status instance_restore(struct instance *instance, const struct instance_sn
     return resume(instance);
 }
 
-/* What a step writes of the memory, but values that are calculated from it. */
-static void copy_written(const struct instance *instance, char *to, const char *from) {
-    const struct instance_memory *memory = &instance->memory;
-    const size_t restart = (size_t)(memory->restart_values - memory->block);
-    const size_t values = (size_t)(memory->values - memory->block);
-    memcpy(to, from, restart + memory->written); // inputs are in front of the value structures
-    memcpy(to + values, from + values, memory->written);
+/* What a step writes. Where inputs are held, it writes neither those of the next step nor the
+ * current ones. */
+static void copy_written(const struct instance_memory *memory, bool inputs_are_held, char *to,
+                         const char *from) {
+    const struct range restart = memory->written_at_restart;
+    const size_t begin = inputs_are_held ? restart.offset : 0;
+    const size_t end = restart.offset + restart.size;
+    memcpy(to + begin, from + begin, end - begin);
+    memcpy(to + memory->written.offset, from + memory->written.offset, memory->written.size);
 }
 
 void instance_keep(struct instance *instance, struct instance_snapshot *snapshot) {
     snapshot->state = instance->state;
-    copy_written(instance, (char *)snapshot->memory, instance->memory.block);
     snapshot->history_is_lost = instance->history_is_lost;
+    snapshot->inputs_are_held = instance->inputs_are_held;
+    copy_written(&instance->memory, snapshot->inputs_are_held, (char *)snapshot->memory,
+                 instance->memory.block);
 }
 
 enum status instance_undo(struct instance *instance, const struct instance_snapshot *snapshot) {
     instance->state = snapshot->state;
-    copy_written(instance, instance->memory.block, (const char *)snapshot->memory);
+    copy_written(&instance->memory, snapshot->inputs_are_held, instance->memory.block,
+                 (const char *)snapshot->memory);
+    if (snapshot->inputs_are_held) {
+        memcpy(instance->memory.current_inputs, instance->memory.next_inputs,
+               count_of(instance->model->inputs) * sizeof(struct polynomial));
+    }
     const enum status status = resume(instance);
     // next_step, which instance_keep has not brought up to date, follows from the integrator
     return status == STATUS_OK && snapshot->state.has_history && !snapshot->history_is_lost

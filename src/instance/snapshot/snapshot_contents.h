@@ -11,7 +11,8 @@ struct instance_snapshot {
     struct instance_snapshot *newer;
     struct instance_snapshot *older;
     unsigned tag;
-    bool history_is_lost; /* of instance_keep */
+    bool history_is_lost; /* of instance_keep, as the next one */
+    bool inputs_are_held;
     struct instance_state state;
     max_align_t memory[]; /* copy of instance_memory.block */
 };

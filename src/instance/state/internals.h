@@ -53,9 +53,10 @@ struct instance_state {
 /* Parts of one block of memory, of which a snapshot is a copy, in this order. */
 struct instance_memory {
     char *block;
-    size_t size;    /* bytes */
-    size_t written; /* bytes of a value structure, from its beginning, in which a step writes more
-                       than what it calculates from the rest */
+    size_t size; /* bytes */
+    /* Of the block: what a step writes, but the first two and what is calculated from the rest. */
+    struct range written_at_restart; /* active_inputs to restart_values */
+    struct range written;            /* of values */
 
     struct polynomial *next_inputs; /* inputs of the next step: last value set, and derivatives */
     struct polynomial *current_inputs; /* inputs at the current time */
@@ -90,6 +91,8 @@ struct instance {
     bool parameters_are_valid;  /* they are consistent; false: not known */
     bool parameters_are_active; /* as in active_values.h; false: not known */
     bool history_is_lost;       /* the integrator is not where state says: replay first */
+    bool inputs_are_held;       /* those of the next step are constant, and current_inputs are the
+                                   same; false: not known */
     bool inputs_move;           /* since the last restart; false: u has their constant values */
     double *u;                  /* one value per input, as the right-hand side sees them */
     double (*input_series)[SERIES_INPUT_LENGTH]; /* coefficients of each input */

@@ -15,6 +15,7 @@ void instance_begin_inputs(struct instance *instance) {
 
 void instance_evaluate_inputs(struct instance *instance, double elapsed) {
     struct instance_memory *memory = &instance->memory;
+    instance->inputs_are_held = false;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         memory->current_inputs[i] = polynomial_shifted(&memory->next_inputs[i], elapsed);
@@ -23,8 +24,9 @@ void instance_evaluate_inputs(struct instance *instance, double elapsed) {
 }
 
 void instance_keep_last_nodes(const struct step *step) {
-    const struct instance *instance = step->instance;
+    struct instance *instance = step->instance;
     const struct instance_memory *memory = &instance->memory;
+    instance->inputs_are_held = false;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         const double *nodes = instance->nodes + i * POLYNOMIAL_NODES;
         memory->next_inputs[i].d[0] =
@@ -68,6 +70,7 @@ static enum status set_polynomials(struct instance *instance, double h) {
         memory->current_inputs[i] = input;
         u[i] = input.d[0];
     }
+    instance->inputs_are_held = false;
     instance->outputs_are_valid = false;
     return STATUS_OK;
 }

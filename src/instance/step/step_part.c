@@ -44,14 +44,18 @@ static enum status advance(struct step *step) {
     if (step->options->accept != NULL) {
         integrator_set_observer(instance->integrator, observe, step);
     }
+    double target = clock_difference(step->until, state->restart_time);
     enum status status;
     for (;;) {
         const int64_t left = instance_steps_left(step);
-        status = integrator_advance(instance->integrator,
-                                    clock_difference(step->until, state->restart_time),
-                                    left > 1 ? left : 1, &state->latest_time, x);
-        if (status != STATUS_OK || step->is_over || is_at_event(instance) ||
-            !(state->latest_time < clock_difference(step->until, state->restart_time))) {
+        status = integrator_advance(instance->integrator, target, left > 1 ? left : 1,
+                                    &state->latest_time, x);
+        if (step->options->accept == NULL || status != STATUS_OK || step->is_over ||
+            is_at_event(instance)) {
+            break;
+        }
+        target = clock_difference(step->until, state->restart_time);
+        if (!(state->latest_time < target)) {
             break;
         }
         // to the new end; the step that the observer cut short counts

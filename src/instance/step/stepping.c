@@ -48,15 +48,19 @@ static enum status refuse_times(const struct instance *instance, double t, doubl
 
 /* ---- Inputs --------------------------------------------------------------------------------- */
 
-/* Inputs at the end of a step of the length elapsed (s). Their derivatives applied to it only. */
-static void end_inputs(struct instance *instance, double elapsed) {
+/* Inputs at the end of a step. Their derivatives applied to it only. */
+static void end_inputs(const struct step *step) {
+    struct instance *instance = step->instance;
+    const double elapsed = clock_difference(instance->state.time, step->begin);
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
+    instance->inputs_are_held = true;
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {
         struct polynomial *next = &memory->next_inputs[i];
         if (polynomial_moves(next)) {
             memory->current_inputs[i] = polynomial_shifted(next, elapsed);
             *next = (struct polynomial){{next->d[0]}};
+            instance->inputs_are_held = false;
         } else {
             memory->current_inputs[i] = *next;
         }
@@ -76,7 +80,9 @@ static void keep(struct step *step) {
 /* The instance is at the time where the step has ended. */
 static void arrive(const struct step *step, struct clock_time time) {
     instance_set_clock(step->instance, time);
-    end_inputs(step->instance, clock_difference(time, step->begin));
+    if (!step->instance->inputs_are_held) {
+        end_inputs(step);
+    }
 }
 
 /* To a point that an internal step may have passed already: then nothing can fail, and nothing is
@@ -129,6 +135,7 @@ static enum status do_step(struct step *step, double communication_point, double
     struct instance *instance = step->instance;
     enum status status = STATUS_OK;
     if (step->options->ask_inputs != NULL) {
+        instance->inputs_are_held = false;
         keep(step);
         status = instance_ask_inputs(step, communication_point, h);
         if (status != STATUS_OK) {

@@ -77,6 +77,7 @@ enum status instance_set_input_derivatives(struct instance *instance, const unsi
         const size_t input = instance_input_index(instance, variable);
         struct polynomial *next = &instance->memory.next_inputs[input];
         next->d[orders[i]] = values[i];
+        instance->inputs_are_held = false;
         // from now on outputs answer for the input of the next step, as after instance_set_real
         instance->memory.current_inputs[input] = *next;
         doubles_of(instance->memory.values, instance->model->inputs)[input] = next->d[0];
