@@ -148,6 +148,11 @@ static void note_error(struct component *component) {
 
 enum component_status component_failure(struct component *component, enum status status) {
     const enum component_status result = of_severity[status_severity(status)].status;
+    // intermediate update mode knows no discard (FMI 3.0, section 4.2.2)
+    if (result == COMPONENT_DISCARD && component->state == STATE_INTERMEDIATE_UPDATE) {
+        return component_fail(component, "the step fails: no value can be discarded in an "
+                                         "intermediate update");
+    }
     if (result == COMPONENT_ERROR) {
         note_error(component);
     }

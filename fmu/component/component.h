@@ -42,6 +42,11 @@ struct adapter {
     unsigned never_silent;         /* categories that component_set_logging cannot switch off */
     enum known_kinds knowns;       /* of directional and adjoint derivatives */
 
+    /* In intermediate update mode: whether these values may be read or set; if not, it fails as
+     * component_fail. NULL: the version has no such mode. */
+    bool (*may_access)(struct component *component, unsigned call, bool setting,
+                       const unsigned references[], size_t count);
+
     /* Sends a finished text to the importer. */
     void (*send)(const struct component *component, enum component_status status,
                  const char *category, const char *text);

@@ -6,19 +6,21 @@
 
 /* ---- Values --------------------------------------------------------------------------------- */
 
-#define ACCESS(access, of_instance, element)                                                       \
+#define ACCESS(access, of_instance, setting, element)                                              \
     enum component_status access(struct component *component, unsigned call,                       \
                                  const unsigned references[], size_t count, element values[]) {    \
         if (!component_enter(component, call) ||                                                   \
-            !component_has_arrays(component, call, count, references, values)) {                   \
+            !component_has_arrays(component, call, count, references, values) ||                   \
+            (component->state == STATE_INTERMEDIATE_UPDATE &&                                      \
+             !component->adapter->may_access(component, call, setting, references, count))) {      \
             return COMPONENT_ERROR;                                                                \
         }                                                                                          \
         return component_result(component,                                                         \
                                 of_instance(component->instance, references, count, values));      \
     }
 #define GET_AND_SET(name, constant, element)                                                       \
-    ACCESS(access_get_##name, instance_get_##name, element)                                        \
-    ACCESS(access_set_##name, instance_set_##name, const element)
+    ACCESS(access_get_##name, instance_get_##name, false, element)                                 \
+    ACCESS(access_set_##name, instance_set_##name, true, const element)
 VALUE_TYPE_LIST(GET_AND_SET)
 
 enum component_status access_none(struct component *component, unsigned call, const char *type,

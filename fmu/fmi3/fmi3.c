@@ -37,6 +37,7 @@ static const struct adapter adapter = {
     .always_logged = ERRORS,
     .never_silent = ERRORS,
     .knowns = KNOWN_ARGUMENTS,
+    .may_access = fmi3_may_access,
     .send = send_text,
 };
 

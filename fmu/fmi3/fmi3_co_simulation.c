@@ -17,9 +17,8 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
         !fmi3_may_access(instance, call, false, valueReferences, nValueReferences)) {
         return fmi3Error;
     }
-    return fmi3_access_status(instance,
-                              access_get_output_derivatives(instance, call, valueReferences,
-                                                            nValueReferences, orders, values));
+    return fmi3_status(access_get_output_derivatives(instance, call, valueReferences,
+                                                     nValueReferences, orders, values));
 }
 
 /* ---- Intermediate updates -------------------------------------------------------------------- */

@@ -45,14 +45,11 @@ bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t cou
 
 /* Whether the variables may be read or set in intermediate update mode; if not, fails as
  * component_fail. Other modes are not checked here. */
-bool fmi3_may_access(struct component *component, enum fmi3_call call, bool setting,
+bool fmi3_may_access(struct component *component, unsigned call, bool setting,
                      const fmi3ValueReference references[], size_t count);
 
 /* Prepares steps with these settings. Allocates what undoing a step needs, since steps allocate
  * nothing. */
 MUST_CHECK enum status fmi3_prepare_steps(struct fmi3_component *component);
-
-/* Intermediate update mode knows no discard (section 4.2.2). */
-fmi3Status fmi3_access_status(struct component *component, enum component_status status);
 
 #endif

@@ -15,7 +15,7 @@ bool fmi3_has_count(struct component *component, enum fmi3_call call, size_t cou
     return true;
 }
 
-bool fmi3_may_access(struct component *component, enum fmi3_call call, bool setting,
+bool fmi3_may_access(struct component *component, unsigned call, bool setting,
                      const fmi3ValueReference references[], size_t count) {
     if (component == NULL || component->state != STATE_INTERMEDIATE_UPDATE) {
         return true;
@@ -41,38 +41,24 @@ bool fmi3_may_access(struct component *component, enum fmi3_call call, bool sett
     return true;
 }
 
-fmi3Status fmi3_access_status(struct component *component, enum component_status status) {
-    if (status == COMPONENT_DISCARD && component->state == STATE_INTERMEDIATE_UPDATE) {
-        status = component_fail(component, "the step fails: no value can be discarded in an "
-                                           "intermediate update");
-    }
-    return fmi3_status(status);
-}
-
-static bool is_checked(fmi3Instance instance, enum fmi3_call call, bool setting,
-                       const fmi3ValueReference references[], size_t count, size_t value_count) {
-    return fmi3_has_count(instance, call, value_count, count) &&
-           fmi3_may_access(instance, call, setting, references, count);
-}
-
 /* ---- Functions ------------------------------------------------------------------------------ */
 
 /* Of one type; `access` reads or sets the values. */
-#define FUNCTION(name, element, setting, access)                                                   \
+#define FUNCTION(name, element, access)                                                            \
     fmi3Status name(fmi3Instance instance, const fmi3ValueReference valueReferences[],             \
                     size_t nValueReferences, element values[], size_t nValues) {                   \
         const enum fmi3_call call = CALL_##name;                                                   \
-        if (!is_checked(instance, call, setting, valueReferences, nValueReferences, nValues)) {    \
+        if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {                          \
             return fmi3Error;                                                                      \
         }                                                                                          \
-        return fmi3_access_status(instance, access);                                               \
+        return fmi3_status(access);                                                                \
     }
 
 /* Types that variables have, and their names in variable_access.h. */
 #define OF_VARIABLES(Type, type)                                                                   \
-    FUNCTION(fmi3Get##Type, fmi3##Type, false,                                                     \
+    FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
              access_get_##type(instance, call, valueReferences, nValueReferences, values))         \
-    FUNCTION(fmi3Set##Type, const fmi3##Type, true,                                                \
+    FUNCTION(fmi3Set##Type, const fmi3##Type,                                                      \
              access_set_##type(instance, call, valueReferences, nValueReferences, values))
 OF_VARIABLES(Float64, real)
 OF_VARIABLES(Int32, int32)
@@ -80,11 +66,19 @@ OF_VARIABLES(Int64, enumeration)
 OF_VARIABLES(Boolean, bool)
 
 /* Types that no variable has. */
+static enum component_status none(struct component *component, enum fmi3_call call, bool setting,
+                                  const char *type, const fmi3ValueReference references[],
+                                  size_t count, const void *values) {
+    return fmi3_may_access(component, call, setting, references, count)
+               ? access_none(component, call, type, references, count, values)
+               : COMPONENT_ERROR;
+}
+
 #define OF_NONE(Type)                                                                              \
-    FUNCTION(fmi3Get##Type, fmi3##Type, false,                                                     \
-             access_none(instance, call, #Type, valueReferences, nValueReferences, values))        \
-    FUNCTION(fmi3Set##Type, const fmi3##Type, true,                                                \
-             access_none(instance, call, #Type, valueReferences, nValueReferences, values))
+    FUNCTION(fmi3Get##Type, fmi3##Type,                                                            \
+             none(instance, call, false, #Type, valueReferences, nValueReferences, values))        \
+    FUNCTION(fmi3Set##Type, const fmi3##Type,                                                      \
+             none(instance, call, true, #Type, valueReferences, nValueReferences, values))
 OF_NONE(Float32)
 OF_NONE(Int8)
 OF_NONE(UInt8)
@@ -98,20 +92,20 @@ fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueRe
                          size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
                          size_t nValues) {
     const enum fmi3_call call = CALL_fmi3GetBinary;
-    if (!is_checked(instance, call, false, valueReferences, nValueReferences, nValues)) {
+    if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {
         return fmi3Error;
     }
     return fmi3_status(
-        access_none(instance, call, "Binary", valueReferences, nValueReferences, values));
+        none(instance, call, false, "Binary", valueReferences, nValueReferences, values));
 }
 
 fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                          size_t nValueReferences, const size_t valueSizes[],
                          const fmi3Binary values[], size_t nValues) {
     const enum fmi3_call call = CALL_fmi3SetBinary;
-    if (!is_checked(instance, call, true, valueReferences, nValueReferences, nValues)) {
+    if (!fmi3_has_count(instance, call, nValues, nValueReferences)) {
         return fmi3Error;
     }
     return fmi3_status(
-        access_none(instance, call, "Binary", valueReferences, nValueReferences, values));
+        none(instance, call, true, "Binary", valueReferences, nValueReferences, values));
 }
