@@ -1,16 +1,13 @@
-/* The measurements of the benchmark, and what they share: the report, and races. bench.c chooses.
- */
+/* The measurements, and what they share: the report, and races. bench.c chooses. */
 #ifndef BENCH_H
 #define BENCH_H
 
-#include "measure.h"
 #include "solvers.h"
 
-/* ---- report.c: a JSON object on stdout ----------------------------------------------------------
- */
+/* ---- report.c: a JSON object on stdout */
 
 struct report {
-    bool is_first; /* in the object or array that is open */
+    bool has_rows;
 };
 
 /* What a figure must be. */
@@ -20,7 +17,7 @@ struct target {
     double limit;
 };
 
-/* The object begins with the machine and the repeats. */
+/* The object begins with compiler and libraries, and the repeats. */
 void report_open(struct report *report, int repeats);
 void report_close(struct report *report);
 
@@ -29,11 +26,10 @@ void report_row(struct report *report, const char *group, const char *work, cons
 void report_number(struct report *report, const char *name, double value);
 void report_row_end(struct report *report);
 
-/* A number that has a target, with the target and whether it is met. */
+/* A number that has a target, with the target. */
 void report_judged(struct report *report, const char *name, double value, struct target target);
 
-/* ---- race.c: several solvers do the same work in turns, again and again
- * -------------------------- */
+/* ---- race.c: several solvers do the same work in turns, again and again */
 
 enum { MOST_RUNS = 10, MOST_REPEATS = 101 };
 
@@ -60,6 +56,7 @@ struct race {
 };
 
 void race_add(struct race *race, struct run run);
+void race_add_method(struct race *race, enum method method, double tolerance);
 
 /* The plain loop at the tolerance at which the FMU runs with CVODE, and the FMU with each method.
  */
@@ -68,24 +65,20 @@ void race_add_usual(struct race *race, const struct fmu_functions *fmu, double t
 void race_run(struct race *race, const struct fmu_functions *fmu, const struct problem *problem,
               int repeats);
 
-/* Index of the run with this name, -1: none. */
-int race_find(const struct race *race, const char *name);
-
 /* Medians over the repeats: time of a communication step, and its ratio to another run's. */
 double race_us(const struct race *race, int run);
 double race_ratio(const struct race *race, int run, int peer);
 
-/* Writes a row for each run; targets of the ratio to the first run, or NULL. */
+/* Writes a row for each run. */
 void race_report(const struct race *race, struct report *report, const char *group,
-                 const char *work, const struct problem *problem, const struct target *targets);
+                 const char *work, const struct problem *problem);
 
 /* The largest tolerance, in quarter decades from 1e-3 down, such that no error from there to a
  * ten-thousandth of the bound, or 1e-14, is above the bound. MuJoCo: sets the substeps instead. */
 void race_tune(struct run *run, const struct fmu_functions *fmu, const struct problem *problem,
                double bound);
 
-/* ---- The measurements
- * ---------------------------------------------------------------------------- */
+/* ---- The measurements */
 
 struct bench {
     struct fmu_functions fmu;

@@ -11,13 +11,16 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import operator
+import os
+import re
 import statistics
 import subprocess
 import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -59,7 +62,47 @@ OTHERS = (
 METHODS = {"erk": 3, "cvode_adams": 1, "taylor": 4}
 ROUNDING = 1e-14  # an error that no peer need stay below
 DRIFT_TOLERANCE = 1e-14
+PACKAGES = ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")  # Python packages of the peers
 TURNS = 5  # of free motion in a round: its targets are near, and bench and the peers take turns
+
+
+C1, C10, C100 = (work.name for work in CHANGING)
+K1, K10 = (work.name for work in OTHERS[:2])
+# of two runs: the largest ratio of their times that meets the target; None: no target
+RATIOS = [
+    (C1, "cvode_adams", "plain loop", 0.5),
+    (C1, "erk", "plain loop", 0.15),
+    (C1, "taylor", "plain loop", 0.04),
+    (C1, "taylor", "erk", 0.42),
+    (C1, "erk", "MuJoCo RK4", None),
+    (C1, "taylor", "MuJoCo RK4", 0.13),
+    (C10, "cvode_adams", "plain loop", 0.5),
+    (C10, "erk", "plain loop", 0.2),
+    (C10, "taylor", "erk", 0.42),
+    (C10, "erk", "MuJoCo RK4", None),
+    (C10, "taylor", "MuJoCo RK4", None),
+    (C100, "taylor", "erk", 0.2),
+    (C100, "taylor", "MuJoCo RK4", None),
+    (K1, "cvode_adams", "plain loop", 0.6),
+    (K1, "taylor", "cvode_adams", 0.95),
+    (K10, "taylor", "cvode_adams", 0.45),
+    (OTHERS[-1].name, "taylor", "erk", None),
+    (FREE[1e-8].name, "erk", "heyoka", 8.0),
+    (FREE[1e-8].name, "taylor", "heyoka", 0.9),
+    (FREE[1e-14].name, "taylor", "heyoka", 0.9),
+    (FREE[1e-8].name, "erk", "heyoka, error no larger than erk's", None),
+]
+RATIOS += [
+    (work, f"{method}, FMI 3.0", method, limit)
+    for work in (C1, C10, C100, K1, K10)
+    for method, limit in (("cvode_adams", 1.05), ("erk", 1.05), ("taylor", None))
+]
+RATIOS += [
+    (work.name, "taylor", "heyoka, error no larger than taylor's", None)
+    for work in (FREE[1e-8], *CHANGING, *OTHERS)
+]
+PLAIN = "plain loop"
+LARGEST_ERROR_OF_TAYLOR = 1e-12  # in steps of 1 ms
 
 
 @dataclass
@@ -71,7 +114,15 @@ class Peer:
     work: Work
     tolerance: float
     group: str = "steps"
-    against: dict[str, float | None] = field(default_factory=dict)  # run of bench: largest ratio
+
+    def row(self) -> dict:
+        """Of one turn."""
+        us, error = once(self)
+        work = self.work
+        return {
+            "group": self.group, "work": work.name, "run": self.name, "step": work.step,
+            "steps": work.steps, "error": error, "tolerance": self.tolerance, "us": us,
+        }  # fmt: skip
 
 
 def once(peer: Peer) -> tuple[float, float]:
@@ -115,7 +166,6 @@ def find(rows: list[dict], work: str, run: str) -> dict:
 def heyoka_like(run: str, work: Work, first: list[dict]) -> Peer:
     """heyoka with an error no larger than that of a run of bench, or ROUNDING."""
     peer = Peer(f"heyoka, error no larger than {run}'s", run_heyoka, work, 0.0)
-    peer.against[run] = None
     return tuned(peer, max(find(first, work.name, run)["error"], ROUNDING))
 
 
@@ -137,13 +187,10 @@ def make_peers(own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool)
         # scipy and fmpy do not come within 1e-14
         peers += [tuned(Peer(name, run, work, 0.0), bound)
                   for name, run in (swept if bound == 1e-8 else swept[:1])]  # fmt: skip
-        heyoka = next(peer for peer in peers if peer.work is work and peer.name == "heyoka")
-        heyoka.against = {"erk": 8.0, "taylor": 0.9} if bound == 1e-8 else {"taylor": 0.9}
-        for name, method in (("erk", 3), ("taylor", 4)):
-            if name in heyoka.against:
-                tolerance = find(first, work.name, name)["tolerance"]
-                run = partial(run_co_simulation, own, method=method)
-                peers.append(Peer(f"{name}, by fmpy", run, work, tolerance))
+        for name in ("erk", "taylor") if bound == 1e-8 else ("taylor",):
+            tolerance = find(first, work.name, name)["tolerance"]
+            run = partial(run_co_simulation, own, method=METHODS[name])
+            peers.append(Peer(f"{name}, by fmpy", run, work, tolerance))
     peers.append(heyoka_like("erk", FREE[1e-8], first))
     peers.append(heyoka_like("taylor", FREE[1e-8], first))
     peers.append(Peer(*python_plant, FREE[1e-8], 1e-8))
@@ -160,47 +207,67 @@ def make_peers(own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool)
     return peers
 
 
+def judged(row: dict, figure: str, limit: float | None) -> dict:
+    """The row with the largest value that its figure may have, if there is one."""
+    target = {"judged": figure, "comparison": "<=", "limit": limit}
+    return row | (target if limit is not None else {})
+
+
+def compared(rows: list[dict]) -> list[dict]:
+    """Rows of one turn with their ratios to the plain loop, and those of all other comparisons."""
+    steps = {(row["work"], row["run"]): row for row in rows if row["group"] == "steps"}
+    first = {work: row["us"] for (work, _), row in reversed(steps.items())}
+    for (work, _), row in steps.items():
+        row["ratio"] = row["us"] / first[work]
+    more = []
+    for work, run, peer, limit in RATIOS:
+        one, other = steps.get((work, run)), steps.get((work, peer))
+        if one and other and peer == PLAIN:
+            one |= judged({}, "ratio", limit)
+        elif one and other:
+            row = {"group": "against", "work": work, "run": f"{run} to {peer}"}
+            row |= {"error": one["error"], "error_of_peer": other["error"]}
+            more.append(judged(row | {"ratio": one["us"] / other["us"]}, "ratio", limit))
+    for work in (C1, C10, C100) if (C1, PLAIN) in steps else ():
+        for method in ("erk", "taylor"):
+            row = {"group": "against", "work": work}
+            row["run"] = f"error of {method} to that of the plain loop"
+            row["ratio"] = steps[work, method]["error"] / steps[work, PLAIN]["error"]
+            more.append(judged(row, "ratio", 1.0))
+    if (C1, "taylor") in steps:
+        row = {"group": "against", "work": C1, "run": "error of taylor"}
+        row["error"] = steps[C1, "taylor"]["error"]
+        more.append(judged(row, "error", LARGEST_ERROR_OF_TAYLOR))
+    return rows + more
+
+
+def judge(rows: list[dict]) -> list[dict]:
+    """The rows, with whether they meet their targets."""
+    for row in rows:
+        if "judged" in row:
+            meets = operator.le if row["comparison"] == "<=" else operator.ge
+            row["met"] = bool(meets(row[row["judged"]], row["limit"]))
+    return rows
+
+
 def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int) -> list[dict]:
     """Rounds of bench's communication steps and all peers; rows with medians over the turns."""
-    values = defaultdict(lambda: defaultdict(list))  # of a row's key: of each figure
-    rows = {}
+    found = defaultdict(list)  # rows of all turns, by key
     free = [peer for peer in peers if peer.work in FREE.values()]
     others = [peer for peer in peers if peer not in free]
     turns = [("steps", others), *[("free-motion", free)] * TURNS] * rounds
     for number, (group, group_peers) in enumerate(turns):
         print(f"turn {number + 1} of {len(turns)}", file=sys.stderr)
         c_rows = run_bench(program, "--only", group, "--repeats", str(repeats))["rows"]
-        for row in c_rows:
-            key = (row["group"], row["work"], row["run"])
-            rows[key] = row
-            for figure in ("us", "ratio"):
-                if figure in row:
-                    values[key][figure].append(row[figure])
-        for peer in group_peers:
-            us, error = once(peer)
-            key = (peer.group, peer.work.name, peer.name, peer.tolerance)
-            rows[key] = {
-                "group": peer.group, "work": peer.work.name, "run": peer.name,
-                "step": peer.work.step, "steps": peer.work.steps, "error": error,
-                "tolerance": peer.tolerance,
-            }  # fmt: skip
-            values[key]["us"].append(us)
-            if peer.group == "steps":
-                first = next(row for row in c_rows if row["work"] == peer.work.name)
-                values[key]["ratio"].append(us / first["us"])
-            for run, limit in peer.against.items():
-                of_bench = find(c_rows, peer.work.name, run)
-                key = ("against", peer.work.name, f"{run} to {peer.name}")
-                values[key]["ratio"].append(of_bench["us"] / us)
-                rows[key] = dict(zip(("group", "work", "run"), key, strict=True))
-                rows[key] |= {"error": of_bench["error"], "error_of_peer": error}
-                if limit is not None:
-                    rows[key] |= {"judged": "ratio", "comparison": "<=", "limit": limit}
-    for key, row in rows.items():
-        row |= {figure: statistics.median(list_) for figure, list_ in values[key].items()}
-        if "judged" in row:
-            row["met"] = row[row["judged"]] <= row["limit"]
-    return list(rows.values())
+        for row in compared(c_rows + [peer.row() for peer in group_peers]):
+            sweep = row["tolerance"] if row["group"] == "precision" else None
+            found[row["group"], row["work"], row["run"], sweep].append(row)
+    return [
+        of_turns[-1]
+        | {figure: statistics.median(row[figure] for row in of_turns)
+           for figure in ("us", "ratio") if figure in of_turns[-1]}
+        for of_turns in found.values()
+    ]  # fmt: skip
 
 
 def drift_rows(steps: int) -> list[dict]:
@@ -228,45 +295,48 @@ def with_figures(page: str, tables: str) -> str:
     return f"{before}{heading}\n{tables}{following}{after}"
 
 
+def libraries(build: Path) -> list[Path]:
+    """Of FMI 2.0, FMI 3.0, with an integrator that returns at once, and of RPPlant."""
+    names = ("fmu/RPManipulator/RPManipulator.so", "fmu/RPManipulator/fmi3/RPManipulator.so",
+             "tests/bench/idle/RPManipulator.so", "fmu/RPPlant/RPPlant.so")  # fmt: skip
+    return [build / name for name in names]
+
+
+def machine() -> dict:
+    """What the figures were measured on."""
+    names = re.findall(r"^model name\s*: (.*)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    return {
+        "processor": names[0] if names else "unknown", "cores": os.cpu_count(),
+        "load": os.getloadavg()[0], "python": sys.version.split()[0],
+    } | {name: version(name) for name in PACKAGES}  # fmt: skip
+
+
 def main() -> None:
     """Measure, then write what was measured."""
-    build = ROOT / "build"
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bench", type=Path, default=build / "tests/bench/bench")
-    parser.add_argument("--library", type=Path,
-                        default=build / "fmu/RPManipulator/RPManipulator.so")  # fmt: skip
-    parser.add_argument("--library-fmi3", type=Path,
-                        default=build / "fmu/RPManipulator/fmi3/RPManipulator.so")  # fmt: skip
-    parser.add_argument("--library-idle", type=Path,
-                        default=build / "tests/bench/idle/RPManipulator.so",
-                        help="the FMU with an integrator that returns at once")  # fmt: skip
-    parser.add_argument("--library-plant", type=Path,
-                        default=build / "fmu/RPPlant/RPPlant.so")  # fmt: skip
-    parser.add_argument("--fmu", type=Path, default=build / "RPManipulator.fmu")
-    parser.add_argument("--output", type=Path, default=build / "report/benchmark")
+    parser.add_argument("--build", type=Path, default=ROOT / "build", help="where it was built")
+    parser.add_argument("--output", type=Path, help="default: report/benchmark there")
     parser.add_argument("--rounds", type=int, default=5, help="of bench and the Python peers")
     parser.add_argument("--repeats", type=int, default=11, help="within bench")
     parser.add_argument("--readme", action="store_true", help="put the ratios into the page")
     parser.add_argument("--quick", action="store_true", help="little of everything, to try it")
     options = parser.parse_args()
-    libraries = (
-        options.library,
-        options.library_fmi3,
-        options.library_idle,
-        options.library_plant,
-    )
-    for path in (options.bench, *libraries, options.fmu):
+    needed = [options.build / "tests/bench/bench", *libraries(options.build)]
+    fmu = options.build / "RPManipulator.fmu"
+    output = options.output or options.build / "report/benchmark"
+    for path in (*needed, fmu):
         if not path.exists():
             sys.exit(f"{path}: no such file. Build it and run this with\n"
                      "    ./setup.sh --platforms && cmake --preset default && "
                      "cmake --build build --target benchmark")  # fmt: skip
-    options.output.mkdir(parents=True, exist_ok=True)
-    program = [str(path) for path in (options.bench, *libraries)]
+    output.mkdir(parents=True, exist_ok=True)
+    about = machine()  # with the load before
+    program = [str(path) for path in needed]
     small = ["--quick"] if options.quick else []
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        own = LoadedFmu(options.fmu, folder / "own")
+        own = LoadedFmu(fmu, folder / "own")
         plant = LoadedFmu(build_python_plant(folder), folder / "plant")
         first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
         peers = make_peers(own, plant, first["rows"], options.quick)
@@ -274,23 +344,23 @@ def main() -> None:
     print("sweeps, instances, threads, energy, calls", file=sys.stderr)
     others = "precision,step-size,instances,threads,energy,instance,calls,life,plant"
     rest = run_bench(program, *small, "--only", others, "--repeats", str(options.repeats))
-    machine = first["machine"] | {
-        name: version(name) for name in ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")
-    }
     result = {
-        "machine": machine | {"python": sys.version.split()[0]},
+        "machine": about | first["machine"],
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": rows + rest["rows"] + drift_rows(10_000 if options.quick else 1_000_000),
+        "rows": judge(rows + rest["rows"] + drift_rows(10_000 if options.quick else 1_000_000)),
     }
-    (options.output / "benchmark.json").write_text(json.dumps(result, indent=1) + "\n")
+    (output / "benchmark.json").write_text(
+        json.dumps(result, indent=1) + "\n", encoding="utf-8", newline="\n"
+    )
     text = markdown(result)
-    (options.output / "benchmark.md").write_text(text)
+    (output / "benchmark.md").write_text(text, encoding="utf-8", newline="\n")
     if options.readme:
         page = Path(__file__).with_name("README.md")
-        page.write_text(with_figures(page.read_text(), summary(result)))
+        figures = with_figures(page.read_text(encoding="utf-8"), summary(result))
+        page.write_text(figures, encoding="utf-8", newline="\n")
     print(text)
-    for path in draw(result["rows"], options.output):
+    for path in draw(result["rows"], output):
         print(path)
 
 

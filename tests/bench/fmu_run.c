@@ -1,6 +1,4 @@
 #include "solvers.h"
-
-#include "measure.h"
 #include "value_references.h"
 
 #include <stdio.h>
@@ -81,8 +79,7 @@ double fmu_run(const struct fmu_functions *fmu, const struct problem *problem, e
     return elapsed;
 }
 
-/* ---- FMI 3.0 ----------------------------------------------------------------------------------
- */
+/* ---- FMI 3.0 */
 
 static void log_text3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                       fmi3String text) {

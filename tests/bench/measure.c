@@ -1,6 +1,6 @@
 #define _POSIX_C_SOURCE 199309L // clock_gettime
 
-#include "measure.h"
+#include "solvers.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,7 +1,5 @@
 #include "solvers.h"
 
-#include "measure.h"
-
 #include <cvode/cvode.h>
 #ifdef BENCH_MUJOCO_MODEL
 #include <mujoco/mujoco.h>
@@ -55,8 +53,7 @@ double plain_loop_run(const struct problem *problem, double tolerance, double st
     return elapsed;
 }
 
-/* ---- MuJoCo -----------------------------------------------------------------------------------
- */
+/* ---- MuJoCo */
 
 #ifdef BENCH_MUJOCO_MODEL
 

@@ -26,66 +26,34 @@ STYLES = {
     "scipy DOP853": ("tab:brown", "P", "--"),
     "model exchange, CVode of fmpy": ("tab:cyan", "X", "--"),
 }
-LABELS = {
-    "cvode_adams": "FMU, cvode_adams",
-    "cvode_bdf": "FMU, cvode_bdf",
-    "erk": "FMU, erk",
-    "taylor": "FMU, taylor",
-    "plain loop": "plain CVODE loop",
-    "heyoka": "heyoka (called from Python)",
-    "model exchange, CVode of fmpy": "FMU as model exchange, CVode of fmpy",
-}
-LIGHT = {"color": "0.9", "linewidth": 0.8}
-
-
-def curve(axes: Axes, run: str, x: list[float], y: list[float]) -> None:
-    """Draw one solver."""
-    color, marker, line = STYLES[run]
-    axes.plot(x, y, line, color=color, marker=marker, markersize=5, linewidth=1.4,
-              label=LABELS.get(run, run))  # fmt: skip
-
-
-def frame(axes: Axes, title: str, x: str, y: str) -> None:
-    """Title, labels, grid."""
-    axes.set_title(title, fontsize=11)
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    axes.grid(True, **LIGHT)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def legend_below(figure: Figure, axes: list[Axes], columns: int) -> None:
-    """One legend for all axes, under them."""
-    entries = {}
-    for one in axes:
-        handles, labels = one.get_legend_handles_labels()
-        entries |= dict(zip(labels, handles, strict=True))
-    figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=columns,
-                  frameon=False)  # fmt: skip
+TIME = "time of a communication step, us"
 
 
 Points = Callable[[dict], tuple[float, float]]
 
 
 def panels(
-    rows: dict[str, list[dict]], runs: Iterable[str], points: Points, x: str, y: str
+    rows: dict[str, list[dict]], runs: Iterable[str], points: Points, x: str, y: str = TIME
 ) -> tuple[Figure, list[Axes]]:
     """Logarithmic plots side by side, by title: a curve for each run that has rows there."""
-    figure, all_axes = plt.subplots(
-        1, len(rows), figsize=(5.2 * len(rows), 5.4), sharey=True, layout="constrained"
-    )
-    for axes, (title, of_title) in zip(all_axes, rows.items(), strict=True):
+    figure, grid = plt.subplots(
+        1, len(rows), figsize=(5.2 * len(rows), 5.4), sharey=True, layout="constrained",
+        squeeze=False,
+    )  # fmt: skip
+    entries = {}
+    for axes, (title, of_title) in zip(grid[0], rows.items(), strict=True):
         for run in runs:
             found = [points(row) for row in of_title if row["run"] == run]
             if found:
-                curve(axes, run, *zip(*found, strict=True))
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        frame(axes, title[0].upper() + title[1:], x, "")
-    all_axes[0].set_ylabel(y)
-    legend_below(figure, list(all_axes), 5)
-    return figure, list(all_axes)
+                color, marker, line = STYLES[run]
+                (entries[run],) = axes.plot(
+                    *zip(*found, strict=True), line, color=color, marker=marker, markersize=5
+                )
+        axes.set(xscale="log", yscale="log", xlabel=x, title=title[0].upper() + title[1:])
+        axes.grid(True, color="0.9")
+    grid[0, 0].set_ylabel(y)
+    figure.legend(entries.values(), entries, loc="outside lower center", ncols=5, frameon=False)
+    return figure, list(grid[0])
 
 
 def by_title(rows: list[dict], group: str, start: int = 0) -> dict[str, list[dict]]:
@@ -97,14 +65,11 @@ def by_title(rows: list[dict], group: str, start: int = 0) -> dict[str, list[dic
     return found
 
 
-TIME = "time of a communication step, us"
-
-
 def precision(rows: list[dict]) -> Figure:
     """Time over error, one point a tolerance (MuJoCo: a time step)."""
     figure, all_axes = panels(
         by_title(rows, "precision"), STYLES, lambda row: (max(row["error"], 1e-16), row["us"]),
-        "error, relative to the largest value (more exact to the right)", TIME,
+        "error, relative to the largest value (more exact to the right)",
     )  # fmt: skip
     for axes in all_axes:
         axes.invert_xaxis()
@@ -114,34 +79,19 @@ def precision(rows: list[dict]) -> Figure:
 def step_size(rows: list[dict]) -> Figure:
     """Time of a communication step over its size."""
     runs = ("plain loop", "cvode_bdf", "cvode_adams", "erk", "taylor")
-    kinds = by_title(rows, "step size", start=1)
     return panels(
-        kinds,
-        runs,
-        lambda row: (row["step"], row["us"]),
+        by_title(rows, "step size", start=1), runs, lambda row: (row["step"], row["us"]),
         "communication step size, s, at tolerance 1e-8",
-        TIME,
-    )[0]
+    )[0]  # fmt: skip
 
 
 def instances(rows: list[dict]) -> Figure:
     """Time of a step over the number of instances stepped in turn."""
-    rows = [row for row in rows if row["group"] == "instances"]
-    limits = {row["run"]: row["limit"] for row in rows if "limit" in row}
-    figure, axes = plt.subplots(figsize=(7, 4.8), layout="constrained")
-    for run in dict.fromkeys(row["run"] for row in rows):
-        points = [(row["instances"], row["us"]) for row in rows if row["run"] == run]
-        x, y = zip(*points, strict=True)
-        curve(axes, run, x, y)
-        if run in limits:
-            axes.plot(x, [y[0] + limits[run]] * len(x), ":", color=STYLES[run][0], linewidth=1.2,
-                      label=f"{run}: one alone + {limits[run]:g} us, the target")  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_ylim(bottom=0.0)
-    frame(axes, "Instances stepped by 1 ms in turn, inputs changing", "number of instances",
-          TIME)  # fmt: skip
-    legend_below(figure, [axes], 2)
-    return figure
+    mine = [row for row in rows if row["group"] == "instances"]
+    title = "Instances stepped by 1 ms in turn, inputs changing"
+    return panels(
+        {title: mine}, STYLES, lambda row: (row["instances"], row["us"]), "number of instances"
+    )[0]
 
 
 def energy_drift(rows: list[dict]) -> Figure:

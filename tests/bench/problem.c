@@ -1,7 +1,5 @@
 #include "solvers.h"
 
-#include "measure.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -65,14 +63,12 @@ static void solve(struct problem *problem) {
 
 static struct problem *create(double step, int steps, enum problem_inputs kind,
                               const double start[4], double g) {
-    struct problem *problem = calloc(1, sizeof *problem);
-    require(problem != NULL, "no memory");
+    struct problem *problem = allocate(1, sizeof *problem);
     *problem = (struct problem){.step = step,
                                 .steps = steps,
                                 .kind = kind,
-                                .inputs = calloc((size_t)steps, sizeof problem->inputs[0]),
+                                .inputs = allocate((size_t)steps, sizeof problem->inputs[0]),
                                 .g = g};
-    require(problem->inputs != NULL, "no memory");
     memcpy(problem->start, start, sizeof problem->start);
     return problem;
 }
@@ -80,8 +76,7 @@ static struct problem *create(double step, int steps, enum problem_inputs kind,
 struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift) {
     const double start[4] = {0.3 + shift, 0.2 + shift, 0.0, 0.0};
     struct problem *problem = create(step, steps, kind, start, problem_parameters.g);
-    problem->reference = calloc((size_t)steps, sizeof problem->reference[0]);
-    require(problem->reference != NULL, "no memory");
+    problem->reference = allocate((size_t)steps, sizeof problem->reference[0]);
     sample_inputs(problem);
     solve(problem);
     return problem;

@@ -25,6 +25,13 @@ static double run_once(const struct run *run, const struct fmu_functions *fmu,
     return 0.0;
 }
 
+void race_add_method(struct race *race, enum method method, double tolerance) {
+    race_add(race, (struct run){.name = method_names[method],
+                                .solver = FMU,
+                                .method = method,
+                                .tolerance = tolerance});
+}
+
 void race_add_usual(struct race *race, const struct fmu_functions *fmu, double tolerance) {
     struct problem *problem = problem_create(1e-3, 1, INPUTS_ZERO, 0.0);
     struct fmu_counts counts;
@@ -35,10 +42,7 @@ void race_add_usual(struct race *race, const struct fmu_functions *fmu, double t
                                 .solver = PLAIN_LOOP,
                                 .tolerance = counts.effective_tolerance});
     for (enum method method = FIRST_METHOD; method < METHODS; method++) {
-        race_add(race, (struct run){.name = method_names[method],
-                                    .solver = FMU,
-                                    .method = method,
-                                    .tolerance = tolerance});
+        race_add_method(race, method, tolerance);
     }
 }
 
@@ -68,15 +72,6 @@ void race_run(struct race *race, const struct fmu_functions *fmu, const struct p
     free(states);
 }
 
-int race_find(const struct race *race, const char *name) {
-    for (int run = 0; run < race->count; run++) {
-        if (strcmp(race->runs[run].name, name) == 0) {
-            return run;
-        }
-    }
-    return -1;
-}
-
 double race_us(const struct race *race, int run) {
     double seconds[MOST_REPEATS];
     memcpy(seconds, race->seconds[run], sizeof seconds);
@@ -92,20 +87,18 @@ double race_ratio(const struct race *race, int run, int peer) {
 }
 
 void race_report(const struct race *race, struct report *report, const char *group,
-                 const char *work, const struct problem *problem, const struct target *targets) {
+                 const char *work, const struct problem *problem) {
     static const char *const ends[4] = {"end_q1", "end_q2", "end_dq1", "end_dq2"};
     for (int i = 0; i < race->count; i++) {
         const struct run *run = &race->runs[i];
-        const double us = race_us(race, i);
         report_row(report, group, work, run->name);
         report_number(report, "step", problem->step);
         report_number(report, "steps", problem->steps);
-        report_number(report, "us", us);
+        report_number(report, "us", race_us(race, i));
         report_number(report, "error", race->error[i]);
         for (int j = 0; j < 4; j++) { // of the reference, for other references to compare with
             report_number(report, ends[j], problem->reference[problem->steps - 1][j]);
         }
-        const double ratio = race_ratio(race, i, 0);
         if (run->solver == MUJOCO) {
             report_number(report, "substeps", run->substeps);
         } else {
@@ -116,8 +109,6 @@ void race_report(const struct race *race, struct report *report, const char *gro
             report_number(report, "internal_steps", race->counts[i].internal_steps);
             report_number(report, "evaluations", race->counts[i].evaluations);
         }
-        report_judged(report, "ratio", ratio,
-                      targets == NULL ? (struct target){NO_TARGET, 0.0} : targets[i]);
         report_row_end(report);
     }
 }

@@ -1,5 +1,5 @@
-/* The solvers of the C part: each run takes all steps of a problem and returns the processor time
- * of the stepping, s. */
+/* The clock, the problem and the solvers of the C part: each run takes all steps of a problem and
+ * returns the processor time of the stepping, s. */
 #ifndef BENCH_SOLVERS_H
 #define BENCH_SOLVERS_H
 
@@ -8,6 +8,40 @@
 #include "rp_manipulator.h"
 
 #include <stdbool.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* ---- measure.c: clock, order statistics, and the end of a program that cannot measure */
+
+/* s since some point in the past */
+double now(void);
+
+/* s that a processor has worked for this thread: what else runs on the machine disturbs it less
+ * than it does the time of day. */
+double processor_time(void);
+
+/* What two readings of a clock in a row differ by, s. */
+double clock_cost(double (*clock)(void));
+
+/* Of count > 0 values, which it sorts; part in [0, 1], 0.5: the median. */
+double quantile(double values[], size_t count, double part);
+double median(double values[], int count);
+
+/* Ends the program with a line on stderr where the condition does not hold. */
+static inline void require(bool condition, const char *what) {
+    if (!condition) {
+        fprintf(stderr, "bench: %s\n", what);
+        exit(1);
+    }
+}
+
+/* Zeros; ends the program where there is no memory. */
+static inline void *allocate(size_t count, size_t size) {
+    void *block = calloc(count, size);
+    require(block != NULL, "no memory");
+    return block;
+}
 
 /* ---- problem.c: the arm from one start, with inputs held over each communication step, and its
  * reference solution */
