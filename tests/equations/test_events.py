@@ -1,5 +1,6 @@
 """Events of files with equations: the ball, the thermostat, relations that switch."""
 
+from functools import cache
 from pathlib import Path
 
 import fmpy
@@ -79,9 +80,10 @@ def test_the_thermostat_switches_when_its_exponentials_do(folder: Path, method: 
     assert run["last_event_time"][-1] == pytest.approx(times[-2], abs=1e-4)
 
 
+@cache
 def made(folder: Path, text: str) -> Path:
-    """The FMU of a text."""
-    folder.mkdir(exist_ok=True)
+    """The FMU of a text, built once."""
+    folder.mkdir()
     (folder / "model.toml").write_text('name = "Made"\n' + text)
     return build(folder / "model.toml", folder)
 
@@ -95,17 +97,12 @@ size = { value = "abs(x)" }
 """
 
 
-@pytest.fixture(scope="module")
-def spring(folder: Path) -> Path:
-    return made(folder / "spring", SPRING)
-
-
 @EACH_METHOD
-def test_a_one_sided_spring_swings_in_two_halves(spring: Path, method: int) -> None:
+def test_a_one_sided_spring_swings_in_two_halves(folder: Path, method: int) -> None:
     """On one side with sqrt(101) rad/s, on the other with 1 rad/s."""
     run = simulated(
-        spring, 12.0, 0.05, {"solver_method": method}, relative_tolerance=1e-12,
-        also=["event_count"],
+        made(folder / "spring", SPRING), 12.0, 0.05, {"solver_method": method},
+        relative_tolerance=1e-12, also=["event_count"],
     )  # fmt: skip
     stiff = np.sqrt(101.0)
     halves = np.array([np.pi / stiff, np.pi])
@@ -131,7 +128,7 @@ y = { derivative = "1 if v < 5 else min(0.5, abs(x))" }
 
 @EACH_METHOD
 def test_relations_in_branches_that_are_not_taken_make_no_events(folder: Path, method: int) -> None:
-    fmu = made(folder / f"branches{method}", BRANCHES)
+    fmu = made(folder / "branches", BRANCHES)
     run = simulated(
         fmu, 12.0, 0.5, {"solver_method": method}, relative_tolerance=1e-10, also=["event_count"]
     )
@@ -155,14 +152,14 @@ above = { value = "1 if u > 0.5 else 0" }
 
 @EACH_METHOD
 def test_a_relation_of_time_switches_at_its_time(folder: Path, method: int) -> None:
-    fmu = made(folder / f"pulse{method}", PULSE)
+    fmu = made(folder / "pulse", PULSE)
     run = simulated(fmu, 2.0, 0.2, {"solver_method": method}, relative_tolerance=1e-8)
     expected = np.clip(run["time"] - 0.73, 0.0, 0.73)
     np.testing.assert_allclose(run["x"], expected, rtol=0, atol=1e-14)
 
 
 def test_a_relation_of_inputs_switches_where_they_are_set(folder: Path, tmp_path: Path) -> None:
-    fmu = made(folder / "inputs", PULSE)
+    fmu = made(folder / "pulse", PULSE)
     unit = opened(fmu, tmp_path)
     unit.exitInitializationMode()
     u, above, y = (reference(fmu, name) for name in ("u", "above", "y"))
@@ -215,7 +212,7 @@ set = { b = "a" }
 def test_events_at_one_instant_run_in_order_and_see_what_the_others_left(
     folder: Path, method: int
 ) -> None:
-    fmu = made(folder / f"chain{method}", CHAIN)
+    fmu = made(folder / "chain", CHAIN)
     run = simulated(fmu, 2.4, 0.3, {"solver_method": method}, also=["a", "b"])
     # at 1 both; at 2 the first clears a, so that the second does not run
     np.testing.assert_array_equal(run["n"], [0, 0, 0, 0, 12, 12, 12, 121, 121])
@@ -240,7 +237,7 @@ def test_events_follow_each_other_max_events_times(folder: Path, most: int) -> N
     text = '[states]\nx = { start = 0, derivative = "0" }\n'
     for i in range(4, 0, -1):
         text += f'[events.e{i}]\nwhen = "x > {i}.5"\nreinit = {{ x = "{i + 1}.75" }}\n'
-    fmu = made(folder / f"four{most}", text)
+    fmu = made(folder / "four", text)
     if most < 4:
         with pytest.raises(fmpy.fmi1.FMICallException):
             simulated(fmu, 1.0, 0.5, {"x": 1.75, "max_events": most})
