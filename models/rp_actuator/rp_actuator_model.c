@@ -38,13 +38,13 @@ static enum status jacobian(const void *values_pointer, double t, const double x
 DEFINE_OUTPUTS(rp_actuator_values)
 
 static enum status check_parameters(const void *values_pointer, char *text, size_t size) {
-    const double *ratio =
-        ((const struct rp_actuator_values *)values_pointer)->parameters.gear_ratio;
+    const struct rp_actuator_parameters *p =
+        &((const struct rp_actuator_values *)values_pointer)->parameters;
     for (int i = 0; i < 2; i++) {
-        if (!(fabs(ratio[i]) >= GEAR_RATIO_MIN)) {
+        if (!(fabs(p->gear_ratio[i]) >= GEAR_RATIO_MIN)) {
             (void)snprintf(text, size,
                            "gear_ratio%d = %g is refused: its magnitude must be %g or more", i + 1,
-                           ratio[i], GEAR_RATIO_MIN);
+                           p->gear_ratio[i], GEAR_RATIO_MIN);
             return STATUS_INVALID_PARAMETERS;
         }
     }

@@ -79,6 +79,23 @@ static void test_a_force_taken_back_in_event_mode_moves_nothing(void) {
     TEST_ASSERT_EQUAL_DOUBLE(0.0, get(TOY_SPEED));
 }
 
+/* The same where the importer integrates: with the force set in Event Mode it sticks. */
+static void test_a_force_taken_back_moves_nothing_outside(void) {
+    struct discrete_update update;
+    for (int sign = -1; sign <= 1; sign += 2) {
+        prepare(&block_description, 1, 1e-10);
+        instance_integrate_outside(instance);
+        initialize();
+        ASSERT_OK(instance_enter_continuous_time(instance));
+        set(TOY_INPUT, sign * 2.0);
+        instance_enter_event_mode(instance);
+        set(TOY_INPUT, sign * 0.5);
+        ASSERT_OK(instance_update_discrete_states(instance, &update));
+        const struct block_values *block = (const void *)instance->memory.values;
+        TEST_ASSERT_EQUAL_INT(0, block->direction);
+    }
+}
+
 /* A force exactly equal to the breakaway friction holds: outside, too. */
 static void test_a_force_equal_to_the_friction_triggers_nothing_outside(void) {
     struct discrete_update update;
