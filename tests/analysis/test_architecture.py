@@ -344,10 +344,7 @@ def test_a_circle_of_calls_is_noticed() -> None:
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "static inline int f(void) {\n    return up_do(1);\n}\n",
-        "#define F(x) \\\n    up_do(x)\n",
-    ],
+    ["static inline int f(void) {\n    return up_do(1);\n}\n", "#define F(x) \\\n    up_do(x)\n"],
 )
 def test_a_header_that_calls_up_is_noticed(text: str) -> None:
     symbols = {"up.c": Symbols({"up_do"}, set())}

@@ -24,11 +24,7 @@ class PythonPlant(Fmi2Slave):
         self.q1 = self.q2 = self.dq1 = self.dq2 = 0.0
         for name in ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a", "g"):
             self.register_variable(
-                Real(
-                    name,
-                    causality=Fmi2Causality.parameter,
-                    variability=Fmi2Variability.tunable,
-                )
+                Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
             )
         for name in ("tau1", "f2"):
             self.register_variable(Real(name, causality=Fmi2Causality.input))

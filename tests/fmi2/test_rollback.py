@@ -9,23 +9,8 @@ from ctypes import byref
 import pytest
 
 from rparm.runs import convergence
-from tests.fmi2.rollback_sequences import (
-    KINDS,
-    START,
-    WHIRL,
-    do,
-    other,
-    run,
-    sequence,
-    times,
-)
-from tests.support.instances import (
-    STATES,
-    Instance,
-    LoadedFmu,
-    restore,
-    serialized,
-)
+from tests.fmi2.rollback_sequences import KINDS, START, WHIRL, do, other, run, sequence, times
+from tests.support.instances import STATES, Instance, LoadedFmu, restore, serialized
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared
 

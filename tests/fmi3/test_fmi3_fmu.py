@@ -137,9 +137,6 @@ def test_parameters_are_knowns_of_outputs(known: str) -> None:
     elements = variables(root)
     output = elements["potential_energy"].get("valueReference")
     (structure,) = [e for e in root.iter("Output") if e.get("valueReference") == output]
-    expected = {
-        "parameters": ["m1", "m2", "l1", "lc1", "a", "g"],
-        "states": ["q1", "q2"],
-    }[known]
+    expected = {"parameters": ["m1", "m2", "l1", "lc1", "a", "g"], "states": ["q1", "q2"]}[known]
     dependencies = structure.get("dependencies").split()
     assert {elements[name].get("valueReference") for name in expected} <= set(dependencies)

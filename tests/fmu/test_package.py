@@ -67,8 +67,7 @@ def test_libraries_of_one_name_become_one_for_both_processors(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "libraries",
-    [(b"", b""), (b"\x7fELF" * 9, library(7, 512)), (library(0x01000007, 512),) * 2],
+    "libraries", [(b"", b""), (b"\x7fELF" * 9, library(7, 512)), (library(0x01000007, 512),) * 2]
 )
 def test_other_files_of_one_name_are_refused(tmp_path: Path, libraries: tuple[bytes, ...]) -> None:
     result = packed(tmp_path, *libraries)

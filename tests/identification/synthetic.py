@@ -107,10 +107,5 @@ def identified(machine: Machine, log: Path, seed: int = 0, **more: object) -> Id
     """Find the parameters of a machine again, from 20 % off."""
     given = {"parameters": list(machine.true), "start": off(machine.true, seed)} | more
     return rparm.identify(
-        machine.fmu,
-        log,
-        inputs=INPUTS,
-        measured=MEASURED,
-        settings=machine.settings,
-        **given,
+        machine.fmu, log, inputs=INPUTS, measured=MEASURED, settings=machine.settings, **given
     )

@@ -186,12 +186,7 @@ class Runner:
     """The library of one FMU on one platform; the native one if there is no row."""
 
     def __init__(
-        self,
-        row: Platform | None,
-        name: str,
-        fmu: Path,
-        folder: Path,
-        archive: Path | None = None,
+        self, row: Platform | None, name: str, fmu: Path, folder: Path, archive: Path | None = None
     ) -> None:
         """`fmu` is the native one; `folder` takes libraries, scripts and transcripts.
 

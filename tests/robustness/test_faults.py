@@ -217,11 +217,7 @@ def test_a_message_is_one_line_whatever_it_quotes(capsys: pytest.CaptureFixture[
 @STOPS
 @pytest.mark.parametrize("arguments", [LONG, ("system",)], ids=["run", "system"])
 def test_stopped_in_the_middle(
-    place: Place,
-    arguments: tuple[str, ...],
-    stop: signal.Signals,
-    code: int,
-    said: str,
+    place: Place, arguments: tuple[str, ...], stop: signal.Signals, code: int, said: str
 ) -> None:
     with place.popen(arguments) as process:
         process.stdout.readline()  # the head of the table: an FMU is unpacked

@@ -82,10 +82,7 @@ def open_ssp(path: Path) -> None:
     ids=["pipe", "device", "loop", "folder"],
 )
 def test_what_is_no_file_is_refused_at_once(
-    model: Path,
-    file: Callable[[Path], Path],
-    make: Callable[[Path], object],
-    message: str,
+    model: Path, file: Callable[[Path], Path], make: Callable[[Path], object], message: str
 ) -> None:
     path = file(model)
     path.unlink()

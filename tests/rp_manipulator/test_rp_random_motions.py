@@ -173,11 +173,7 @@ def test_tiny_steps(loaded: LoadedFmu, exact: Exact, tolerance: float) -> None:
     ("parameters", "h"), [(WEIGHTLESS, 1e6), (ARM, 100.0)], ids=["weightless", "falling"]
 )
 def test_huge_steps(
-    loaded: LoadedFmu,
-    exact: Exact,
-    tolerance: float,
-    parameters: tuple[float, ...],
-    h: float,
+    loaded: LoadedFmu, exact: Exact, tolerance: float, parameters: tuple[float, ...], h: float
 ) -> None:
     """Link 2 flies off, or falls 50 km."""
     flight = case((0.4, 0.1, 2.0, 1.0), (h,), tolerance, parameters)

@@ -11,14 +11,7 @@ from rparm.models.rp_sensor.references.make_references import Encoder
 
 from rparm.fmi.fmi_instance import Instance
 from rparm.fmi.fmu_file import Fmu
-from tests.rp_sensor.sensor_runs import (
-    INPUTS,
-    Cubic,
-    Stepper,
-    shown,
-    start_values,
-    started,
-)
+from tests.rp_sensor.sensor_runs import INPUTS, Cubic, Stepper, shown, start_values, started
 
 STILL = (0.0,)
 # Further from the end of a step than what counts as rounding of a time, relative to the step.

@@ -18,12 +18,7 @@ from rparm.runs.reference import Reference
 from rparm.runs.tolerance_sweep import Sweep
 from tests.report.sizes import OF_SCENARIOS
 from tests.support.paths import FOLDERS
-from tests.support.rparm_project import (
-    LONG,
-    NAMES,
-    SHORT,
-    load,
-)
+from tests.support.rparm_project import LONG, NAMES, SHORT, load
 
 
 @pytest.fixture(scope="module")

@@ -16,15 +16,7 @@ from rparm.errors import UserError, WrongValueError
 from rparm.fmi.fmu_file import Fmu, read_model
 from rparm.fmi.model import Variable
 from rparm.runs import convergence, simulation
-from tests.support.rparm_project import (
-    FMUS,
-    SHORT,
-    declared,
-    fmi3_fmu,
-    load,
-    names_of,
-    repacked,
-)
+from tests.support.rparm_project import FMUS, SHORT, declared, fmi3_fmu, load, names_of, repacked
 
 
 @pytest.fixture(scope="module", params=FMUS)

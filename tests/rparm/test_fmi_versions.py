@@ -166,10 +166,7 @@ def rename_a_variable(twin: Path) -> None:
     ],
 )
 def test_a_wrong_twin_is_reported_before_anything_runs(
-    built: Path,
-    capsys: pytest.CaptureFixture[str],
-    change: Callable[[Path], None],
-    reason: str,
+    built: Path, capsys: pytest.CaptureFixture[str], change: Callable[[Path], None], reason: str
 ) -> None:
     change(built / "fmi3" / NAME)
     code, out, err = call(capsys, "run", SHORT)

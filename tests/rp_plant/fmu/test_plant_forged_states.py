@@ -76,9 +76,7 @@ def test_the_modes_are_where_the_test_looks_for_them(moving: Run) -> None:
 def test_modes_that_do_not_exist_are_refused(moving: Run, impossible: Modes) -> None:
     content = serialized(moving.instance)
     assert_refused(
-        moving.instance,
-        forged(content, SLIDING_MODES, impossible),
-        "the modes are impossible",
+        moving.instance, forged(content, SLIDING_MODES, impossible), "the modes are impossible"
     )
 
 
