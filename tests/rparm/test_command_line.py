@@ -176,8 +176,8 @@ def test_list(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) -> None:
     path = project / f"models/rp_manipulator/scenarios/{LONG}.toml"
-    edit(path, "step = 0.01", "step = 2e-6")
-    edit(path, "tolerance = 1e-8", "tolerance = 1e-8\nreference_every = 5000")
+    edit(path, "step = 0.01", "step = 5e-7")
+    edit(path, "tolerance = 1e-8", "tolerance = 1e-8\nreference_every = 20000")
     file = reference_file(project, LONG)
     rows = np.loadtxt(file, delimiter=",", skiprows=1)
     rows[:, 0] = load(LONG, project).times[load(LONG, project).reference_rows]
@@ -190,7 +190,7 @@ def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) 
         command, cwd=project, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
         process.stdout.readline()  # the head of the table: everything is imported and read
-        time.sleep(0.5)
+        time.sleep(0.2)  # into the steps, which take seconds
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=10)
     assert process.returncode == 130
