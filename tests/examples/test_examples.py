@@ -107,12 +107,3 @@ def test_friction_takes_energy_and_nothing_else_does(tmp_path: Path) -> None:
     assert sorted(lost) == [0.0, 0.5, 1.0]
     assert lost[0.0] == 0.0 and min(lost[0.5], lost[1.0]) > 1.0
     assert picture.read_bytes().startswith(PNG)
-
-
-def test_a_run_of_each_model_is_drawn(tmp_path: Path) -> None:
-    picture = tmp_path / "models.png"
-    ran = run(sys.executable, EXAMPLES / "models" / "draw.py", picture, cwd=tmp_path)
-    assert ran.returncode == 0, ran.stderr
-    files = {file.name.partition(".")[0] for file in (EXAMPLES / "models").glob("*.toml")}
-    assert {line.partition(":")[0] for line in ran.stdout.splitlines()} == files
-    assert picture.read_bytes().startswith(PNG) and [*tmp_path.iterdir()] == [picture]

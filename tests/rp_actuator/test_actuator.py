@@ -17,7 +17,7 @@ from rparm.runs import reference
 from rparm.runs.comparison import Runs
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
-from tests.support.rparm_project import assert_made_again, declared, load, names_of
+from tests.support.rparm_project import declared, load, names_of
 
 UNIT = "RPActuator"
 
@@ -229,10 +229,6 @@ def test_units_of_what_is_connected_are_those_of_arm_and_controller(
 
 
 # ---- References ----------------------------------------------------------------------------------
-
-
-def test_references_are_those_of_the_script(tmp_path: Path) -> None:
-    assert_made_again(FOLDER.name, tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ from tests.rp_controller.controller_symbolic import (
 )
 from tests.support.instances import ERROR, OK, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
-from tests.support.rparm_project import assert_made_again, declared, load, names_of
+from tests.support.rparm_project import declared, load, names_of
 
 UNIT = "RPController"
 
@@ -234,10 +234,6 @@ def test_references_and_units_of_the_arm_are_the_arms(
 
 
 # ---- References ----------------------------------------------------------------------------------
-
-
-def test_references_are_those_of_the_script(tmp_path: Path) -> None:
-    assert_made_again(FOLDER.name, tmp_path)
 
 
 @pytest.mark.parametrize(

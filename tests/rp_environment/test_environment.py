@@ -22,7 +22,7 @@ from rparm.runs import reference
 from rparm.runs.comparison import Runs
 from tests.support.instances import DISCARD, Instance, LoadedFmu, status_of
 from tests.support.paths import ROOT
-from tests.support.rparm_project import assert_made_again, declared, load, names_of
+from tests.support.rparm_project import declared, load, names_of
 
 UNIT = "RPEnvironment"
 
@@ -312,10 +312,6 @@ def test_parameters_change_between_steps(loaded: LoadedFmu) -> None:
 
 
 # ---- References ----------------------------------------------------------------------------------
-
-
-def test_references_are_those_of_the_script(tmp_path: Path) -> None:
-    assert_made_again(FOLDER.name, tmp_path)
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

@@ -11,7 +11,7 @@ from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from tests.rp_sensor.sensor_runs import COUNTS, MODEL, start_values, started
 from tests.support.instances import DISCARD, Instance, LoadedFmu, instantiated, status_of
-from tests.support.rparm_project import assert_made_again, declared, fmi3_fmu, load, names_of
+from tests.support.rparm_project import declared, fmi3_fmu, load, names_of
 
 SCENARIOS = names_of(MODEL.name)
 
@@ -157,10 +157,6 @@ def test_inputs_set_at_a_tick_in_event_mode_are_sampled(fmu: Path) -> None:
 
 
 # ---- References --------------------------------------------------------------------------------
-
-
-def test_references_made_again_are_the_same(tmp_path: Path) -> None:
-    assert_made_again(MODEL.name, tmp_path)
 
 
 def test_scenarios_cover_the_parameters() -> None:

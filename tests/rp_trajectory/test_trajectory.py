@@ -15,7 +15,7 @@ from rparm.models.rp_trajectory.references import make_references
 
 from tests.support.instances import Instance, LoadedFmu
 from tests.support.paths import ROOT
-from tests.support.rparm_project import assert_made_again, declared, load, names_of
+from tests.support.rparm_project import declared, load, names_of
 
 UNIT = "RPTrajectory"
 
@@ -238,10 +238,6 @@ def test_only_the_start_is_settable(loaded: LoadedFmu) -> None:
 
 
 # ---- references --------------------------------------------------------------------------------
-
-
-def test_references_made_again_are_the_same(tmp_path: Path) -> None:
-    assert_made_again(MODEL.name, tmp_path)
 
 
 def test_every_motion_and_branch_has_a_scenario() -> None:

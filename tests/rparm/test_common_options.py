@@ -12,7 +12,7 @@ from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.system import study
 from tests.support.paths import ROOT
 from tests.support.rparm_project import SHORT, assert_one_line, call
-from tests.support.ssp_files import SSP
+from tests.support.ssp_files import SSP, edited, replace
 
 # what each command cannot do without
 NEEDED = {
@@ -130,7 +130,9 @@ def test_an_fmu_is_copied(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
 def test_a_federation_writes_what_it_recorded(
     tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ("nominal", "--ssp", SSP, "--output", tmp_path, "--json", "--quiet", "--open")
+    short = {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="0.5"')}
+    system = edited(SSP, tmp_path / "Short.ssp", short)
+    arguments = ("nominal", "--ssp", system, "--output", tmp_path, "--json", "--quiet", "--open")
     code, out, err = call(capsys, "federation", *arguments)
     assert code == 0 and err == "--open: federation has written no page\n" and shown == []
     (row,) = json.loads(out)["variants"]

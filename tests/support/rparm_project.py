@@ -3,8 +3,6 @@
 import functools
 import os
 import shutil
-import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -58,17 +56,6 @@ def copy_project(folder: Path) -> None:
         original = load(name)
         shutil.copy(original.path, model / "scenarios")
         shutil.copytree(original.reference_folder, model / "references" / name)
-
-
-def assert_made_again(model: str, folder: Path) -> None:
-    """The references of a model are what its script writes into an empty folder, byte for byte."""
-    kept = ROOT / "models" / model / "references"
-    script = kept / "make_references.py"
-    subprocess.run([sys.executable, script, "--output", folder], check=True, cwd=folder)
-    names = {path.name for path in folder.iterdir()}
-    assert names == set(names_of(model)) == {path.parent.name for path in kept.glob("*/*_ref.csv")}
-    for made in folder.glob("*/*"):
-        assert made.read_bytes() == (kept / made.relative_to(folder)).read_bytes(), made
 
 
 def reference_file(project: Path, name: str) -> Path:

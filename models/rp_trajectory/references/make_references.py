@@ -29,6 +29,12 @@ OUTPUTS = (*JOINTS, "ee_x_ref", "ee_y_ref", "ee_vx_ref", "ee_vy_ref")
 # items of the enumerations `motion` and `branch`
 POINT_TO_POINT, LINE, CIRCLE = 1, 2, 3
 FORWARD, BACKWARD = 1, 2
+# parameters of the path of each motion
+PATHS = {
+    POINT_TO_POINT: ("duration", "q1_from", "q1_to", "q2_from", "q2_to"),
+    LINE: ("duration", "ee_x_from", "ee_x_to", "ee_y_from", "ee_y_to"),
+    CIRCLE: ("frequency", "turns", "ramp_time", "radius", "start_angle", "x_center", "y_center"),
+}
 
 
 @functools.cache
@@ -58,12 +64,19 @@ def fraction(number: float | mp.mpf) -> sp.Rational:
 
 def segments(value: dict[str, float | mp.mpf]) -> list[Segment]:
     """Both coordinates of the motion, joints of point_to_point or those of the end effector."""
+    motion = value["motion"]
+    return _segments(motion, *(value[name] for name in PATHS[motion]))
+
+
+@functools.cache  # most parameters move nothing here
+def _segments(motion: int, *values: float | mp.mpf) -> list[Segment]:
+    """The same of the parameters that the path has."""
     u = sp.Symbol("u")
 
     def exact(name: str) -> sp.Expr:
-        return fraction(value[name])
+        return fraction(values[PATHS[motion].index(name)])
 
-    if value["motion"] == CIRCLE:
+    if motion == CIRCLE:
         rate, ramp = exact("frequency"), exact("ramp_time")
         full = exact("turns") / abs(rate)  # s: time that the turns take at full speed
         x = sp.Symbol("x")
@@ -80,7 +93,7 @@ def segments(value: dict[str, float | mp.mpf]) -> list[Segment]:
     else:
         duration = exact("duration")
         times = [(0, 0), (duration, scaling_law(u / duration)), (sp.oo, 1)]
-        joints = value["motion"] == POINT_TO_POINT
+        joints = motion == POINT_TO_POINT
         names = ("q1", "q2") if joints else ("ee_x", "ee_y")
 
         def position(time: sp.Expr) -> list[sp.Expr]:
