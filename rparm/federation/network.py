@@ -94,9 +94,15 @@ class Broker:
         self._close()
 
     def _close(self) -> None:
-        self._h.helicsBrokerDisconnect(self._broker)
-        if self._questions.ended():  # else they still use it
-            self._h.helicsBrokerFree(self._broker)
+        def close() -> None:
+            self._h.helicsBrokerDisconnect(self._broker)
+            if self._questions.ended():  # else they still use it
+                self._h.helicsBrokerFree(self._broker)
+
+        # nothing watches this one, and HELICS sets no limit to its waiting
+        closing = Thread(target=close, daemon=True)
+        closing.start()
+        closing.join(2.0 * ANSWER)
 
     @contextmanager
     def shielded(self) -> Iterator[None]:

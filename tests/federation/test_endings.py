@@ -184,6 +184,15 @@ def test_a_broker_that_does_not_open_is_ended(monkeypatch: pytest.MonkeyPatch) -
         run(system, "nominal", address, silence=1.0)
 
 
+def test_a_broker_that_does_not_close_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("helics.helicsBrokerDisconnect", lambda _: time.sleep(LIMIT))
+    monkeypatch.setattr("rparm.federation.network.ANSWER", 0.5)
+    begin = time.monotonic()
+    with Broker(2, addresses.free()):
+        pass
+    assert time.monotonic() - begin < LIMIT / 2
+
+
 def test_an_fmu_that_does_not_return_is_named() -> None:
     def hang(_: str) -> None:
         time.sleep(LIMIT)
