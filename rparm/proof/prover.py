@@ -138,9 +138,9 @@ class Prover:
     def problem(self, scenario: Scenario, start: Start) -> Iterable[str]:
         """What the program is asked, in lines."""
         value = scenario.start_values
-        yield _line("parameters", (x for name in self.parameters for x in (value[name], 0.0)))
-        yield _line("states", (x for name in self.states for x in start[name]))
         yield _line("start", [scenario.times[0]])
+        yield _line("states", (x for n in self.states for x in (start[n][0], 0.0, start[n][1])))
+        yield _line("parameters", (x for n in self.parameters for x in (value[n], 0.0, 0.0)))
         inputs = [scenario.input(name) for name in self.inputs]
         for i, end in enumerate(scenario.times[1:]):
             held = (x for values in inputs for x in (values[i], 0.0, 0.0, 0.0))

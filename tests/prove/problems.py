@@ -48,10 +48,10 @@ class Problem:
     def text(self) -> str:
         """As the program reads it."""
         lines = [
-            _line("parameters", np.column_stack((self.parameters, self.parameter_radii)).ravel()),
-            _line("states", np.column_stack((self.states, self.radii)).ravel()),
-            *(_line("sine", sine) for sine in self.sines),
             _line("start", [self.start]),
+            _line("states", _balls(self.states, self.radii)),
+            _line("parameters", _balls(self.parameters, self.parameter_radii)),
+            *(_line("sine", sine) for sine in self.sines),
             *(_line("to", [end, *_four(tau1), *_four(f2)]) for end, tau1, f2 in self.steps),
         ]
         return "".join(lines)
@@ -59,6 +59,10 @@ class Problem:
 
 def _line(name: str, numbers: Iterable[float]) -> str:
     return f"{name} {' '.join(float(x).hex() for x in numbers)}\n"
+
+
+def _balls(middles: Sequence[float], radii: Sequence[float]) -> np.ndarray:
+    return np.column_stack((middles, np.zeros(len(middles)), radii)).ravel()
 
 
 def _four(cubic: Cubic) -> list[float]:

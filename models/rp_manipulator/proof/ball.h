@@ -136,13 +136,12 @@ static inline struct ball ball_convolution(const struct ball *x, const struct ba
         low += term;
         products += fabs(product);
         low_sizes += fabs(term) + fabs(low);
-        radius += fabs(a.hi) * b.radius + a.radius * (fabs(b.hi) + b.radius) + TINY;
+        radius += fabs(a.hi) * b.radius + a.radius * (fabs(b.hi) + b.radius);
     }
     double lo;
     const double hi = two_sum(high, low, &lo);
-    const double rounding = HALF_ULP * (low_sizes + 8.0 * HALF_ULP * products);
+    radius += HALF_ULP * (low_sizes + 8.0 * HALF_ULP * products) + TINY * (n + 1);
     // OUTWARD for every 16 terms: each adds a rounding
-    radius += rounding;
     for (int i = 0; i <= n; i += 16) {
         radius *= OUTWARD;
     }
@@ -155,6 +154,15 @@ static inline struct ball ball_product(struct ball x, struct ball y) {
 
 static inline struct ball ball_times(double factor, struct ball x) {
     return ball_product(ball_exact(factor), x);
+}
+
+/* The sum of x_i y_i. */
+static inline struct ball ball_dot(const double x[], const struct ball y[], int count) {
+    struct ball sum = ball_exact(0.0);
+    for (int i = 0; i < count; i++) {
+        sum = ball_sum(sum, ball_times(x[i], y[i]));
+    }
+    return sum;
 }
 
 /* The quotient of the midpoints is corrected once; what then remains of x - quotient y, as a ball,

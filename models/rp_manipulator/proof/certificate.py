@@ -55,11 +55,10 @@ class Problem:
 
 @dataclass
 class Set:
-    """States centre + spread s + frame c, |s| <= what the problem says, |c| <= radii."""
+    """States centre + sum of c_j side_j, |c_j| <= radii_j; the first four sides are a frame."""
 
     centre: list[fmpq]
-    spread: list[list[fmpq]]
-    frame: list[list[fmpq]]
+    sides: list[list[fmpq]]
     radii: list[fmpq]
 
 
@@ -105,14 +104,19 @@ def of_states(words: Sequence[str]) -> list[Ball]:
     return found
 
 
+def _vector(words: Sequence[str]) -> list[fmpq]:
+    found = _numbers(words)
+    if len(found) != STATES:
+        raise WrongClaim(f"{len(found)} numbers for {STATES} states")
+    return found
+
+
 def read_problem(lines: Iterable[str]) -> Problem:
     """Read what `prove` was given."""
     problem = Problem()
     for name, *words in map(str.split, lines):
         if name in ("parameters", "states"):
-            numbers = _numbers(words)
-            pairs = [Ball(*numbers[i : i + 2]) for i in range(0, len(numbers), 2)]
-            setattr(problem, name, pairs)
+            setattr(problem, name, balls_of(words))
         elif name == "sine":
             effort, *numbers = words
             problem.sines.append((int(float.fromhex(effort)), *_numbers(numbers)))
@@ -124,8 +128,14 @@ def read_problem(lines: Iterable[str]) -> Problem:
     return problem
 
 
-def read_certificate(lines: Iterable[str]) -> Iterator[Step | fmpq]:
-    """Steps, and after those of each communication step the time of its end."""
+def read_certificate(lines: Iterable[str], start_radii: list[fmpq]) -> Iterator[Step | fmpq]:
+    """Steps, and after those of each communication step the time of its end.
+
+    Parameters
+    ----------
+    start_radii : list of fmpq
+        Those of the sides after the frame, which stay the same.
+    """
     rows = map(str.split, lines)
 
     def take(name: str) -> list[str]:
@@ -146,7 +156,7 @@ def read_certificate(lines: Iterable[str]) -> Iterator[Step | fmpq]:
         centre = of_states(take("centre"))
         if any(ball.radius != 0 for ball in centre):
             raise WrongClaim("a centre has a radius")
-        spread = [_numbers(take("spread")) for _ in range(STATES)]
-        frame = [_numbers(take("frame")) for _ in range(STATES)]
-        after = Set([x.middle for x in centre], spread, frame, _numbers(take("radii")))
+        sides = [_vector(take("side")) for _ in range(STATES + len(start_radii))]
+        radii = _vector(take("radii"))
+        after = Set([x.middle for x in centre], sides, radii + start_radii)
         yield Step(int(words[0]), times, balls, jacobian, deviation, after)

@@ -38,27 +38,24 @@ BITS = 192
 
 
 class Start:
-    """Coordinates of uncertain states and parameters, and the set at the start."""
+    """The set at the start: uncertain variables have sides of their own, forever the same ones."""
 
     def __init__(self, problem: Problem) -> None:
-        self.uncertain = [i for i, p in enumerate(problem.parameters) if p.radius > 0]
-        of_states = [i for i, x in enumerate(problem.states) if x.radius > 0]
-        self.directions = of_states + [STATES + k for k in range(len(self.uncertain))]
-        self.radii = [problem.states[i].radius for i in of_states]
-        self.radii += [problem.parameters[i].radius for i in self.uncertain]
+        vague = any(p.radius > 0 for p in problem.parameters)
+        self.uncertain = list(range(len(problem.parameters))) if vague else []
+        variables = problem.states + (problem.parameters if vague else [])
+        self.radii = [x.radius for x in variables] if any(x.radius > 0 for x in variables) else []
+        identity = [[fmpq(int(i == j)) for i in range(STATES)] for j in range(len(variables))]
         self.set = Set(
             [x.middle for x in problem.states],
-            [[fmpq(int(d == i)) for d in self.directions] for i in range(STATES)],
-            [[fmpq(int(i == j)) for j in range(STATES)] for i in range(STATES)],
-            [fmpq(0)] * STATES,
+            identity[:STATES] + identity[: len(self.radii)],
+            [NOTHING] * STATES + self.radii,
         )
 
 
-def hull_radius(start: Start, of: Set, i: int) -> fmpq:
+def hull_radius(of: Set, i: int) -> fmpq:
     """How far state i of a set is from its centre at most."""
-    by_starts = (abs(x) * r for x, r in zip(of.spread[i], start.radii, strict=True))
-    by_frame = (abs(x) * r for x, r in zip(of.frame[i], of.radii, strict=True))
-    return sum((*by_starts, *by_frame), NOTHING)
+    return sum((abs(s[i]) * r for s, r in zip(of.sides, of.radii, strict=True)), NOTHING)
 
 
 def effort_series(
@@ -127,7 +124,7 @@ class Checker:
     def check_hull(self, step: Step) -> None:
         """The hull contains the set at the begin."""
         for i, ball in enumerate(step.balls["hull"]):
-            if not ball.holds(self.set.centre[i], hull_radius(self.start, self.set, i)):
+            if not ball.holds(self.set.centre[i], hull_radius(self.set, i)):
                 raise WrongClaim(f"hull of state {i}")
 
     def check_endpoint(self, step: Step, inputs: list[list[arb]]) -> None:
@@ -168,7 +165,7 @@ class Checker:
     def check_set(self, step: Step) -> None:
         """The set at the end contains all motions from the set at the begin, in rationals."""
         after = step.after
-        frame = fmpq_mat([*after.frame])
+        frame = fmpq_mat(after.sides[:STATES]).transpose()
         deviation = frame.transpose() * frame
         for i in range(STATES):
             row = sum((abs(int(i == j) - deviation[i, j]) for j in range(STATES)), NOTHING)
@@ -177,11 +174,11 @@ class Checker:
         inverse = frame.inv()
         rest = [self._rest(step, k) for k in range(STATES)]
         middles = fmpq_mat([[ball.middle for ball in row[:STATES]] for row in step.jacobian])
-        before = fmpq_mat([*self.set.frame])
+        before = fmpq_mat(self.set.sides[:STATES]).transpose()
         turned = inverse * middles * before
         spread = _product(
             [[ball.radius for ball in row[:STATES]] for row in step.jacobian],
-            [[abs(x) for x in row] for row in self.set.frame],
+            [[abs(side[k]) for side in self.set.sides[:STATES]] for k in range(STATES)],
         )
         sizes = [[abs(inverse[i, k]) for k in range(STATES)] for i in range(STATES)]
         widths = _product(sizes, spread)
@@ -193,23 +190,24 @@ class Checker:
                 raise WrongClaim(f"radius {i} of the set")
 
     def _rest(self, step: Step, k: int) -> fmpq:
-        """What neither the spread nor the frame accounts for, in state k."""
+        """What the sides do not account for, in state k."""
         end, remainder = step.balls["endpoint"][k], step.balls["remainder"][k]
         rest = abs(end.middle + remainder.middle - step.after.centre[k])
         rest += end.radius + remainder.radius
-        for j, direction in enumerate(self.start.directions):
-            column = [(self.set.spread[i][j], step.jacobian[k][i]) for i in range(STATES)]
-            if direction >= STATES:
-                column.append((fmpq(1), step.jacobian[k][direction]))
+        for j, radius in enumerate(self.start.radii):
+            before, after = self.set.sides[STATES + j], step.after.sides[STATES + j]
+            column = list(zip(before, step.jacobian[k], strict=False))
+            if j >= STATES:
+                column.append((fmpq(1), step.jacobian[k][j]))
             middle = sum((x * ball.middle for x, ball in column), NOTHING)
-            radius = sum((abs(x) * ball.radius for x, ball in column), NOTHING)
-            rest += (abs(middle - step.after.spread[k][j]) + radius) * self.start.radii[j]
+            error = sum((abs(x) * ball.radius for x, ball in column), NOTHING)
+            rest += (abs(middle - after[k]) + error) * radius
         return rest
 
     def point(self, balls: Sequence[Ball]) -> None:
         """The balls that were printed contain the set."""
         for i, ball in enumerate(balls):
-            if not ball.holds(self.set.centre[i], hull_radius(self.start, self.set, i)):
+            if not ball.holds(self.set.centre[i], hull_radius(self.set, i)):
                 raise WrongClaim(f"printed ball of state {i}")
 
 
@@ -278,7 +276,7 @@ def _check(
     checker.point(of_states(points[0][2:]))
     count, begin, steps = 0, problem.start, []
     index = 0
-    for claim in read_certificate(certificate):
+    for claim in read_certificate(certificate, checker.start.radii):
         if isinstance(claim, Step):
             steps.append(claim)
             continue

@@ -1,10 +1,10 @@
 """Taylor coefficients of the arm's motion in arb's intervals, for check.py.
 
 With w = dq1, v = dq2, L = l1 + q2, P = L w and F = m1 lc1^2 + I1z + I2z, the momentum about the
-joint F w + m2 L P and the velocity v - a w along the slide have simple rates:
+joint over m2 and the velocity v - a w along the slide have simple rates:
 
-    (F w + m2 L P)' = tau1 + a f2 + a m2 P w - g (m1 lc1 + m2 L) cos q1
-    (v - a w)'      = f2 / m2 + P w - g sin q1
+    ((F / m2) w + L P)' = (tau1 + a f2) / m2 + a P w - g (m1 lc1 / m2 + L) cos q1
+    (v - a w)'          = f2 / m2 + P w - g sin q1
 """
 
 from collections.abc import Sequence
@@ -105,30 +105,26 @@ def _extend(
 ) -> None:
     """Append the next order. h: the step over that order."""
     m1, m2, I1z, I2z, _, lc1, a, g = parameters
-    tau1, f2 = effort
+    tau1, f2 = (of.over(x, m2) for x in effort)
     angular, sine, cosine = row["w"], row["sin"], row["cos"]
-    centrifugal = of.convolution(row["P"], angular)
-    weight = _plus(
-        of.times(of.times(m1, lc1), cosine[-1]),
-        of.times(m2, of.convolution(row["L"], cosine)),
-    )
-    push = _plus(f2, of.times(m2, centrifugal))
+    share = of.over(of.times(m1, lc1), m2)
+    push = _plus(f2, of.convolution(row["P"], angular))
+    weight = _plus(of.times(share, cosine[-1]), of.convolution(row["L"], cosine))
     momentum = _scaled(h, _minus(_plus(tau1, of.times(a, push)), of.times(g, weight)))
-    sliding = _scaled(h, _minus(_plus(of.over(f2, m2), centrifugal), of.times(g, sine[-1])))
+    sliding = _scaled(h, _minus(push, of.times(g, sine[-1])))
     next_sine = _scaled(h, of.convolution(angular, cosine))
     next_cosine = _scaled(-h, of.convolution(angular, sine))
 
     row["q1"].append(_scaled(h, angular[-1]))
     row["q2"].append(_scaled(h, row["v"][-1]))
     row["L"].append(row["q2"][-1])
-    # momentum of this order = F w + m2 (L0 P + sum), P = L0 w + sum: solved for w
+    # momentum of this order = (F / m2) w + L0 P + sum, P = L0 w + sum: solved for w
     first = row["L"][0]
     ahead_w = of.convolution(row["L"][1:], angular)
     ahead_P = of.convolution(row["L"][1:], row["P"])
-    fixed = _plus(of.times(of.times(m1, lc1), lc1), I1z, I2z)
-    inertia = _plus(fixed, of.times(m2, of.times(first, first)))
-    known = of.times(m2, _plus(of.times(first, ahead_w), ahead_P))
-    next_w = of.over(_minus(momentum, known), inertia)
+    fixed = _plus(of.times(share, lc1), of.over(_plus(I1z, I2z), m2))
+    known = _plus(of.times(first, ahead_w), ahead_P)
+    next_w = of.over(_minus(momentum, known), _plus(fixed, of.times(first, first)))
     row["P"].append(_plus(of.times(first, next_w), ahead_w))
     row["v"].append(_plus(sliding, of.times(a, next_w)))
     row["w"].append(next_w)

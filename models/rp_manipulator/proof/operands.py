@@ -60,8 +60,10 @@ def range_of(x: Parts) -> Range:
     return middle - Fraction(x[2]), middle + Fraction(x[2])
 
 
-def text(*operands: Sequence[float]) -> str:
-    return " ".join(float(part).hex() for one in operands for part in one)
+def ask(name: str, *operands: Parts) -> str:
+    """The line of a question."""
+    parts = (float(part).hex() for one in operands for part in one)
+    return " ".join((name, str(len(operands)), *parts))
 
 
 # ---- What answers have to satisfy ----------------------------------------------------------------

@@ -1,12 +1,10 @@
-/* Single operations on given operands, so that another program can check each by itself. */
 #ifndef OPERATIONS_H
 #define OPERATIONS_H
 
-#include <stdbool.h>
-#include <stdio.h>
+#include "text.h"
 
-/* Answers lines `NAME number ...` with a line of numbers each, to the end of the file. False: a
- * line is not understood. */
+/* Answers lines `NAME count ball ...` with a line of two balls each, to the end of the file. False:
+ * a line is not understood. */
 bool operations_answer(FILE *questions, FILE *answers);
 
 #endif

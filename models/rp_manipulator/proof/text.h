@@ -1,37 +1,66 @@
-/* Problems and claims as text: words and hexadecimal numbers, a line each. README.md has the
- * format. */
+/* Numbers and balls as text, in hexadecimal. README.md has the formats. */
 #ifndef TEXT_H
 #define TEXT_H
 
-#include "step.h"
+#include "ball.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 
-enum { MESSAGE_LENGTH = 160 };
+enum { WORD = 64 };
 
-/* What is read before the first communication step. */
-struct text_problem {
-    struct arm_problem arm;
-    double start; /* s */
-    int sine_count[EFFORTS];
-    struct sine sines[EFFORTS][SINES];
-};
+/* False, and an empty word: the file ends. */
+static inline bool text_read_word(FILE *file, char word[WORD]) {
+    word[0] = '\0';
+    return fscanf(file, "%63s", word) == 1;
+}
 
-/* Reads up to the first `to`. False: `message` says what is wrong. */
-bool text_read_problem(FILE *file, struct text_problem *problem, char message[MESSAGE_LENGTH]);
+/* Finite numbers of no more than 2^100. */
+static inline bool text_read_numbers(FILE *file, double numbers[], int count) {
+    char word[WORD];
+    for (int i = 0; i < count; i++) {
+        char *end = word;
+        if (!text_read_word(file, word)) {
+            return false;
+        }
+        numbers[i] = strtod(word, &end);
+        if (*end != '\0' || !(fabs(numbers[i]) <= 0x1p100)) {
+            return false;
+        }
+    }
+    return true;
+}
 
-/* Reads a communication step: its end (s) and the efforts over it. False: at the end of the file,
- * where `message` is empty, or what is wrong. */
-bool text_read_step(FILE *file, const struct text_problem *problem, double *end,
-                    struct effort efforts[EFFORTS], char message[MESSAGE_LENGTH]);
+static inline bool text_read_balls(FILE *file, struct ball balls[], int count) {
+    for (int i = 0; i < count; i++) {
+        double parts[3];
+        if (!text_read_numbers(file, parts, 3)) {
+            return false;
+        }
+        balls[i] = (struct ball){parts[0], parts[1], parts[2]};
+        if (!(fabs(balls[i].lo) <= HALF_ULP * fabs(balls[i].hi)) || balls[i].radius < 0.0) {
+            return false;
+        }
+    }
+    return true;
+}
 
-/* Reads `count` finite numbers of no more than 2^100. */
-bool text_read_numbers(FILE *file, double numbers[], int count);
+static inline void text_write_numbers(FILE *file, const char *name, const double numbers[],
+                                      int count) {
+    fprintf(file, "%s", name);
+    for (int i = 0; i < count; i++) {
+        fprintf(file, " %a", numbers[i]);
+    }
+    fprintf(file, "\n");
+}
 
-void text_write_balls(FILE *file, const char *name, const struct ball balls[], int count);
-void text_write_numbers(FILE *file, const char *name, const double numbers[], int count);
-
-/* All that a step claims. */
-void text_write_step(FILE *file, const struct arm_problem *problem, const struct arm_step *step);
+static inline void text_write_balls(FILE *file, const char *name, const struct ball balls[],
+                                    int count) {
+    fprintf(file, "%s", name);
+    for (int i = 0; i < count; i++) {
+        fprintf(file, " %a %a %a", balls[i].hi, balls[i].lo, balls[i].radius);
+    }
+    fprintf(file, "\n");
+}
 
 #endif
