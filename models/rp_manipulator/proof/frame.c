@@ -63,8 +63,7 @@ static double deviation(double frame[STATES][STATES]) {
     return sum * OUTWARD;
 }
 
-/* With E = I - Q^T Q, Q^-1 = (I - E)^-1 Q^T and (I - E)^-1 = I + E (I - E)^-1. Where the row sums
- * of |E| are at most e < 1, those of E (I - E)^-1 are at most e / (1 - e). */
+/* README.md derives the share of the inverse. */
 double frame_coordinates(double frame[STATES][STATES], struct ball sides[STATES][STATES],
                          const double radius[STATES], const double rest[STATES],
                          double coordinates[STATES]) {
