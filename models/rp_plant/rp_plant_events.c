@@ -212,6 +212,9 @@ static bool modes_are_possible(const void *values_pointer, bool is_held) {
 static enum status update(void *values_pointer, const struct event *event) {
     static const int none[2] = {0, 0};
     struct rp_plant_values *values = values_pointer;
+    if (event->triggered == NULL && rp_plant_surely_holds(values)) {
+        return STATUS_OK;
+    }
     struct triggered triggered;
     read_triggered(values, event->triggered, &triggered);
 

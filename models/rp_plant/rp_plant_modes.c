@@ -2,6 +2,7 @@
 
 #include "rp_plant_contact.h"
 
+#include <math.h>
 #include <string.h>
 
 /* ---- Modes from velocities and forces ------------------------------------------------------- */
@@ -56,6 +57,34 @@ void rp_plant_first_modes(const struct rp_plant_values *values, const double q[2
         rp_plant_decide(p, q, dq, inputs, modes, &decision);
     }
     rp_plant_begin_contacts(p, q, dq, inputs, modes);
+}
+
+/* ---- Held joints ----------------------------------------------------------------------------- */
+
+static bool stays_stuck(const struct rp_plant_values *values, int joint, double most_force) {
+    const struct rp_plant_parameters *p = &values->parameters;
+    const double margin = 1.0 + 1e-9; // far above the rounding of the forces
+    return values->modes.joint[joint] == RP_PLANT_STUCK && values->dq[joint] == 0.0 &&
+           values->modes.contact[joint] == RP_PLANT_APART && !rp_plant_has_contacts(p, joint) &&
+           rp_plant_closed_stop(p, joint, values->q[joint]) == 0 &&
+           margin * most_force < rp_plant_breakaway(p, joint);
+}
+
+bool rp_plant_surely_holds(const struct rp_plant_values *values) {
+    const struct rp_parameters *arm = &values->parameters.arm;
+    const struct rp_plant_inputs *inputs = &values->inputs;
+    if (values->modes.payload != RP_PLANT_RELEASED || values->payload_attached != 0) {
+        return false;
+    }
+    // as if each term had the largest sine and cosine, and no two of them opposite signs
+    const double L = fabs(arm->l1 + values->q[1]);
+    const double a = fabs(arm->a);
+    const double weight2 = fabs(arm->m2 * arm->g);
+    const double weight1 = fabs(arm->m1 * arm->lc1 * arm->g) + weight2 * (L + a);
+    const double push = fabs(inputs->wrench[0]) + fabs(inputs->wrench[1]);
+    const double moment = push * (L + a) + fabs(inputs->wrench[2]);
+    return stays_stuck(values, 0, fabs(inputs->tau[0]) + moment + weight1) &&
+           stays_stuck(values, 1, fabs(inputs->tau[1]) + push + weight2);
 }
 
 /* ---- Breaking away -------------------------------------------------------------------------- */

@@ -39,6 +39,10 @@ void rp_plant_decide(const struct rp_plant_parameters *p, const double q[2], con
                      const struct rp_plant_inputs *inputs, struct rp_plant_modes *modes,
                      struct rp_plant_decision *decision);
 
+/* Both joints stick and will do so, without a payload and apart from stops: whatever the angle is,
+ * friction exceeds the forces. False: that takes a decision. */
+bool rp_plant_surely_holds(const struct rp_plant_values *values);
+
 /* At the limit with no acceleration, stuck and sliding fit both: the next derivative decides. It
  * follows the same principle: D q''' = rates of the reactions, where a joint at its limit can only
  * go to that side, and without friction, since that does not change at breakaway. A joint whose

@@ -3,7 +3,7 @@
  * 200 000 random cases; those in which a pattern fits or fails by no more than rounding are drawn
  * again, and there are few. */
 #include "plant_test_support.h"
-#include "rp_plant_rest.h"
+#include "rp_plant_modes.h"
 #include "unity.h"
 
 #include <math.h>
@@ -213,4 +213,29 @@ static void test_decisions_at_the_limits(void) {
             ASSERT_CLOSE(a[i], outcome.ddq[i], 1e-14 * inverse * size);
         }
     }
+}
+
+/* Friction that exceeds the forces at any angle holds: the decision says the same. */
+static void test_joints_that_surely_hold_stay(void) {
+    static struct rp_plant_values v;
+    int holding = 0;
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        plant_test_random_plant(&random_source, &v);
+        for (int i = 0; i < 2; i++) {
+            v.dq[i] = 0.0;
+            v.modes.joint[i] = RP_PLANT_STUCK;
+            v.modes.contact[i] = RP_PLANT_APART;
+            v.parameters.breakaway_friction[i] = 100.0 * decades(-1.0, 1.0);
+        }
+        v.modes.payload = RP_PLANT_RELEASED;
+        v.payload_attached = 0;
+        if (rp_plant_surely_holds(&v)) {
+            holding++;
+            v.modes.payload = RP_PLANT_UNDECIDED; // an update decides all
+            plant_test_update(&v, -1);
+            TEST_ASSERT_EQUAL_INT(RP_PLANT_STUCK, v.modes.joint[0]);
+            TEST_ASSERT_EQUAL_INT(RP_PLANT_STUCK, v.modes.joint[1]);
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_INT(RP_TEST_SAMPLES / 10, holding);
 }
