@@ -16,9 +16,11 @@
  * which F + m2 L_0^2 = J at the origin solves for w_k. It is above 0 for valid parameters. */
 #include "rp_series.h"
 
+#include "platform.h"
 #include "rp_model.h"
 
 #include <math.h>
+#include <stddef.h>
 
 enum row { Q1, Q2, W, V, L, P, S, C };
 
@@ -54,18 +56,28 @@ static void begin(const struct rp_parameters *p, double row[][SERIES_LENGTH]) {
 }
 
 /* Right sides of order n that the efforts give: those of N' and y'. */
-static inline void efforts(const struct series_origin *origin, const struct rp_parameters *p, int n,
-                           double effort[2]) {
+ALWAYS_INLINE void efforts(const struct series_origin *origin, const struct rp_parameters *p,
+                           const double friction[2], int n, double effort[2]) {
     effort[0] = 0.0;
     effort[1] = 0.0;
-    if (n < SERIES_INPUT_LENGTH) {
-        effort[0] = origin->inputs[0][n] + p->a * origin->inputs[1][n];
-        effort[1] = origin->inputs[1][n] / p->m2;
+    if (n >= SERIES_INPUT_LENGTH) {
+        return;
     }
+    double tau1 = origin->inputs[0][n];
+    double f2 = origin->inputs[1][n];
+    if (friction == NULL) {
+        effort[1] = f2 / p->m2;
+    } else {
+        tau1 -= n == 0 ? friction[0] : 0.0;
+        f2 -= n == 0 ? friction[1] : 0.0;
+        effort[1] = f2 * (1.0 / p->m2); // rounded as in the plant's other modes
+    }
+    effort[0] = tau1 + p->a * f2;
 }
 
-void rp_series_extend(const struct rp_parameters *parameters, const struct series_origin *origin,
-                      int first, int last, double row[][SERIES_LENGTH]) {
+ALWAYS_INLINE void extend_with(const struct rp_parameters *parameters, const double friction[2],
+                               const struct series_origin *origin, int first, int last,
+                               double row[][SERIES_LENGTH]) {
     // a copy, which no coefficient overwrites
     const struct rp_parameters p = *parameters;
     if (first == 0) {
@@ -83,7 +95,7 @@ void rp_series_extend(const struct rp_parameters *parameters, const struct serie
         row[L][k] = row[Q2][k];
 
         double effort[2];
-        efforts(origin, &p, n, effort);
+        efforts(origin, &p, friction, n, effort);
         const struct products sum = products_of_order(row, n);
         const double weight = p.g * (m1_lc1 * row[C][n] + p.m2 * sum.L_c);
         const double N = h * (effort[0] + a_m2 * sum.P_w - weight);
@@ -96,10 +108,20 @@ void rp_series_extend(const struct rp_parameters *parameters, const struct serie
     }
 }
 
+void rp_series_extend(const struct rp_parameters *parameters, const double friction[2],
+                      const struct series_origin *origin, int first, int last,
+                      double row[][SERIES_LENGTH]) {
+    if (friction == NULL) {
+        extend_with(parameters, NULL, origin, first, last, row); // compiled without friction
+    } else {
+        extend_with(parameters, friction, origin, first, last, row);
+    }
+}
+
 static enum status extend(const struct series_origin *origin, int first, int last,
                           double row[][SERIES_LENGTH]) {
     const struct rp_values *values = origin->values;
-    rp_series_extend(&values->parameters, origin, first, last, row);
+    extend_with(&values->parameters, NULL, origin, first, last, row);
     return STATUS_OK;
 }
 

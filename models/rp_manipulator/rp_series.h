@@ -11,8 +11,10 @@ enum { RP_SERIES_ROWS = 8 };
 /* Of struct rp_values: inputs tau1, f2. */
 extern const struct series rp_series;
 
-/* extend of rp_series with these parameters instead of those of the origin's values. */
-void rp_series_extend(const struct rp_parameters *parameters, const struct series_origin *origin,
-                      int first, int last, double row[][SERIES_LENGTH]);
+/* extend of rp_series with these parameters instead of those of the origin's values. friction:
+ * constant efforts (N.m, N) against the inputs; NULL: none. */
+void rp_series_extend(const struct rp_parameters *parameters, const double friction[2],
+                      const struct series_origin *origin, int first, int last,
+                      double row[][SERIES_LENGTH]);
 
 #endif

@@ -27,6 +27,7 @@
 #include "rp_plant_series_efforts.h"
 #include "rp_series.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -39,14 +40,13 @@ static const double fast = 6.0;
 /* ---- Constants ------------------------------------------------------------------------------ */
 
 static bool has_wrench(const struct series_origin *origin) {
+    double size = 0.0;
     for (int i = FX; i <= MZ; i++) {
         for (int k = 0; k < SERIES_INPUT_LENGTH; k++) {
-            if (origin->inputs[i][k] != 0.0) {
-                return true;
-            }
+            size += fabs(origin->inputs[i][k]); // one branch for all
         }
     }
-    return false;
+    return size != 0.0;
 }
 
 static bool is_stuck(const struct series_motion *m, int joint) {
@@ -67,13 +67,18 @@ static bool has_payload(const struct series_motion *m) {
            (m->p->payload_mass > 0.0 || m->p->payload_inertia > 0.0);
 }
 
-/* The motion is that of the manipulator. */
+static bool has_constant_friction(const struct series_motion *m, int joint) {
+    return m->direction[joint] != 0.0 && !m->depends_on_velocity[joint];
+}
+
+/* The motion is that of the manipulator, up to constant friction. */
 static bool is_plain(const struct series_motion *m) {
     const struct rp_plant_parameters *p = m->p;
-    return m->modes.joint[0] == RP_PLANT_FREE && m->modes.joint[1] == RP_PLANT_FREE &&
+    return (m->modes.joint[0] == RP_PLANT_FREE || has_constant_friction(m, 0)) &&
+           (m->modes.joint[1] == RP_PLANT_FREE || has_constant_friction(m, 1)) &&
            m->modes.contact[0] == RP_PLANT_APART && m->modes.contact[1] == RP_PLANT_APART &&
-           p->armature[0] == 0.0 && p->armature[1] == 0.0 && p->damping[0] == 0.0 &&
-           p->damping[1] == 0.0 && !m->has_wrench && !has_payload(m);
+           p->armature[0] + p->armature[1] + p->damping[0] + p->damping[1] == 0.0 &&
+           !m->has_wrench && !has_payload(m);
 }
 
 /* The bodies at this q2. */
@@ -253,7 +258,10 @@ static enum status extend(const struct series_origin *origin, int first, int las
     struct series_motion m;
     begin_motion(origin, row, &m);
     if (is_plain(&m)) {
-        rp_series_extend(&m.p->arm, origin, first, last, row);
+        const double *coulomb = m.p->coulomb_friction;
+        const double friction[2] = {m.direction[0] * coulomb[0], m.direction[1] * coulomb[1]};
+        const bool slides = m.modes.joint[0] != RP_PLANT_FREE || m.modes.joint[1] != RP_PLANT_FREE;
+        rp_series_extend(&m.p->arm, slides ? friction : NULL, origin, first, last, row);
         return STATUS_OK;
     }
     set_bodies(&m, row[Q2][0]);
