@@ -117,6 +117,10 @@ EQUATION real plant_sliding_friction(const struct rp_plant_parameters *const p[S
         return coulomb;
     }
     const real w = quotient(v, velocity);
+    // exp(-100) of the difference is left, and rounding leaves Fc
+    if (value_of(w) > 10.0 && value_of(breakaway) < 1e20 * value_of(coulomb)) {
+        return coulomb;
+    }
     real e = plant_exponential(negative(times(w, w)));
     if (value_of(w) < 0.0) {
         e = plus(e, plant_turned_back(w));
