@@ -50,6 +50,11 @@ void location_destroy(struct location *location) {
     *location = (struct location){.time = INFINITY};
 }
 
+/* fmax, without the call. */
+static double larger(double x, double y) {
+    return x > y ? x : y;
+}
+
 static enum status evaluate(struct location *location, double t, const double x[]) {
     return location->ode->indicators(t, x, location->z, location->ode->context);
 }
@@ -90,13 +95,13 @@ enum status location_restart(struct location *location, const struct indicator *
         needs_model |= indicator->kind == INDICATOR_OF_MODEL;
         location->is_armed[i] = false;
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
-        location->noise[i] = fmax(2.0 * rounding, DBL_MIN);
+        location->noise[i] = larger(2.0 * rounding, DBL_MIN);
         if (indicator->kind == INDICATOR_OF_STATE) {
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
             const double miss = fabs(indicator->factor) * location->tolerances[indicator->state];
-            location->noise[i] = is_sure ? rounding : fmax(rounding, miss);
+            location->noise[i] = is_sure ? rounding : larger(rounding, miss);
         }
     }
     if (!needs_model) {
@@ -129,11 +134,28 @@ static void expand(const struct step_polynomial *step, const struct indicator *i
     }
 }
 
+/* The state moves by less than the indicator is above 0, and above what counts as 0 at a restart.
+ */
+static bool is_far_above(const struct step_polynomial *step, const struct indicator *indicator,
+                         double value, double noise) {
+    const double *row = step->row[indicator->state];
+    double way = 0.0;
+    for (int k = 1; k <= step->degree; k++) {
+        way += fabs(row[k]);
+    }
+    const double slack = 0x1p-40; // far above all rounding here and in Horner's scheme
+    return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
+}
+
 static double first_of_state(struct location *location, size_t i) {
     const struct step_polynomial *step = &location->step;
     const struct indicator *indicator = &location->indicators[i];
     double c[ROOTS_LENGTH];
     c[0] = indicator->offset + indicator->factor * step->row[indicator->state][0];
+    if (is_far_above(step, indicator, c[0], location->is_armed[i] ? 0.0 : location->noise[i])) {
+        location->is_armed[i] = true;
+        return INFINITY;
+    }
     if (step->is_from_end) {
         // backwards in time a proof needs no shift
         expand(step, indicator, -1.0, c);
@@ -223,7 +245,7 @@ static enum status begin_piece(struct location *location, double begin, double l
 static double largest(const double samples[], int count) {
     double scale = 0.0;
     for (int k = 0; k < count; k++) {
-        scale = fmax(scale, fabs(samples[k]));
+        scale = larger(fabs(samples[k]), scale);
     }
     return scale;
 }
