@@ -46,10 +46,27 @@ static double first_below(const struct roots_polynomial *p, double level) {
     return roots_first(&above);
 }
 
+/* p rises from the start on until it is above the noise: its slope is half the first one or more as
+ * far as s = c1 / (2 sum of k |c_k|). False: that is not known. */
+static bool rises_at_once(const struct roots_polynomial *p, double noise) {
+    double bend = 0.0;
+    for (int k = p->degree; k >= 2; k--) {
+        bend += k * fabs(p->c[k]);
+    }
+    const double slope = p->degree > 0 ? p->c[1] : 0.0;
+    const double s = slope < 2.0 * bend ? slope / (2.0 * bend) : 1.0;
+    const double margin = 0.5 * (1.0 - 0x1p-40); // more than all rounding
+    return slope > 0.0 && p->c[0] + margin * s * slope > noise;
+}
+
 /* The first fall of an indicator that is 0 at a restart and is to rise. As small as the noise it
  * may have either sign; it has fallen where it is below the noise, and did so where it was 0 last.
  */
 static double first_fall_from_zero(const struct roots_polynomial *p, double noise, bool *is_armed) {
+    if (rises_at_once(p, noise)) {
+        *is_armed = true;
+        return fall_behind(p, 0.0);
+    }
     const double below = first_below(p, -noise);
     const double above = first_rise(p, noise);
     if (above < below) {
