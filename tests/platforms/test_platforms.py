@@ -14,13 +14,14 @@ from tests.platforms import refusals, scripts
 from tests.platforms.platforms import PLATFORMS, Platform, Runner, runner
 from tests.platforms.scripts import Model, Script, joined
 from tests.platforms.transcript import first_difference, read
-from tests.support.paths import EVERY
+from tests.support.paths import NAMES
 
 VARIANTS = (1, 2, 3)
 THREADS = 8
 STEPS = 40  # before a state is saved, and after
 
-each_fmu = pytest.mark.parametrize("name", EVERY)
+# of the examples the one with events: each takes about a minute
+each_fmu = pytest.mark.parametrize("name", (*NAMES, "BouncingBall"))
 each_platform = pytest.mark.parametrize("row", PLATFORMS, ids=lambda row: row.name)
 # and this one, whose library comes from the FMU in build/
 everywhere = pytest.mark.parametrize(
