@@ -56,10 +56,12 @@ def _line(text: str, message: str) -> str:
     if place and place[1]:
         head = re.sub(QUOTES, "", place[1][1:-1])
         plain = [re.sub(QUOTES, "", line.partition("#")[0]) for line in lines]
-        # the table itself, else one below it
-        exact, below = f"[{head}]", f"[{head}."
-        heads = [i for i, line in enumerate(plain, 1) if line == exact]
-        heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(below)]
+        # the table itself, else one below it, else its line in the table above
+        heads = [i for i, line in enumerate(plain, 1) if line == f"[{head}]"]
+        heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(f"[{head}.")]
+        if not heads:
+            above, _, key = head.rpartition(".")
+            heads = [i for i, line in enumerate(plain, 1) if line == f"[{above}]"]
         begin = heads[0] if len(heads) == 1 else len(lines)
     for i, line in enumerate(lines[begin:], begin + 1):
         if line.lstrip().startswith("["):

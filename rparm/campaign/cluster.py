@@ -130,9 +130,17 @@ def _local(count: int, folder: Path, dashboard: bool) -> Iterator[Client]:
     with ExitStack() as stack:
         with uninterrupted():  # a cluster that is half made cannot be closed
             # without workers at first: one that dies while it starts would end the cluster
-            made = SpecCluster(
-                scheduler=scheduler, worker=worker, security=security, silence_logs=logging.CRITICAL
-            )
+            try:
+                made = SpecCluster(
+                    scheduler=scheduler,
+                    worker=worker,
+                    security=security,
+                    silence_logs=logging.CRITICAL,
+                )
+            except RuntimeError as error:  # it waits for a connection until it gives up
+                raise UserError(
+                    f"the campaign's processes cannot connect at {LOCAL}: {one_line(error)}"
+                ) from error
             client = stack.enter_context(Client(stack.enter_context(made)))
         made.sync(_keep_signals_from_children)
         keeper = PeriodicCallback(partial(_keep_workers, made, count), RESTART_EVERY)

@@ -194,6 +194,18 @@ def test_a_worker_that_is_killed_as_it_starts_is_made_again(
     assert "Traceback" not in err
 
 
+def test_a_cluster_that_cannot_start_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def refuse(**_: object) -> None:
+        raise RuntimeError("Cluster failed to start:\nno loopback")  # as distributed says it
+
+    monkeypatch.setattr(cluster, "SpecCluster", refuse)
+    expected = "cannot connect at 127.0.0.1: Cluster failed to start: no loopback$"
+    with pytest.raises(UserError, match=expected), cluster.opened(None, 1, tmp_path):
+        pass
+
+
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_campaign_that_is_stopped_as_it_starts_says_only_so(
     ending: signal.Signals, small: tuple[Path, Path], tmp_path: Path

@@ -123,6 +123,7 @@ MISTAKES = {
     "line": (STATE + "[parameters]\na = { start = 1 }\n\nb = { }", "line 7: [parameters]: b"),
     "line of a table": (STATE + "[inputs.u]\nmin = 1", "line 4: [inputs]: u: start = 0"),
     "line of an odd name": (STATE + "[events.0]\nwhen = 'x < 0'", "line 4: [events.'0']: expected"),
+    "line above": (STATE + "[events]\nwhen = 'x < 0'", "line 5: [events.when]: expected"),
     "line of a deep table": (STATE + "[events.0.1]\na = 2", "line 4: [events.'0']: expected"),
     "large": ("#" * 1_000_001, "has 1000001 bytes, expected at most 1000000"),
 }  # fmt: skip
