@@ -148,17 +148,6 @@ def test_energy_changes_by_the_work_of_the_efforts(run: Scenario, reference: Ref
     assert np.max(np.abs(gained - work)) < 1e-17 * scale
 
 
-@pytest.mark.parametrize("name", ["free_fall", "coasting", "constant_effort"])
-def test_energy_in_the_files_with_constant_efforts(name: str) -> None:
-    run, column = SCENARIOS[name], columns(SCENARIOS[name])
-    gained = column["total_energy"] - column["total_energy"][0]
-    for effort, coordinate in (("tau1", "q1"), ("f2", "q2")):
-        if effort in run.inputs:
-            gained -= run.inputs[effort][0] * (column[coordinate] - column[coordinate][0])
-    scale = np.max(np.abs(column["kinetic_energy"]) + np.abs(column["potential_energy"]))
-    assert np.max(np.abs(gained)) < 1e-15 * scale
-
-
 @each_scenario
 def test_outputs_in_the_files_belong_together(run: Scenario) -> None:
     """Single columns against formulas written here: no column is mixed up with another."""

@@ -1,5 +1,5 @@
-/* Newton-Euler recursion against the closed forms of the notes, with (18) corrected, against
- * accelerations differentiated from positions, and against the Euler-Lagrange dynamics. */
+/* Newton-Euler recursion against the closed forms of the notes, with (18) corrected, and against
+ * the Euler-Lagrange dynamics. */
 #include "rp_manipulator.h"
 #include "rp_test_support.h"
 #include "unity.h"
@@ -75,68 +75,12 @@ static void test_link_motion_is_16_to_18(void) {
     }
 }
 
-/* A point of the arm in frame 0 along q + dq t + ddq t^2 / 2: `along` (and q2 where it slides) on
- * z1, `across` on x1, from the joint axis. */
-struct tracked_point {
-    double along;
-    double across;
-    bool slides;
-    int axis;
-};
-
-static double tracked_coordinate(const void *context, double t) {
-    const struct tracked_point *point = context;
-    double angle = s.q[0] + t * (s.dq[0] + 0.5 * t * s.ddq[0]);
-    double slide = s.q[1] + t * (s.dq[1] + 0.5 * t * s.ddq[1]);
-    double along = point->along + (point->slides ? slide : 0.0);
-    return point->axis == 0 ? along * cos(angle) - point->across * sin(angle)
-                            : along * sin(angle) + point->across * cos(angle);
-}
-
-static void check_acceleration(struct tracked_point point, const double acceleration[3]) {
-    /* Over the stencil q1 = u + u^2 / 2 with |u| <= w t at most, whose sine has a tenth derivative
-     * below 9496 * 1.125^10 w^10: with w h <= 1/32 truncation is below 40 epsilons by h^2.
-     * Positions err by 4 epsilons, times 6.4. */
-    double w = fmax(1.0, fmax(fabs(dq1), sqrt(fabs(ddq1))));
-    double h = rp_test_power_of_two(1.0 / w) / 32;
-    double length = fabs(point.along) + fabs(point.across);
-    if (point.slides) {
-        length += fabs(q2) + fabs(dq2) / w + fabs(ddq2) / (w * w);
-    }
-    double bound = 66 * EPS * length / (h * h);
-    point.axis = 0;
-    double x = rp_test_second_derivative(tracked_coordinate, &point, 0.0, h);
-    point.axis = 1;
-    double y = rp_test_second_derivative(tracked_coordinate, &point, 0.0, h);
-    /* x1 = (-s1, c1), y1 = z0, z1 = (c1, s1) */
-    ASSERT_VECTOR(-s1 * x + c1 * y, 0.0, c1 * x + s1 * y, acceleration, 1.5 * bound);
-}
-
-/* Nothing of the notes but the positions goes in: the Coriolis term has the factor 2. */
-static void test_link_accelerations_are_second_derivatives_of_positions(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_link_motion motion;
-        next_sample();
-        rp_newton_euler_forward(&p, s.q, s.dq, s.ddq, &motion);
-        check_acceleration((struct tracked_point){.along = p.lc1}, motion.ac1);
-        check_acceleration((struct tracked_point){.along = p.l1, .across = p.a}, motion.ae1);
-        check_acceleration((struct tracked_point){.along = p.l1, .across = p.a, .slides = true},
-                           motion.ac2);
-    }
-}
-
 /* ---- Backward recursion --------------------------------------------------------------------- */
 
-/* (24) and (25) with `coriolis` times q1' q2': 2 is right, the notes print 1. */
-static void forces_on_link_2(double coriolis, double *f2x, double *f2z) {
-    *f2x = p.m2 * (L * ddq1 - p.a * dq1 * dq1 + coriolis * dq1 * dq2 + p.g * c1);
-    *f2z = p.m2 * (-p.a * ddq1 - L * dq1 * dq1 + ddq2 + p.g * s1);
-}
-
-/* (20), (22) and (23) from them, as printed. */
+/* (20) and (22) to (25) with `coriolis` times q1' q2': 2 is right, the notes print 1. */
 static void loads_as_printed(double coriolis, struct rp_joint_loads *loads) {
-    double f2x, f2z;
-    forces_on_link_2(coriolis, &f2x, &f2z);
+    double f2x = p.m2 * (L * ddq1 - p.a * dq1 * dq1 + coriolis * dq1 * dq2 + p.g * c1);
+    double f2z = p.m2 * (-p.a * ddq1 - L * dq1 * dq1 + ddq2 + p.g * s1);
     double f1x = f2x + p.m1 * (p.lc1 * ddq1 + p.g * c1);
     double f1z = f2z + p.m1 * (-p.lc1 * dq1 * dq1 + p.g * s1);
     double tau2 =
@@ -161,30 +105,6 @@ static void test_joint_loads_are_19_to_25(void) {
         ASSERT_VECTOR(expected.f2[0], 0.0, expected.f2[2], loads.f2, force);
         ASSERT_VECTOR(0.0, expected.tau1[1], 0.0, loads.tau1, moment);
         ASSERT_VECTOR(0.0, expected.tau2[1], 0.0, loads.tau2, moment);
-    }
-}
-
-static void test_torque_is_the_moment_of_both_links_about_the_joint_axis(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_joint_loads loads;
-        double f2x, f2z;
-        next_sample();
-        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
-        forces_on_link_2(2.0, &f2x, &f2z);
-        double moment = p.lc1 * p.m1 * (p.lc1 * ddq1 + p.g * c1) + L * f2x - p.a * f2z;
-        moment += (p.I1z + p.I2z) * ddq1;
-        ASSERT_CLOSE(moment, loads.tau1[1], 16 * EPS * moment_scale());
-    }
-}
-
-static void test_plane_motion_loads_nothing_out_of_the_plane(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; ++n) {
-        struct rp_joint_loads loads;
-        next_sample();
-        rp_newton_euler(&p, s.q, s.dq, s.ddq, &loads);
-        TEST_ASSERT_TRUE(loads.f1[1] == 0.0 && loads.f2[1] == 0.0);
-        TEST_ASSERT_TRUE(loads.tau1[0] == 0.0 && loads.tau1[2] == 0.0);
-        TEST_ASSERT_TRUE(loads.tau2[0] == 0.0 && loads.tau2[2] == 0.0);
     }
 }
 
