@@ -2,7 +2,6 @@
 
 import subprocess
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,27 +24,10 @@ RESULTS = (
     "tau2_y", "friction1", "friction2", "stop_force1", "stop_force2",
 )  # fmt: skip
 FREE, STUCK = 2.0, 0.0
-ORDERS = 13  # of series, from 0 on
 DEFAULT = {
     "m1": 2.0, "m2": 1.0, "I1z": 0.1, "I2z": 0.05, "l1": 0.5, "lc1": 0.25, "a": 0.1, "g": 9.81,
     "mode1": FREE, "mode2": FREE,
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Rest:
-    """Decisions about n pairs of joints at rest."""
-
-    pattern: np.ndarray  # (n, 2): -1, 0, 1
-    accelerations: np.ndarray  # (n, 2) rad/s2, m/s2
-    reactions: np.ndarray  # (n, 2) N.m, N
-
-
-def _run(program: Path, what: str, rows: np.ndarray, width: int) -> np.ndarray:
-    """Results of the rows, (n, width)."""
-    data = np.ascontiguousarray(rows, dtype=np.float64).tobytes()
-    done = subprocess.run([program, what], input=data, capture_output=True, check=True)
-    return np.frombuffer(done.stdout).reshape(len(rows), width)
 
 
 def evaluate(program: Path, cases: list[Mapping[str, float]]) -> list[dict[str, float]]:
@@ -53,34 +35,7 @@ def evaluate(program: Path, cases: list[Mapping[str, float]]) -> list[dict[str, 
     DEFAULT, or else 0."""
     values = [DEFAULT | dict(case) for case in cases]
     assert all(case.keys() <= set(KNOWNS) for case in values)
-    rows = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values])
-    found = _run(program, "model", rows, len(RESULTS))
+    rows = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values], dtype=np.float64)
+    done = subprocess.run(program, input=rows.tobytes(), capture_output=True, check=True)
+    found = np.frombuffer(done.stdout).reshape(len(rows), len(RESULTS))
     return [dict(zip(RESULTS, row, strict=True)) for row in found.tolist()]
-
-
-def expand(
-    program: Path, cases: list[Mapping[str, float]], units: np.ndarray, inputs: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of the states, (n, 4, ORDERS), and of the indicators, (n, 10, ORDERS).
-
-    `units`: (n,) s; `inputs`: (n, 5, 4) coefficients in these units.
-    """
-    values = [DEFAULT | dict(case) for case in cases]
-    knowns = np.array([[case.get(name, 0.0) for name in KNOWNS] for case in values])
-    rows = np.hstack([knowns, units[:, np.newaxis], inputs.reshape(len(inputs), -1)])
-    found = _run(program, "series", rows, 14 * ORDERS).reshape(-1, 14, ORDERS)
-    return found[:, :4], found[:, 4:]
-
-
-def decide(
-    program: Path,
-    inertia: np.ndarray,
-    forces: np.ndarray,
-    breakaway: np.ndarray,
-    at_rest: np.ndarray,
-    closed: np.ndarray,
-) -> Rest:
-    """What the joints at rest do: arguments (n, 3) D11, D12, D22 and (n, 2) each."""
-    rows = np.hstack([inertia, forces, breakaway, at_rest, closed])
-    found = _run(program, "rest", rows, 6)
-    return Rest(found[:, :2], found[:, 2:4], found[:, 4:])

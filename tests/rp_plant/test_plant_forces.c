@@ -107,36 +107,6 @@ static void test_sliding_friction_is_smooth_past_zero(void) {
 
 /* ---- Motion --------------------------------------------------------------------------------- */
 
-/* D q'' = forces in the rows of moving joints; in those of stuck ones the reaction is missing. */
-static void test_motion_obeys_the_equations(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_plant_inertia inertia;
-        struct rp_plant_motion motion;
-        double forces[2];
-        next_sample_at_stops(n);
-        const bool attached = v.modes.payload == RP_PLANT_ATTACHED;
-        rp_plant_inertia(&v.parameters, attached, v.q[1], &inertia);
-        rp_plant_forces(&v.parameters, &v.modes, v.q, v.dq, &v.inputs, forces);
-        rp_plant_motion(&v.parameters, &v.modes, v.q, v.dq, &v.inputs, &motion);
-        double(*D)[2] = inertia.D;
-        const double determinant = D[0][0] * D[1][1] - D[0][1] * D[1][0];
-        ASSERT_CLOSE(determinant, inertia.determinant, 8 * EPS * D[0][0] * D[1][1]);
-        TEST_ASSERT_TRUE(inertia.determinant > 0.0);
-        const double condition = D[0][0] * D[1][1] / inertia.determinant;
-        for (int i = 0; i < 2; i++) {
-            const double inertial[2] = {D[i][0] * motion.ddq[0], D[i][1] * motion.ddq[1]};
-            const double scale = fabs(inertial[0]) + fabs(inertial[1]) + fabs(forces[i]) + 1000.0;
-            ASSERT_CLOSE(forces[i], inertial[0] + inertial[1] + motion.reaction[i],
-                         64 * EPS * condition * scale);
-            if (v.modes.joint[i] == RP_PLANT_STUCK) {
-                TEST_ASSERT_TRUE(motion.ddq[i] == 0.0);
-            } else {
-                TEST_ASSERT_TRUE(motion.reaction[i] == 0.0);
-            }
-        }
-    }
-}
-
 /* The curve on which the state moves, by which propagate gives derivatives by time. */
 static void along_the_motion(struct rp_plant_values *first) {
     memset(first, 0, sizeof *first);
@@ -165,24 +135,6 @@ static void test_power_is_balanced(void) {
     }
 }
 
-/* The recursion of the joint loads shares no equation with the motion: what passes through the
- * joints is what drives, friction, stops and armature exert on them. */
-static void test_joint_loads_are_what_the_joints_exert(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_sample();
-        plant_test_outputs(&v);
-        const double loads[2] = {v.loads.tau1[1], v.loads.f2[2]};
-        for (int i = 0; i < 2; i++) {
-            const struct rp_plant_parameters *p = &v.parameters;
-            const double exerted = v.inputs.tau[i] - p->damping[i] * v.dq[i] - v.friction[i] +
-                                   v.stop_force[i] - p->armature[i] * v.ddq[i];
-            const double scale = 100.0 * (1.0 + fabs(v.ddq[0]) + fabs(v.ddq[1])) +
-                                 100.0 * (v.dq[0] * v.dq[0] + v.dq[1] * v.dq[1]);
-            ASSERT_CLOSE(exerted, loads[i], 1e-13 * scale);
-        }
-    }
-}
-
 static void test_end_effector_moves_as_its_derivatives_say(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         struct rp_plant_values first;
@@ -203,22 +155,6 @@ static void test_end_effector_moves_as_its_derivatives_say(void) {
 
 /* ---- Derivatives ---------------------------------------------------------------------------- */
 
-struct rate {
-    int row;
-    int state;
-};
-
-static double rate_at(const void *context, double value) {
-    const struct rate *rate = context;
-    double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
-    double u[PLANT_INPUTS];
-    double dx[PLANT_STATES];
-    memcpy(u, &v.inputs, sizeof u);
-    x[rate->state] = value;
-    ASSERT_OK(rp_plant_model.right_hand_side(&v, 3.0, x, u, dx));
-    return dx[rate->row];
-}
-
 /* No more than a sign or a factor is at stake: the arithmetics that differentiate are tested in
  * tests/rp_manipulator. */
 /* The joint of a state rests, so that nothing depends on the state while the modes last. */
@@ -226,30 +162,6 @@ static bool state_rests(int state) {
     struct rp_plant_modes modes;
     rp_plant_modes_in_effect(&v, v.q, v.dq, &v.inputs, &modes);
     return modes.joint[state % 2] == RP_PLANT_STUCK;
-}
-
-static void test_jacobian_is_that_of_the_right_hand_side(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        double J[PLANT_STATES][PLANT_STATES];
-        next_sample_at_stops(n);
-        v.parameters.arm.I1z += 1.0;
-        double u[PLANT_INPUTS];
-        const double x[PLANT_STATES] = {v.q[0], v.q[1], v.dq[0], v.dq[1]};
-        memcpy(u, &v.inputs, sizeof u);
-        ASSERT_OK(rp_plant_model.jacobian(&v, 3.0, x, u, J[0]));
-        for (int j = 0; j < PLANT_STATES; j++) {
-            for (int i = 0; i < PLANT_STATES; i++) {
-                const struct rate rate = {i, j};
-                if (state_rests(j) && i >= 2) {
-                    TEST_ASSERT_EQUAL_DOUBLE(0.0, J[j][i]);
-                    continue;
-                }
-                const double expected = rp_test_derivative(rate_at, &rate, x[j], 1.0 / 256);
-                const double scale = 1.0 + fabs(rate_at(&rate, x[j])) + fabs(expected);
-                ASSERT_CLOSE(expected, J[j][i], 1e-8 * scale);
-            }
-        }
-    }
 }
 
 static void test_jacobian_is_what_propagation_gives(void) {

@@ -46,24 +46,6 @@ static void test_momenta_of_the_joints_are_kept(void) {
     }
 }
 
-/* a = 0 and the payload at the origin of frame 2:
- * q2'+ = q2' m2 / (m2 + mp),  q1'+ = q1' J / (J + mp L^2 + Ip) */
-static void test_closed_form_without_offset(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_sample();
-        struct rp_plant_parameters *p = &v.parameters;
-        p->arm.a = p->payload_x = p->payload_z = 0.0;
-        p->armature[0] = p->armature[1] = 0.0;
-        (void)rp_plant_grasp_at_rest(p, v.q, v.dq, after);
-        const double J = rp_test_inertia(&p->arm, v.q[1]);
-        const double L = p->arm.l1 + v.q[1];
-        const double grown = J + p->payload_mass * L * L + p->payload_inertia;
-        const double mass = p->arm.m2 + p->payload_mass;
-        ASSERT_CLOSE(v.dq[0] * J / grown, after[0], 16 * EPS * fabs(v.dq[0]));
-        ASSERT_CLOSE(v.dq[1] * p->arm.m2 / mass, after[1], 16 * EPS * fabs(v.dq[1]));
-    }
-}
-
 static void test_nothing_is_lost_at_rest_or_without_payload(void) {
     for (int n = 0; n < RP_TEST_SAMPLES; n++) {
         next_sample();

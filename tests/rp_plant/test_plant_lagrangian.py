@@ -114,6 +114,14 @@ def assert_accelerations(exact: SmoothPlant, case: Case, found: Case) -> Case:
     return case | {"ddq1": found["ddq1"], "ddq2": found["ddq2"]}
 
 
+def assert_loads(exact: SmoothPlant, moved: Case, found: Case) -> None:
+    """Those of Newton's and Euler's laws at the accelerations of `moved`."""
+    loads = exact.evaluate("loads", moved)
+    scale = 100 * (10 + abs(found["ddq1"]) + abs(found["ddq2"]))
+    for i, name in enumerate(("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")):
+        assert_close(found[name], loads[i], scale, (name, moved))
+
+
 def test_motion_is_that_of_the_lagrangian(
     program: Path, exact: SmoothPlant, cases: list[Case]
 ) -> None:
@@ -139,7 +147,6 @@ def test_motion_in_compliant_stops(program: Path, exact: SmoothPlant, cases: lis
     for number, case in enumerate(cases):
         held = {"mode1": STUCK, "coulomb_friction1": 1e4, "dq1": 0.0} if number % 3 == 0 else {}
         changed.append(in_stops(random, case) | held)
-    names = ("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")
     for case, found in zip(changed, evaluate(program, changed), strict=True):
         moved = assert_accelerations(exact, case, found)
         stored = mpmath.mpf(0)
@@ -149,10 +156,7 @@ def test_motion_in_compliant_stops(program: Path, exact: SmoothPlant, cases: lis
             stored += case[f"stop_stiffness{joint}"] * mpmath.mpf(depth_of(case, joint)) ** 2 / 2
         energy = exact.evaluate("potential_energy", case) + stored
         assert_close(found["potential_energy"], energy, 100 + abs(energy), case)
-        loads = exact.evaluate("loads", moved)
-        scale = 100 * (10 + abs(found["ddq1"]) + abs(found["ddq2"]))
-        for i, name in enumerate(names):
-            assert_close(found[name], loads[i], scale, (name, case))
+        assert_loads(exact, moved, found)
 
 
 def test_terms_and_energies(program: Path, exact: SmoothPlant, cases: list[Case]) -> None:
@@ -170,13 +174,9 @@ def test_terms_and_energies(program: Path, exact: SmoothPlant, cases: list[Case]
 
 
 def test_joint_loads_are_newtons(program: Path, exact: SmoothPlant, cases: list[Case]) -> None:
-    names = ("f1_x", "f1_z", "tau1_y", "f2_x", "f2_z", "tau2_y")
     for case, found in zip(cases, evaluate(program, cases), strict=True):
         # the accelerations are those found: their rounding is tested above
-        loads = exact.evaluate("loads", case | {"ddq1": found["ddq1"], "ddq2": found["ddq2"]})
-        scale = 100 * (10 + abs(found["ddq1"]) + abs(found["ddq2"]))
-        for i, name in enumerate(names):
-            assert_close(found[name], loads[i], scale, (name, case))
+        assert_loads(exact, case | {"ddq1": found["ddq1"], "ddq2": found["ddq2"]}, found)
 
 
 def test_acceleration_of_the_end_effector(

@@ -1,5 +1,5 @@
 /* The series of the plant against its right-hand side, its indicators, and the manipulator's
- * series. In test_plant_series.py its coefficients are those of the Lagrangian. */
+ * series. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_model.h"

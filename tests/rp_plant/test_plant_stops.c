@@ -69,34 +69,6 @@ static void test_bouncing_ends_where_a_bounce_is_below_the_tolerance(void) {
     }
 }
 
-/* From one impact to the next the velocity is the same. All energy is lost: the last impact, too,
- * takes what it does. */
-static void test_bouncing_from_half_a_meter(void) {
-    set_falling_slide(0.8, 0.5);
-    const double fall = v.parameters.arm.m2 * v.parameters.arm.g * 0.5;
-    int impacts = 0;
-    while (v.modes.joint[1] != RP_PLANT_STUCK) {
-        plant_test_update(&v, LOWER2);
-        v.dq[1] = -v.dq[1];
-        impacts++;
-        TEST_ASSERT_LESS_THAN_INT(100, impacts);
-    }
-    // 0.5 m 0.64^n <= 1e-10 m
-    TEST_ASSERT_EQUAL_INT((int)ceil(log(2e-10) / log(0.64)), impacts);
-    ASSERT_CLOSE(fall, v.sums.impact_loss, 1e-14 * fall * impacts);
-}
-
-static void test_elastic_impacts_lose_nothing(void) {
-    set_falling_slide(1.0, 0.5);
-    for (int n = 0; n < 10000; n++) {
-        const double before = v.dq[1];
-        plant_test_update(&v, LOWER2);
-        v.dq[1] = -v.dq[1];
-        TEST_ASSERT_TRUE(v.dq[1] == before);
-    }
-    TEST_ASSERT_TRUE(v.sums.impact_loss == 0.0);
-}
-
 static void test_a_slide_on_its_stop_is_carried_until_it_is_lifted(void) {
     set_falling_slide(0.0, 0.5);
     plant_test_update(&v, LOWER2);
@@ -117,21 +89,6 @@ static void test_a_slide_on_its_stop_is_carried_until_it_is_lifted(void) {
     plant_test_outputs(&v);
     ASSERT_SAME(0.0, v.stop_force[1]);
     ASSERT_SAME(0.0, v.indicators[LOWER2]);
-}
-
-/* Friction is bounded: the momentum about joint 1 comes through the offset, and joint 1 moves. */
-static void test_an_impact_knocks_a_stuck_joint_loose(void) {
-    set_falling_slide(0.5, 0.5);
-    v.parameters.arm.a = 0.25;
-    v.parameters.coulomb_friction[0] = 100.0;
-    plant_test_update(&v, -1);
-    assert_modes(RP_PLANT_STUCK, RP_PLANT_FREE);
-    const double m2 = v.parameters.arm.m2;
-    const double J = rp_test_inertia(&v.parameters.arm, 0.25);
-    const double change = -1.5 * v.dq[1];
-    plant_test_update(&v, LOWER2);
-    assert_modes(RP_PLANT_FORWARD, RP_PLANT_FREE);
-    ASSERT_CLOSE(0.25 * m2 * change / (J + m2 * 0.0625), v.dq[0], 1e-14);
 }
 
 static void test_a_joint_on_its_stop_at_the_start(void) {
@@ -180,24 +137,6 @@ static void test_a_stop_that_is_moved_away_at_the_event_is_not_met(void) {
     ASSERT_SAME(q2, v.q[1]);
     ASSERT_SAME(before, v.dq[1]);
     ASSERT_SAME(0.0, v.sums.impact_loss);
-}
-
-/* The same impact twice: twice the impulse and the loss, m2 v (1 + e) and m2 v^2 (1 - e^2) / 2. */
-static void test_impulses_and_losses_add_up(void) {
-    const double e = 0.5;
-    set_falling_slide(e, 0.1);
-    const struct rp_plant_values falling = v;
-    const double speed = -v.dq[1];
-    for (int count = 1; count <= 2; count++) {
-        v.q[1] = falling.q[1];
-        v.dq[1] = falling.dq[1];
-        plant_test_update(&v, LOWER2);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14, count * v.parameters.arm.m2 * speed * (1.0 + e),
-                                  v.sums.stop_impulse[1]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-14,
-                                  count * v.parameters.arm.m2 * speed * speed * (1.0 - e * e) / 2.0,
-                                  v.sums.impact_loss);
-    }
 }
 
 static void test_grazing_a_stop_changes_no_velocity(void) {

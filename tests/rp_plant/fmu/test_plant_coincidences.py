@@ -52,16 +52,6 @@ def test_a_motion_continues_after_an_impact_that_ends_a_long_step(plant: Fmu, me
 
 
 @each_method
-def test_a_held_joint_stays_where_it_is_while_the_other_one_slides(plant: Fmu, method: str) -> None:
-    """Not one bit of its position changes."""
-    friction = {"coulomb_friction1": FIRM, "coulomb_friction2": 1.1}
-    with started(plant, method, m2=1.3, a=0.0, dq2=1.5, **friction) as instance:
-        for i in range(2000):
-            instance.do_step(i * 1e-3, 1e-3)
-            assert read(instance, "q1", "dq1") == [0.0, 0.0]
-
-
-@each_method
 @pytest.mark.parametrize("seed", ["cvode_adams", 56])
 def test_joints_that_kick_each_other_off_their_stops_come_to_rest(
     plant: Fmu, method: str, seed: str | int

@@ -183,28 +183,6 @@ def test_a_joint_that_slows_down_meets_the_stop_again(plant: Fmu, method: str) -
         assert force == pytest.approx(STIFFNESS * (LOWER - q2) * (1 - c * dq2), rel=1e-12)
 
 
-@each_method
-def test_no_force_pulls(plant: Fmu, method: str) -> None:
-    """Over seconds of pushing and pulling at two damped stops, with steps of many lengths."""
-    chance = np.random.default_rng(3)
-    lowest, t, pulled = 0.0, 0.0, 0
-    with started(plant, method, 1e-8, **block(c=1.0, dq2=1.0)) as instance:
-        reals = instance.reals(["q2", "stop_force2"])
-        while t < 2.0:
-            instance.set("f2", float(chance.choice([-300.0, 300.0])))
-            for _ in range(10):
-                h = float(chance.uniform(1e-4, 1e-2))
-                instance.do_step(t, h)
-                t += h
-                reals.get()
-                q2, force = reals.view.tolist()
-                inside = q2 < LOWER or q2 > UPPER
-                lowest = min(lowest, force if q2 < 0 else -force)
-                assert inside or force == 0.0
-                pulled += inside and force == 0.0
-    assert lowest == 0.0 and pulled > 0
-
-
 # ---- Rest ------------------------------------------------------------------------------------
 
 
