@@ -1,5 +1,5 @@
-/* The controller: its law with the arm that it drives, and its integral part through the instance
- * and the integrator. test_controller.py compares values and derivatives with sympy. */
+/* The controller: its limits, and its integral part through the instance and the integrator.
+ * test_controller.py compares values and derivatives with sympy. */
 #include "derivatives.h"
 #include "model_test.h"
 #include "rp_controller_model.h"
@@ -7,7 +7,6 @@
 #include "run_instance.h"
 #include "value_references.h"
 
-#include <float.h>
 #include <string.h>
 
 static struct rp_test_random random_source;
@@ -17,7 +16,7 @@ void setUp(void) {
     random_source.state = 4;
 }
 
-/* ---- The law and the arm -------------------------------------------------------------------- */
+/* ---- The law -------------------------------------------------------------------------------- */
 
 static double positive(double high) {
     return fabs(rp_test_uniform(&random_source, 0.01, high));
@@ -39,86 +38,6 @@ static void random_values(struct rp_controller_values *v) {
     double *inputs = v->inputs.q_ref;
     for (size_t i = 0; i < sizeof v->inputs / sizeof(double); i++) {
         inputs[i] = rp_test_uniform(&random_source, -2.0, 2.0);
-    }
-}
-
-/* With the arm's own parameters computed torque leaves ddq = ddq_ref + Kd de + Kp e + w, whatever
- * the motion: linear and decoupled. */
-static void test_computed_torque_makes_the_error_dynamics_linear(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_controller_values v;
-        random_values(&v);
-        v.parameters.mode = RP_CONTROLLER_COMPUTED_TORQUE;
-        const struct rp_controller_inputs *in = &v.inputs;
-        double efforts[2];
-        double ddq[2];
-        double asked[2];
-        struct rp_test_state state = {.q = {in->q[0], in->q[1]}, .dq = {in->dq[0], in->dq[1]}};
-        for (int i = 0; i < 2; i++) {
-            asked[i] = in->ddq_ref[i] + v.parameters.Kd[i] * (in->dq_ref[i] - in->dq[i]) +
-                       v.parameters.Kp[i] * (in->q_ref[i] - in->q[i]) + v.integral[i];
-            state.ddq[i] = asked[i];
-        }
-        rp_controller_unlimited(&v.parameters, false, in, v.integral, efforts);
-        rp_forward_dynamics(&v.parameters.arm, in->q, in->dq, efforts, ddq);
-
-        double force[2];
-        double scale[2];
-        rp_test_force_scale(&v.parameters.arm, &state, force);
-        rp_test_acceleration_scale(&v.parameters.arm, in->q, force, scale);
-        for (int i = 0; i < 2; i++) {
-            ASSERT_CLOSE(asked[i], ddq[i], 16 * DBL_EPSILON * scale[i]);
-        }
-    }
-}
-
-/* At rest on the target the efforts are what holds the arm: g(q) and nothing else. */
-static void test_gravity_compensation_holds_the_arm(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_controller_values v;
-        random_values(&v);
-        v.parameters.mode = RP_CONTROLLER_PD_GRAVITY;
-        memcpy(v.inputs.q, v.inputs.q_ref, sizeof v.inputs.q);
-        memset(v.inputs.dq, 0, sizeof v.inputs.dq);
-        memset(v.inputs.dq_ref, 0, sizeof v.inputs.dq_ref);
-        memset(v.integral, 0, sizeof v.integral);
-
-        double efforts[2];
-        double gravity[2];
-        double ddq[2];
-        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, efforts);
-        rp_gravity_forces(&v.parameters.arm, v.inputs.q, gravity);
-        TEST_ASSERT_TRUE(efforts[0] == gravity[0] && efforts[1] == gravity[1]);
-
-        const struct rp_test_state state = {.q = {v.inputs.q[0], v.inputs.q[1]}};
-        double force[2];
-        double scale[2];
-        rp_test_force_scale(&v.parameters.arm, &state, force);
-        rp_test_acceleration_scale(&v.parameters.arm, v.inputs.q, force, scale);
-        rp_forward_dynamics(&v.parameters.arm, v.inputs.q, v.inputs.dq, efforts, ddq);
-        for (int i = 0; i < 2; i++) {
-            ASSERT_CLOSE(0.0, ddq[i], 16 * DBL_EPSILON * scale[i]);
-        }
-    }
-}
-
-/* PD modes: a joint's effort is its inertia times what computed torque asks of a free mass. */
-static void test_pd_is_computed_torque_of_two_free_masses(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        struct rp_controller_values v;
-        random_values(&v);
-        memset(v.inputs.ddq_ref, 0, sizeof v.inputs.ddq_ref);
-        v.parameters.arm = (struct rp_parameters){
-            .m2 = v.parameters.inertia[1], .I1z = v.parameters.inertia[0], .l1 = -v.inputs.q[1]};
-        double pd[2];
-        double computed[2];
-        v.parameters.mode = RP_CONTROLLER_PD;
-        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, pd);
-        v.parameters.mode = RP_CONTROLLER_COMPUTED_TORQUE;
-        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, computed);
-        for (int i = 0; i < 2; i++) {
-            ASSERT_CLOSE(computed[i], pd[i], 4 * DBL_EPSILON * fabs(computed[i]));
-        }
     }
 }
 

@@ -1,11 +1,10 @@
-/* The wall: its force against formulas written out here, power, no adhesion, symmetry under turns,
- * derivatives. */
+/* The wall: where it touches and lets go, and derivatives along curves. test_environment.py
+ * compares force and moment with sympy. */
 #include "equations.h"
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_test_support.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 #include <unity.h>
@@ -65,69 +64,6 @@ static void test_a_tip_that_moves_along_the_normal(void) {
     TEST_ASSERT_TRUE(v.v_ee_fx == v.v_wall_force && v.v_ee_fy == 0.0 && v.v_ee_mz == 0.0);
 }
 
-/* The arm's slide upwards: x2 points to -x0, z2 to y0. */
-static void test_a_tip_beside_the_end_effector_takes_part_in_its_turn(void) {
-    v.v_tip_x = 0.25;
-    v.v_ee_angle = RP_TEST_PI / 2.0;
-    v.v_ee_rate = 2.0;
-    v.v_ee_x = -0.125; // the tip: (-0.375, 0.125)
-    outputs();
-    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.125, v.v_penetration);
-    // from the end effector (-0.25, 0.125): turned by 2 rad/s, vx = -0.25 into the wall
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2000.0 * 0.125 + 30.0 * 0.25, v.v_wall_force);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.125 * v.v_wall_force, v.v_ee_mz);
-}
-
-static void test_force_and_moment_are_those_of_the_formulas(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_at_depth(uniform(0.1, 0.5));
-        outputs();
-
-        // tip and normal by angles: the tip is at the distance r in the direction beta
-        const double r = hypot(v.v_tip_x, v.v_tip_z);
-        const double beta = v.v_ee_angle + atan2(v.v_tip_x, v.v_tip_z);
-        const double between = beta - v.v_angle;
-        const double depth =
-            v.v_position - v.v_ee_x * cos(v.v_angle) - v.v_ee_y * sin(v.v_angle) - r * cos(between);
-        const double speed = v.v_ee_vx * cos(v.v_angle) + v.v_ee_vy * sin(v.v_angle) -
-                             v.v_ee_rate * r * sin(between);
-        const double force = fmax(v.v_stiffness * depth - v.v_damping * speed, 0.0);
-        const double bound = 64.0 * DBL_EPSILON;
-        const double size = 4.0 * v.v_stiffness + 4.0 * v.v_damping;
-        ASSERT_CLOSE(depth, v.v_penetration, 4.0 * bound);
-        ASSERT_CLOSE(force, v.v_wall_force, size * bound);
-        ASSERT_CLOSE(force * cos(v.v_angle), v.v_ee_fx, size * bound);
-        ASSERT_CLOSE(force * sin(v.v_angle), v.v_ee_fy, size * bound);
-        ASSERT_CLOSE(-force * r * sin(between), v.v_ee_mz, size * bound);
-    }
-}
-
-/* The wrench about the origin of frame 2 does the work of the force at the tip. */
-static void test_power_of_the_wrench_is_that_of_the_force_at_the_tip(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_at_depth(uniform(0.1, 0.5));
-        outputs();
-        const double power =
-            v.v_ee_fx * v.v_ee_vx + v.v_ee_fy * v.v_ee_vy + v.v_ee_mz * v.v_ee_rate;
-        // the speed of the tip along the normal by a difference of its depth over 2 h
-        const double h = 1.0 / 1024.0;
-        double depth[2];
-        const struct equations_values now = v;
-        for (int k = 0; k < 2; k++) {
-            const double dt = k == 0 ? -h : h;
-            v.v_ee_x = now.v_ee_x + dt * now.v_ee_vx;
-            v.v_ee_y = now.v_ee_y + dt * now.v_ee_vy;
-            v.v_ee_angle = now.v_ee_angle + dt * now.v_ee_rate;
-            outputs();
-            depth[k] = v.v_penetration;
-            v = now;
-        }
-        const double speed = -(depth[1] - depth[0]) / (2.0 * h);
-        // truncation: rate^3 r h^2 / 6
-        ASSERT_CLOSE(v.v_wall_force * speed, power, 1e-6 * (v.v_stiffness + v.v_damping));
-    }
-}
-
 /* ---- Touch and release ---------------------------------------------------------------------- */
 
 static void test_nothing_acts_outside_of_the_wall(void) {
@@ -175,30 +111,6 @@ static void test_a_wall_without_stiffness_and_damping_is_felt_by_nobody(void) {
     v.v_stiffness = v.v_damping = 0.0;
     outputs();
     TEST_ASSERT_TRUE(v.v_penetration > 0.2 && v.v_wall_force == 0.0);
-}
-
-/* The whole scene turned about the origin of frame 0: the force turns with it. */
-static void test_a_turned_wall_pushes_a_turned_tip_alike(void) {
-    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
-        next_at_depth(uniform(0.1, 0.5));
-        outputs();
-        const struct equations_values one = v;
-        const double turn = uniform(-3.0, 3.0);
-        const double c = cos(turn);
-        const double s = sin(turn);
-        v.v_angle += turn;
-        v.v_ee_angle += turn;
-        v.v_ee_x = c * one.v_ee_x - s * one.v_ee_y;
-        v.v_ee_y = s * one.v_ee_x + c * one.v_ee_y;
-        v.v_ee_vx = c * one.v_ee_vx - s * one.v_ee_vy;
-        v.v_ee_vy = s * one.v_ee_vx + c * one.v_ee_vy;
-        outputs();
-        const double bound = 1e-11;
-        ASSERT_CLOSE(one.v_wall_force, v.v_wall_force, bound);
-        ASSERT_CLOSE(c * one.v_ee_fx - s * one.v_ee_fy, v.v_ee_fx, bound);
-        ASSERT_CLOSE(s * one.v_ee_fx + c * one.v_ee_fy, v.v_ee_fy, bound);
-        ASSERT_CLOSE(one.v_ee_mz, v.v_ee_mz, bound);
-    }
 }
 
 /* A motion that overflows is not taken for one outside of the wall. */

@@ -1,16 +1,12 @@
-/* The reference motions: geometry, continuity, what is refused, and a model without states. */
+/* The reference motions: geometry, continuity, what is refused, and a model without states. Outputs
+ * and their derivatives are compared with 40 digits in test_trajectory.py. */
 #include "continuous_states.h"
-#include "derivatives.h"
 #include "instance.h"
 #include "last_text.h"
 #include "model_description.h"
 #include "rp_manipulator.h"
 #include "rp_trajectory_example.h"
 #include "rp_trajectory_model.h"
-#include "serialization.h"
-#include "snapshot.h"
-#include "stepping.h"
-#include "values.h"
 
 #include <math.h>
 #include <unity.h>
@@ -238,25 +234,6 @@ static void test_the_later_segment_holds_where_a_ramp_ends_or_begins(void) {
     }
 }
 
-static void test_derivatives_along_time_are_the_rates(void) {
-    for (int kind = 0; kind < KINDS; kind++) {
-        set_kind(kind);
-        for (int i = 0; i <= 200; i++) {
-            const struct rp_trajectory_point point = at(0.4 + i * end_time() / 190.0);
-            const struct motion all[] = {point.q[0], point.q[1], point.ee[0], point.ee[1]};
-            for (size_t j = 0; j < COUNT(all); j++) {
-                const struct motion m = all[j];
-                const double scale = 1.0 + fabs(m.acceleration.value);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale, m.velocity.value, m.position.first);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.velocity.first);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.position.second);
-                TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (scale + fabs(m.velocity.second)),
-                                          m.velocity.second, m.acceleration.first);
-            }
-        }
-    }
-}
-
 static void test_it_rests_before_and_after(void) {
     for (int kind = 0; kind < KINDS; kind++) {
         set_kind(kind);
@@ -400,82 +377,15 @@ static void test_what_belongs_to_another_motion_is_not_checked(void) {
     TEST_ASSERT_EQUAL_INT(RP_TRAJECTORY_VALID, rp_trajectory_check(&p));
 }
 
-/* ---- A model without states and inputs ------------------------------------------------------- */
+/* ---- A model without states ------------------------------------------------------------------ */
 
-static const unsigned outputs[] = {40, 41, 42, 43, 44, 45, 46, 47, 48, 49};
-
-static struct instance *initialized(void) {
+static void test_arrays_of_no_states(void) {
     const struct instance_experiment experiment = {.start_time = 0.0};
     struct instance *instance;
     ASSERT_OK(instance_create(&model_description, &last_text_sink, &instance));
     ASSERT_OK(instance_setup_experiment(instance, &experiment));
     ASSERT_OK(instance_enter_initialization(instance));
     ASSERT_OK(instance_exit_initialization(instance));
-    return instance;
-}
-
-static void test_steps_follow_the_motion(void) {
-    struct instance *instance = initialized();
-    for (int i = 0; i < 60; i++) {
-        double values[COUNT(outputs)];
-        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.1));
-        ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), values));
-        const struct rp_trajectory_point point = at(instance_time(instance));
-        TEST_ASSERT_TRUE(values[0] == point.q[0].position.value);
-        TEST_ASSERT_TRUE(values[5] == point.q[1].acceleration.value);
-        TEST_ASSERT_TRUE(values[8] == point.ee[0].velocity.value);
-    }
-    instance_destroy(instance);
-}
-
-/* The second derivative of a position by time is the acceleration, though no state moves. */
-static void test_derivatives_of_outputs_along_time(void) {
-    const int orders[] = {1, 2, 1};
-    const unsigned references[] = {40, 40, 42}; // q1_ref, q1_ref, dq1_ref
-    struct instance *instance = initialized();
-    for (int i = 0; i < 30; i++) {
-        double values[3];
-        ASSERT_OK(instance_do_step(instance, instance_time(instance), 0.17));
-        ASSERT_OK(instance_get_output_derivatives(instance, references, 3, orders, values));
-        const struct rp_trajectory_point point = at(instance_time(instance));
-        TEST_ASSERT_DOUBLE_WITHIN(1e-13, point.q[0].velocity.value, values[0]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-12, point.q[0].acceleration.value, values[1]);
-        TEST_ASSERT_DOUBLE_WITHIN(1e-12, point.q[0].acceleration.value, values[2]);
-    }
-    instance_destroy(instance);
-}
-
-static void test_snapshots_and_their_bytes_go_back(void) {
-    struct instance *instance = initialized();
-    struct instance *other = initialized();
-    struct instance_snapshot *snapshot = NULL;
-    struct instance_snapshot *read = NULL;
-    unsigned char bytes[1024];
-    double expected[COUNT(outputs)];
-    double values[COUNT(outputs)];
-    ASSERT_OK(instance_do_step(instance, 0.0, 1.1));
-    ASSERT_OK(instance_save(instance, 7, &snapshot));
-    ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), expected));
-    TEST_ASSERT_LESS_OR_EQUAL_UINT64(sizeof bytes, instance_serialized_size(instance));
-    ASSERT_OK(instance_serialize(instance, snapshot, bytes, sizeof bytes));
-
-    ASSERT_OK(instance_do_step(instance, 1.1, 1.0));
-    ASSERT_OK(instance_restore(instance, snapshot));
-    ASSERT_OK(instance_get_real(instance, outputs, COUNT(outputs), values));
-    TEST_ASSERT_EQUAL_MEMORY(expected, values, sizeof values);
-
-    ASSERT_OK(instance_deserialize(other, bytes, instance_serialized_size(other), &read));
-    ASSERT_OK(instance_restore(other, read));
-    TEST_ASSERT_TRUE(instance_time(other) == 1.1);
-    ASSERT_OK(instance_get_real(other, outputs, COUNT(outputs), values));
-    TEST_ASSERT_EQUAL_MEMORY(expected, values, sizeof values);
-    ASSERT_OK(instance_do_step(other, 1.1, 0.5));
-    instance_destroy(instance);
-    instance_destroy(other);
-}
-
-static void test_arrays_of_no_states(void) {
-    struct instance *instance = initialized();
     TEST_ASSERT_EQUAL_UINT64(0, instance_state_count(instance));
     ASSERT_OK(instance_set_states(instance, NULL, 0));
     ASSERT_OK(instance_get_states(instance, NULL, 0));
