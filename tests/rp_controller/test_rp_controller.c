@@ -1,5 +1,5 @@
-/* The controller: its limits, and its integral part through the instance and the integrator.
- * test_controller.py compares values and derivatives with sympy. */
+/* The controller: computed torque with the arm, limits, and the integral part through the instance
+ * and the integrator. test_controller.py compares values and derivatives with sympy. */
 #include "derivatives.h"
 #include "model_test.h"
 #include "rp_controller_model.h"
@@ -7,6 +7,7 @@
 #include "run_instance.h"
 #include "value_references.h"
 
+#include <float.h>
 #include <string.h>
 
 static struct rp_test_random random_source;
@@ -38,6 +39,36 @@ static void random_values(struct rp_controller_values *v) {
     double *inputs = v->inputs.q_ref;
     for (size_t i = 0; i < sizeof v->inputs / sizeof(double); i++) {
         inputs[i] = rp_test_uniform(&random_source, -2.0, 2.0);
+    }
+}
+
+/* With the arm's own parameters computed torque leaves ddq = ddq_ref + Kd de + Kp e + w, whatever
+ * the motion: linear and decoupled. */
+static void test_computed_torque_makes_the_error_dynamics_linear(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_controller_values v;
+        random_values(&v);
+        v.parameters.mode = RP_CONTROLLER_COMPUTED_TORQUE;
+        const struct rp_controller_inputs *in = &v.inputs;
+        double efforts[2];
+        double ddq[2];
+        double asked[2];
+        struct rp_test_state state = {.q = {in->q[0], in->q[1]}, .dq = {in->dq[0], in->dq[1]}};
+        for (int i = 0; i < 2; i++) {
+            asked[i] = in->ddq_ref[i] + v.parameters.Kd[i] * (in->dq_ref[i] - in->dq[i]) +
+                       v.parameters.Kp[i] * (in->q_ref[i] - in->q[i]) + v.integral[i];
+            state.ddq[i] = asked[i];
+        }
+        rp_controller_unlimited(&v.parameters, false, in, v.integral, efforts);
+        rp_forward_dynamics(&v.parameters.arm, in->q, in->dq, efforts, ddq);
+
+        double force[2];
+        double scale[2];
+        rp_test_force_scale(&v.parameters.arm, &state, force);
+        rp_test_acceleration_scale(&v.parameters.arm, in->q, force, scale);
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(asked[i], ddq[i], 16 * DBL_EPSILON * scale[i]);
+        }
     }
 }
 

@@ -64,6 +64,19 @@ static void test_a_tip_that_moves_along_the_normal(void) {
     TEST_ASSERT_TRUE(v.v_ee_fx == v.v_wall_force && v.v_ee_fy == 0.0 && v.v_ee_mz == 0.0);
 }
 
+/* The arm's slide upwards: x2 points to -x0, z2 to y0. */
+static void test_a_tip_beside_the_end_effector_takes_part_in_its_turn(void) {
+    v.v_tip_x = 0.25;
+    v.v_ee_angle = RP_TEST_PI / 2.0;
+    v.v_ee_rate = 2.0;
+    v.v_ee_x = -0.125; // the tip: (-0.375, 0.125)
+    outputs();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.125, v.v_penetration);
+    // from the end effector (-0.25, 0.125): turned by 2 rad/s, vx = -0.25 into the wall
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2000.0 * 0.125 + 30.0 * 0.25, v.v_wall_force);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.125 * v.v_wall_force, v.v_ee_mz);
+}
+
 /* ---- Touch and release ---------------------------------------------------------------------- */
 
 static void test_nothing_acts_outside_of_the_wall(void) {

@@ -234,6 +234,25 @@ static void test_the_later_segment_holds_where_a_ramp_ends_or_begins(void) {
     }
 }
 
+static void test_derivatives_along_time_are_the_rates(void) {
+    for (int kind = 0; kind < KINDS; kind++) {
+        set_kind(kind);
+        for (int i = 0; i <= 200; i++) {
+            const struct rp_trajectory_point point = at(0.4 + i * end_time() / 190.0);
+            const struct motion all[] = {point.q[0], point.q[1], point.ee[0], point.ee[1]};
+            for (size_t j = 0; j < COUNT(all); j++) {
+                const struct motion m = all[j];
+                const double scale = 1.0 + fabs(m.acceleration.value);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-14 * scale, m.velocity.value, m.position.first);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.velocity.first);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-13 * scale, m.acceleration.value, m.position.second);
+                TEST_ASSERT_DOUBLE_WITHIN(1e-12 * (scale + fabs(m.velocity.second)),
+                                          m.velocity.second, m.acceleration.first);
+            }
+        }
+    }
+}
+
 static void test_it_rests_before_and_after(void) {
     for (int kind = 0; kind < KINDS; kind++) {
         set_kind(kind);
