@@ -1,4 +1,4 @@
-"""Roots that the search finds, against roots by integers of any size and by mpmath."""
+"""Roots that the search finds, against roots by integers of any size."""
 
 import os
 import subprocess
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from math import inf, nextafter
 from pathlib import Path
 
-import mpmath
 import numpy as np
 import pytest
 
@@ -188,16 +187,3 @@ def test_extrema_within_rounding_are_roots(program: Path) -> None:
                     missing.append((s, list(c), found))
     assert missing == []
     assert seen > 100
-
-
-def test_random_polynomials_have_the_roots_of_mpmath(program: Path) -> None:
-    random = np.random.default_rng(17)
-    given = [kind(random) for kind in (smooth, separate, near_start, oscillating) for _ in range(6)]
-    for c, found in zip(given, find(program, given), strict=True):
-        highest_first = [mpmath.mpf(float(x)) for x in reversed(np.trim_zeros(c, "b"))]
-        with mpmath.workdps(50):
-            roots = mpmath.polyroots(highest_first, maxsteps=300, extraprec=300)
-            real = sorted(x.real for x in roots if abs(x.imag) < 1e-30 and 0 < x.real <= 1)
-        assert len(found.roots) == len(real)
-        for (s, _), expected in zip(found.roots, real, strict=True):
-            assert 0 <= s - expected <= np.spacing(s)

@@ -53,30 +53,36 @@ def test_positions_that_overflow_within_a_step(fmu: Path, tmp_path: Path) -> Non
 
 # ---- Model Exchange ----------------------------------------------------------------------------
 
+STILL = {"q1": 0.4, "q2": -0.01}
+
+
+def assert_counts(result: np.ndarray, values: dict[str, float]) -> None:
+    """Of joints at STILL, with ticks every 0.00737 s."""
+    encoder = Encoder(start_values() | values)
+    expected = []
+    for _ in range(70):
+        encoder.sample([*STILL.values()])
+        expected.append(encoder.counts())
+    for t, *counts in result:
+        ticks = t / 0.00737
+        if abs(ticks - round(ticks)) > 1e-6:  # at a tick both rows are right
+            assert counts == expected[int(ticks)], t
+
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 def test_fmpy_simulates_it(sensor: Fmu, kind: str) -> None:
     """In Model Exchange, ticks are time events at which the inputs are those of the time itself."""
     values = {"sample_time": 0.00737, "noise1": 0.01, "seed": 4, "latency": 1}
-    encoder = Encoder(start_values() | values)
     result = fmpy.simulate_fmu(
         str(sensor.path),
         fmi_type=kind,
         stop_time=0.5,
         output_interval=0.01,
-        start_values=values | {"q1": 0.4, "q2": -0.01},
+        start_values=values | STILL,
         output=COUNTS,
     )
-    expected = []
-    for _ in range(70):
-        encoder.sample([0.4, -0.01])
-        expected.append(encoder.counts())
     assert len(result) >= 51
-    for row in result:
-        t, *counts = row
-        after = t / 0.00737
-        if abs(after - round(after)) > 1e-6:  # at a tick both rows are right
-            assert counts == expected[int(after)], t
+    assert_counts(result, values)
 
 
 def test_in_model_exchange_ticks_sample_the_inputs_of_their_time(sensor: Fmu) -> None:
@@ -110,7 +116,6 @@ def test_in_model_exchange_ticks_sample_the_inputs_of_their_time(sensor: Fmu) ->
 def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: bool) -> None:
     """The counts are the same; a step that may return early does so at each tick within it."""
     values = {"sample_time": 0.00737, "noise1": 0.01, "noise2": 1e-4, "seed": 9, "latency": 1}
-    encoder = Encoder(start_values() | values)
     result = fmpy.simulate_fmu(
         str(fmi3_fmu(fmu.with_name("RPSensor.fmu"))),
         fmi_type="CoSimulation",
@@ -118,17 +123,10 @@ def test_steps_that_return_at_ticks(fmu: Path, event_mode: bool, early_return: b
         early_return_allowed=early_return,
         stop_time=0.3,
         output_interval=0.01,
-        start_values=values | {"q1": 0.4, "q2": -0.01},
+        start_values=values | STILL,
         output=COUNTS,
     )
-    expected = []
-    for _ in range(41):
-        encoder.sample([0.4, -0.01])
-        expected.append(encoder.counts())
-    for t, *counts in result:
-        ticks = t / 0.00737
-        if abs(ticks - round(ticks)) > 1e-6:  # at a tick both rows are right
-            assert counts == expected[int(ticks)], t
+    assert_counts(result, values)
     within = [k * 0.00737 for k in range(1, 41)]
     found = [np.abs(result["time"] - t).min() < 1e-12 for t in within]
     assert all(found) if early_return else not any(found)

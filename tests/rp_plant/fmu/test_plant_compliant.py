@@ -115,23 +115,6 @@ def test_the_error_falls_with_the_tolerance(plant: Fmu, method: str) -> None:
         assert fine < 0.2 * coarse or fine < 1e-13
 
 
-@each_method
-@each_step
-def test_a_start_in_a_stop(plant: Fmu, method: str, h: float) -> None:
-    """From rest at the depth d the joint leaves after a quarter of a period with d sqrt(k / m)."""
-    d = 0.015
-    leaves = math.pi / 2 * math.sqrt(MASS / STIFFNESS)
-    with started(plant, method, **block(q2=LOWER - d)) as instance:
-        assert read(instance, "stop_force2", "potential_energy") == [
-            pytest.approx(STIFFNESS * d), pytest.approx(STIFFNESS * d * d / 2)
-        ]  # fmt: skip
-        stop = 0.1 if h < 0.1 else h
-        found = events(instance, h, stop)
-        if h < 0.1:
-            assert found == [(1, near(leaves))]
-        assert abs(read(instance, "dq2")[0]) == near(d * math.sqrt(STIFFNESS / MASS))
-
-
 # ---- A stop never pulls ----------------------------------------------------------------------
 
 
@@ -238,19 +221,6 @@ def test_a_ramp_presses_a_joint_that_rests_on_its_limit(plant: Fmu, method: str)
 
 
 # ---- Importers -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("c", [0.0, 0.3])
-def test_an_importer_integrates_a_contact(plant: Fmu, c: float) -> None:
-    """Model Exchange with CVode: both events by their indicators."""
-    v = 1.5
-    values = block(c=c, dq2=v)
-    times = np.array([0.0, 0.35])
-    names = ("dq2", "event_count", "total_energy")
-    with model(plant.path, **values) as instance:
-        rows = instance.simulate(times, {}, 1e-11, names)
-    out = damped_exit(c, v) if c > 0 else v
-    assert rows[-1].tolist() == [near(-out, 1e-7), 2, near(MASS * out * out / 2, 1e-7)]
 
 
 def test_an_importer_pulls_a_joint_out_of_a_stop(plant: Fmu) -> None:
