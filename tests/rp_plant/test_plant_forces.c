@@ -1,4 +1,5 @@
-/* The smooth part: friction law, mass matrix, balance of power, joint loads, derivatives. */
+/* The smooth part: friction law, balance of power, derivatives. test_plant_lagrangian.py compares
+ * motion and joint loads with the Lagrangian. */
 #include "last_text.h"
 #include "plant_test_support.h"
 #include "rp_plant_modes.h"
@@ -155,8 +156,6 @@ static void test_end_effector_moves_as_its_derivatives_say(void) {
 
 /* ---- Derivatives ---------------------------------------------------------------------------- */
 
-/* No more than a sign or a factor is at stake: the arithmetics that differentiate are tested in
- * tests/rp_manipulator. */
 /* The joint of a state rests, so that nothing depends on the state while the modes last. */
 static bool state_rests(int state) {
     struct rp_plant_modes modes;
