@@ -1,5 +1,5 @@
-/* The reference motions as the instance sees them: the payload, what is refused. Derivatives are
- * compared with 40 digits in test_trajectory.py. */
+/* The reference motions as the instance sees them: rates, the payload, what is refused.
+ * Derivatives by parameters are compared with 40 digits in test_trajectory.py. */
 #include "last_text.h"
 #include "model_test.h"
 #include "rp_trajectory_example.h"
@@ -10,11 +10,31 @@
 
 static const double pi = 3.14159265358979323846;
 
+static const int motions[] = {RP_TRAJECTORY_POINT_TO_POINT, RP_TRAJECTORY_LINE,
+                              RP_TRAJECTORY_CIRCLE};
 static struct rp_trajectory_values v;
 
 void setUp(void) {
     v = (struct rp_trajectory_values){.parameters = rp_trajectory_example};
     v.parameters.start_angle = 0.25;
+}
+
+static void test_rates_along_time_are_the_fields(void) {
+    for (size_t i = 0; i < 3; i++) {
+        struct rp_trajectory_values first = {0};
+        struct rp_trajectory_values second = {0};
+        v.parameters.motion = motions[i];
+        ASSERT_OK(rp_trajectory_model.outputs(&v, 1.1));
+        ASSERT_OK(rp_trajectory_model.propagate(&v, 1.1, 1.0, &first, &second));
+        for (int k = 0; k < 2; k++) {
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.dq[k], first.q[k]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.ddq[k], first.dq[k]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.ee_velocity[k], first.ee_position[k]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, v.ddq[k], second.q[k]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-10, first.ddq[k], second.dq[k]);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-12, first.ee_velocity[k], second.ee_position[k]);
+        }
+    }
 }
 
 static void test_there_is_no_state(void) {
@@ -91,8 +111,6 @@ static void assert_accepted(void) {
 }
 
 static void test_start_values_are_accepted(void) {
-    static const int motions[] = {RP_TRAJECTORY_POINT_TO_POINT, RP_TRAJECTORY_LINE,
-                                  RP_TRAJECTORY_CIRCLE};
     for (size_t i = 0; i < 3; i++) {
         v.parameters.motion = motions[i];
         assert_accepted();
