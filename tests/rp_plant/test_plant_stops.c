@@ -139,6 +139,24 @@ static void test_a_stop_that_is_moved_away_at_the_event_is_not_met(void) {
     ASSERT_SAME(0.0, v.sums.impact_loss);
 }
 
+/* The same impact twice: twice the impulse and the loss, m2 v (1 + e) and m2 v^2 (1 - e^2) / 2. */
+static void test_impulses_and_losses_add_up(void) {
+    const double e = 0.5;
+    set_falling_slide(e, 0.1);
+    const struct rp_plant_values falling = v;
+    const double speed = -v.dq[1];
+    for (int count = 1; count <= 2; count++) {
+        v.q[1] = falling.q[1];
+        v.dq[1] = falling.dq[1];
+        plant_test_update(&v, LOWER2);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14, count * v.parameters.arm.m2 * speed * (1.0 + e),
+                                  v.sums.stop_impulse[1]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-14,
+                                  count * v.parameters.arm.m2 * speed * speed * (1.0 - e * e) / 2.0,
+                                  v.sums.impact_loss);
+    }
+}
+
 static void test_grazing_a_stop_changes_no_velocity(void) {
     set_stops(1, -1.0, 1.0, 0.5);
     v.q[1] = nextafter(-1.0, 0.0);
