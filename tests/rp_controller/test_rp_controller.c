@@ -1,5 +1,6 @@
-/* The controller: computed torque with the arm, limits, and the integral part through the instance
- * and the integrator. test_controller.py compares values and derivatives with sympy. */
+/* The controller: computed torque and gravity compensation of the arm, limits, and the integral
+ * part through the instance and the integrator. test_controller.py compares values and derivatives
+ * with sympy. */
 #include "derivatives.h"
 #include "model_test.h"
 #include "rp_controller_model.h"
@@ -68,6 +69,36 @@ static void test_computed_torque_makes_the_error_dynamics_linear(void) {
         rp_test_acceleration_scale(&v.parameters.arm, in->q, force, scale);
         for (int i = 0; i < 2; i++) {
             ASSERT_CLOSE(asked[i], ddq[i], 16 * DBL_EPSILON * scale[i]);
+        }
+    }
+}
+
+/* At rest on the target the efforts are what holds the arm: g(q) and nothing else. */
+static void test_gravity_compensation_holds_the_arm(void) {
+    for (int n = 0; n < RP_TEST_SAMPLES; n++) {
+        struct rp_controller_values v;
+        random_values(&v);
+        v.parameters.mode = RP_CONTROLLER_PD_GRAVITY;
+        memcpy(v.inputs.q, v.inputs.q_ref, sizeof v.inputs.q);
+        memset(v.inputs.dq, 0, sizeof v.inputs.dq);
+        memset(v.inputs.dq_ref, 0, sizeof v.inputs.dq_ref);
+        memset(v.integral, 0, sizeof v.integral);
+
+        double efforts[2];
+        double gravity[2];
+        double ddq[2];
+        rp_controller_unlimited(&v.parameters, false, &v.inputs, v.integral, efforts);
+        rp_gravity_forces(&v.parameters.arm, v.inputs.q, gravity);
+        TEST_ASSERT_TRUE(efforts[0] == gravity[0] && efforts[1] == gravity[1]);
+
+        const struct rp_test_state state = {.q = {v.inputs.q[0], v.inputs.q[1]}};
+        double force[2];
+        double scale[2];
+        rp_test_force_scale(&v.parameters.arm, &state, force);
+        rp_test_acceleration_scale(&v.parameters.arm, v.inputs.q, force, scale);
+        rp_forward_dynamics(&v.parameters.arm, v.inputs.q, v.inputs.dq, efforts, ddq);
+        for (int i = 0; i < 2; i++) {
+            ASSERT_CLOSE(0.0, ddq[i], 16 * DBL_EPSILON * scale[i]);
         }
     }
 }
