@@ -302,8 +302,6 @@ def test_a_single_bit_is_found(arm: Runner) -> None:
         ("FreeInstance x", "an integer is expected"),
         ("FreeInstance 0 1", "a word too many"),
         ("poke 0 3 ff", "there is no such byte"),
-        ("fail 1 one", "a command is expected"),
-        ("fail 1 GetVersion", "a command is expected"),
         ("SetReal 0 " + "1 " * 520, "too many words"),
     ],
 )
