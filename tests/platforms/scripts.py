@@ -45,9 +45,6 @@ class Model:
     def __getitem__(self, name: str) -> Variable:
         return next(v for v in self.variables if v.name == name)
 
-    def __contains__(self, name: str) -> bool:
-        return any(v.name == name for v in self.variables)
-
     def reals(self, *causalities: str) -> list[int]:
         """References of Real variables, each once."""
         found = (
