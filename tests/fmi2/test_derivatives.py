@@ -14,9 +14,9 @@ import mpmath
 import numpy as np
 import pytest
 import sympy as sp
-from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Real, fmi2ValueReference
+from fmpy.fmi2 import FMU2Model, FMU2Slave
 
-from tests.support.instances import ERROR, INPUTS, OK, STATES, Instance, LoadedFmu, status_of
+from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
 from tests.support.rp_symbolic import KNOWNS, Exact, Model, Values, random_arm
 
 
@@ -346,17 +346,6 @@ def test_input_derivatives_apply_to_one_step(loaded: LoadedFmu, model: Model, se
         assert_output_derivatives(instance, model, {}, NO_RATES)
 
 
-def test_derivatives_of_the_energy_are_the_power_and_its_rate(loaded: LoadedFmu) -> None:
-    with in_initialization_mode(loaded, 3) as instance:
-        instance.fmi.exitInitializationMode()
-        instance.set_input_derivatives(tau1=(30.0,), f2=(-20.0,))
-        instance.step(0.0, 0.01)
-        rates = output_derivatives(instance, ("total_energy", "actuator_power"))
-        power = instance.get("actuator_power")[0]
-        assert rates["total_energy", 1] == pytest.approx(power, rel=1e-12)
-        assert rates["total_energy", 2] == pytest.approx(rates["actuator_power", 1], rel=1e-12)
-
-
 # ---- Bad input -----------------------------------------------------------------------------------
 
 
@@ -400,29 +389,3 @@ def test_parameters_are_no_knowns_after_the_initialization(
 ) -> None:
     with enter(loaded, 0) as instance:
         assert_refused(instance, "m1", instance.fmi.getDirectionalDerivative, [DDQ1], [M1], [1.0])
-
-
-@pytest.mark.parametrize("missing", range(4))
-@each_mode
-def test_missing_arrays_of_a_directional_derivative_are_refused(
-    loaded: LoadedFmu, enter: Callable, missing: int
-) -> None:
-    references, value = (fmi2ValueReference * 1)(DDQ1), (fmi2Real * 1)(1.0)
-    knowns, result = (fmi2ValueReference * 1)(TAU1), (fmi2Real * 1)(7.0)
-    arrays = [references, knowns, value, result]
-    arrays[missing] = None
-    unknown, known, seed, out = arrays
-    with enter(loaded, 0) as instance:
-        call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
-        assert status_of(call, component, None, 0, None, 0, None, None) == OK
-        assert_refused(instance, "NULL", call, component, unknown, 1, known, 1, seed, out)
-        assert result[0] == 7.0
-
-
-def test_a_refused_directional_derivative_writes_nothing(loaded: LoadedFmu) -> None:
-    unknowns, result = (fmi2ValueReference * 2)(DDQ1, TAU1), (fmi2Real * 2)(7.0, 8.0)
-    knowns, seed = (fmi2ValueReference * 1)(TAU1), (fmi2Real * 1)(1.0)
-    with between_steps(loaded, 0) as instance:
-        call, component = instance.fmi.fmi2GetDirectionalDerivative, instance.fmi.component
-        assert_refused(instance, "tau1", call, component, unknowns, 2, knowns, 1, seed, result)
-        assert list(result) == [7.0, 8.0]

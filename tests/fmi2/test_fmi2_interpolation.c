@@ -80,6 +80,7 @@ static void test_what_is_not_refreshed_no_longer_applies(void) {
     double dq2 = fmu_get(c, RP_MANIPULATOR_dq2);
     step(c, 0.5, 0.25); // nothing set: held at the last value set
     assert_slid(c, &held, 0.25, q2, dq2);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, force->d[0] / fmu_slide_mass, fmu_get(c, RP_MANIPULATOR_ddq2));
 
     q2 = fmu_get(c, RP_MANIPULATOR_q2);
     dq2 = fmu_get(c, RP_MANIPULATOR_dq2);

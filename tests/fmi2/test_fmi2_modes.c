@@ -1,5 +1,5 @@
-/* Model Exchange: what may be set in which mode, rollback, and instances of both kinds side by
- * side. FMI 2.0, sections 2.1.8 and 3.2.3. */
+/* Model Exchange: what may be set in which mode, and instances of both kinds side by side.
+ * Rollback: test_fmi2_snapshots.c and test_faults_memory.c. FMI 2.0, section 3.2.3. */
 #include "fmu_model_exchange.h"
 #include "fmu_snapshots.h"
 #include "fmu_states.h"
@@ -101,53 +101,6 @@ static void test_parameters_without_inertia_are_refused(void) {
     ASSERT_ERROR(fmu.EnterContinuousTimeMode(c));
     fmu_assert_logged(&messages, "lc1 = 0");
     fmu_assert_reset_is_fresh_as(fmi2ModelExchange, c, "after an event without inertia");
-}
-
-/* ---- Rollback ------------------------------------------------------------------------------- */
-
-/* An integrator that refuses a step goes back to the states and the time of before. */
-static void test_rollback_is_exact(void) {
-    static struct fmu_run expected;
-    static struct fmu_run run;
-    const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
-
-    const fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu_run_start(fmi2ModelExchange, c, 0));
-    memset(&run, 0, sizeof run);
-    fmi2FMUstate saved[FMU_RUN_STEPS];
-    for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
-        saved[i] = fmu_save(c);
-        ASSERT_OK(fmu_run_step(fmi2ModelExchange, c, i, &run));
-        if (i % 4 == 3) { // go back, and repeat without saving
-            fmu_restore(c, saved[i - 2]);
-            for (unsigned again = i - 2; again <= i; again++) {
-                memset(&run.after[again], 0, sizeof run.after[again]);
-                ASSERT_OK(fmu_run_step(fmi2ModelExchange, c, again, &run));
-            }
-        }
-    }
-    TEST_ASSERT_EQUAL_MEMORY(&expected, &run, sizeof run);
-}
-
-static void test_another_instance_goes_on_from_the_bytes(void) {
-    static struct fmu_run expected;
-    static struct fmu_run run;
-    const fmi2Component plain = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu_run_as(fmi2ModelExchange, plain, 0, &expected));
-
-    memset(&run, 0, sizeof run);
-    fmi2Component c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-    ASSERT_OK(fmu_run_start(fmi2ModelExchange, c, 0));
-    for (unsigned i = 0; i < FMU_RUN_STEPS; i++) {
-        struct fmu_bytes bytes = fmu_save_bytes(c);
-        fmu_free(c);
-        c = fmu_instantiate_as(fmi2ModelExchange, &messages, false);
-        fmu_restore_bytes(c, &bytes);
-        fmu_bytes_free(&bytes);
-        ASSERT_OK(fmu_run_step(fmi2ModelExchange, c, i, &run));
-    }
-    TEST_ASSERT_EQUAL_MEMORY(&expected, &run, sizeof run);
 }
 
 /* ---- Both kinds ----------------------------------------------------------------------------- */

@@ -8,24 +8,10 @@ from rparm.runs import reference
 from rparm.runs.reference import Reference
 from rparm.runs.simulation import Result
 from rparm.scenarios.scenario import Scenario
-from tests.support.instances import INPUTS, LoadedFmu
-from tests.support.rparm_project import declared, load, names_of
+from tests.support.instances import LoadedFmu
+from tests.support.rparm_project import declared, load, names_of, staircase
 
 NAMES = names_of("rp_manipulator")
-# ---- fmpy's solver against the references ------------------------------------------------------
-
-
-def staircase(scenario: Scenario) -> np.ndarray | None:
-    """Inputs held over each step, with an event for fmpy wherever one of them changes."""
-    if not scenario.inputs:
-        return None
-    values = np.column_stack([scenario.input(name) for name in INPUTS])
-    rows = [(scenario.times[0], *values[0])]
-    for i in range(1, len(values) - 1):
-        if np.any(values[i] != values[i - 1]):
-            rows += [(scenario.times[i], *values[i - 1]), (scenario.times[i], *values[i])]
-    rows.append((scenario.times[-1], *values[-2]))
-    return np.array(rows, dtype=[("time", float), *((name, float) for name in INPUTS)])
 
 
 def simulate(loaded: LoadedFmu, scenario: Scenario, expected: Reference, tolerance: float) -> float:
@@ -46,7 +32,7 @@ def simulate(loaded: LoadedFmu, scenario: Scenario, expected: Reference, toleran
         output_interval=interval,
         relative_tolerance=tolerance,
         start_values=scenario.parameters | scenario.initial,
-        input=staircase(scenario),
+        input=staircase(scenario, len(scenario.times) - 1),
         output=expected.names,
         record_events=True,
     )

@@ -1,8 +1,8 @@
-"""Start times, long runs, masters that are a little off, and what changes between steps."""
+"""Long runs, masters that are a little off, and what the solver says of itself."""
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from ctypes import c_double
 from types import ModuleType, SimpleNamespace
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from fmpy import fmi2
 
-from tests.support.instances import ERROR, INPUTS, STATES, Instance, LoadedFmu, status_of
+from tests.support.instances import INPUTS, STATES, Instance, LoadedFmu
 from tests.support.paths import ROOT
 from tests.support.rparm_project import declared
 
@@ -39,49 +39,6 @@ def reference(maker: ModuleType, values: dict[str, float]) -> hy.taylor_adaptive
     motion = maker.integrator(case, inputs, pars=len(INPUTS))
     motion.pars[:] = [np.longdouble(values.get(name, 0.0)) for name in INPUTS]
     return motion
-
-
-def reals(instance: Instance, without: Sequence[str] = ("time",)) -> list[float]:
-    """Values of all Real variables but those."""
-    left_out = {instance.loaded.references[name] for name in without}
-    return instance.fmi.getReal([r for r in instance.loaded.reals if r not in left_out])
-
-
-# ---- Start times -------------------------------------------------------------------------------
-
-
-def master(
-    loaded: LoadedFmu, start: float, h: float, count: int, without: Sequence[str] = ("time",)
-) -> np.ndarray:
-    """Values after every step of a run whose inputs rest, jump and move in turn."""
-    rows = []
-    with Instance(loaded) as instance:
-        instance.initialize(start, start + count * h, 1e-8, **START)
-        for i in range(count):
-            elapsed = i * h
-            if i % 3:
-                instance.set(tau1=math.sin(3 * elapsed), f2=-9 + math.cos(2 * elapsed))
-            if i % 3 == 2:
-                instance.set_input_derivatives(
-                    tau1=[3 * math.cos(3 * elapsed)], f2=[-2 * math.sin(2 * elapsed), 0.1, -0.2]
-                )
-            instance.step(start + elapsed, h)
-            rows.append(reals(instance, without))
-        assert instance.get("time") == [start + count * h]
-    return np.array(rows)
-
-
-@pytest.mark.parametrize("start", [-1000.0, -0.5, 1000.0, 1e6])
-def test_start_time_matters_by_the_rounding_of_points_alone(
-    loaded: LoadedFmu, start: float
-) -> None:
-    """Steps of 1 ms are rounded, at 1e6 s by up to 6e-11 s: inputs change that much off."""
-    without = ("time", "solver_last_step")
-    expected = master(loaded, 0.0, 1e-3, 3000, without)
-    found = master(loaded, start, 1e-3, 3000, without)
-    scale = np.maximum(np.max(np.abs(expected), axis=0), 1e-3)
-    rounding = np.spacing(abs(start) + 3.0) / 2
-    assert np.max(np.abs(found - expected) / scale) < 1e-12 + 30 * rounding
 
 
 # ---- Ten minutes -------------------------------------------------------------------------------
@@ -166,100 +123,6 @@ def test_ten_minutes_under_control(loaded: LoadedFmu, maker: ModuleType) -> None
         assert instance.count("solver_restarts") == count
     assert np.max(np.abs(expected)) < 5 and np.ptp(expected[-3000:, 0]) > 0.5  # still moving
     assert np.max(np.abs(found - expected)) < 1e-8
-
-
-def test_stop_time_is_reached_by_600_000_steps(loaded: LoadedFmu) -> None:
-    """The master adds up 1 ms and ends 7e-9 s off; one more step goes past the stop time."""
-    times, t, h = [], 0.0, 1e-3
-    for _ in range(600_000):
-        times.append(t)
-        t += h
-    assert 1e-9 < abs(t - 600.0) < 1e-7
-    with Instance(loaded) as instance:
-        instance.initialize(0.0, 600.0, 1e-10, **WHIRL)
-        first = conserved(instance)
-        component, step = instance.fmi.component, instance.fmi.fmi2DoStep
-        for point in times:
-            step(component, point, h, fmi2.fmi2True)
-        assert instance.get("time")[0] == pytest.approx(600.0, abs=1e-7)
-        assert conserved(instance) == pytest.approx(first, rel=1e-8)
-        assert not instance.messages
-        assert status_of(instance.fmi.doStep, t, h) == ERROR
-        assert "600" in instance.messages[-1].text
-
-
-# ---- Tunable parameters ------------------------------------------------------------------------
-
-
-CHANGES = [
-    {"m2": 1.6},
-    {"g": 1.62, "a": -0.3},
-    {"m1": 1.0, "I1z": 0.3, "I2z": 0.2, "l1": 0.7, "lc1": 0.4, "m2": 0.6},
-]
-
-
-@pytest.mark.parametrize("change", CHANGES)
-@pytest.mark.parametrize("moving", [False, True])
-def test_new_parameters_are_those_of_a_new_instance(
-    loaded: LoadedFmu, change: dict[str, float], moving: bool
-) -> None:
-    """A change between steps: as if a new instance started there, bit for bit."""
-
-    def go_on(instance: Instance) -> Iterator[list[float]]:
-        yield reals(instance, ("time", "solver_last_step"))  # the new one has made no step yet
-        for i in range(64, 192):
-            if i % 20 == 0:
-                instance.set(tau1=i / 100)
-            if moving:
-                instance.set_input_derivatives(tau1=[1.0, -2.0], f2=[0.5])
-            instance.step(i / 64, 1 / 64)
-            yield reals(instance)
-
-    inputs = {"tau1": 0.8, "f2": -7.0}
-    with Instance(loaded) as instance, Instance(loaded) as fresh:
-        instance.initialize(tolerance=1e-9, **START)
-        instance.set(**inputs)
-        for i in range(64):
-            instance.step(i / 64, 1 / 64)
-        states = dict(zip(STATES, instance.get(*STATES), strict=True))
-        before = instance.get("ddq1")
-        instance.set(**change)
-        assert instance.get("ddq1") != before
-        fresh.initialize(1.0, tolerance=1e-9, **states, **inputs, **change)
-        for found, expected in zip(go_on(instance), go_on(fresh), strict=True):
-            assert found == expected
-
-
-def test_new_parameters_at_a_time_that_is_rounded(loaded: LoadedFmu) -> None:
-    """The new instance knows the time as a double, the old one what rounding left over as well.
-
-    Its first step differs in length by that, so the integrator may take other internal
-    steps: equal to what the integration is accurate to.
-    """
-    step, tolerance = 1 / 60, 1e-9
-    with Instance(loaded) as instance, Instance(loaded) as fresh:
-        instance.initialize(tolerance=tolerance, **START)
-        for i in range(60):
-            instance.step(i * step, step)
-        states = dict(zip(STATES, instance.get(*STATES), strict=True))
-        instance.set(m2=1.6)
-        fresh.initialize(60 * step, tolerance=tolerance, m2=1.6, **states)
-        for i in range(60, 120):
-            for one in (instance, fresh):
-                one.step(i * step, step)
-            assert instance.get(*STATES) == pytest.approx(fresh.get(*STATES), rel=tolerance)
-
-
-def test_parameters_set_to_what_they_are_change_nothing(loaded: LoadedFmu) -> None:
-    with Instance(loaded) as instance, Instance(loaded) as other:
-        for one in (instance, other):
-            one.initialize(**START)
-            one.step(0.0, 0.5)
-        instance.set(m2=2.0)
-        instance.set(m2=1.0, tau1=0.0)
-        for one in (instance, other):
-            one.step(0.5, 0.5)
-        assert instance.everything() == other.everything()
 
 
 # ---- Solver insight ----------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import pytest
 from rparm.project import model_folder
 from rparm.scenarios.scenario import Scenario
 from tests.support.instances import instantiated, set_value
-from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load
+from tests.support.rparm_project import FILES, FMUS, NAMES, fmi3_fmu, load, staircase
 
 MODES = {  # eventModeUsed, earlyReturnAllowed
     "plain": (False, False),
@@ -93,19 +93,6 @@ def test_event_mode_and_early_return_change_nothing(mode: str) -> None:
     expected = run(path, scenario, names)
     actual = run(fmi3_fmu(path), scenario, names, mode)
     np.testing.assert_array_equal(actual.view(np.uint64), expected.view(np.uint64))
-
-
-def staircase(scenario: Scenario, points: int) -> np.ndarray | None:
-    """Inputs held over each of the first steps, with an event wherever one of them changes."""
-    if not scenario.inputs:
-        return None
-    values = np.column_stack([*scenario.inputs.values()])[:points]
-    rows = [(scenario.times[0], *values[0])]
-    for i in range(1, len(values)):
-        if np.any(values[i] != values[i - 1]):
-            rows += [(scenario.times[i], *values[i - 1]), (scenario.times[i], *values[i])]
-    rows.append((scenario.times[points], *values[-1]))
-    return np.array(rows, dtype=[("time", float), *((name, float) for name in scenario.inputs)])
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -71,7 +71,7 @@ void fmu_restore_bytes(fmi2Component component, const struct fmu_bytes *bytes) {
 
 /* ---- An instance to save -------------------------------------------------------------------- */
 
-const double fmu_used_until = 0.625;
+static const double used_until = 0.625; /* s */
 
 fmi2Component fmu_used(fmi2Integer method, struct fmu_log *log) {
     const fmi2Integer order = 2;
@@ -92,6 +92,6 @@ fmi2Component fmu_used(fmi2Integer method, struct fmu_log *log) {
 }
 
 void fmu_used_step(fmi2Component component, struct fmu_values *values) {
-    ASSERT_OK(fmu.DoStep(component, fmu_used_until, 0.25, fmi2True));
+    ASSERT_OK(fmu.DoStep(component, used_until, 0.25, fmi2True));
     ASSERT_OK(fmu_get_all(component, values));
 }

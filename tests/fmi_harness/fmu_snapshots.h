@@ -31,9 +31,8 @@ void fmu_restore_bytes(fmi2Component component, const struct fmu_bytes *bytes);
 
 /* ---- An instance to save -------------------------------------------------------------------- */
 
-/* Between steps, at time fmu_used_until (s), everything set that can be. */
+/* Between steps, everything set that can be. */
 fmi2Component fmu_used(fmi2Integer method, struct fmu_log *log);
-extern const double fmu_used_until;
 
 /* One step from there; values are those after it. */
 void fmu_used_step(fmi2Component component, struct fmu_values *values);

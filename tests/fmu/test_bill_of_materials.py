@@ -90,3 +90,9 @@ def test_what_cannot_be_written_is_told_in_a_line(
     assert code == 2
     assert line.startswith("bill_of_materials.py: ") and reason in line
     assert not (release / "SHA256SUMS").exists()
+
+
+def test_a_file_that_cannot_be_read_is_told_in_a_line(release: Path) -> None:
+    (release / "No.fmu").symlink_to("nowhere")
+    code, error = write(release)
+    assert code == 2 and "No.fmu" in error and error.count("\n") == 1

@@ -1,13 +1,11 @@
 """The FMUs of ./release.sh: what is in them, and their binaries as far as files show it."""
 
 import hashlib
-import io
 import json
 import os
 import re
 import zipfile
 from collections.abc import Iterator
-from contextlib import redirect_stderr
 from pathlib import Path
 
 import fmpy.validation
@@ -239,22 +237,3 @@ def test_macos_needs_version_11_and_its_system_library(macho: lief.MachO.Binary,
 def test_macos_on_arm_loads_signed_code_only(macho: lief.MachO.Binary) -> None:
     if macho.header.cpu_type == lief.MachO.Header.CPU_TYPE.ARM64:
         assert macho.has_code_signature
-
-
-# ---- The bill of materials ----------------------------------------------------------------------
-
-
-def test_a_bill_of_a_file_that_is_not_there_is_refused(tmp_path: Path, capsys) -> None:
-    import sys
-
-    sys.path.insert(0, str(ROOT / "fmu"))
-    try:
-        import bill_of_materials
-    finally:
-        sys.path.remove(str(ROOT / "fmu"))
-    arguments = ["bill", str(tmp_path / "No.fmu"), "--output", str(tmp_path), "--version", "1",
-                 "--license", str(ROOT / "LICENSE")]  # fmt: skip
-    with redirect_stderr(io.StringIO()) as error, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", arguments)
-        assert bill_of_materials.main() == 2
-    assert "No.fmu" in error.getvalue() and error.getvalue().count("\n") == 1

@@ -28,17 +28,4 @@ void fuzz_repair_checksum(struct fuzz_bytes *bytes);
 /* Changes one to three fields, and repairs the checksum. */
 void fuzz_forge(struct fuzz_input *input, struct fuzz_bytes *bytes);
 
-/* How a target steps. */
-struct fuzz_stepping {
-    double (*any_length)(struct fuzz_input *input);
-    fmi2Status (*step)(struct fuzz_instance *instance, double length, unsigned choices);
-    bool has_choices;
-    fmi2Integer most; /* internal steps and events that a forged state may ask for */
-};
-
-/* Another instance of this variety takes the state of the instance from its bytes: a step has the
- * same bits. Or forged bytes do no harm: a step can be tried, and what it gives is finite. */
-void fuzz_move_state(struct fuzz_input *input, struct fuzz_instance *instance,
-                     const struct fuzz_stepping *stepping);
-
 #endif

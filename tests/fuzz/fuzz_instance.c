@@ -314,10 +314,6 @@ double fuzz_value(const struct fuzz_values *values, fmi2ValueReference reference
     return values->reals[model_description.row_of_reference[reference]];
 }
 
-fmi2Integer fuzz_integer_value(const struct fuzz_values *values, fmi2ValueReference reference) {
-    return values->integers[model_description.row_of_reference[reference]];
-}
-
 void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_values *actual,
                       const char *what) {
     for (size_t i = 0; i < model_description.variable_count; i++) {

@@ -110,9 +110,8 @@ struct fuzz_values {
 /* Reads all variables; a value that is not finite is a finding. */
 void fuzz_read(struct fuzz_instance *instance, struct fuzz_values *values);
 
-/* The value of a Real or an Integer variable. */
+/* The value of a Real variable. */
 double fuzz_value(const struct fuzz_values *values, fmi2ValueReference reference);
-fmi2Integer fuzz_integer_value(const struct fuzz_values *values, fmi2ValueReference reference);
 
 /* Same bits, or a finding that names the variable. */
 void fuzz_assert_same(const struct fuzz_values *expected, const struct fuzz_values *actual,

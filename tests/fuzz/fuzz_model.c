@@ -202,12 +202,77 @@ static void do_step(struct subject *subject) {
     fuzz_forget(subject->instance, &state);
 }
 
-static const struct fuzz_stepping stepping = {
-    .any_length = any_length,
-    .step = fuzz_model_step,
-    .has_choices = true,
-    .most = 4 * MAX_INTERNAL_STEPS,
-};
+/* ---- Moved to another instance --------------------------------------------------------------- */
+
+/* Whether a forged state asks for no more work in a step than this. */
+static bool is_quick(struct fuzz_instance *instance, fmi2Integer most) {
+    static const char *const limits[] = {"max_internal_steps", "max_events"};
+    for (size_t i = 0; i < FUZZ_COUNT(limits); i++) {
+        const struct variable *limit = fuzz_find(limits[i]);
+        fmi2Integer value = 0;
+        if (limit != NULL &&
+            (FUZZ_CHECKED(instance, GetInteger, &limit->reference, 1, &value) != fmi2OK ||
+             value > most)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void use_forged(struct fuzz_input *input, struct fuzz_instance *other) {
+    const fmi2ValueReference time = 0;
+    const double length = any_length(input);
+    struct fuzz_values values;
+    if (is_quick(other, 4 * MAX_INTERNAL_STEPS) &&
+        FUZZ_CHECKED(other, GetReal, &time, 1, &other->time) == fmi2OK &&
+        fuzz_step(other, length) != fmi2Error) {
+        fuzz_read(other, &values);
+    }
+}
+
+static void use_same(struct fuzz_input *input, struct fuzz_instance *instance,
+                     struct fuzz_instance *other) {
+    struct fuzz_values here;
+    struct fuzz_values there;
+    const double length = any_length(input);
+    const unsigned choices = fuzz_byte(input);
+    const double begin = instance->time;
+    fmi2FMUstate before = fuzz_save(instance);
+    other->time = begin;
+    const fmi2Status status = fuzz_model_step(instance, length, choices);
+    if (fuzz_model_step(other, length, choices) != status) {
+        fuzz_fail("a step in another instance has another status than %d", (int)status);
+    }
+    fuzz_read(instance, &here);
+    fuzz_read(other, &there);
+    fuzz_assert_same(&here, &there, "a step in another instance");
+    fuzz_restore(instance, before, begin);
+    fuzz_forget(instance, &before);
+}
+
+/* Another instance of this variety takes the state of the instance from its bytes: a step has the
+ * same bits. Or forged bytes do no harm: a step can be tried, and what it gives is finite. */
+static void move_state(struct fuzz_input *input, struct fuzz_instance *instance) {
+    static struct fuzz_bytes bytes;
+    const bool is_forged = fuzz_below(input, 2) == 0;
+    struct fuzz_instance *other = fuzz_instance_create_variety(
+        instance->kind, is_forged ? 0 : instance->variety, true, false);
+    fmi2FMUstate state = NULL;
+    fuzz_serialize(instance, &bytes);
+    if (is_forged) {
+        fuzz_forge(input, &bytes);
+    }
+    const fmi2Status status =
+        FUZZ_CHECKED(other, DeSerializeFMUstate, bytes.data, bytes.size, &state);
+    if (!is_forged && status != fmi2OK) {
+        fuzz_fail("a serialized state is refused: %s", other->text);
+    }
+    if (status == fmi2OK) {
+        fuzz_require(FUZZ_CHECKED(other, SetFMUstate, state), other, "fmi2SetFMUstate");
+        is_forged ? use_forged(input, other) : use_same(input, instance, other);
+    }
+    fuzz_instance_free(other);
+}
 
 /* ---- Co-Simulation --------------------------------------------------------------------------- */
 
@@ -222,7 +287,7 @@ static void run_co_simulation(struct subject *subject) {
             fuzz_model_move_inputs(subject);
             break;
         case 3:
-            fuzz_move_state(subject->input, subject->instance, &stepping);
+            move_state(subject->input, subject->instance);
             break;
         case 4:
         case 5:

@@ -77,7 +77,6 @@ int main(int argument_count, char *arguments[]) {
     if (library == NULL || !find_functions(library, &fmi)) {
         return 2;
     }
-    system_watch_allocations(library);
 
     struct job jobs[MOST_SCRIPTS];
     void *items[MOST_SCRIPTS];

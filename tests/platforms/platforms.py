@@ -148,7 +148,7 @@ def host_of(row: Platform) -> Path:
     command += ["-I", str(ROOT / "fmu" / "fmi2")]  # fmi2_functions.h
     command += [str(sources / name) for name in HOST_SOURCES]
     if row.system == "Linux":
-        command += ["-rdynamic", "-pthread", "-ldl"]  # -rdynamic: its malloc for the FMU
+        command += ["-pthread", "-ldl"]
     finish(command, host.parent)
     return host
 

@@ -1,7 +1,6 @@
 #include "script.h"
 
 #include "calls.h"
-#include "system.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -28,25 +27,6 @@ static void run_command(struct run *run) {
     }
 }
 
-/* "fail", number, "one" or "all", command */
-static void run_failing(struct run *run) {
-    run->at = 1;
-    const long first = run_read_integer(run);
-    const bool all = run_skip(run, "all");
-    if ((!all && !run_skip(run, "one")) || run_words_left(run) == 0) {
-        run_mistake(run, "a command is expected");
-        return;
-    }
-    memmove(run->words, run->words + run->at, run_words_left(run) * sizeof run->words[0]);
-    run->word_count -= run->at;
-    if (!system_fail_allocations(first, all)) {
-        run_mistake(run, "the allocations of this library cannot be made to fail");
-        return;
-    }
-    run_command(run);
-    fprintf(run->transcript, "%u failed %ld\n", run->line, system_stop_failing());
-}
-
 static void run_line(struct run *run, char *line) {
     run->word_count = 0;
     while (*(line += strspn(line, " \r")) != '\0') {
@@ -60,9 +40,7 @@ static void run_line(struct run *run, char *line) {
             *line++ = '\0';
         }
     }
-    if (run->word_count > 0 && strcmp(run->words[0], "fail") == 0) {
-        run_failing(run);
-    } else if (run->word_count > 0) {
+    if (run->word_count > 0) {
         run_command(run);
     }
 }

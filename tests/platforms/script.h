@@ -8,7 +8,6 @@
  *     SetReal 0  20 3ff0000000000000  21 4000000000000000     value reference, value, ...
  *     DoStep 0  0000000000000000 3f847ae147ae147b             time, step
  *     SerializeFMUstate 0 2 1                                 instance, state, bytes
- *     fail 3 one Instantiate 0 ...                            the third allocation of it fails
  *
  * Further commands: "bytes 1 434f..." fills bytes, "poke 1 40 ff" changes one of them and "cut 1
  * 100" shortens them; "Euler 0 4 h" makes a step of Euler's method with 4 states.

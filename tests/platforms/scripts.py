@@ -45,9 +45,6 @@ class Model:
     def __getitem__(self, name: str) -> Variable:
         return next(v for v in self.variables if v.name == name)
 
-    def __contains__(self, name: str) -> bool:
-        return any(v.name == name for v in self.variables)
-
     def reals(self, *causalities: str) -> list[int]:
         """References of Real variables, each once."""
         found = (
@@ -389,37 +386,4 @@ def restore(model: Model, state: str) -> Script:
     script.call("bytes", 0, state)
     script.call("DeSerializeFMUstate", 0, 0, 0)
     script.call("SetFMUstate", 0, 0)
-    return script
-
-
-# ---- Failing allocations -------------------------------------------------------------------------
-
-MOST_ALLOCATIONS = 24  # in one call; more than any call needs
-
-
-def faults(model: Model) -> Script:
-    """Allocations fail in each function that makes any; statuses depend on how many it makes."""
-    script = Script()
-    new = ("Instantiate", 0, CO_SIMULATION, model.guid, 1, "unit")
-    for which in ("one", "all"):
-        for number in range(1, MOST_ALLOCATIONS + 1):
-            prefix = ("fail", number, which)
-            script.call(*prefix, *new, expect="any")
-            script.call("FreeInstance", 0)
-            script.call(*new)
-            change(script, model, 0, 1)
-            initialize(script, 0)
-            step(script, model, 0, 0, 0.0)
-            script.call("GetFMUstate", 0, 0)
-            script.call("SerializeFMUstate", 0, 0, 0)
-            script.call(*prefix, "GetFMUstate", 0, 1, expect="any")
-            script.call(*prefix, "DeSerializeFMUstate", 0, 0, 2, expect="any")
-            script.call("SetFMUstate", 0, 0)
-            script.call("GetFMUstate", 0, 1)
-            script.call("DeSerializeFMUstate", 0, 0, 2)
-            script.call("SetFMUstate", 0, 2)
-            step(script, model, 0, 1, LENGTHS[0])
-            for state in range(3):
-                script.call("FreeFMUstate", 0, state)
-            script.call("FreeInstance", 0)
     return script

@@ -39,7 +39,7 @@ def runners(fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Runners:
 
 def everything(model: Model) -> Script:
     """All that a platform may do differently, in one script."""
-    others = (scripts.model_exchange, refusals.refusals, refusals.logging, scripts.faults)
+    others = (scripts.model_exchange, refusals.refusals, refusals.logging)
     return joined(
         *(scripts.co_simulation(model, variant) for variant in VARIANTS),
         *(part(model) for part in others),
@@ -113,34 +113,3 @@ def test_threads_do_not_disturb_each_other(
     assert len(set(expected)) == THREADS
     for script, alone, transcript in zip(several, expected, tested.run(*several), strict=True):
         assert first_difference(script, alone, transcript) is None
-
-
-# ---- Allocations ---------------------------------------------------------------------------------
-
-
-@everywhere
-@each_fmu
-def test_allocations_that_fail(runners: Runners, row: Platform | None, name: str) -> None:
-    """An error with a message, and the next try succeeds."""
-    one = runners(row, name)
-    script = scripts.faults(one.model)
-    (transcript,) = one.run(script)
-    failed: dict[str, int] = {}
-    for line, answer, expected in zip(
-        script.lines, read(script, transcript), script.statuses, strict=True
-    ):
-        if not line.startswith("fail "):
-            assert answer.status == expected, line
-            continue
-        function = line.split()[3]
-        if answer.failed:
-            assert answer.status == ("NULL" if function == "Instantiate" else "Error"), line
-            assert any("out of memory" in text for *_, text in answer.log), line
-            failed[function] = failed.get(function, 0) + 1
-        else:
-            assert answer.status == "OK", line
-            assert f"fail {scripts.MOST_ALLOCATIONS} " in line or failed[function], line
-    # one at a time and with all later ones; the last number is beyond what a call allocates
-    assert set(failed) == {"Instantiate", "GetFMUstate", "DeSerializeFMUstate"}
-    assert failed["GetFMUstate"] == failed["DeSerializeFMUstate"] == 2
-    assert 2 * 3 <= failed["Instantiate"] < 2 * scripts.MOST_ALLOCATIONS

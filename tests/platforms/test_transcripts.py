@@ -12,7 +12,7 @@ import pytest
 
 from tests.platforms import refusals, scripts
 from tests.platforms.platforms import Runner, runner
-from tests.platforms.scripts import METHODS, Model, Script, bits, joined
+from tests.platforms.scripts import Model, Script, bits, joined
 from tests.platforms.transcript import NOT_WRITTEN, Answer, first_difference, read
 from tests.support.paths import EVERY
 
@@ -43,21 +43,6 @@ def rows(model: Model, answers: list[Answer], place: int) -> list[dict[str, floa
         for a in answers
         if a.call == call
     ]
-
-
-def held_rows(model: Model, answers: list[Answer]) -> list[dict[str, float]]:
-    """As rows, of instance 0, without those after a step with derivatives of inputs: outputs are
-    those of the input then, which moved, and the input reads as it was set."""
-    found = []
-    is_moved = False
-    for answer in answers:
-        if answer.call.startswith("SetRealInputDerivatives 0"):
-            is_moved = True
-        elif answer.call.startswith("SetReal 0"):
-            is_moved = False
-        elif not is_moved:
-            found += rows(model, [answer], 0)
-    return found
 
 
 # ---- Statuses and messages -----------------------------------------------------------------------
@@ -163,48 +148,6 @@ def test_how_much_is_compared(native: Runner, name: str) -> None:
     assert len(set(saved)) >= (3 * 3 + 1 if has_variants else 6) and min(map(len, saved)) > 2 * 300
 
 
-def test_methods_agree_and_have_other_bits(arm: Runner) -> None:
-    ends = []
-    for method in METHODS:
-        script = scripts.co_simulation(arm.model, method)
-        ends.append(rows(arm.model, answers_of(arm, script), 0)[-1])
-    for state in ("q1", "q2", "dq1", "dq2"):
-        values = [end[state] for end in ends]
-        assert len(set(values)) == len(METHODS)
-        assert max(values) - min(values) < 1e-4 * max(map(abs, values))
-
-
-@pytest.mark.parametrize("name", ["RPController"])
-def test_the_controller_sees_its_errors(native: Runner) -> None:
-    laws = set()
-    for variant in (1, 2, 3):
-        script = scripts.co_simulation(native.model, variant)
-        points = held_rows(native.model, answers_of(native, script))
-        for p in points:
-            for joint in ("q1", "q2", "dq1", "dq2"):
-                assert p[f"{joint}_error"] == p[f"{joint}_ref"] - p[joint]
-            assert abs(p["tau1"]) <= p["tau1_max"] and abs(p["f2"]) <= p["f2_max"]
-        assert {abs(p["tau1"]) == p["tau1_max"] for p in points} == {True, False}
-        laws.add(points[-1]["tau1_unlimited"])
-    assert len(laws) == 3
-
-
-def assert_stopped(points: list[dict[str, float]], joint: int, is_rigid: bool) -> None:
-    """A rigid stop is a limit; a joint goes into a compliant one, which never pulls."""
-    beyond = 0
-    for p in points:
-        q, lower, upper = (p[f"{name}{joint}"] for name in ("q", "lower", "upper"))
-        force = p[f"stop_force{joint}"]
-        if is_rigid:
-            assert lower - 1e-9 <= q <= upper + 1e-9
-        elif q < lower - 1e-9 or q > upper + 1e-9:
-            assert force >= 0.0 if q < lower else force <= 0.0
-            beyond += force != 0.0
-        elif lower + 1e-9 < q < upper - 1e-9:
-            assert force == 0.0
-    assert is_rigid or beyond > 5
-
-
 @pytest.mark.parametrize("name", ["RPPlant"])
 def test_the_plant_slides_strikes_and_is_held(native: Runner, name: str) -> None:
     """Events with every method, in modes of all kinds."""
@@ -225,9 +168,8 @@ def test_the_plant_slides_strikes_and_is_held(native: Runner, name: str) -> None
         attached = [a.words for a in answers if a.call.startswith("GetBoolean 0")]
         assert {*map(tuple, attached)} == {("0",), ("1",)}
         for joint in (1, 2):
-            is_rigid = scripts.CHANGED[name][f"stops{joint}"][variant - 1] == 2
-            assert_stopped(points, joint, is_rigid)
-        assert all(point["friction_power"] >= 0.0 for point in points)
+            is_compliant = scripts.CHANGED[name][f"stops{joint}"][variant - 1] == 3
+            assert not is_compliant or any(point[f"stop_force{joint}"] for point in points)
         ends.append(points[-1]["last_event_time"])
     assert len(set(ends)) == 3 and min(ends) > 1.0
 
@@ -302,8 +244,6 @@ def test_a_single_bit_is_found(arm: Runner) -> None:
         ("FreeInstance x", "an integer is expected"),
         ("FreeInstance 0 1", "a word too many"),
         ("poke 0 3 ff", "there is no such byte"),
-        ("fail 1 one", "a command is expected"),
-        ("fail 1 GetVersion", "a command is expected"),
         ("SetReal 0 " + "1 " * 520, "too many words"),
     ],
 )

@@ -16,7 +16,6 @@ class Answer:
     status: str
     words: list[str]
     log: list[list[str]] = field(default_factory=list)  # instance, status, category, text
-    failed: int = 0  # allocations
 
     @property
     def reals(self) -> list[float]:
@@ -33,8 +32,6 @@ def read(script: Script, transcript: bytes) -> list[Answer]:
         number, name, *words = line.split(" ")
         if name == "log":
             log.append([*words[:3], " ".join(words[3:])])
-        elif name == "failed":
-            answers[int(number) - 1].failed = int(words[0])
         else:
             call = script.lines[int(number) - 1]
             assert len(answers) == int(number) - 1 and name in call

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rparm import __main__ as cli
@@ -44,6 +45,19 @@ def load(name: str, root: Path = ROOT) -> Scenario:
     """A scenario of the project, or of a copy of it."""
     path = root / FILES[name].relative_to(ROOT)
     return scenarios.load(path, declared(project.model_folder(path).name))
+
+
+def staircase(scenario: Scenario, points: int) -> np.ndarray | None:
+    """Inputs held over each of the first steps, for fmpy: an event wherever one of them changes."""
+    if not scenario.inputs:
+        return None
+    values = np.column_stack([*scenario.inputs.values()])[:points]
+    rows = [(scenario.times[0], *values[0])]
+    for i in range(1, len(values)):
+        if np.any(values[i] != values[i - 1]):
+            rows += [(scenario.times[i], *values[i - 1]), (scenario.times[i], *values[i])]
+    rows.append((scenario.times[points], *values[-1]))
+    return np.array(rows, dtype=[("time", float), *((name, float) for name in scenario.inputs)])
 
 
 def copy_project(folder: Path) -> None:
