@@ -93,6 +93,29 @@ def test_gauss_seidel_steps_meet_their_reference(loop: ClosedLoop, variant: str)
     assert deviation(jacobi["arm.q1"], expected["arm.q1"]) > 1e2 * BOUND
 
 
+@pytest.mark.parametrize("mode", ["pd", "pd_gravity", "computed_torque"])
+def test_every_law_meets_its_reference_at_the_limits_of_its_efforts(
+    loop: ClosedLoop, mode: str
+) -> None:
+    """From off the trajectory, so that both efforts come to their limits, both ways."""
+    from rparm.models.closed_loop.references.closed_loop import sampled
+
+    modes = loop.fmus["controller"].model.variables["mode"].items
+    limits = {"tau1": 9.0, "f2": 2.0}
+    changes = {
+        "arm": {"q1": 0.06, "q2": -0.03, "dq1": 0.4, "dq2": 0.3},
+        "controller": {f"{name}_max": limit for name, limit in limits.items()}
+        | {"mode": modes[mode], "integral1": 2.0, "integral2": -1.0},
+    }
+    columns, _ = loop.run(METHODS[0], STEP, "limited_effort", 0.2, changes)
+    expected = sampled(flat(loop.parameters("limited_effort", changes)), columns["time"])
+    errors = {name: deviation(columns[name], expected[name]) for name in expected}
+    assert max(errors.values()) <= BOUND, errors
+    for name, limit in limits.items():
+        efforts = expected[f"controller.{name}"]
+        assert (min(efforts), max(efforts)) == (-limit, limit) and np.any(np.abs(efforts) < limit)
+
+
 # ---- The study -----------------------------------------------------------------------------------
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from rparm.__main__ import main
 from rparm.errors import UserError
 from rparm.system import ssp
 from rparm.system.structure import Connector
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -299,13 +299,9 @@ def test_a_damaged_archive_is_refused(tmp_path: Path) -> None:
     assert "is a folder" in refused(path)
 
 
-def test_the_command_line_explains_in_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_line_explains_in_one_line(tmp_path: Path, console: Console) -> None:
     edits, _ = BAD["input without a connection"]
     path = edited(SSP, tmp_path / "wrong.ssp", edits)
-    assert main(["system", "--ssp", str(path), "--report", str(tmp_path / "report")]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err == f"error: {path}: component 'arm': input 'f2' is not connected\n"
+    error = console.refused("system", "--ssp", path, "--report", tmp_path / "report")
+    assert error == f"error: {path}: component 'arm': input 'f2' is not connected\n"
     assert not (tmp_path / "report").exists()
