@@ -5,14 +5,11 @@ import os
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
 from rparm.__main__ import main
@@ -80,37 +77,6 @@ def test_a_component_may_be_stepped_elsewhere(short: Ssp, start: Start) -> None:
     assert text == f"waiting for a federation at {address}\n"
     together = federation.run(short, "nominal", addresses.free())
     assert np.array_equal(record.values, together.values)
-
-
-def test_a_process_that_is_killed_ends_the_federation(tmp_path: Path) -> None:
-    with ssp.unpacked(SSP) as system:
-        killed = threading.Thread(target=kill_soon, args=("controller",))
-        killed.start()
-        with pytest.raises(UserError, match="controller: its process was ended by signal 9"):
-            federation.run(system, "nominal", addresses.free())
-        killed.join()
-    assert not processes_of("nominal"), "a process is left"
-
-
-def processes_of(component: str) -> list[psutil.Process]:
-    """Processes that this one has started to step the component."""
-    found = []
-    for child in psutil.Process().children(recursive=True):
-        with suppress(psutil.NoSuchProcess):  # it has just ended
-            if {"federate", component} <= set(child.cmdline()):
-                found.append(child)
-    return found
-
-
-def kill_soon(component: str) -> None:
-    """Kill the process of a component when it has run for a while."""
-    for _ in range(600):
-        time.sleep(0.05)
-        found = processes_of(component)
-        if found:
-            time.sleep(1.0)
-            found[0].kill()
-            return
 
 
 # Each value may be 0, all of them together may not: only the FMU knows.
