@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm.__main__ import main
 from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.federation import addresses, federation
@@ -22,6 +21,7 @@ from rparm.system import ssp
 from rparm.system.ssp import Ssp
 from tests.federation.processes import Start
 from tests.support.paths import ROOT
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -125,12 +125,8 @@ def test_it_is_a_document(short: Ssp) -> None:
         (["nominal", "--silence", "0"], "expected 1 s or more: a number, or one with s, ms"),
     ],
 )
-def test_wrong_use(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["federation", "--ssp", str(SSP), *arguments]) == 2
-    output = capsys.readouterr()
-    assert words in output.err
-    assert output.err.startswith("error: ")
-    assert not output.out, "the head of a table that stays empty"
+def test_wrong_use(arguments: list[str], words: str, console: Console) -> None:
+    assert words in console.refused("federation", "--ssp", SSP, *arguments)
 
 
 def test_a_port_that_is_in_use_is_named() -> None:
