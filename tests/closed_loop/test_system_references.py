@@ -183,14 +183,6 @@ def test_started_anywhere_the_motion_goes_on() -> None:
         assert np.max(np.abs(part[name] - whole[name][rows])) < 1e-15, name
 
 
-def test_effort_saturates_and_the_arm_recovers() -> None:
-    column = monolithic(VARIANTS["limited_effort"], np.arange(601) / 100)
-    limit = VARIANTS["limited_effort"]["controller.tau1_max"]
-    assert 0.05 < np.mean(np.abs(column["controller.tau1"]) == limit) < 0.25
-    assert np.max(np.abs(column["controller.tau1"])) == limit
-    assert abs(column["controller.q1_error"][-1]) < 1e-5
-
-
 # -- sampled system --
 
 

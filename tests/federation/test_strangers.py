@@ -21,15 +21,9 @@ def said(address: str, user: int | None, *arguments: str) -> str:
     """What a stranger says."""
     _, port = addresses.check_form(address)
     environment = {name: value for name, value in os.environ.items() if name != KEY}
+    who = (str(port), str(-1 if user is None else user), *arguments)
     return subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "tests.federation.stranger",
-            str(port),
-            str(-1 if user is None else user),
-            *arguments,
-        ],
+        [sys.executable, "-m", "tests.federation.stranger", *who],
         cwd=ROOT,
         env=environment,
         stdout=subprocess.PIPE,

@@ -250,21 +250,20 @@ def same(content: bytes) -> bytes:
     return content
 
 
-def test_on_arm_the_binary_has_the_folder_of_fmi_3(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "binaries",
+    [
+        # linux64, in which fmpy looks there too, holds the binary for x86-64
+        {"aarch64-linux": same, "linux64": lambda _: b"for another machine"},
+        {"linux64": same},  # as fmpy compiles it
+    ],
+    ids=["shipped", "compiled"],
+)
+def test_on_arm_a_binary_is_in_the_folder_of_either_version(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, binaries: dict
 ) -> None:
-    """linux64, in which fmpy looks there too, holds the binary for x86-64."""
     monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
-    binaries = {"aarch64-linux": same, "linux64": lambda _: b"for another machine"}
     with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", binaries)) as opened:
-        simulation.simulate(opened, load(SHORT))
-
-
-def test_compiled_on_arm_by_fmpy_it_has_that_of_fmi_2(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
-    with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", {"linux64": same})) as opened:
         simulation.simulate(opened, load(SHORT))
 
 
