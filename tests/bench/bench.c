@@ -24,12 +24,13 @@ enum { GROUPS = sizeof groups / sizeof groups[0] };
 /* Marks the groups of a list with commas. */
 static void choose(char *list, bool chosen[GROUPS]) {
     for (char *name = strtok(list, ","); name != NULL; name = strtok(NULL, ",")) {
-        size_t i = 0;
-        while (i < GROUPS && strcmp(groups[i].name, name) != 0) {
-            i++;
+        bool is_known = false;
+        for (size_t i = 0; i < GROUPS; i++) {
+            const bool is_named = strcmp(groups[i].name, name) == 0;
+            chosen[i] = chosen[i] || is_named;
+            is_known = is_known || is_named;
         }
-        require(i < GROUPS, "no such group");
-        chosen[i] = true;
+        require(is_known, "no such group");
     }
 }
 
