@@ -188,19 +188,6 @@ def test_a_replay_before_the_campaign_leads_to_no_page(tmp_path: Path, console: 
     assert "index.html" not in text_of(output / "replays" / "run_3.html")
 
 
-def test_no_other_command_imports_what_campaigns_need() -> None:
-    code = (
-        "import sys; from rparm.__main__ import main; main(['list']);"
-        "import rparm.commands.run, rparm.commands.system, rparm.commands.coupling;"
-        "print(*(set(sys.modules) & {'dask', 'distributed', 'numba', 'pyarrow', 'SALib'}))"
-    )
-    run = subprocess.run(
-        [sys.executable, "-P", "-c", code], capture_output=True, text=True, env=ENVIRONMENT
-    )
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.splitlines()[-1] == ""
-
-
 def test_it_says_what_is_not_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:

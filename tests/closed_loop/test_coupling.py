@@ -24,15 +24,9 @@ from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
 from rparm.__main__ import main
 from rparm.errors import UserError
+from tests.closed_loop.variants import VARIANTS
 from tests.support.paths import ROOT
 
-VARIANTS = (
-    "nominal",
-    "heavy_payload",
-    "heavy_payload_integral",
-    "horizontal_plane",
-    "limited_effort",
-)
 STEP = 1e-3  # s, of the sampled references
 BOUND = 1e-7  # relative, at the relative tolerance of the variants, 1e-11
 SMALLEST_SCALE = 1e-3
@@ -230,14 +224,6 @@ def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
 
 
 # ---- The command ---------------------------------------------------------------------------------
-
-
-def test_a_missing_system_is_named(tmp_path: Path) -> None:
-    with (
-        pytest.raises(UserError, match=r"none\.ssp: no such file"),
-        closed_loop.opened(tmp_path / "none.ssp"),
-    ):
-        pass
 
 
 def test_an_unknown_variant_is_named(loop: ClosedLoop) -> None:

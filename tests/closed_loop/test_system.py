@@ -15,15 +15,12 @@ from rparm.models.closed_loop.study import EXPERIMENT
 from rparm.errors import UserError
 from rparm.report import overview
 from rparm.system import comparison, ecos, ssp
+from tests.closed_loop.variants import VARIANTS
 from tests.support.paths import ROOT
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace
 
 SSP3 = SSP.parent / "fmi3" / SSP.name
-VARIANTS = (
-    *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
-    "limited_effort",
-)
 BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
 SCALE = 1e-3
 ROUNDING = 1e-9  # two engines with the same order

@@ -8,14 +8,11 @@ import pytest
 from rparm import project
 from rparm.errors import UserError
 from rparm.system import study
+from tests.closed_loop.variants import VARIANTS
 from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
-VARIANTS = (
-    *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
-    "limited_effort",
-)
 SECOND = tuple(f"{name}_2" for name in VARIANTS)
 Add = Callable[[str, str, str], Path]
 

@@ -55,16 +55,9 @@ def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     there = start("federate", str(SSP), "nominal", "arm", "--broker", address)
     wait_for_steps(here)
-    whole = [
-        process
-        for started in (here, there)
-        for process in (
-            psutil.Process(started.pid),
-            *psutil.Process(started.pid).children(recursive=True),
-        )
-    ]
+    started = [psutil.Process(process.pid) for process in (here, there)]
     found = []
-    for process in whole:
+    for process in [*started, *(child for each in started for child in each.children(True))]:
         with suppress(psutil.NoSuchProcess):  # the trajectory runs ahead, and may have ended
             assert os.environ[KEY] not in " ".join(process.cmdline())
             found += [

@@ -11,7 +11,7 @@ from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.system import study
 from tests.support.paths import ROOT
-from tests.support.rparm_project import SHORT, Console
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, replace
 
 # what each command cannot do without
@@ -46,15 +46,6 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     addresses: list[str] = []
     monkeypatch.setattr("webbrowser.open_new_tab", lambda url: bool(addresses.append(url)) or True)
     return addresses
-
-
-def test_a_run_and_a_new_scenario_are_shown(
-    project: Path, fmu: Path, tmp_path: Path, shown: list[str], console: Console
-) -> None:
-    folder = project / "report"
-    arguments = (SHORT, "--tolerance", "1e-8", "--fmu", fmu, "--output", folder, "--open")
-    assert console("run", *arguments)[0] == 0
-    assert len(shown) == 1 and Path(shown[0].removeprefix("file://")).is_relative_to(folder)
 
 
 def test_a_new_scenario_goes_into_a_folder_and_is_shown(
