@@ -91,8 +91,11 @@ def test_gauss_seidel_steps_meet_their_reference(loop: ClosedLoop, variant: str)
 def test_every_law_meets_its_reference_at_the_limits_of_its_efforts(
     loop: ClosedLoop, mode: str
 ) -> None:
-    """From off the trajectory, so that both efforts come to their limits, both ways."""
-    from rparm.models.closed_loop.references.closed_loop import sampled
+    """From off the trajectory, so that both efforts come to their limits, both ways.
+
+    Sampled, and in continuous time, which steps of second order come near to.
+    """
+    from rparm.models.closed_loop.references.closed_loop import STATE, monolithic, sampled
 
     modes = loop.fmus["controller"].model.variables["mode"].items
     limits = {"tau1": 9.0, "f2": 2.0}
@@ -102,12 +105,16 @@ def test_every_law_meets_its_reference_at_the_limits_of_its_efforts(
         | {"mode": modes[mode], "integral1": 2.0, "integral2": -1.0},
     }
     columns, _ = loop.run(METHODS[0], STEP, "limited_effort", 0.2, changes)
-    expected = sampled(flat(loop.parameters("limited_effort", changes)), columns["time"])
+    parameters = flat(loop.parameters("limited_effort", changes))
+    expected = sampled(parameters, columns["time"])
     errors = {name: deviation(columns[name], expected[name]) for name in expected}
     assert max(errors.values()) <= BOUND, errors
     for name, limit in limits.items():
         efforts = expected[f"controller.{name}"]
         assert (min(efforts), max(efforts)) == (-limit, limit) and np.any(np.abs(efforts) < limit)
+    finer, _ = loop.run(METHODS[3], STEP, "limited_effort", 0.2, changes)
+    continuous = monolithic(parameters, finer["time"])
+    assert max(deviation(finer[name], continuous[name]) for name in STATE) <= 1e-3
 
 
 # ---- The study -----------------------------------------------------------------------------------
