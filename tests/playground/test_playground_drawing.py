@@ -1,8 +1,6 @@
 """The drawings of the playground: hands that pull at the arm, what is seen, and how it looks."""
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -27,26 +25,19 @@ def drag_place(opened: OpenedPage) -> tuple[float, float]:
     ))  # fmt: skip
 
 
-@contextmanager
-def dragged(opened: OpenedPage, right: int, down: int) -> Iterator[list[int]]:
-    """The mouse holds the end effector, which it has pulled so far (px); where it is."""
+def test_drag_by_mouse(opened: OpenedPage) -> None:
     x, y = (round(number) for number in drag_place(opened))
-    at = [x + right, y + down]
     mouse = ActionChains(opened.browser.driver, duration=0).w3c_actions
-    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(*at)
+    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(x - 40, y + 60)
     mouse.perform()
-    yield at
+    opened.run("simulation.step()")
+    fx, fy = opened.value("ee_fx"), opened.value("ee_fy")
+    assert fx < -1 and fy < -1
     opened.browser.driver.execute_cdp_cmd(
         "Input.dispatchMouseEvent",
-        {"type": "mouseReleased", "x": at[0], "y": at[1], "button": "left", "clickCount": 1},
+        {"type": "mouseReleased", "x": x - 40, "y": y + 60, "button": "left", "clickCount": 1},
     )
     mouse.clear_actions()
-
-
-def test_drag_by_mouse(opened: OpenedPage) -> None:
-    with dragged(opened, -40, 60):
-        opened.run("simulation.step()")
-        assert opened.value("ee_fx") < -1 and opened.value("ee_fy") < -1
     opened.run("simulation.step()")
     assert (opened.value("ee_fx"), opened.value("ee_fy")) == (0, 0)
 
@@ -81,15 +72,23 @@ def test_the_view_follows_the_arm(opened: OpenedPage) -> None:
         opened.run("for (let n = 0; n < 5000; n++) simulation.step(); window.tested.stage.draw()")
         assert abs(opened.value("q2")) > 20
         assert is_seen(opened, opened.value("ee_x"), opened.value("ee_y"))
-    with dragged(opened, -30, 0) as at:
-        opened.run("for (let n = 0; n < 10; n++) simulation.step(); window.tested.stage.draw()")
-        assert opened.value("ee_fx") < -1
-        held = opened.run(
-            "const box = document.getElementById('stage').getBoundingClientRect();"
-            "return Arm.toPixel(window.tested.stage.view, simulation.hand.target)"
-            ".map((at, i) => at + [box.left, box.top][i])"
-        )
-        assert held == pytest.approx(at)
+    x, y = (round(number) for number in drag_place(opened))
+    mouse = ActionChains(opened.browser.driver, duration=0).w3c_actions
+    mouse.pointer_action.move_to_location(x, y).pointer_down().move_to_location(x - 30, y)
+    mouse.perform()
+    opened.run("for (let n = 0; n < 10; n++) simulation.step(); window.tested.stage.draw()")
+    assert opened.value("ee_fx") < -1
+    held = opened.run(
+        "const box = document.getElementById('stage').getBoundingClientRect();"
+        "return Arm.toPixel(window.tested.stage.view, simulation.hand.target)"
+        ".map((at, i) => at + [box.left, box.top][i])"
+    )
+    assert held == pytest.approx([x - 30, y])
+    opened.browser.driver.execute_cdp_cmd(
+        "Input.dispatchMouseEvent",
+        {"type": "mouseReleased", "x": x - 30, "y": y, "button": "left", "clickCount": 1},
+    )
+    mouse.clear_actions()
     click(opened, "#reset")
     assert opened.run("return window.tested.stage.view.scale") == scale
 
