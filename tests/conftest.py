@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tests.support.browser import Browser
     from tests.support.hosts import Network
     from tests.support.instances import LoadedFmu
+    from tests.support.rparm_project import Console
 
 
 # A shell that starts the tests in the background lets them, and all that they start, ignore Ctrl-C.
@@ -63,6 +64,14 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     copy_project(tmp_path)
     monkeypatch.setattr("rparm.project.ROOT", tmp_path)
     return tmp_path
+
+
+@pytest.fixture
+def console(capsys: pytest.CaptureFixture[str]) -> "Console":
+    """The command line."""
+    from tests.support.rparm_project import Console
+
+    return Console(capsys)
 
 
 @pytest.fixture

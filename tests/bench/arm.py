@@ -15,7 +15,6 @@ PARAMETERS = {
 START = (0.3, 0.2, 0.0, 0.0)  # q1, q2, dq1, dq2
 STATES = ("q1", "q2", "dq1", "dq2")
 INPUTS = ("tau1", "f2")
-MECHANICS = ("m1", "m2", "I1z", "I2z", "l1", "lc1", "a")
 
 
 @dataclass(frozen=True)
@@ -51,37 +50,9 @@ class Work:
         return float((np.abs(states - self.reference).max(axis=0) / largest).max())
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A motion without losses, as in energy.c: its inputs do not change."""
-
-    name: str
-    start: tuple[float, float, float, float]
-    inputs: tuple[float, float]
-    g: float  # m/s^2
-
-    def energy(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Total energy, and the larger of kinetic and potential, J, of states of shape (n, 4)."""
-        q1, q2, dq1, dq2 = states.T
-        m1, m2, I1z, I2z, l1, lc1, a = (PARAMETERS[name] for name in MECHANICS)
-        length = l1 + q2
-        inertia = m1 * lc1 * lc1 + I1z + I2z + m2 * (length * length + a * a)
-        kinetic = 0.5 * (inertia * dq1 * dq1 + m2 * dq2 * dq2) - m2 * a * dq1 * dq2
-        height = m1 * lc1 * np.sin(q1) + m2 * (length * np.sin(q1) + a * np.cos(q1))
-        potential = self.g * height - self.inputs[0] * q1 - self.inputs[1] * q2
-        return kinetic + potential, np.maximum(kinetic, np.abs(potential))
-
-
-MOTIONS = (
-    Motion("free motion", (0.3, 0.2, 0.0, 0.0), (0.0, 0.0), 9.81),
-    Motion("in the horizontal plane, the slide pulled inwards", (0.3, 0.2, 3.0, 0.0), (0.0, -2.0),
-           0.0),
-)  # fmt: skip
-
-
-def accelerations(q1, q2, dq1, dq2, tau1, f2, cosine=cos, sine=sin, g=PARAMETERS["g"]):
+def accelerations(q1, q2, dq1, dq2, tau1, f2, cosine=cos, sine=sin):
     """Equations (14) and (15) of the notes, solved for ddq1 and ddq2; floats or expressions."""
-    m1, m2, I1z, I2z, l1, lc1, a = (PARAMETERS[name] for name in MECHANICS)
+    m1, m2, I1z, I2z, l1, lc1, a, g = PARAMETERS.values()
     length = l1 + q2
     inertia = m1 * lc1 * lc1 + I1z + I2z + m2 * length * length
     c, s = cosine(q1), sine(q1)
@@ -91,12 +62,10 @@ def accelerations(q1, q2, dq1, dq2, tau1, f2, cosine=cos, sine=sin, g=PARAMETERS
     return ddq1, force / m2 + a * ddq1
 
 
-def taylor_adaptive(
-    tolerance: float, real: type = float, g: float = PARAMETERS["g"]
-) -> hy.taylor_adaptive:
+def taylor_adaptive(tolerance: float, real: type = float) -> hy.taylor_adaptive:
     """Compile heyoka's integrator, at START and t = 0; its parameters are the inputs."""
     q1, q2, dq1, dq2 = hy.make_vars(*STATES)
-    ddq1, ddq2 = accelerations(q1, q2, dq1, dq2, hy.par[0], hy.par[1], hy.cos, hy.sin, g)
+    ddq1, ddq2 = accelerations(q1, q2, dq1, dq2, hy.par[0], hy.par[1], hy.cos, hy.sin)
     return hy.taylor_adaptive(
         [(q1, dq1), (q2, dq2), (dq1, ddq1), (dq2, ddq2)],
         np.array(START, real),

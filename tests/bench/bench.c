@@ -8,8 +8,7 @@
 #include <string.h>
 
 static const char usage[] =
-    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 "
-    "RPManipulator.so-with-idle-integrator RPPlant.so [--repeats N] [--quick] "
+    "usage: bench RPManipulator.so RPManipulator.so-of-FMI-3.0 RPPlant.so [--repeats N] [--quick] "
     "[--only GROUP[,GROUP...]]";
 
 static const struct {
@@ -17,23 +16,21 @@ static const struct {
     void (*measure)(struct bench *bench);
 } groups[] = {
     {"steps", measure_steps},         {"free-motion", measure_free_motion},
-    {"precision", measure_precision}, {"step-size", measure_step_sizes},
     {"instances", measure_instances}, {"threads", measure_threads},
-    {"energy", measure_energy},       {"instance", measure_instance},
-    {"calls", measure_calls},         {"life", measure_life},
-    {"plant", measure_plant},
+    {"life", measure_life},           {"plant", measure_plant},
 };
 enum { GROUPS = sizeof groups / sizeof groups[0] };
 
 /* Marks the groups of a list with commas. */
 static void choose(char *list, bool chosen[GROUPS]) {
     for (char *name = strtok(list, ","); name != NULL; name = strtok(NULL, ",")) {
-        size_t i = 0;
-        while (i < GROUPS && strcmp(groups[i].name, name) != 0) {
-            i++;
+        bool is_known = false;
+        for (size_t i = 0; i < GROUPS; i++) {
+            const bool is_named = strcmp(groups[i].name, name) == 0;
+            chosen[i] = chosen[i] || is_named;
+            is_known = is_known || is_named;
         }
-        require(i < GROUPS, "no such group");
-        chosen[i] = true;
+        require(is_known, "no such group");
     }
 }
 
@@ -41,8 +38,8 @@ int main(int count, char **arguments) {
     struct bench bench = {.repeats = 11};
     bool all = true;
     bool chosen[GROUPS] = {false};
-    require(count >= 5, usage);
-    for (int i = 5; i < count; i++) {
+    require(count >= 4, usage);
+    for (int i = 4; i < count; i++) {
         const bool has_value = i + 1 < count;
         if (strcmp(arguments[i], "--quick") == 0) {
             bench.quick = true;
@@ -59,9 +56,7 @@ int main(int count, char **arguments) {
     require(fmu_library_open(arguments[1], &bench.fmu) != NULL, "the FMU cannot be loaded");
     require(fmu3_library_open(arguments[2], &bench.fmu3) != NULL,
             "the FMU of FMI 3.0 cannot be loaded");
-    require(fmu_library_open(arguments[3], &bench.idle) != NULL,
-            "the FMU with an integrator that returns at once cannot be loaded");
-    require(fmu_library_open(arguments[4], &bench.plant) != NULL, "RPPlant cannot be loaded");
+    require(fmu_library_open(arguments[3], &bench.plant) != NULL, "RPPlant cannot be loaded");
 
     report_open(&bench.report, bench.repeats);
     for (size_t i = 0; i < GROUPS; i++) {

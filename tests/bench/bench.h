@@ -42,7 +42,6 @@ struct run {
     double tolerance;   /* of the plain loop, or requested from an FMU */
     enum mujoco_integrator integrator;
     int substeps;                      /* of MuJoCo in a communication step */
-    const struct fmu_functions *fmu;   /* of FMU, where it is not that of the race */
     const struct fmu3_functions *fmu3; /* of FMU3: the FMU of FMI 3.0 */
 };
 
@@ -83,19 +82,15 @@ void race_tune(struct run *run, const struct fmu_functions *fmu, const struct pr
 struct bench {
     struct fmu_functions fmu;
     struct fmu3_functions fmu3;
-    struct fmu_functions idle;  /* the FMU with idle_integrator.c */
     struct fmu_functions plant; /* RPPlant */
     struct report report;
     int repeats;
     bool quick; /* little of everything: shows that it works, the figures mean nothing */
 };
 
-/* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors;
- * error and time over the tolerance, time over the communication step size */
+/* steps.c: communication steps against the plain loop and MuJoCo; free motion at equal errors */
 void measure_steps(struct bench *bench);
 void measure_free_motion(struct bench *bench);
-void measure_precision(struct bench *bench);
-void measure_step_sizes(struct bench *bench);
 
 /* plant.c: friction and stops, against the arm without them */
 void measure_plant(struct bench *bench);
@@ -104,13 +99,7 @@ void measure_plant(struct bench *bench);
 void measure_instances(struct bench *bench);
 void measure_threads(struct bench *bench);
 
-/* energy.c: how the energy of a motion without losses drifts */
-void measure_energy(struct bench *bench);
-
-/* calls.c: a step without the time of its integrator, each call by itself, and from fmi2Instantiate
- * to fmi2FreeInstance */
-void measure_instance(struct bench *bench);
-void measure_calls(struct bench *bench);
+/* life.c: from fmi2Instantiate to fmi2FreeInstance, and memory */
 void measure_life(struct bench *bench);
 
 #endif

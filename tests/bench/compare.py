@@ -1,4 +1,4 @@
-"""The benchmark: the program bench and the Python peers in turns, a table, a JSON file and plots.
+"""The benchmark: the program bench and the Python peers in turns, tables and a JSON file.
 
     cmake --build build --target benchmark
 
@@ -25,13 +25,11 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
-from arm import MOTIONS, Work
+from arm import Work
 from peers import (
     LoadedFmu,
     Run,
     build_python_plant,
-    follow,
     run_co_simulation,
     run_compiled,
     run_dop853,
@@ -39,7 +37,6 @@ from peers import (
     run_model_exchange,
     run_mujoco,
 )
-from plots import draw
 from table import markdown, summary
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -52,7 +49,6 @@ CHANGING = (
     Work("10 ms steps, inputs changing", 1e-2, 200, "changing"),
     Work("0.1 s steps, inputs changing", 0.1, 20, "changing"),
 )
-SWEPT = (*CHANGING[:2], Work("one step of 2 s, free motion", 2.0, 1, "zero"))
 OTHERS = (
     Work("1 ms steps, inputs constant", 1e-3, 2000, "constant"),
     Work("10 ms steps, inputs constant", 1e-2, 200, "constant"),
@@ -62,7 +58,6 @@ OTHERS = (
 )
 METHODS = {"erk": 3, "cvode_adams": 1, "taylor": 4}
 ROUNDING = 1e-14  # an error that no peer need stay below
-DRIFT_TOLERANCE = 1e-14
 PACKAGES = ("fmpy", "heyoka", "scipy", "mujoco", "pythonfmu")  # Python packages of the peers
 TURNS = 5  # of free motion in a round: its targets are near, and bench and the peers take turns
 
@@ -114,14 +109,13 @@ class Peer:
     run: Callable[[Work, float], Run]
     work: Work
     tolerance: float
-    group: str = "steps"
 
     def row(self) -> dict:
         """Of one turn."""
         us, error = once(self)
         work = self.work
         return {
-            "group": self.group, "work": work.name, "run": self.name, "step": work.step,
+            "group": "steps", "work": work.name, "run": self.name, "step": work.step,
             "steps": work.steps, "error": error, "tolerance": self.tolerance, "us": us,
         }  # fmt: skip
 
@@ -170,14 +164,12 @@ def heyoka_like(run: str, work: Work, first: list[dict]) -> Peer:
     return tuned(peer, max(find(first, work.name, run)["error"], ROUNDING))
 
 
-def make_peers(
-    fmu: Path, own: LoadedFmu, plant: LoadedFmu, first: list[dict], quick: bool
-) -> list[Peer]:
+def make_peers(fmu: Path, own: LoadedFmu, plant: LoadedFmu, first: list[dict]) -> list[Peer]:
     """All peers at their tolerances; first: rows of bench, to know how exact its runs are.
 
     fmu: the file of which own is made.
     """
-    swept = [
+    tuned_ones = [
         ("heyoka", run_heyoka),
         ("scipy DOP853", run_dop853),
         ("model exchange, CVode of fmpy", partial(run_model_exchange, own)),
@@ -193,7 +185,7 @@ def make_peers(
     for bound, work in FREE.items():
         # scipy and fmpy do not come within 1e-14
         peers += [tuned(Peer(name, run, work, 0.0), bound)
-                  for name, run in (swept if bound == 1e-8 else swept[:1])]  # fmt: skip
+                  for name, run in (tuned_ones if bound == 1e-8 else tuned_ones[:1])]  # fmt: skip
         for name in ("erk", "taylor") if bound == 1e-8 else ("taylor",):
             tolerance = find(first, work.name, name)["tolerance"]
             run = partial(run_co_simulation, own, method=METHODS[name])
@@ -202,15 +194,10 @@ def make_peers(
     peers.append(heyoka_like("taylor", FREE[1e-8], first))
     peers.append(Peer(*python_plant, FREE[1e-8], 1e-8))
     for work in CHANGING:
-        for name, run in (*swept, *driven, python_plant, bindings):
+        for name, run in (*tuned_ones, *driven, python_plant, bindings):
             peers.append(Peer(name, run, work, 1e-8))
     for work in (*CHANGING, *OTHERS):
         peers.append(heyoka_like("taylor", work, first))
-    for work in SWEPT:
-        for exponent in range(-4, -16, -4 if quick else -1):
-            # scipy and fmpy refuse finer tolerances than 1e-12, or work no better at them
-            peers += [Peer(name, run, work, 10.0**exponent, "precision")
-                      for name, run in (swept if exponent >= -12 else swept[:1])]  # fmt: skip
     return peers
 
 
@@ -267,32 +254,13 @@ def take_rounds(program: list[str], peers: list[Peer], rounds: int, repeats: int
         print(f"turn {number + 1} of {len(turns)}", file=sys.stderr)
         c_rows = run_bench(program, "--only", group, "--repeats", str(repeats))["rows"]
         for row in compared(c_rows + [peer.row() for peer in group_peers]):
-            sweep = row["tolerance"] if row["group"] == "precision" else None
-            found[row["group"], row["work"], row["run"], sweep].append(row)
+            found[row["group"], row["work"], row["run"]].append(row)
     return [
         of_turns[-1]
         | {figure: statistics.median(row[figure] for row in of_turns)
            for figure in ("us", "ratio") if figure in of_turns[-1]}
         for of_turns in found.values()
     ]  # fmt: skip
-
-
-def drift_rows(steps: int) -> list[dict]:
-    """heyoka's drift of the energy, in rows as those of bench's energy.c."""
-    rows = []
-    for motion in MOTIONS:
-        seconds, states = follow(motion, DRIFT_TOLERANCE, steps)
-        total, scale = motion.energy(np.vstack((motion.start, states)))
-        drift = (np.abs(total - total[0]) / np.maximum.accumulate(scale))[1:]
-        ends = sorted({math.ceil(10.0 ** (k / 8)) for k in range(8 * 6)} | {steps})
-        ends = [end for end in ends if end <= steps]
-        for begin, end in zip([0, *ends[:-1]], ends, strict=True):
-            rows.append({
-                "group": "energy", "work": motion.name, "run": "heyoka", "steps": end,
-                "drift": drift[begin:end].max(), "largest": drift[:end].max(),
-                "at_end": drift[end - 1], "us": 1e6 * seconds / steps, "end_q1": states[end - 1, 0],
-            })  # fmt: skip
-    return rows
 
 
 def with_figures(page: str, tables: str) -> str:
@@ -303,9 +271,9 @@ def with_figures(page: str, tables: str) -> str:
 
 
 def libraries(build: Path) -> list[Path]:
-    """Of FMI 2.0, FMI 3.0, with an integrator that returns at once, and of RPPlant."""
+    """Of FMI 2.0, FMI 3.0, and of RPPlant."""
     names = ("fmu/RPManipulator/RPManipulator.so", "fmu/RPManipulator/fmi3/RPManipulator.so",
-             "tests/bench/idle/RPManipulator.so", "fmu/RPPlant/RPPlant.so")  # fmt: skip
+             "fmu/RPPlant/RPPlant.so")  # fmt: skip
     return [build / name for name in names]
 
 
@@ -346,16 +314,16 @@ def main() -> None:
         own = LoadedFmu(fmu, folder / "own")
         plant = LoadedFmu(build_python_plant(folder), folder / "plant")
         first = run_bench(program, "--only", "steps,free-motion", "--repeats", "1")
-        peers = make_peers(options.fmu, own, plant, first["rows"], options.quick)
+        peers = make_peers(fmu, own, plant, first["rows"])
         rows = take_rounds(program, peers, options.rounds, min(3, options.repeats))
-    print("sweeps, instances, threads, energy, calls", file=sys.stderr)
-    others = "precision,step-size,instances,threads,energy,instance,calls,life,plant"
+    print("instances, threads, friction and stops", file=sys.stderr)
+    others = "instances,threads,life,plant"
     rest = run_bench(program, *small, "--only", others, "--repeats", str(options.repeats))
     result = {
         "machine": about | first["machine"],
         "rounds": options.rounds,
         "repeats": options.repeats,
-        "rows": judge(rows + rest["rows"] + drift_rows(10_000 if options.quick else 1_000_000)),
+        "rows": judge(rows + rest["rows"]),
     }
     (output / "benchmark.json").write_text(
         json.dumps(result, indent=1) + "\n", encoding="utf-8", newline="\n"
@@ -367,8 +335,6 @@ def main() -> None:
         figures = with_figures(page.read_text(encoding="utf-8"), summary(result))
         page.write_text(figures, encoding="utf-8", newline="\n")
     print(text)
-    for path in draw(result["rows"], output):
-        print(path)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ static const unsigned states_of[] = {RP_MANIPULATOR_q1, RP_MANIPULATOR_q2, RP_MA
                                      RP_MANIPULATOR_dq2};
 static const unsigned inputs_of[] = {RP_MANIPULATOR_tau1, RP_MANIPULATOR_f2};
 static const unsigned solver_method = RP_MANIPULATOR_solver_method;
-static const unsigned gravity = RP_MANIPULATOR_g;
 static const unsigned totals_of[] = {RP_MANIPULATOR_solver_steps,
                                      RP_MANIPULATOR_solver_rhs_evaluations};
 static const unsigned effective = RP_MANIPULATOR_effective_relative_tolerance;
@@ -36,7 +35,6 @@ fmi2Component fmu_start(const struct fmu_functions *fmu, const struct problem *p
     const int chosen = (int)method;
     fmi2Component c = fmu_instantiate(fmu, fmu_guid_of_arm);
     require(fmu->SetReal(c, states_of, 4, problem->start) == fmi2OK &&
-                fmu->SetReal(c, &gravity, 1, &problem->g) == fmi2OK &&
                 fmu->SetInteger(c, &solver_method, 1, &chosen) == fmi2OK &&
                 fmu->SetupExperiment(c, 1, tolerance, 0.0, 0, 0.0) == fmi2OK &&
                 fmu->EnterInitializationMode(c) == fmi2OK &&
@@ -45,19 +43,11 @@ fmi2Component fmu_start(const struct fmu_functions *fmu, const struct problem *p
     return c;
 }
 
-fmi2Status fmu_set_inputs(const struct fmu_functions *fmu, fmi2Component c, const double u[2]) {
-    return fmu->SetReal(c, inputs_of, 2, u);
-}
-
-fmi2Status fmu_get_states(const struct fmu_functions *fmu, fmi2Component c, double x[4]) {
-    return fmu->GetReal(c, states_of, 4, x);
-}
-
 void fmu_step(const struct fmu_functions *fmu, fmi2Component c, const struct problem *problem,
               int i, double x[4]) {
-    const bool done = fmu_set_inputs(fmu, c, problem->inputs[i]) == fmi2OK &&
+    const bool done = fmu->SetReal(c, inputs_of, 2, problem->inputs[i]) == fmi2OK &&
                       fmu->DoStep(c, problem->step * i, problem->step, 1) == fmi2OK &&
-                      fmu_get_states(fmu, c, x) == fmi2OK;
+                      fmu->GetReal(c, states_of, 4, x) == fmi2OK;
     require(done, "a step failed");
 }
 
@@ -97,7 +87,6 @@ static fmi3Instance start3(const struct fmu3_functions *fmu, const struct proble
                                      false, NULL, 0, NULL, log_text3, NULL);
     require(c != NULL, "not instantiated");
     require(fmu->SetFloat64(c, states_of, 4, problem->start, 4) == fmi3OK &&
-                fmu->SetFloat64(c, &gravity, 1, &problem->g, 1) == fmi3OK &&
                 fmu->SetInt64(c, &solver_method, 1, &chosen, 1) == fmi3OK &&
                 fmu->EnterInitializationMode(c, true, tolerance, 0.0, false, 0.0) == fmi3OK &&
                 fmu->ExitInitializationMode(c) == fmi3OK,

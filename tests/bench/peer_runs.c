@@ -70,7 +70,6 @@ double mujoco_run(const struct problem *problem, enum mujoco_integrator integrat
     char message[500] = "";
     mjModel *model = mj_loadXML(BENCH_MUJOCO_MODEL, NULL, message, sizeof message);
     require(model != NULL, message);
-    model->opt.gravity[1] = -problem->g;
     model->opt.timestep = problem->step / substeps;
     model->opt.integrator = integrator == MUJOCO_RK4 ? mjINT_RK4 : mjINT_IMPLICITFAST;
     mjData *data = mj_makeData(model);

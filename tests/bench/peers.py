@@ -17,7 +17,7 @@ from time import thread_time
 import fmpy
 import mujoco
 import numpy as np
-from arm import INPUTS, START, STATES, Motion, Work, accelerations, taylor_adaptive
+from arm import INPUTS, START, STATES, Work, accelerations, taylor_adaptive
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.sundials import CVodeSolver
 from scipy.integrate import DOP853
@@ -71,20 +71,6 @@ def run_heyoka(work: Work, tolerance: float) -> Run:
         return state.copy()
 
     return stepped(work, step)
-
-
-def follow(motion: Motion, tolerance: float, steps: int) -> Run:
-    """heyoka along a motion without losses, in communication steps of 1 ms."""
-    taylor = taylor_adaptive(tolerance, g=motion.g)
-    taylor.state[:] = motion.start
-    taylor.pars[:] = motion.inputs
-    state, propagate = taylor.state, taylor.propagate_until
-    states = np.empty((steps, 4))
-    begin = thread_time()
-    for i in range(steps):
-        propagate(1e-3 * (i + 1))
-        states[i] = state
-    return thread_time() - begin, states
 
 
 def run_dop853(work: Work, tolerance: float) -> Run:

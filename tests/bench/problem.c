@@ -61,33 +61,18 @@ static void solve(struct problem *problem) {
     }
 }
 
-static struct problem *create(double step, int steps, enum problem_inputs kind,
-                              const double start[4], double g) {
-    struct problem *problem = allocate(1, sizeof *problem);
-    *problem = (struct problem){.step = step,
-                                .steps = steps,
-                                .kind = kind,
-                                .inputs = allocate((size_t)steps, sizeof problem->inputs[0]),
-                                .g = g};
-    memcpy(problem->start, start, sizeof problem->start);
-    return problem;
-}
-
 struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift) {
-    const double start[4] = {0.3 + shift, 0.2 + shift, 0.0, 0.0};
-    struct problem *problem = create(step, steps, kind, start, problem_parameters.g);
-    problem->reference = allocate((size_t)steps, sizeof problem->reference[0]);
+    struct problem *problem = allocate(1, sizeof *problem);
+    *problem = (struct problem){
+        .step = step,
+        .steps = steps,
+        .kind = kind,
+        .start = {0.3 + shift, 0.2 + shift, 0.0, 0.0},
+        .inputs = allocate((size_t)steps, sizeof problem->inputs[0]),
+        .reference = allocate((size_t)steps, sizeof problem->reference[0]),
+    };
     sample_inputs(problem);
     solve(problem);
-    return problem;
-}
-
-struct problem *problem_create_without_reference(double step, int steps, const double start[4],
-                                                 const double u[2], double g) {
-    struct problem *problem = create(step, steps, INPUTS_CONSTANT, start, g);
-    for (int i = 0; i < steps; i++) {
-        memcpy(problem->inputs[i], u, sizeof problem->inputs[i]);
-    }
     return problem;
 }
 

@@ -15,8 +15,7 @@ static double run_once(const struct run *run, const struct fmu_functions *fmu,
     case PLAIN_LOOP:
         return plain_loop_run(problem, run->tolerance, states);
     case FMU:
-        return fmu_run(run->fmu != NULL ? run->fmu : fmu, problem, run->method, run->tolerance,
-                       states, counts);
+        return fmu_run(fmu, problem, run->method, run->tolerance, states, counts);
     case FMU3:
         return fmu3_run(run->fmu3, problem, run->method, run->tolerance, states, counts);
     case MUJOCO:

@@ -24,8 +24,7 @@ double processor_time(void);
 /* What two readings of a clock in a row differ by, s. */
 double clock_cost(double (*clock)(void));
 
-/* Of count > 0 values, which it sorts; part in [0, 1], 0.5: the median. */
-double quantile(double values[], size_t count, double part);
+/* Of count > 0 values, which it sorts. */
 double median(double values[], int count);
 
 /* Ends the program with a line on stderr where the condition does not hold. */
@@ -58,8 +57,7 @@ struct problem {
     enum problem_inputs kind;
     double start[4];     /* q1, q2, dq1, dq2 at t = 0 */
     double (*inputs)[2]; /* tau1 in N.m and f2 in N of each step; no sine is in a time measured */
-    double g;            /* of the FMU and MuJoCo, m/s^2 */
-    double (*reference)[4]; /* states at the end of each step; NULL: not known */
+    double (*reference)[4]; /* states at the end of each step */
 };
 
 /* Those of the FMU's start values. */
@@ -67,10 +65,6 @@ extern const struct rp_parameters problem_parameters;
 
 /* With the usual start, moved by shift (rad, m). Ends the program if memory runs out. */
 struct problem *problem_create(double step, int steps, enum problem_inputs kind, double shift);
-
-/* From another start, with inputs u that do not change and gravity g; has no reference. */
-struct problem *problem_create_without_reference(double step, int steps, const double start[4],
-                                                 const double u[2], double g);
 
 void problem_destroy(struct problem *problem);
 
@@ -100,10 +94,6 @@ extern const char fmu_guid_of_arm[];
 /* An initialized instance at the problem's start. */
 fmi2Component fmu_start(const struct fmu_functions *fmu, const struct problem *problem,
                         enum method method, double tolerance);
-
-/* Two of the three calls of a communication step; the third is fmi2DoStep. */
-fmi2Status fmu_set_inputs(const struct fmu_functions *fmu, fmi2Component c, const double u[2]);
-fmi2Status fmu_get_states(const struct fmu_functions *fmu, fmi2Component c, double x[4]);
 
 /* fmi2SetReal, fmi2DoStep and fmi2GetReal of step i. */
 void fmu_step(const struct fmu_functions *fmu, fmi2Component c, const struct problem *problem,

@@ -14,13 +14,7 @@ GROUPS = {
         "Two threads with an instance each, 1 ms steps",
         ("throughput", "undisturbed", "processor_share", "error"),
     ),
-    "energy": ("Drift of the energy, steps of 1 ms", ("us", "steps", "largest", "at_end")),
-    "instance": ("The instance with an integrator that returns at once", ("us", "ratio")),
     "plant": ("Friction and stops, steps of 1 ms", ("us", "ratio", "events")),
-    "calls": (
-        "Each call by itself, 1 ms steps, inputs changing, medians",
-        ("set_us", "step_us", "get_us", "step_percentile_us", "ratio", "step_largest_us"),
-    ),
     "life": ("An instance", ("us", "kib")),
 }
 # columns of the table of ratios: heading and work
@@ -56,11 +50,9 @@ def lines(header: list[str], rows: list[list[str]]) -> list[str]:
 
 
 def of_group(rows: list[dict], group: str) -> list[str]:
-    """The table of a group; of a drift, what it is at the end."""
+    """The table of a group."""
     title, figures = GROUPS[group]
     mine = [row for row in rows if row["group"] == group]
-    if group == "energy":
-        mine = list({(row["work"], row["run"]): row for row in mine}.values())
     cells = [
         [f"{row['work']}: {row['run']}", *(number(row.get(name)) for name in figures), result(row)]
         for row in mine

@@ -5,116 +5,95 @@ from zipfile import ZipFile
 
 import pytest
 
-from rparm import __main__ as cli
 from rparm.campaign import bases, planning
 from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
-from tests.support.rparm_project import FMUS, assert_one_line
+from tests.support.rparm_project import FMUS, Console
 
-MISTAKES = {
-    "no file of TOML": ([("seed = 3", "seed = ")], "not valid TOML"),
-    "unknown key": ([("seed = 3", "sead = 3")], "unknown key 'sead', did you mean 'seed'?"),
-    "unknown key below": ([("uniform", "unifrom")], "parameters.m2: unknown key 'unifrom', did"),
-    "missing key": ([('title = "Test"\n', "")], "missing key 'title'"),
-    "wrong type": ([("seed = 3", 'seed = "a"')], "seed: expected a valid integer, got 'a'"),
-    "no base": ([('scenario = "hanging_swing"\n', "")], "exactly one of scenario, system"),
-    "no such scenario": ([("hanging_swing", "hanging_swim")], "did you mean 'hanging_swing'?"),
-    "two distributions": ([("[1.0, 3.0]", "[1.0, 3.0]\nvalues = [1.0]")], "exactly one of"),
-    "no distribution": ([("uniform = [1.0, 3.0]", "")], "parameters.m2: expected exactly one of"),
-    "limits the wrong way": ([("[1.0, 3.0]", "[3.0, 1.0]")], "a lower and an upper limit"),
-    "not finite": ([("[1.0, 3.0]", "[1.0, inf]")], "parameters.m2.uniform[1]: expected a finite"),
-    "no deviation": ([("[-2.0, 0.2]", "[-2.0, 0.0]")], "a positive standard deviation, got 0.0"),
-    "negative logarithm": ([("uniform = [1.0", "log_uniform = [-1.0")], "expected positive limits"),
-    "unknown parameter": ([("[parameters.m2]", "[parameters.m4]")], "[parameters.m4]: the model"),
-    "out of range": ([("[1.0, 3.0]", "[-1.0, 3.0]")], "[parameters.m2] uniform: expected at least"),
-    "no parameter": ([("[parameters.m2]", "[parameters.ee_x]")], "is not a parameter"),
-    "no runs": ([("runs = 40\n", "")], "missing key 'runs'"),
-    "too many runs": ([("runs = 40", "runs = 2000000000")], "runs: makes 2e+09, expected at most"),
-    "block of nothing": ([("block = 8", "block = 0")], "block: expected greater than or equal"),
-    "points without a grid": ([("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3")], "goes with a grid only"),
-    "empty grid": (
-        [("sobol", "grid"), ("runs = 40\n", "")],
-        "[parameters.m2] points: is missing, for a grid",
-    ),
-    "grid of no points": (
+MISTAKES = [
+    ([("seed = 3", "seed = ")], "not valid TOML"),
+    ([("seed = 3", "sead = 3")], "unknown key 'sead', did you mean 'seed'?"),
+    ([("uniform", "unifrom")], "parameters.m2: unknown key 'unifrom', did"),
+    ([('title = "Test"\n', "")], "missing key 'title'"),
+    ([("seed = 3", 'seed = "a"')], "seed: expected a valid integer, got 'a'"),
+    ([('scenario = "hanging_swing"\n', "")], "exactly one of scenario, system"),
+    ([("hanging_swing", "hanging_swim")], "did you mean 'hanging_swing'?"),
+    ([("[1.0, 3.0]", "[1.0, 3.0]\nvalues = [1.0]")], "exactly one of"),
+    ([("uniform = [1.0, 3.0]", "")], "parameters.m2: expected exactly one of"),
+    ([("[1.0, 3.0]", "[3.0, 1.0]")], "a lower and an upper limit"),
+    ([("[1.0, 3.0]", "[1.0, inf]")], "parameters.m2.uniform[1]: expected a finite"),
+    ([("[-2.0, 0.2]", "[-2.0, 0.0]")], "a positive standard deviation, got 0.0"),
+    ([("uniform = [1.0", "log_uniform = [-1.0")], "expected positive limits"),
+    ([("[parameters.m2]", "[parameters.m4]")], "[parameters.m4]: the model"),
+    ([("[1.0, 3.0]", "[-1.0, 3.0]")], "[parameters.m2] uniform: expected at least"),
+    ([("[parameters.m2]", "[parameters.ee_x]")], "is not a parameter"),
+    ([("runs = 40\n", "")], "missing key 'runs'"),
+    ([("runs = 40", "runs = 2000000000")], "runs: makes 2e+09, expected at most"),
+    ([("block = 8", "block = 0")], "block: expected greater than or equal"),
+    ([("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3")], "goes with a grid only"),
+    ([("sobol", "grid"), ("runs = 40\n", "")], "[parameters.m2] points: is missing, for a grid"),
+    (
         [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 0")],
         "parameters.m2.points: expected greater than 0, got 0",
     ),
-    "no power of 2": ([("sobol", "indices")], "runs: expected a power of 2"),
-    "nothing kept": ([(ARM[ARM.index("final") :], "")], "[keep]: keeps nothing of a run"),
-    "unknown variable": ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
-    "no number": (
+    ([("sobol", "indices")], "runs: expected a power of 2"),
+    ([(ARM[ARM.index("final") :], "")], "[keep]: keeps nothing of a run"),
+    ([('"q1", "q2"', '"q3"')], "[keep] final: the model has no variable 'q3'"),
+    (
         [('"q1", "q2"', '"solver_method"')],
         "[keep] final: 'solver_method' is not a Real or Integer variable",
     ),
-    "no Real variable": (
+    (
         [('maximum = ["dq1"]', 'maximum = ["solver_steps"]')],
         "[keep] maximum: 'solver_steps' is not a Real variable",
     ),
-    "huge grid": (
+    (
         [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", "[1.0, 3.0]\npoints = 3000000000")]
         + [("normal = [-2.0, 0.2]", "values = [-2.0]")],
         "runs: makes 3e+09, expected at most 1000000000",
     ),
-    "huge grid of two": (
+    (
         [("sobol", "grid"), ("runs = 40\n", ""), ("[1.0, 3.0]", f"[1.0, 3.0]\npoints = {2**62}")]
         + [("normal = [-2.0, 0.2]", f"uniform = [-2.0, 0.2]\npoints = {2**62}")],
         "runs: makes 2.127e+37, expected at most 1000000000",
     ),
-    "no list": ([('["q1", "q2"]', '"q1"')], "keep.final: expected a list, got 'q1'"),
-    "no table": (
+    ([('["q1", "q2"]', '"q1"')], "keep.final: expected a list, got 'q1'"),
+    (
         [("uniform = [1.0, 3.0]", "")] + [("[parameters.m2]", "[parameters]\nm2 = 1.0")],
         "parameters.m2: expected a table, got 1.0",
     ),
-    "empty list": (
+    (
         [("uniform = [1.0, 3.0]", "values = []")],
         "parameters.m2.values: expected a longer list, got []",
     ),
-    "title that moves the cursor": (
-        [('"Test"', '"\\u001b[2J"')],
-        "title: expected one line of text",
-    ),
-    "derived value without a value": (
-        [("[keep]", '[derived]\ndq1 = "1 / 0"\n[keep]')],
-        "[derived] dq1: has no value: ",
-    ),
-    "no such run": ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
-    "unknown column": ([("seed = 3", 'worst = ["final(q3)"]')], "worst: no column 'final(q3)'"),
-    "unknown name": ([("[keep]", '[derived]\ndq1 = "2 * q9"\n[keep]')], "unknown name 'q9'"),
-    "no expression": (
-        [("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')],
-        "[derived] dq1: column 4: expected a number",
-    ),
-    "forbidden": (
-        [("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')],
-        "column 1: no function 'open'",
-    ),
-    "run": (
+    ([('"Test"', '"\\u001b[2J"')], "title: expected one line of text"),
+    ([("[keep]", '[derived]\ndq1 = "1 / 0"\n[keep]')], "[derived] dq1: has no value: "),
+    ([("[3, 17]", "[3, 40]")], "trajectories: expected runs from 0 to 39, got 40"),
+    ([("seed = 3", 'worst = ["final(q3)"]')], "worst: no column 'final(q3)'"),
+    ([("[keep]", '[derived]\ndq1 = "2 * q9"\n[keep]')], "unknown name 'q9'"),
+    ([("[keep]", '[derived]\ndq1 = "2 *"\n[keep]')], "[derived] dq1: column 4: expected a number"),
+    ([("[keep]", '[derived]\ndq1 = "open(1)"\n[keep]')], "column 1: no function 'open'"),
+    (
         [("[keep]", '[parameters.run]\nuniform = [0.0, 1.0]\n[derived]\ndq1 = "run"\n[keep]')],
         "[parameters.run]: every table has a column of that name",
     ),
-    "failure": (
+    (
         [("[keep]", '[derived]\nfailure = "1"\ndq1 = "failure"\n[keep]')],
         "[derived] failure: every table has a column of that name",
     ),
-    "set twice": ([("[keep]", "[set]\nm2 = 1.0\n[keep]")], "[set] m2: is in [parameters]"),
-    "set too low": ([("[keep]", "[set]\nm1 = -1.0\n[keep]")], "[set] m1: expected at least 0.0 kg"),
-    "no time": ([("stop = 1.0", "stop = -1.0")], "[time] stop: expected a time after start"),
-}
+    ([("[keep]", "[set]\nm2 = 1.0\n[keep]")], "[set] m2: is in [parameters]"),
+    ([("[keep]", "[set]\nm1 = -1.0\n[keep]")], "[set] m1: expected at least 0.0 kg"),
+    ([("stop = 1.0", "stop = -1.0")], "[time] stop: expected a time after start"),
+]
 
 
-@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize(("changes", "expected"), MISTAKES)
 def test_a_mistake_is_refused(
-    mistake: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    changes: list[tuple[str, str]], expected: str, tmp_path: Path, console: Console
 ) -> None:
-    changes, expected = MISTAKES[mistake]
-    path = write(tmp_path, changes=changes)
-    output = tmp_path / "output"
-    assert cli.main(["campaign", str(path), "--output", str(output)]) == 2
-    error = capsys.readouterr().err
-    assert_one_line(error)
-    assert str(path) in error
-    assert expected in error
+    path, output = write(tmp_path, changes=changes), tmp_path / "output"
+    error = console.refused("campaign", path, "--output", output)
+    assert str(path) in error and expected in error
     assert not output.exists()
 
 
@@ -163,17 +142,13 @@ def test_a_mistake_of_a_system_is_refused(
         planning.plan(given, base, "test")
 
 
-def test_a_damaged_binary_is_that_of_the_file_of_the_user(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_binary_is_that_of_the_file_of_the_user(tmp_path: Path, console: Console) -> None:
     fmu = tmp_path / "mine.fmu"
     with ZipFile(FMUS["rp_manipulator"]) as archive, ZipFile(fmu, "w") as copy:
         for name in archive.namelist():
             content = archive.read(name)
             copy.writestr(name, content[:64] + bytes(999) if name.endswith(".so") else content)
-    assert cli.main(["campaign", str(write(tmp_path)), "--fmu", str(fmu)]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith(f"error: {fmu}: ")
+    assert console.failed("campaign", write(tmp_path), "--fmu", fmu).startswith(f"error: {fmu}: ")
 
 
 def test_blocks_cover_all_runs(tmp_path: Path) -> None:

@@ -12,12 +12,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from rparm import __main__ as cli
 from rparm.campaign import figures, page
 from rparm.commands.campaign import _command
 from tests.campaign.cluster.processes import ENVIRONMENT, finish, start, table
 from tests.campaign.files import commands, write
 from tests.support.paths import ROOT
+from tests.support.rparm_project import Console
 
 PAGE = [
     ("seed = 3", 'seed = 3\nworst = ["maximum(dq1)"]'),
@@ -57,8 +57,9 @@ def text_of(page: Path) -> str:
     return page.read_text(encoding="utf-8")
 
 
-def in_this_process(done: Path, output: Path, *options: str) -> int:
-    return cli.main(["campaign", str(done / "test.toml"), "--output", str(output), *options])
+def of(done: Path, output: Path, *options: str) -> tuple[object, ...]:
+    """Arguments of the campaign in a folder, with its results in another one."""
+    return "campaign", done / "test.toml", "--output", output, *options
 
 
 def copied(done: Path, folder: Path) -> Path:
@@ -91,40 +92,41 @@ def test_commands_of_files_of_the_project_have_short_paths(monkeypatch: pytest.M
 
 
 def test_an_error_of_the_page_loses_no_results(
-    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
     output = copied(done, tmp_path)
     with monkeypatch.context() as patched:
         patched.setattr(figures, "distributions", lambda _: 1 / 0)
-        assert in_this_process(done, output) == 2
-    error = capsys.readouterr().err
-    assert "the page cannot be written: ZeroDivisionError" in error
+        code, _, error = console(*of(done, output))
+    assert code == 2 and "the page cannot be written: ZeroDivisionError" in error
     assert "the results are complete" in error
-    assert in_this_process(done, output) == 0
-    assert table(capsys.readouterr().out) == (done / "hash").read_text()
+    code, out, _ = console(*of(done, output))
+    assert code == 0 and table(out) == (done / "hash").read_text()
 
 
-def test_it_is_a_document(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_is_a_document(done: Path, tmp_path: Path, console: Console) -> None:
     output = copied(done, tmp_path)
-    assert in_this_process(done, output, "--json") == 0
-    out, err = capsys.readouterr()
+    code, out, err = console(*of(done, output, "--json"))
     found = json.loads(out)
-    assert (found["exit_code"], found["runs"]) == (0, 32)
+    assert (code, found["exit_code"], found["runs"]) == (0, 0, 32)
     assert found["table"] == (done / "hash").read_text() and Path(found["page"]).is_file()
     assert err.splitlines()[-1].startswith("complete: 32 runs")
-    assert in_this_process(done, output, "--json", "--quiet", "--replay", "17") == 0
-    out, err = capsys.readouterr()
+    code, out, err = console(*of(done, output, "--json", "--quiet", "--replay", "17"))
     found = json.loads(out)
-    assert err == "" and set(found["parameters"]) >= {"m2", "q1"} and found["failure"] == ""
+    assert (
+        (code, err) == (0, "")
+        and set(found["parameters"]) >= {"m2", "q1"}
+        and found["failure"] == ""
+    )
     assert all(Path(file).is_file() for file in found["files"])
 
 
 def test_pictures_have_so_many_columns_at_most(
-    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
     monkeypatch.setattr(page, "DRAWN", 2)
     output = copied(done, tmp_path)
-    assert in_this_process(done, output) == 0
+    assert console(*of(done, output))[0] == 0
     text = text_of(output / "index.html")
     assert text.count("The picture leaves out maximum(dq1) and what is below it") == 2
     heights = [height(folder / "indices.png") for folder in (done / "output", output)]
@@ -135,13 +137,11 @@ def height(picture: Path) -> int:
     return int.from_bytes(picture.read_bytes()[20:24], "big")
 
 
-def test_a_replay_is_the_run_again(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_replay_is_the_run_again(done: Path, console: Console) -> None:
     output = done / "output"
-    arguments = ["campaign", str(done / "test.toml"), "--output", str(output), "--replay", "17"]
-    assert cli.main(arguments) == 0
-    printed = dict(
-        line.split(" = ") for line in capsys.readouterr().out.splitlines() if " = " in line
-    )
+    code, out, _ = console(*of(done, output, "--replay", "17"))
+    assert code == 0
+    printed = dict(line.split(" = ") for line in out.splitlines() if " = " in line)
     row = pq.read_table(output / "blocks", filters=[("run", "=", 17)]).to_pylist()[0]
     for name, value in printed.items():
         assert float(value) == row[name]
@@ -161,58 +161,38 @@ def test_a_replay_is_the_run_again(done: Path, capsys: pytest.CaptureFixture[str
     assert moving["motion"]["arm"]["l1"] > 0
     assert '<a href="../index.html">' in page
     assert (output / "assets" / "player.js").is_file()
-    assert cli.main([*arguments[:-1], "32"]) == 2
-    assert "the campaign has runs 0 to 31" in capsys.readouterr().err
+    assert "the campaign has runs 0 to 31" in console.failed(*of(done, output, "--replay", "32"))
 
 
 def test_a_replay_leaves_the_results_of_another_campaign_alone(
-    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    done: Path, tmp_path: Path, console: Console
 ) -> None:
     output = copied(done, tmp_path)
-    assert in_this_process(done, output, "--replay", "3") == 0
+    assert console(*of(done, output, "--replay", "3"))[0] == 0
     before = {path: path.read_bytes() for path in (output / "replays").iterdir()}
     (tmp_path / "test.toml").write_text(text_of(done / "test.toml").replace("seed = 3", "seed = 4"))
-    capsys.readouterr()
-    assert in_this_process(tmp_path, output, "--replay", "3") == 2
-    assert "has another campaign" in capsys.readouterr().err
+    assert "has another campaign" in console.failed(*of(tmp_path, output, "--replay", "3"))
     assert before == {path: path.read_bytes() for path in (output / "replays").iterdir()}
 
 
-def test_the_replay_of_a_failed_run_fails(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_replay_of_a_failed_run_fails(tmp_path: Path, console: Console) -> None:
     write(tmp_path, changes=[("uniform = [1.0, 3.0]", "normal = [-50.0, 0.5]")])
-    assert in_this_process(tmp_path, tmp_path / "output", "--replay", "3") == 1
-    out = capsys.readouterr().out
-    assert "failed: hanging_swing" in out and "is refused" in out
+    code, out, _ = console(*of(tmp_path, tmp_path / "output", "--replay", "3"))
+    assert code == 1 and "failed: hanging_swing" in out and "is refused" in out
     assert not (tmp_path / "output").exists()
 
 
-def test_a_replay_before_the_campaign_leads_to_no_page(tmp_path: Path) -> None:
+def test_a_replay_before_the_campaign_leads_to_no_page(tmp_path: Path, console: Console) -> None:
     output = tmp_path / "output"
-    assert in_this_process(write(tmp_path).parent, output, "--replay", "3") == 0
+    assert console(*of(write(tmp_path).parent, output, "--replay", "3"))[0] == 0
     assert "index.html" not in text_of(output / "replays" / "run_3.html")
 
 
-def test_no_other_command_imports_what_campaigns_need() -> None:
-    code = (
-        "import sys; from rparm.__main__ import main; main(['list']);"
-        "import rparm.commands.run, rparm.commands.system, rparm.commands.coupling;"
-        "print(*(set(sys.modules) & {'dask', 'distributed', 'numba', 'pyarrow', 'SALib'}))"
-    )
-    run = subprocess.run(
-        [sys.executable, "-P", "-c", code], capture_output=True, text=True, env=ENVIRONMENT
-    )
-    assert run.returncode == 0, run.stderr
-    assert run.stdout.splitlines()[-1] == ""
-
-
 def test_it_says_what_is_not_installed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
     monkeypatch.setattr("rparm.commands.campaign.NEEDED", ("numpy", "no_such_package"))
-    assert cli.main(["campaign", str(write(tmp_path))]) == 2
-    error = capsys.readouterr().err
+    error = console.refused("campaign", write(tmp_path))
     assert error == "error: no_such_package: not installed, ./setup.sh --campaign does it\n"
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import dask
 import pytest
 
-from rparm import __main__ as cli
 from rparm.campaign import cluster, credentials
 from rparm.errors import UserError
 from tests.campaign.cluster import certificates, processes
 from tests.campaign.files import write
 from tests.support.hosts import LOOPBACK
+from tests.support.rparm_project import Console
 
 Files = tuple[Path, Path, Path]
 FEW = [("runs = 40", "runs = 8"), ("[3, 17]", "[3]")]
@@ -56,7 +56,7 @@ def test_a_cluster_with_certificates(own: Files, other: Files, tmp_path: Path) -
 
 
 def test_wrong_certificates_are_refused(
-    own: Files, other: Files, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    own: Files, other: Files, tmp_path: Path, console: Console
 ) -> None:
     """Before anything runs, in one line."""
     ca, cert, key = own
@@ -82,14 +82,10 @@ def test_wrong_certificates_are_refused(
         ([TCP, "--no-dashboard"], "--no-dashboard: that of a --scheduler"),
         (["nonsense://x"], "nonsense://x: the scheduler cannot be reached"),
     ]
-    command = ["campaign", str(write(tmp_path, changes=FEW)), "--output", str(tmp_path / "out")]
+    command = ("campaign", write(tmp_path, changes=FEW), "--output", tmp_path / "out")
     for arguments, words in cases:
-        assert cli.main([*command, "--scheduler", *arguments]) == 2, arguments
-        error = capsys.readouterr().err
-        assert words in error
-        assert error.startswith("error: ") and error.count("\n") == 1
-    assert cli.main([*command, *options(*own)]) == 2
-    assert "are for a --scheduler" in capsys.readouterr().err
+        assert words in console.failed(*command, "--scheduler", *arguments)
+    assert "are for a --scheduler" in console.failed(*command, *options(*own))
 
 
 def test_dasks_configuration_has_certificates(own: Files, other: Files) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from rparm import __main__ as cli
 from rparm.campaign.measures import LYAPUNOV
 from rparm.campaign.runs import Rows
 from rparm.fmi.compiled.calls import DO_STEP
@@ -18,7 +17,7 @@ from tests.campaign.cluster.processes import completed
 from tests.campaign.files import ARM, HEAD, campaign, commands, write
 from tests.campaign.runners import rows, runner
 from tests.support.paths import ROOT
-from tests.support.rparm_project import BUILD, FMUS, fmi3_fmu, repacked
+from tests.support.rparm_project import BUILD, FMUS, Console, fmi3_fmu, repacked
 
 ARM2 = FMUS["rp_manipulator"]
 ARM3 = fmi3_fmu(ARM2)
@@ -93,7 +92,7 @@ def test_both_versions_in_one_system(tmp_path: Path) -> None:
 
 
 def test_the_command_replays_what_its_page_says(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(ROOT)  # commands of pages are for the project's folder
     file = write(tmp_path, changes=[("seed = 3", 'seed = 3\nworst = ["maximum(dq1)"]')])
@@ -104,8 +103,8 @@ def test_the_command_replays_what_its_page_says(
     assert tables[0] == tables[1]
     page = (tmp_path / "3" / "index.html").read_text(encoding="utf-8")
     again = next(command for command in commands(page) if "--replay" in command)
-    assert cli.main(again[1:]) == 0
-    out = capsys.readouterr().out
+    code, out, _ = console(*again[1:])
+    assert code == 0
     printed = dict(line.split(" = ") for line in out.splitlines() if " = " in line)
     run = int(again[-1])
     table = pq.read_table(tmp_path / "3" / "blocks", filters=[("run", "=", run)])
@@ -161,14 +160,11 @@ def test_a_run_that_the_fmu_ends_has_failed(tmp_path: Path) -> None:
     assert np.array_equal(found.measures[1], expected.measures[1])
 
 
-def test_an_exponent_needs_directional_derivatives(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_exponent_needs_directional_derivatives(tmp_path: Path, console: Console) -> None:
     def change(xml: str) -> str:
         return re.sub(r'providesDirectionalDerivatives="true"', "", xml)
 
     fmu = repacked(ARM3, tmp_path / "none.fmu", change)
     file = write(tmp_path, changes=[("[keep]", f"[keep]\n{LYAPUNOV} = true")])
-    assert cli.main(["campaign", str(file), "--fmu", str(fmu)]) == 2
     expected = "[keep] lyapunov: the FMU gives no directional derivatives\n"
-    assert capsys.readouterr().err.endswith(expected)
+    assert console.refused("campaign", file, "--fmu", fmu).endswith(expected)

@@ -1,8 +1,7 @@
 """Scheduler and workers on different hosts, links between which are lost, too.
 
 The hosts are network namespaces, connected by a pair of virtual devices. Where the kernel permits
-none, only the process groups on loopback are left. cluster/long_kills.py waits for the time-outs
-that are short here.
+none, only the process groups on loopback are left.
 """
 
 import os

@@ -43,13 +43,22 @@ def test_a_module_uses_those_of_its_layer_and_above(module: str) -> None:
     assert not used(module) & below
 
 
-def test_a_worker_loads_neither_sampling_nor_pages() -> None:
-    code = (
-        f"import sys, {PREFIX}.worker;"
-        "print(*(set(sys.modules) & {'scipy.stats', 'SALib', 'matplotlib'}))"
-    )
+@pytest.mark.parametrize(
+    ("code", "unneeded"),
+    [
+        (f"import {PREFIX}.worker", {"scipy.stats", "SALib", "matplotlib"}),
+        (
+            "from rparm.__main__ import main; main(['list']);"
+            "import rparm.commands.run, rparm.commands.system, rparm.commands.coupling",
+            {"dask", "distributed", "numba", "pyarrow", "SALib"},
+        ),
+    ],
+    ids=["worker", "other commands"],
+)
+def test_what_is_not_needed_is_not_loaded(code: str, unneeded: set[str]) -> None:
+    code = f"import sys\n{code}\nprint(*(set(sys.modules) & {unneeded}))"
     run = subprocess.run(
         [sys.executable, "-P", "-c", code], capture_output=True, text=True, env=ENVIRONMENT
     )
     assert run.returncode == 0, run.stderr
-    assert run.stdout.split() == []
+    assert run.stdout.splitlines()[-1] == ""

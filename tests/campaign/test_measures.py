@@ -1,4 +1,4 @@
-"""What is kept of a run, of motions whose measures are known; and expressions."""
+"""What is kept of a run, of motions whose measures are known."""
 
 import math
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rparm.campaign.measures import LYAPUNOV, Measure, Recorded, plain
-from rparm.expressions import evaluation as expressions
 
 TIMES = np.linspace(3.0, 5.0, 20001)
 ELAPSED = TIMES - 3.0
@@ -74,42 +73,3 @@ def test_an_exponent_is_the_mean_growth() -> None:
     strong = np.full(20000, 1e30)  # neither product nor sum overflows
     expected = 20000 * math.log(1e30) / 2
     assert of(Measure(LYAPUNOV, (), LYAPUNOV), growth=strong) == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("2 * x + 1", 7.0),
-        ("-(x - 5) ** 2 / 4", -1.0),
-        ("sqrt(part.y)", 4.0),
-        ("2 ** -x", 0.125),
-        ("sin(pi / 2) + cos(0) + log(exp(2))", 4.0),
-    ],
-)
-def test_expressions(text: str, expected: float) -> None:
-    value = expressions.parsed(text).value({"x": 3.0, "part.y": 16.0})
-    assert value == pytest.approx(expected)
-
-
-def test_names_of_an_expression() -> None:
-    assert expressions.parsed("a * part.b + sqrt(c) * pi").names == {"a", "part.b", "c"}
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", "1 +", "x if y else z", "[1]", "f(x)", "sqrt(x, y)", "sqrt.real", "x()", "'a'", "True"]
-    + ["lambda: 1", "x @ y", "x // 2", "(y := 3)", "a[0]", "__import__('os')", "x." * 600 + "x"]
-    + ["(" * 900],
-)
-def test_what_is_no_expression_is_refused(text: str) -> None:
-    if text == "sqrt.real":  # a name like any other: no attribute of anything
-        assert expressions.parsed(text).names == {"sqrt.real"}
-        return
-    with pytest.raises(ValueError):
-        expressions.parsed(text)
-
-
-@pytest.mark.parametrize("text", ["1 / x", "sqrt(x - 1)", "log(x)", "(x - 1) ** 0.5", "exp(1e9)"])
-def test_a_value_that_is_not_defined(text: str) -> None:
-    with pytest.raises((ArithmeticError, ValueError)):
-        expressions.parsed(text).value({"x": 0.0})

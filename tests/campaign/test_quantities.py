@@ -6,14 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rparm import __main__ as cli
 from rparm.campaign import bases, quantities
 from rparm.campaign.campaign_file import Campaign
 from rparm.campaign.points import Points
 from rparm.errors import UserError
 from tests.campaign.files import ARM, HEAD, campaign, write
 from tests.campaign.runners import rows, runner
-from tests.support.rparm_project import BUILD, FMUS, assert_one_line
+from tests.support.rparm_project import BUILD, FMUS, Console, assert_one_line
 
 RIGHT_ANGLE = repr(math.pi / 2)
 # with units, and the same in SI
@@ -116,14 +115,12 @@ def test_a_system_takes_units_too(tmp_path: Path) -> None:
     assert in_si.parameters["arm.a"].numbers == [0.05, 0.1]
 
 
-def test_an_angle_beyond_a_turn_is_asked_about(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_angle_beyond_a_turn_is_asked_about(tmp_path: Path, console: Console) -> None:
     changes = [("[-2.0, 0.2]", "[90, 0.2]"), ("[1.0, 3.0]", '["1 g", 2.0]')]
     path = write(tmp_path, changes=changes)
-    fmu = ["--fmu", str(FMUS["rp_manipulator"])]
-    assert cli.main(["campaign", str(path), *fmu]) == 2
-    asked, error = capsys.readouterr().err.splitlines(keepends=True)
+    code, _, err = console("campaign", path, "--fmu", FMUS["rp_manipulator"])
+    asked, error = err.splitlines(keepends=True)
+    assert code == 2
     assert asked.endswith("[parameters.q1]: 90 rad is 14.3 turns, is that meant? In degrees it is "
                           '"90 deg".\n')  # fmt: skip
     assert "[parameters.m2] uniform: unknown unit 'g'" in error

@@ -1,6 +1,7 @@
 """Runs by the compiled loop: those of rparm's own simulation and master, to the last bit."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -200,6 +201,28 @@ def test_an_input_can_be_a_parameter(tmp_path: Path) -> None:
     assert np.allclose(record[:, 0], q1, rtol=0, atol=1e-9)
 
 
+def growth_of_a_deviation(
+    folder: Path,
+    text: str,
+    changes: Sequence[tuple[str, str]],
+    start: Mapping[str, float],
+    size: float,
+) -> float:
+    """By how much two runs part that begin half of `size` before and behind a start in each state.
+
+    `text` varies q1 and keeps q1, q2, dq1, dq2 first.
+    """
+    ends = []
+    for sign in (-1, 1):
+        moved = {name: value + sign * size / 2 for name, value in start.items()}
+        lines = "".join(f"{n} = {v!r}\n" for n, v in moved.items() if n != "q1")
+        shifted = text.replace("[set]\n", f"[set]\n{lines}")
+        shifted = shifted.replace(f"values = [{start['q1']}]", f"values = [{moved['q1']!r}]")
+        with runner(campaign(folder, shifted, changes), folder) as (runs, job, points):
+            ends.append(rows(runs, job, points, [0]).measures[0, :4])
+    return float(np.linalg.norm(ends[1] - ends[0]) / (2 * size))  # of a deviation of length 2 size
+
+
 def test_the_exponent_is_the_growth_of_a_small_deviation(tmp_path: Path) -> None:
     text = ARM[: ARM.index("[parameters.m2]")] + (
         "[set]\nrelative_tolerance = 5e-12\n[parameters.q1]\nvalues = [-1.0]\n"
@@ -212,16 +235,8 @@ def test_the_exponent_is_the_growth_of_a_small_deviation(tmp_path: Path) -> None
     with runner(given, tmp_path) as (runs, job, points):
         found = rows(runs, job, points, [0])
         assert job.measures[-1].column == LYAPUNOV
-    ends = []
-    for sign in (-1, 1):
-        start = {"q1": -1.0, "q2": 0.25, "dq1": 0.0, "dq2": 0.0}
-        moved = {name: value + sign * size / 2 for name, value in start.items()}
-        lines = "".join(f"{n} = {v!r}\n" for n, v in moved.items() if n != "q1")
-        shifted = text.replace("[set]\n", f"[set]\n{lines}")
-        shifted = shifted.replace("values = [-1.0]", f"values = [{moved['q1']!r}]")
-        with runner(campaign(tmp_path, shifted, changes), tmp_path) as (runs, job, points):
-            ends.append(rows(runs, job, points, [0]).measures[0, :4])
-    growth = np.linalg.norm(ends[1] - ends[0]) / (2 * size)  # of a deviation of length 2 size
+    start = {"q1": -1.0, "q2": 0.25, "dq1": 0.0, "dq2": 0.0}
+    growth = growth_of_a_deviation(tmp_path, text, changes, start, size)
     assert found.measures[0, -1] == pytest.approx(np.log(growth) / 2.0, abs=1e-5)
 
 
@@ -235,8 +250,6 @@ time = { start = 0.0, stop = 0.5, step = 0.0005 }
 [set]
 relative_tolerance = 5e-12
 f2 = 0.0
-q2 = 0.0
-dq2 = 0.4
 damping1 = 0.0
 coulomb_friction1 = 0.0
 breakaway_friction1 = 0.0
@@ -261,21 +274,14 @@ def test_the_exponent_passes_springs_and_has_no_value_where_a_deviation_jumps(
 ) -> None:
     """At a spring derivatives are continuous; at an impact and under dry friction they are not."""
     size = 1e-7
-    with runner(campaign(tmp_path, PLANT), tmp_path) as (runs, job, points):
+    start = {"q1": 0.4, "q2": 0.0, "dq1": 0.0, "dq2": 0.4}
+    text = PLANT.replace("[set]\n", "[set]\nq2 = 0.0\ndq2 = 0.4\n")
+    with runner(campaign(tmp_path, text), tmp_path) as (runs, job, points):
         (found,) = rows(runs, job, points, [0]).measures
         columns = [measure.column for measure in job.measures]
     assert found[columns.index("final(event_count)")] > 2
     states = [columns.index(f"final({name})") for name in ("q1", "q2", "dq1", "dq2")]
-    ends = []
-    for sign in (-1, 1):
-        half = sign * size / 2
-        text = PLANT.replace(
-            "q2 = 0.0\ndq2 = 0.4", f"q2 = {half!r}\ndq1 = {half!r}\ndq2 = {0.4 + half!r}"
-        )
-        text = text.replace("values = [0.4]", f"values = [{0.4 + half!r}]")
-        with runner(campaign(tmp_path, text), tmp_path) as (runs, job, points):
-            ends.append(rows(runs, job, points, [0]).measures[0, states])
-    growth = np.linalg.norm(ends[1] - ends[0]) / (2 * size)
+    growth = growth_of_a_deviation(tmp_path, PLANT, (), start, size)
     exponent = found[columns.index(LYAPUNOV)]
     assert exponent == pytest.approx(np.log(growth) / 0.5, abs=2e-3)
     for change in (
@@ -285,6 +291,6 @@ def test_the_exponent_passes_springs_and_has_no_value_where_a_deviation_jumps(
             "coulomb_friction2 = 0.5\nbreakaway_friction2 = 0.5",
         ),
     ):
-        with runner(campaign(tmp_path, PLANT, [change]), tmp_path) as (runs, job, points):
+        with runner(campaign(tmp_path, text, [change]), tmp_path) as (runs, job, points):
             (other,) = rows(runs, job, points, [0]).measures
         assert np.isnan(other[columns.index(LYAPUNOV)]) and np.isfinite(other[states]).all()

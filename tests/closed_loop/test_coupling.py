@@ -24,15 +24,9 @@ from rparm.models.closed_loop.coupling.step_errors import StepErrors
 
 from rparm.__main__ import main
 from rparm.errors import UserError
+from tests.closed_loop.variants import VARIANTS
 from tests.support.paths import ROOT
 
-VARIANTS = (
-    "nominal",
-    "heavy_payload",
-    "heavy_payload_integral",
-    "horizontal_plane",
-    "limited_effort",
-)
 STEP = 1e-3  # s, of the sampled references
 BOUND = 1e-7  # relative, at the relative tolerance of the variants, 1e-11
 SMALLEST_SCALE = 1e-3
@@ -91,6 +85,36 @@ def test_gauss_seidel_steps_meet_their_reference(loop: ClosedLoop, variant: str)
     assert max(errors.values()) <= BOUND, errors
     jacobi, _ = loop.run(METHODS[0], STEP, variant, stop=1.0)
     assert deviation(jacobi["arm.q1"], expected["arm.q1"]) > 1e2 * BOUND
+
+
+@pytest.mark.parametrize("mode", ["pd", "pd_gravity", "computed_torque"])
+def test_every_law_meets_its_reference_at_the_limits_of_its_efforts(
+    loop: ClosedLoop, mode: str
+) -> None:
+    """From off the trajectory, so that both efforts come to their limits, both ways.
+
+    Sampled, and in continuous time, which steps of second order come near to.
+    """
+    from rparm.models.closed_loop.references.closed_loop import STATE, monolithic, sampled
+
+    modes = loop.fmus["controller"].model.variables["mode"].items
+    limits = {"tau1": 9.0, "f2": 2.0}
+    changes = {
+        "arm": {"q1": 0.06, "q2": -0.03, "dq1": 0.4, "dq2": 0.3},
+        "controller": {f"{name}_max": limit for name, limit in limits.items()}
+        | {"mode": modes[mode], "integral1": 2.0, "integral2": -1.0},
+    }
+    columns, _ = loop.run(METHODS[0], STEP, "limited_effort", 0.2, changes)
+    parameters = flat(loop.parameters("limited_effort", changes))
+    expected = sampled(parameters, columns["time"])
+    errors = {name: deviation(columns[name], expected[name]) for name in expected}
+    assert max(errors.values()) <= BOUND, errors
+    for name, limit in limits.items():
+        efforts = expected[f"controller.{name}"]
+        assert (min(efforts), max(efforts)) == (-limit, limit) and np.any(np.abs(efforts) < limit)
+    finer, _ = loop.run(METHODS[3], STEP, "limited_effort", 0.2, changes)
+    continuous = monolithic(parameters, finer["time"])
+    assert max(deviation(finer[name], continuous[name]) for name in STATE) <= 1e-3
 
 
 # ---- The study -----------------------------------------------------------------------------------
@@ -207,14 +231,6 @@ def test_the_reference_of_the_motion_is_up_to_date(tmp_path: Path) -> None:
 
 
 # ---- The command ---------------------------------------------------------------------------------
-
-
-def test_a_missing_system_is_named(tmp_path: Path) -> None:
-    with (
-        pytest.raises(UserError, match=r"none\.ssp: no such file"),
-        closed_loop.opened(tmp_path / "none.ssp"),
-    ):
-        pass
 
 
 def test_an_unknown_variant_is_named(loop: ClosedLoop) -> None:

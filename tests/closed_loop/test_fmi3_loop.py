@@ -8,9 +8,9 @@ import pytest
 from rparm.models.closed_loop.coupling import loop as closed_loop
 from rparm.models.closed_loop.coupling.loop import METHODS, REFERENCE_AHEAD, ClosedLoop, Method
 
-from rparm.__main__ import main
 from rparm.errors import UserError
 from rparm.system import comparison, ecos, ssp
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, edited_fmu, replace
 
 SSP3 = SSP.parent / "fmi3" / SSP.name
@@ -70,34 +70,20 @@ def test_ecos_gives_the_same_bits(variant: str) -> None:
     assert first.values.tobytes() == second.values.tobytes()
 
 
-def test_the_command_takes_the_fmus_of_fmi_3(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["system", "nominal", "--fmi", "3", "--report", str(tmp_path)]) == 0
-    out, err = capsys.readouterr()
-    assert "passed: 1 variant\n" in out and err == ""
+def test_the_command_takes_the_fmus_of_fmi_3(tmp_path: Path, console: Console) -> None:
+    code, out, err = console("system", "nominal", "--fmi", "3", "--report", tmp_path)
+    assert (code, err) == (0, "") and "passed: 1 variant\n" in out
     assert "ClosedLoop (FMI 3.0)" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
-def failure(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """What `system` says of a system that fails."""
-    report = path.parent / "report"
-    assert main(["system", "nominal", "--ssp", str(path), "--report", str(report)]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("error: ") and err.count("\n") == 1
-    return err
-
-
 @pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
-def test_what_ecos_would_not_set_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path
-) -> None:
+def test_what_ecos_would_not_set_is_refused(tmp_path: Path, console: Console, source: Path) -> None:
     """Enumerations of any version of FMI."""
     law = '<ssv:Parameter name="mode"><ssv:Integer value="1"/></ssv:Parameter>'
     added = replace("<ssv:Parameters>", f"<ssv:Parameters>{law}")
     path = edited(source, tmp_path / "law.ssp", {"resources/controller_nominal.ssv": added})
-    err = failure(path, capsys)
-    assert "component 'controller': 'mode' is an Enumeration, which Ecos does not set" in err
+    error = console.failed("system", "nominal", "--ssp", path, "--report", tmp_path / "report")
+    assert "component 'controller': 'mode' is an Enumeration, which Ecos does not set" in error
 
 
 def test_another_version_of_fmi_is_refused(tmp_path: Path) -> None:

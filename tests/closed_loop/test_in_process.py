@@ -1,14 +1,15 @@
 """Systems without Ecos: the project's own master gives what the references say."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rparm import project
-from rparm.__main__ import main
 from rparm.coupling import in_process
 from rparm.system import comparison, ecos, ssp, study
+from tests.support.rparm_project import Console
 
 ABSENT = "ecospy is not installed"
 ROUNDING = 1e-9  # two engines with the same order, whose times differ by rounding
@@ -53,12 +54,12 @@ def test_it_reads_what_ecos_reads() -> None:
 
 
 def test_the_command_says_who_steps(
-    tmp_path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(ecos, "absent", lambda: ABSENT)
     monkeypatch.setattr(ecos, "run", None)  # nobody may call it
-    assert main(["system", "nominal", "--report", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
+    code, out, _ = console("system", "nominal", "--report", tmp_path)
+    assert code == 0
     assert f"{ABSENT}: the master of rparm steps the systems" in out
     assert "passed: 1 variant" in out
 

@@ -10,22 +10,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 from rparm.models.closed_loop.study import EXPERIMENT
 
-from rparm.__main__ import main
 from rparm.errors import UserError
 from rparm.report import overview
 from rparm.system import comparison, ecos, ssp
+from tests.closed_loop.variants import VARIANTS
 from tests.support.paths import ROOT
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, edited_fmu, not_a_number, read_csv, replace
 
 SSP3 = SSP.parent / "fmi3" / SSP.name
-FMUS = ("RPTrajectory", "RPController", "RPManipulator")
-VARIANTS = (
-    *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
-    "limited_effort",
-)
 BOUND = 1e-7  # of the largest value of a variable, or of SCALE where that is larger
 SCALE = 1e-3
 ROUNDING = 1e-9  # two engines with the same order
@@ -79,14 +74,6 @@ def test_ecos_is_at_the_reference_of_its_order(variant: str) -> None:
     assert max(worst.values()) <= BOUND, max(worst, key=worst.__getitem__)
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_motion_in_ecos_is_that_of_jacobi_stepping(variant: str) -> None:
-    expected = reference(variant, "sampled.csv")
-    result, rows = run(variant), rows_of(expected)
-    for name in STATES:
-        assert difference(result[f"arm.{name}"][rows], expected[f"arm.{name}"]) <= BOUND
-
-
 def test_the_bound_tells_one_order_from_another() -> None:
     """A delay of one step more or less, or none at all, is far beyond it."""
     other = reference("nominal", "monolithic.csv")
@@ -127,20 +114,12 @@ def test_variants_differ_as_they_should() -> None:
     assert distance["limited_effort"][-1] < 1e-4
 
 
-# ---- the FMUs ------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", FMUS)
-def test_fmpy_finds_nothing_in_the_fmus(name: str) -> None:
-    assert validate_fmu(str(ROOT / "build" / f"{name}.fmu")) == []
-
-
 # ---- the command ---------------------------------------------------------------------------------
 
 
-def test_the_command_checks_and_reports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["system", "heavy_payload", "nominal", "--report", str(tmp_path)]) == 0
-    out = capsys.readouterr().out
+def test_the_command_checks_and_reports(tmp_path: Path, console: Console) -> None:
+    code, out, _ = console("system", "heavy_payload", "nominal", "--report", tmp_path)
+    assert code == 0
     names = [line.split()[0] for line in out.splitlines() if " passed" in line]
     assert names == ["heavy_payload", "nominal"]
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
@@ -160,19 +139,17 @@ def test_the_command_checks_and_reports(tmp_path: Path, capsys: pytest.CaptureFi
     assert len(list((tmp_path / "system").iterdir())) == 6
 
 
-def test_a_run_beyond_the_bound_fails(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_beyond_the_bound_fails(tmp_path: Path, console: Console) -> None:
     """Another payload is not what the reference is of."""
     path = edited(
         SSP, tmp_path / "other.ssp", {"resources/arm_heavy_payload.ssv": replace("1.2", "1.2001")}
     )
-    command = ["system", "heavy_payload", "--ssp", str(path), "--report", str(tmp_path / "report")]
-    assert main(command) == 1
-    assert "FAILED" in capsys.readouterr().out
+    report = ("--report", tmp_path / "report")
+    code, out, _ = console("system", "heavy_payload", "--ssp", path, *report)
+    assert code == 1 and "FAILED" in out
 
 
-def fails(
-    path: Path, variant: str, folder: Path, capsys: pytest.CaptureFixture[str], ran: bool = True
-) -> str:
+def fails(path: Path, variant: str, folder: Path, console: Console, ran: bool = True) -> str:
     """Error of a run that fails; neither older results nor temporary files stay.
 
     If it `ran`, there is a page of the failure, with values if there are any.
@@ -183,10 +160,7 @@ def fails(
     for file in (*files, "system/entries.json"):
         (report / file).write_text("of an earlier run", encoding="utf-8")
     before = set(folder.iterdir())
-    assert main(["system", variant, "--ssp", str(path), "--report", str(report)]) == 2
-    err = capsys.readouterr().err
-    assert err.startswith("error: ")
-    assert err.count("\n") == 1
+    err = console.failed("system", variant, "--ssp", path, "--report", report)
     assert bool(list(report.iterdir())) == ran
     if ran:
         page = html.unescape((report / f"system/{variant}.html").read_text(encoding="utf-8"))
@@ -212,10 +186,10 @@ def fails(
     ],
 )
 def test_a_system_that_cannot_be_compared_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, words: list[str]
+    tmp_path: Path, console: Console, old: str, new: str, words: list[str]
 ) -> None:
     path = edited(SSP, tmp_path / "other.ssp", {"SystemStructure.ssd": replace(old, new)})
-    text = fails(path, "nominal", tmp_path, capsys, ran=False)
+    text = fails(path, "nominal", tmp_path, console, ran=False)
     for word in words:
         assert word in text
 
@@ -243,27 +217,22 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_a_component_that_gives_nan_is_named(
-    component: str,
-    fmu: str,
-    variable: str,
-    reference: int,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    component: str, fmu: str, variable: str, reference: int, tmp_path: Path, console: Console
 ) -> None:
     path = broken(component, fmu, reference, tmp_path)
-    err = fails(path, "nominal", tmp_path, capsys)
+    err = fails(path, "nominal", tmp_path, console)
     assert err == f"error: nominal: component '{component}': '{variable}' is nan at t = 0.01 s\n"
 
 
 @pytest.mark.usefixtures("temporary")
 @pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
 def test_a_component_that_fails_in_initialization_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path
+    tmp_path: Path, console: Console, source: Path
 ) -> None:
     """A path through the joint axis; Ecos itself would continue."""
     edits = {"resources/trajectory_nominal.ssv": replace('value="0.1"', 'value="0.4"')}
     path = edited(source, tmp_path / "unreachable.ssp", edits)
-    err = fails(path, "nominal", tmp_path, capsys)
+    err = fails(path, "nominal", tmp_path, console)
     assert "component 'trajectory' failed in initialization (error): " in err
     assert "0.1 m" in err  # the smallest reachable distance
 
@@ -271,21 +240,21 @@ def test_a_component_that_fails_in_initialization_is_named(
 @pytest.mark.usefixtures("temporary")
 @pytest.mark.parametrize("source", [SSP, SSP3], ids=["2.0", "3.0"])
 def test_a_component_that_fails_in_a_step_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: Path
+    tmp_path: Path, console: Console, source: Path
 ) -> None:
     limited = '<ssv:Parameter name="max_internal_steps"><ssv:Integer value="1"/></ssv:Parameter>'
     edits = {"resources/arm_nominal.ssv": replace("<ssv:Parameters>", f"<ssv:Parameters>{limited}")}
     path = edited(source, tmp_path / "impatient.ssp", edits)
-    err = fails(path, "nominal", tmp_path, capsys)
+    err = fails(path, "nominal", tmp_path, console)
     assert f"component 'arm' failed by t = 0.00{'1 s' if source is SSP else ''}" in err
 
 
 @pytest.mark.usefixtures("temporary")
-def test_ecos_that_crashes_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ecos_that_crashes_is_reported(tmp_path: Path, console: Console) -> None:
     library: Edit = lambda _: b"no shared object"  # noqa: E731
     fmu_edit = edited_fmu({"binaries/linux64/RPController.so": library})
     path = edited(SSP, tmp_path / "crash.ssp", {"resources/RPController.fmu": fmu_edit})
-    err = fails(path, "nominal", tmp_path, capsys)
+    err = fails(path, "nominal", tmp_path, console)
     assert "Ecos failed" in err
 
 

@@ -1,11 +1,11 @@
-"""The references of the closed loop: physics, closed forms, another integrator, made again."""
+"""The references of the closed loop: physics, closed forms, made again.
 
-from collections.abc import Callable
+test_coupling.py compares them with the FMUs, with every law and at the limits of the efforts.
+"""
 
 import mpmath
 import numpy as np
 import pytest
-import sympy as sp
 from rparm.models.closed_loop.references import closed_loop, equations, make_references
 from rparm.models.closed_loop.references.closed_loop import (
     COLUMNS,
@@ -17,16 +17,12 @@ from rparm.models.closed_loop.references.closed_loop import (
 
 from rparm.errors import UserError
 from tests.support.paths import ROOT
-from tests.support.rp_symbolic import PARAMETERS, STATES, TERMS, terms_of_the_motion
 from tests.support.rparm_project import declared
 from tests.support.ssp_files import read_csv
 
 FOLDER = ROOT / "models" / "closed_loop" / "references"
 VARIANTS = make_references.variants()
 FILES = ("monolithic.csv", "sampled.csv", "ecos.csv")
-BELIEVED = dict(
-    zip(sp.symbols(PARAMETERS), equations.symbols("controller", PARAMETERS), strict=True)
-) | dict(zip(sp.symbols(STATES), equations.symbols("controller", STATES), strict=True))
 
 
 def largest(columns: Columns, other: Columns, names: tuple[str, ...]) -> float:
@@ -34,51 +30,6 @@ def largest(columns: Columns, other: Columns, names: tuple[str, ...]) -> float:
 
 
 # -- equations --
-
-
-def test_controller_knows_the_dynamics_of_the_notes() -> None:
-    """D, C dq and g of equations (6) to (13), and what rp_symbolic derives, in every mode."""
-    m1, m2, i1, i2, l1, lc1, a, g = sp.symbols(PARAMETERS)
-    q1, q2, dq1, dq2 = sp.symbols(STATES)
-    length = l1 + q2
-    notes = {
-        "D11": m1 * lc1**2 + i1 + i2 + m2 * (length**2 + a**2),
-        "D12": -a * m2,
-        "D22": m2,
-        "coriolis1": 2 * m2 * length * dq1 * dq2,
-        "coriolis2": -m2 * length * dq1**2,
-        "gravity1": g * (m1 * lc1 * sp.cos(q1) + m2 * (length * sp.cos(q1) - a * sp.sin(q1))),
-        "gravity2": g * m2 * sp.sin(q1),
-    }
-    derived = terms_of_the_motion()
-    assert all(sp.simplify(notes[name] - derived[name]) == 0 for name in TERMS)
-
-    Kp, Kd, reference, measured, integral, inertia = (
-        equations.symbols("controller", names)
-        for names in (
-            "Kp1 Kp2", "Kd1 Kd2", equations.REFERENCES, STATES, "integral1 integral2",
-            "inertia1 inertia2",
-        )
-    )  # fmt: skip
-    v = [
-        Kp[i] * (reference[i] - measured[i])
-        + Kd[i] * (reference[2 + i] - measured[2 + i])
-        + integral[i]
-        for i in (0, 1)
-    ]
-    c = {name: term.subs(BELIEVED) for name, term in notes.items()}
-    wanted = [reference[4] + v[0], reference[5] + v[1]]
-    laws = {
-        "pd": (inertia[0] * v[0], inertia[1] * v[1]),
-        "pd_gravity": (inertia[0] * v[0] + c["gravity1"], inertia[1] * v[1] + c["gravity2"]),
-        "computed_torque": (
-            c["D11"] * wanted[0] + c["D12"] * wanted[1] + c["coriolis1"] + c["gravity1"],
-            c["D12"] * wanted[0] + c["D22"] * wanted[1] + c["coriolis2"] + c["gravity2"],
-        ),
-    }
-    for mode, efforts in laws.items():
-        difference = equations.law(mode) - sp.Matrix(efforts)
-        assert difference.applyfunc(sp.simplify) == sp.zeros(2, 1), mode
 
 
 def test_columns_are_the_outputs_of_the_models() -> None:
@@ -230,110 +181,6 @@ def test_started_anywhere_the_motion_goes_on() -> None:
     part = monolithic(parameters, (np.arange(251) / 50)[rows], state)
     for name in COLUMNS:
         assert np.max(np.abs(part[name] - whole[name][rows])) < 1e-15, name
-
-
-def test_effort_saturates_and_the_arm_recovers() -> None:
-    column = monolithic(VARIANTS["limited_effort"], np.arange(601) / 100)
-    limit = VARIANTS["limited_effort"]["controller.tau1_max"]
-    assert 0.05 < np.mean(np.abs(column["controller.tau1"]) == limit) < 0.25
-    assert np.max(np.abs(column["controller.tau1"])) == limit
-    assert abs(column["controller.q1_error"][-1]) < 1e-5
-
-
-# -- another integrator --
-
-# both efforts saturate, both ways
-ROUGH = VARIANTS["limited_effort"] | {"controller.f2_max": 3.0, "controller.tau1_max": 9.0}
-OFF = np.array([0.06, -0.03, 0.4, 0.3, 2.0, -1.0])
-
-
-def accelerations(p: dict, q: np.ndarray, efforts: np.ndarray) -> np.ndarray:
-    inertia, bias = dynamics(p, "arm", q)
-    return np.linalg.solve(inertia, efforts - bias)
-
-
-def dynamics(p: dict, component: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """D and C dq + g, as in the notes."""
-    m1, m2, i1, i2, l1, lc1, a, g = (p[f"{component}.{name}"] for name in PARAMETERS)
-    length, s, c = l1 + q[1], np.sin(q[0]), np.cos(q[0])
-    first = m1 * lc1**2 + i1 + i2 + m2 * (length**2 + a**2)
-    gravity = g * np.array([m1 * lc1 * c + m2 * (length * c - a * s), m2 * s])
-    velocity = m2 * length * np.array([2 * q[2] * q[3], -(q[2] ** 2)])
-    return np.array([[first, -a * m2], [-a * m2, m2]]), velocity + gravity
-
-
-class Holding:
-    """The controller with the references of the hold at q = 0."""
-
-    def __init__(self) -> None:
-        self.p = {
-            f"{component}.{name}": start
-            for component, folder in (("controller", "rp_controller"), ("arm", "rp_manipulator"))
-            for name, start in declared(folder).start_values.items()
-        } | ROUGH
-        pair = lambda name: np.array([self.p[f"controller.{name}{i}"] for i in (1, 2)])  # noqa: E731
-        self.Kp, self.Kd, self.Ki = pair("Kp"), pair("Kd"), pair("Ki")
-        self.back = 1 / (pair("inertia") * self.p["controller.tracking_time"])
-        self.limit = np.array([self.p["controller.tau1_max"], self.p["controller.f2_max"]])
-
-    def law(self, q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Efforts and rates of the integral parts."""
-        inertia, bias = dynamics(self.p, "controller", q)
-        unlimited = inertia @ (-self.Kp * q[:2] - self.Kd * q[2:] + w) + bias
-        efforts = np.clip(unlimited, -self.limit, self.limit)
-        return efforts, -self.Ki * q[:2] + self.back * (efforts - unlimited)
-
-
-def runge_kutta(f: Callable, y: np.ndarray, length: float, parts: int) -> np.ndarray:
-    h = length / parts
-    for _ in range(parts):
-        k1 = f(y)
-        k2 = f(y + h / 2 * k1)
-        k3 = f(y + h / 2 * k2)
-        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + f(y + h * k3))
-    return y
-
-
-def test_sampled_by_another_integrator() -> None:
-    controller, h, steps = Holding(), 1e-3, 200
-    y, w, known = OFF[:4], OFF[4:], OFF[:4]
-    effort = controller.law(known, w)[0]
-    rows = [(*y, *w, *effort)]
-    for _ in range(steps):
-        held, seen = effort, known
-        y = runge_kutta(
-            lambda s, u=held: np.concatenate((s[2:], accelerations(controller.p, s, u))), y, h, 2
-        )
-        w = runge_kutta(lambda s, q=seen: controller.law(q, s)[1], w, h, 40)
-        effort = controller.law(seen, w)[0]
-        known = y
-        rows.append((*y, *w, *effort))
-    times = np.arange(steps + 1) / 1000
-    column = sampled(ROUGH, times, OFF)
-    names = (*STATE, "controller.tau1", "controller.f2")
-    for name, row in zip(names, np.array(rows).T, strict=True):
-        # switches within a step are kinks, at which this integrator is of order 2
-        assert np.max(np.abs(column[name] - row)) < 1e-8 * (1 + np.max(np.abs(row))), name
-    for name, limit in (("tau1", 9.0), ("f2", 3.0)):
-        values = column[f"controller.{name}"]
-        assert np.any(values == limit) and np.any(values == -limit) and np.any(abs(values) < limit)
-
-
-def test_monolithic_by_another_integrator() -> None:
-    controller = Holding()
-
-    def rates(s: np.ndarray) -> np.ndarray:
-        efforts, integral = controller.law(s[:4], s[4:])
-        return np.concatenate((s[2:4], accelerations(controller.p, s, efforts), integral))
-
-    y, rows = OFF, [OFF]
-    for _ in range(20):
-        y = runge_kutta(rates, y, 1e-2, 100)
-        rows.append(y)
-    column = monolithic(ROUGH, np.arange(21) / 100, OFF)
-    for name, row in zip(STATE, np.array(rows).T, strict=True):
-        # the switches are kinks, at which this integrator is of order 2
-        assert np.max(np.abs(column[name] - row)) < 1e-7 * (1 + np.max(np.abs(row))), name
 
 
 # -- sampled system --

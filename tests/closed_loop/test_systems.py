@@ -6,16 +6,13 @@ from pathlib import Path
 import pytest
 
 from rparm import project
-from rparm.__main__ import main
 from rparm.errors import UserError
 from rparm.system import study
+from tests.closed_loop.variants import VARIANTS
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, Edit, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
-VARIANTS = (
-    *("nominal", "heavy_payload", "heavy_payload_integral", "horizontal_plane"),
-    "limited_effort",
-)
 SECOND = tuple(f"{name}_2" for name in VARIANTS)
 Add = Callable[[str, str, str], Path]
 
@@ -41,14 +38,12 @@ def add(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Add:
     return one
 
 
-def listed(
-    capsys: pytest.CaptureFixture[str], *names: str, ssp: Path | None = None
-) -> dict[str, list[str]]:
+def listed(console: Console, *arguments: object) -> dict[str, list[str]]:
     """What --list prints: variants by system."""
-    option = ["--ssp", str(ssp)] if ssp else []
-    assert main(["system", "--list", *option, *names]) == 0
+    code, out, _ = console("system", "--list", *arguments)
+    assert code == 0
     found: dict[str, list[str]] = {}
-    for line in capsys.readouterr().out.splitlines():
+    for line in out.splitlines():
         if line.startswith("  "):
             found[list(found)[-1]].append(line.strip())
         else:
@@ -56,66 +51,54 @@ def listed(
     return found
 
 
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(["system", *arguments]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.startswith("error: ") and err.count("\n") == 1
-    return err
-
-
-def test_names_are_those_of_variants_and_systems(
-    add: Add, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_names_are_those_of_variants_and_systems(add: Add, console: Console) -> None:
     add("loop", "Loop.ssp", "")
     second = add("loop_two", "LoopTwo.ssp", "_2")
     both = {"loop": list(VARIANTS), "loop_two": list(SECOND)}
-    assert listed(capsys) == both
-    assert listed(capsys, "loop_two") == {"loop_two": list(SECOND)}
-    assert listed(capsys, "loop_two", "loop") == both
-    assert listed(capsys, "nominal_2") == {"loop_two": ["nominal_2"]}
-    mixed = listed(capsys, "nominal", "loop_two", "nominal_2", "nominal")
+    assert listed(console) == both
+    assert listed(console, "loop_two") == {"loop_two": list(SECOND)}
+    assert listed(console, "loop_two", "loop") == both
+    assert listed(console, "nominal_2") == {"loop_two": ["nominal_2"]}
+    mixed = listed(console, "nominal", "loop_two", "nominal_2", "nominal")
     assert mixed == {"loop": ["nominal"], "loop_two": list(SECOND)}
-    assert listed(capsys, ssp=second) == {"loop_two": list(SECOND)}
+    assert listed(console, "--ssp", second) == {"loop_two": list(SECOND)}
 
 
-def test_an_unknown_name_is_refused(add: Add, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_name_is_refused(add: Add, console: Console) -> None:
     add("loop", "Loop.ssp", "")
     add("loop_two", "LoopTwo.ssp", "_2")
-    err = refused(capsys, "nominal", "lop_two")
+    err = console.refused("system", "nominal", "lop_two")
     assert "no variant 'lop_two', did you mean 'loop_two'? (./run.sh system --list names" in err
-    assert "variant 'nope' (./run.sh system --list names them)" in refused(capsys, "loop", "nope")
+    assert "variant 'nope' (./run.sh system --list names them)" in console.refused(
+        "system", "loop", "nope"
+    )
 
 
-def test_a_name_stands_for_one_thing(add: Add, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_name_stands_for_one_thing(add: Add, console: Console) -> None:
     add("loop", "Loop.ssp", "")
     path = add("loop_two", "LoopTwo.ssp", "")
     wanted = f"{path}: the name of variant 'nominal' is taken by a variant of loop\n"
-    assert refused(capsys, "--list") == f"error: {wanted}"
+    assert console.refused("system", "--list") == f"error: {wanted}"
 
 
-def test_a_variant_has_not_the_name_of_a_system(
-    add: Add, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_variant_has_not_the_name_of_a_system(add: Add, console: Console) -> None:
     path = add("nominal", "Nominal.ssp", "")
     wanted = f"{path}: the name of variant 'nominal' is taken by a system\n"
-    assert refused(capsys, "--list") == f"error: {wanted}"
+    assert console.refused("system", "--list") == f"error: {wanted}"
 
 
-def test_a_system_that_is_not_built_is_named(add: Add, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_system_that_is_not_built_is_named(add: Add, console: Console) -> None:
     add("loop", "Loop.ssp", "")
     add("loop_two", "LoopTwo.ssp", "_2").unlink()
-    assert "has no SSP of loop_two: ./run.sh builds it" in refused(capsys, "--list")
-    assert listed(capsys, "loop") == {"loop": list(VARIANTS)}
+    assert "has no SSP of loop_two: ./run.sh builds it" in console.refused("system", "--list")
+    assert listed(console, "loop") == {"loop": list(VARIANTS)}
 
 
-def test_a_system_without_a_folder_is_refused(
-    add: Add, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_system_without_a_folder_is_refused(add: Add, tmp_path: Path, console: Console) -> None:
     path = add("loop", "Loop.ssp", "")
     other = edited(path, tmp_path / "x.ssp", {STRUCTURE: replace('name="loop"', 'name="lop"')})
     wanted = f"{other}: no system 'lop' has references, did you mean 'loop'? (known: loop)\n"
-    assert refused(capsys, "--ssp", str(other)) == f"error: {wanted}"
+    assert console.refused("system", "--ssp", other) == f"error: {wanted}"
 
 
 def test_one_system_has_a_study_of_its_coupling(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,20 +63,6 @@ def test_an_importer_of_c_gives_what_python_gives(importer: tuple[Path, Path], f
         assert printed[name] == pytest.approx(table[name], rel=1e-12, abs=1e-12)
 
 
-def test_both_importers_print_the_same(fmu: Path, tmp_path: Path) -> None:
-    printed = []
-    for version, archive in ((2, fmu), (3, fmu.parent / "fmi3" / fmu.name)):
-        program, folder = tmp_path / f"importer{version}", tmp_path / f"arm{version}"
-        source = EXAMPLES / f"fmi{version}_importer.c"
-        run(
-            "cc", "-D_GNU_SOURCE", "-I", headers(), source, "-o", program, "-ldl", "-lm", check=True
-        )
-        with zipfile.ZipFile(archive) as opened:
-            opened.extractall(folder)
-        printed.append(run(program, folder, check=True).stdout)
-    assert printed[0] == printed[1] != ""
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [([], "usage: "), (["/nowhere"], "cannot open shared object file"), (["a", "b"], "usage: ")],

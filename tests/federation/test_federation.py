@@ -5,17 +5,13 @@ import os
 import socket
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
-from rparm.__main__ import main
 from rparm.coupling.master import Master
 from rparm.errors import UserError
 from rparm.federation import addresses, federation
@@ -25,6 +21,7 @@ from rparm.system import ssp
 from rparm.system.ssp import Ssp
 from tests.federation.processes import Start
 from tests.support.paths import ROOT
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, replace
 
 STRUCTURE = "SystemStructure.ssd"
@@ -82,37 +79,6 @@ def test_a_component_may_be_stepped_elsewhere(short: Ssp, start: Start) -> None:
     assert np.array_equal(record.values, together.values)
 
 
-def test_a_process_that_is_killed_ends_the_federation(tmp_path: Path) -> None:
-    with ssp.unpacked(SSP) as system:
-        killed = threading.Thread(target=kill_soon, args=("controller",))
-        killed.start()
-        with pytest.raises(UserError, match="controller: its process was ended by signal 9"):
-            federation.run(system, "nominal", addresses.free())
-        killed.join()
-    assert not processes_of("nominal"), "a process is left"
-
-
-def processes_of(component: str) -> list[psutil.Process]:
-    """Processes that this one has started to step the component."""
-    found = []
-    for child in psutil.Process().children(recursive=True):
-        with suppress(psutil.NoSuchProcess):  # it has just ended
-            if {"federate", component} <= set(child.cmdline()):
-                found.append(child)
-    return found
-
-
-def kill_soon(component: str) -> None:
-    """Kill the process of a component when it has run for a while."""
-    for _ in range(600):
-        time.sleep(0.05)
-        found = processes_of(component)
-        if found:
-            time.sleep(1.0)
-            found[0].kill()
-            return
-
-
 # Each value may be 0, all of them together may not: only the FMU knows.
 def test_what_an_fmu_refuses_is_the_message(tmp_path: Path) -> None:
     none = TOLERANCE.replace("relative_tolerance", "I1z").replace("1e-11", "0")
@@ -159,12 +125,8 @@ def test_it_is_a_document(short: Ssp) -> None:
         (["nominal", "--silence", "0"], "expected 1 s or more: a number, or one with s, ms"),
     ],
 )
-def test_wrong_use(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["federation", "--ssp", str(SSP), *arguments]) == 2
-    output = capsys.readouterr()
-    assert words in output.err
-    assert output.err.startswith("error: ")
-    assert not output.out, "the head of a table that stays empty"
+def test_wrong_use(arguments: list[str], words: str, console: Console) -> None:
+    assert words in console.refused("federation", "--ssp", SSP, *arguments)
 
 
 def test_a_port_that_is_in_use_is_named() -> None:

@@ -21,15 +21,9 @@ def said(address: str, user: int | None, *arguments: str) -> str:
     """What a stranger says."""
     _, port = addresses.check_form(address)
     environment = {name: value for name, value in os.environ.items() if name != KEY}
+    who = (str(port), str(-1 if user is None else user), *arguments)
     return subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "tests.federation.stranger",
-            str(port),
-            str(-1 if user is None else user),
-            *arguments,
-        ],
+        [sys.executable, "-m", "tests.federation.stranger", *who],
         cwd=ROOT,
         env=environment,
         stdout=subprocess.PIPE,
@@ -61,16 +55,9 @@ def test_a_federation_has_one_port_on_loopback(start: Start) -> None:
     here = federation(start, "--listen", address, "--elsewhere", "arm")
     there = start("federate", str(SSP), "nominal", "arm", "--broker", address)
     wait_for_steps(here)
-    whole = [
-        process
-        for started in (here, there)
-        for process in (
-            psutil.Process(started.pid),
-            *psutil.Process(started.pid).children(recursive=True),
-        )
-    ]
+    started = [psutil.Process(process.pid) for process in (here, there)]
     found = []
-    for process in whole:
+    for process in [*started, *(child for each in started for child in each.children(True))]:
         with suppress(psutil.NoSuchProcess):  # the trajectory runs ahead, and may have ended
             assert os.environ[KEY] not in " ".join(process.cmdline())
             found += [

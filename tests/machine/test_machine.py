@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from rparm.models.machine.experiment import STEPS_PER_SECOND, STOP
 
-from rparm.__main__ import main
 from rparm.system import comparison, ecos, ssp
 from tests.support.paths import ROOT
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import MACHINE as SSP
 from tests.support.ssp_files import read_csv
 
@@ -173,12 +173,11 @@ def test_fmus_of_fmi_3_give_the_same_bits(variant: str) -> None:
         assert values.tobytes() == second[name].tobytes(), name
 
 
-def test_the_command_runs_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_runs_it(tmp_path: Path, console: Console) -> None:
     pictures = tmp_path / "pictures"
-    arguments = ["--report", str(tmp_path), "--pictures", str(pictures)]
-    assert main(["system", "stick_slip", *arguments]) == 0
-    out = capsys.readouterr().out
-    assert out.endswith("passed: 1 variant\n")
+    arguments = ("--report", tmp_path, "--pictures", pictures)
+    code, out, _ = console("system", "stick_slip", *arguments)
+    assert code == 0 and out.endswith("passed: 1 variant\n")
     assert max(map(len, out.split("report: ")[0].splitlines())) <= 80
     page = (tmp_path / "system/stick_slip.html").read_text(encoding="utf-8")
     assert 'src="machine.svg"' in page and 'href="stick_slip.csv"' in page
@@ -190,9 +189,8 @@ def test_the_command_runs_it(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         np.testing.assert_allclose(written[name], values[rows], rtol=1e-11)  # twelve digits
 
 
-def test_systems_are_listed_with_their_variants(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["system", "--list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_systems_are_listed_with_their_variants(console: Console) -> None:
+    lines = console("system", "--list")[1].splitlines()
     at = lines.index("machine")
     assert lines[0] == "closed_loop"
     assert lines[at + 1 : at + 1 + len(VARIANTS)] == [f"  {name}" for name in VARIANTS]

@@ -3,7 +3,7 @@
 random_mutants.py BUILD takes a sample of all mutants of src, fmu and models, builds each with the
 settings of the folder BUILD in a copy of the sources and runs the C tests until one fails; those
 that live run with sanitizers too. Mutants that do not compile, or of which the compiler makes the
-same code, are replaced by the next ones of the seed. --sample takes the mutants of a stored sample.
+same code, are replaced by the next ones of the seed.
 """
 
 import argparse
@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
-from samples import Chosen, Places, order, read_sample, write_sample
-from sites import sources
+from samples import order
+from sites import Mutant, sources
 from workshop import Processes, Record, Workshop
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -43,7 +43,7 @@ class Campaign:
         File that is written after every verdict.
     """
 
-    mutants: list[Chosen]
+    mutants: list[Mutant]
     wanted: int
     results: Path | None
     processes: Processes = field(default_factory=Processes)
@@ -89,7 +89,7 @@ class Campaign:
     def judge_one(self, workshop: Workshop, index: int, kind: str) -> None:
         """Judge one mutant; print the verdict."""
         started = time.monotonic()
-        verdict, test = workshop.judge(self.mutants[index].mutant, kind)
+        verdict, test = workshop.judge(self.mutants[index], kind)
         with self.lock:
             self.verdicts[index] = (verdict, test, time.monotonic() - started)
             self.note(index)
@@ -99,15 +99,13 @@ class Campaign:
         """Print a verdict; write all verdicts to the file."""
         verdict, test, _ = self.verdicts[index]
         by = f" by {test}" if test else ""
-        print(f"{index}: {self.mutants[index].mutant.description()}: {verdict}{by}", flush=True)
+        print(f"{index}: {self.mutants[index].description()}: {verdict}{by}", flush=True)
         if self.results is None:
             return
         lines = [
             json.dumps(
-                {"index": i, **self.mutants[i].mutant.as_dict()}
+                {"index": i, **self.mutants[i].as_dict()}
                 | {"verdict": verdict, "test": test, "seconds": round(seconds, 1)}
-                | ({"equivalent": self.mutants[i].equivalent} if self.mutants[i].equivalent else {})
-                | ({"lives": self.mutants[i].lives} if self.mutants[i].lives else {})
             )
             for i, (verdict, test, seconds) in sorted(self.verdicts.items())
         ]
@@ -156,46 +154,20 @@ class Campaign:
                 self.in_parallel(lambda workshop: self.judge_again(workshop, rest), workshops)
 
 
-def report(campaign: Campaign, gone: list[str], seconds: float) -> float:
+def report(campaign: Campaign, seconds: float) -> float:
     """Print the figures; the share in percent of those that die."""
     counts = Counter(verdict for verdict, _, _ in campaign.verdicts.values())
-    judged = [
-        (campaign.mutants[index], campaign.verdicts[index][0]) for index in campaign.counted()
-    ]
-    living = [chosen for chosen, verdict in judged if verdict not in DEAD]
-    unequal = sum(verdict in DEAD or not chosen.equivalent for chosen, verdict in judged)
+    judged = campaign.counted()
+    living = [index for index in judged if campaign.verdicts[index][0] not in DEAD]
     died = len(judged) - len(living)
-    for line in gone:
-        print(f"gone: {line}")
-    for chosen in living:
-        reason = f"equivalent, {chosen.equivalent}" if chosen.equivalent else chosen.lives
-        print(f"lives: {chosen.mutant.description()}{': ' if reason else ''}{reason}")
+    for index in living:
+        print(f"lives: {campaign.mutants[index].description()}")
     print("; ".join(f"{verdict} {count}" for verdict, count in sorted(counts.items())))
-    unknown = sum(not chosen.equivalent and not chosen.lives for chosen in living)
     print(
         f"figures: random mutants of all C; executions {len(judged)}; seconds {seconds:.0f}; "
-        f"findings {unknown}; {died} of {unequal} that are not equivalent die"
+        f"findings {len(living)}; {died} of {len(judged)} die"
     )
-    return 100.0 * died / unequal if unequal else 100.0
-
-
-def chosen_mutants(arguments: argparse.Namespace) -> tuple[list[Chosen], list[str]]:
-    """Mutants to judge, and lines on those of the stored sample whose place is gone."""
-    texts = sources(ROOT)
-    if arguments.sample is None:
-        mutants = order(texts, arguments.seed)
-        print(f"seed {arguments.seed}: {len(mutants)} places", flush=True)
-        return [Chosen(mutant) for mutant in mutants], []
-    places = Places(texts)
-    here, gone = [], []
-    for chosen in read_sample(arguments.sample):
-        found = places.find(chosen.mutant)
-        if found is None:
-            nearest = places.nearest(chosen.mutant)
-            gone.append(f"{chosen.mutant.description()}; most like it: {nearest}")
-        else:
-            here.append(Chosen(found, chosen.equivalent, chosen.lives))
-    return here, gone
+    return 100.0 * died / len(judged) if judged else 100.0
 
 
 def main() -> int:
@@ -205,12 +177,10 @@ def main() -> int:
     parser.add_argument("--seed", type=int, help="of the sample; a new one if it is not given")
     parser.add_argument("--count", type=int, metavar="N", help="mutants of the sample, else all")
     parser.add_argument("--jobs", type=int, default=2, metavar="N")
-    parser.add_argument("--sample", type=Path, help="stored sample to take instead of a seed")
-    parser.add_argument("--store", type=Path, help="write the sample that was judged to this file")
     parser.add_argument("--results", type=Path, help="write all verdicts to this file")
     parser.add_argument(
         "--at-least", type=float, default=0.0, metavar="PERCENT",
-        help="of those that are not equivalent must die",
+        help="of them must die",
     )  # fmt: skip
     arguments = parser.parse_args()
     if arguments.seed is None:
@@ -218,16 +188,14 @@ def main() -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(2))
     started = time.monotonic()
     try:
-        mutants, gone = chosen_mutants(arguments)
+        mutants = order(sources(ROOT), arguments.seed)
+        print(f"seed {arguments.seed}: {len(mutants)} places", flush=True)
         campaign = Campaign(mutants, arguments.count or len(mutants), arguments.results)
         campaign.run(arguments.jobs, arguments.build)
     except (RuntimeError, LookupError) as error:
         print(f"random_mutants.py: {error}", file=sys.stderr)
         return 2
-    if arguments.store is not None:
-        judged = [campaign.mutants[index] for index in campaign.counted()]
-        write_sample(arguments.store, arguments.seed, judged)
-    share = report(campaign, gone, time.monotonic() - started)
+    share = report(campaign, time.monotonic() - started)
     return 1 if share < arguments.at_least else 0
 
 

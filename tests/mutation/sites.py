@@ -1,7 +1,6 @@
 """All places where random mutants break a C source, and how.
 
-A mutant is identified by the file, the function, the statement and the token that it replaces. So
-it is found again after the source was moved, wrapped otherwise or renamed (samples.py).
+A mutant is identified by the file, the function, the statement and the token that it replaces.
 """
 
 from collections.abc import Iterator

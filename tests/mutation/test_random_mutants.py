@@ -1,4 +1,4 @@
-"""The mutants of tests/mutation: where they are, what they make, and how they are found again."""
+"""The mutants of tests/mutation: where they are, and what they make."""
 
 import sys
 from dataclasses import replace
@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from samples import Chosen, Places, order, read_sample, write_sample
+from samples import order
 from sites import REMOVED, Mutant, mutants_of, mutated, sources
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -104,28 +104,9 @@ def test_an_order_follows_from_its_seed() -> None:
     assert abs(sum(mutant.kind == "constant" for mutant in first[:300]) / 300 - share) < 0.02
 
 
-def test_a_mutant_is_found_after_moves_and_wrapping() -> None:
-    text = SOURCE.replace("sum[0] = ", "sum[0] =\n        ")
-    texts = {"src/instance/other.c": text.replace("slave_sum", "exact_sum")}
-    found = Places(texts).find(mutant_of("-", "+"))
-    assert found is not None
-    assert (found.file, found.function) == ("src/instance/other.c", "exact_sum")
-    assert "slave->x[0] + slave->x[1]" in mutated(found, texts["src/instance/other.c"])
-
-
-def test_a_place_that_is_gone_is_none() -> None:
-    places = Places({"src/slave.c": SOURCE.replace("return -sum[0]", "return sum[0]")})
+def test_a_place_that_is_not_there_is_an_error() -> None:
     mutant = mutant_of("-", "")
-    assert places.find(mutant) is None
-    assert places.nearest(mutant) == "src/slave.c, slave_sum: return sum[0]"
-    assert Places({}).nearest(mutant) == "nothing"
+    with pytest.raises(LookupError):
+        mutated(mutant, SOURCE.replace("return -sum[0]", "return sum[0]"))
     with pytest.raises(LookupError):
         mutated(replace(mutant, nth=1), SOURCE)
-
-
-def test_a_sample_is_read_as_it_was_written(tmp_path: Path) -> None:
-    mutants = mutants_of("a.c", SOURCE)
-    chosen = [Chosen(mutants[0]), Chosen(mutants[1], equivalent="no one asks"), Chosen(mutants[2])]
-    path = tmp_path / "sample.json"
-    write_sample(path, 5, chosen)
-    assert read_sample(path) == chosen

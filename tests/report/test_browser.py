@@ -24,13 +24,6 @@ def shown(each_browser: Browser, tmp_path: Path):
     return show
 
 
-def test_a_quiet_page(shown) -> None:
-    browser = shown("<p>Text</p>", width=400)
-    browser.check_quiet()
-    assert browser.overflow() == 0
-    assert browser.violations() == []
-
-
 @pytest.mark.parametrize("script", ["console.error('wrong')", "console.warn('odd')", "nothing()"])
 def test_a_complaint_is_noticed(shown, script: str) -> None:
     browser = shown(f"<script>{script}</script>")

@@ -13,7 +13,7 @@ from rparm.scenarios import scenario
 from rparm.scenarios.signals import Table
 from tests.report.conftest import CONTENT, STRANGE, show
 from tests.support.browser import Browser
-from tests.support.rparm_project import FMUS, assert_one_line, call, declared
+from tests.support.rparm_project import FMUS, Console, declared
 
 
 @pytest.fixture(autouse=True)
@@ -25,21 +25,17 @@ def in_a_folder_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("model", FMUS)
-def test_a_new_scenario_runs_as_written(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, model: str
-) -> None:
-    assert call(capsys, "new", "first", "--model", model)[0] == 0
+def test_a_new_scenario_runs_as_written(console: Console, tmp_path: Path, model: str) -> None:
+    assert console("new", "first", "--model", model)[0] == 0
     loaded = scenario.load(tmp_path / "first.toml", declared(model))
     assert loaded.model == model and loaded.start_values == declared(model).start_values
-    code, out, err = call(capsys, "run", "first.toml", "--report", "out")
+    code, out, err = console("run", "first.toml", "--report", "out")
     assert (code, err) == (0, "") and "first: out/files/first.html\nreport: out/index.html" in out
 
 
 @pytest.mark.parametrize("model", FMUS)
-def test_every_line_in_a_comment_can_be_used(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, model: str
-) -> None:
-    assert call(capsys, "new", "all", "--model", model)[0] == 0
+def test_every_line_in_a_comment_can_be_used(console: Console, tmp_path: Path, model: str) -> None:
+    assert console("new", "all", "--model", model)[0] == 0
     path = tmp_path / "all.toml"
     used = re.sub(r"(?m)^# (\w+ = )", r"\1", path.read_text(encoding="utf-8"))
     path.write_text(used, encoding="utf-8")
@@ -54,24 +50,22 @@ def test_every_line_in_a_comment_can_be_used(
     assert given == {name: loaded.defaults[name] for name in settable}
 
 
-def test_the_usual_model_has_the_most_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(capsys, "new", "first.toml")[0] == 0
+def test_the_usual_model_has_the_most_scenarios(console: Console) -> None:
+    assert console("new", "first.toml")[0] == 0
     assert 'model = "rp_manipulator"' in Path("first.toml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", [STRANGE, "mit Leerzeichen", "a.b", 'quote " and \\ here'])
-def test_strange_names(capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str) -> None:
-    assert call(capsys, "new", "--", name)[0] == 0
+def test_strange_names(console: Console, tmp_path: Path, name: str) -> None:
+    assert console("new", "--", name)[0] == 0
     assert f"{name}.toml" in {path.name for path in tmp_path.iterdir()}
     assert scenario.title(tmp_path / f"{name}.toml") == name
 
 
-def test_a_file_that_exists_stays(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_exists_stays(console: Console) -> None:
     Path("mine.toml").write_text("precious", encoding="utf-8")
     for name in ("mine", "mine.toml"):
-        code, out, err = call(capsys, "new", name)
-        assert (code, out) == (2, "") and "mine.toml: exists already" in err
-        assert_one_line(err)
+        assert "mine.toml: exists already" in console.refused("new", name)
     assert Path("mine.toml").read_text(encoding="utf-8") == "precious"
 
 
@@ -91,11 +85,9 @@ def test_a_file_that_exists_stays(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_what_cannot_be_written(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: list[str], words: str
+    console: Console, tmp_path: Path, arguments: list[str], words: str
 ) -> None:
-    code, out, err = call(capsys, "new", *arguments)
-    assert (code, out) == (2, "") and words in err
-    assert_one_line(err)
+    assert words in console.refused("new", *arguments)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -114,24 +106,18 @@ def test_what_cannot_be_written(
         ("tolerance = 1e-8", "tolerance =", "not valid TOML"),
     ],
 )
-def test_a_wrong_file_is_refused(
-    capsys: pytest.CaptureFixture[str], old: str, new: str, words: str
-) -> None:
+def test_a_wrong_file_is_refused(console: Console, old: str, new: str, words: str) -> None:
     assert old in CONTENT
     Path("wrong.toml").write_text(CONTENT.replace(old, new), encoding="utf-8")
-    code, out, err = call(capsys, "run", "wrong.toml", "--report", "out")
-    assert (code, out) == (2, "") and "wrong.toml: " in err and words in err
-    assert err.count("wrong.toml") == 1
-    assert_one_line(err)
+    error = console.refused("run", "wrong.toml", "--report", "out")
+    assert "wrong.toml: " in error and error.count("wrong.toml") == 1 and words in error
     assert not Path("out").exists()
 
 
 @pytest.mark.parametrize("name", ["missing.toml", ".", "folder.toml"])
-def test_what_is_no_file_is_refused(capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_what_is_no_file_is_refused(console: Console, name: str) -> None:
     Path("folder.toml").mkdir()
-    code, out, err = call(capsys, "run", name, "--report", "out")
-    assert (code, out) == (2, "") and name in err
-    assert_one_line(err)
+    assert name in console.refused("run", name, "--report", "out")
 
 
 STOPS = CONTENT.replace('"erk"', '"cvode_adams"').replace(
@@ -139,17 +125,14 @@ STOPS = CONTENT.replace('"erk"', '"cvode_adams"').replace(
 )
 
 
-def test_a_run_that_fails_is_in_the_report(
-    capsys: pytest.CaptureFixture[str], browser: Browser
-) -> None:
+def test_a_run_that_fails_is_in_the_report(console: Console, browser: Browser) -> None:
     """Its page replaces that of an earlier run, and the files after it still run."""
     Path("a.toml").write_text(CONTENT, encoding="utf-8")
-    assert call(capsys, "run", "a.toml", "--report", "out")[0] == 0
+    assert console("run", "a.toml", "--report", "out")[0] == 0
     Path("a.toml").write_text(STOPS, encoding="utf-8")
     Path("b.toml").write_text(CONTENT, encoding="utf-8")
-    code, out, err = call(capsys, "run", "a.toml", "b.toml", "--report", "out")
-    assert code == 2 and err.startswith("error: ") and "the integrator took all" in err
-    assert_one_line(err)
+    code, out, err = console("run", "a.toml", "b.toml", "--report", "out")
+    assert code == 2 and err.count("\n") == 1 and "the integrator took all" in err
     assert "FAILED" in out and "b: out/files/b.html" in out
     entries = {entry.name: entry for entry in read(Path("out"), "files")}
     assert {name: entry.status for name, entry in entries.items()} == {"a": "FAILED", "b": "ran"}
@@ -162,12 +145,10 @@ def test_a_run_that_fails_is_in_the_report(
     browser.check_quiet()
 
 
-def test_a_run_that_fails_shows_its_rows(
-    capsys: pytest.CaptureFixture[str], browser: Browser
-) -> None:
+def test_a_run_that_fails_shows_its_rows(console: Console, browser: Browser) -> None:
     late = CONTENT.replace("[0.5, 10.0]]", "[0.5, 10.0], [0.51, 1e300]]")
     Path("late.toml").write_text(late, encoding="utf-8")
-    code, _, err = call(capsys, "run", "late.toml", "--report", "out")
+    code, _, err = console("run", "late.toml", "--report", "out")
     assert code == 2 and "in the step from t = 0.5" in err
     show(browser, Path("out/files/late.html"))
     last = float(Path("out/files/late.csv").read_text("utf-8").splitlines()[-1].split(",")[0])
@@ -177,13 +158,13 @@ def test_a_run_that_fails_shows_its_rows(
 
 
 def test_a_run_that_never_starts_has_a_page_without_plots(
-    capsys: pytest.CaptureFixture[str], browser: Browser
+    console: Console, browser: Browser
 ) -> None:
     massless = CONTENT.replace("[initial]", "m1 = 0.0\nI1z = 0.0\nI2z = 0.0\n[initial]")
     Path("x.toml").write_text(CONTENT, encoding="utf-8")
-    assert call(capsys, "run", "x.toml", "--report", "out")[0] == 0
+    assert console("run", "x.toml", "--report", "out")[0] == 0
     Path("x.toml").write_text(massless, encoding="utf-8")
-    code, _, err = call(capsys, "run", "x.toml", "--report", "out")
+    code, _, err = console("run", "x.toml", "--report", "out")
     assert code == 2
     browser.open(Path("out/files/x.html"))
     text = browser.run("return document.body.innerText")
@@ -193,41 +174,41 @@ def test_a_run_that_never_starts_has_a_page_without_plots(
     browser.check_quiet()
 
 
-def test_two_files_of_one_name_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_files_of_one_name_are_refused(console: Console) -> None:
     for name in ("a", "b"):
         Path(name).mkdir()
         Path(name, "x.toml").write_text(CONTENT, encoding="utf-8")
-    code, _, err = call(capsys, "run", "a/x.toml", "b/x.toml", "--report", "out")
-    assert code == 2 and "b/x.toml: its page would have the name of that of a/x.toml" in err
+    error = console.refused("run", "a/x.toml", "b/x.toml", "--report", "out")
+    assert "b/x.toml: its page would have the name of that of a/x.toml" in error
 
 
 def test_files_stay_in_the_overview_and_scenarios_beside_them(
-    capsys: pytest.CaptureFixture[str],
+    console: Console,
 ) -> None:
     for name in ("a", "b", "a"):
         Path(f"{name}.toml").write_text(CONTENT, encoding="utf-8")
-        assert call(capsys, "run", f"{name}.toml", "--report", "out")[0] == 0
+        assert console("run", f"{name}.toml", "--report", "out")[0] == 0
     quick = ("constant_effort_single_step", "--tolerance", "1e-8")
-    assert call(capsys, "run", *quick, "--report", "out")[0] == 0
+    assert console("run", *quick, "--report", "out")[0] == 0
     assert [entry.name for entry in read(Path("out"), "files")] == ["a", "b"]
     page = Path("out/index.html").read_text(encoding="utf-8")
     for href in ("files/a", "files/b", "scenarios/constant_effort_single_step"):
         assert page.count(f'href="{href}.html"') == 1
 
 
-def test_capitals_of_a_suffix_do_not_matter(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call(capsys, "new", "Swing.TOML")[0] == 0
+def test_capitals_of_a_suffix_do_not_matter(console: Console) -> None:
+    assert console("new", "Swing.TOML")[0] == 0
     assert [path.name for path in Path.cwd().iterdir()] == ["Swing.TOML"]
-    code, out, _ = call(capsys, "run", "Swing.TOML", "--report", "out")
+    code, out, _ = console("run", "Swing.TOML", "--report", "out")
     assert code == 0 and "Swing: out/files/Swing.html" in out
 
 
-def test_files_of_one_name_have_pages_of_their_own(capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_of_one_name_have_pages_of_their_own(console: Console) -> None:
     for folder, speed in (("a", "0.3"), ("b", "0.4"), ("a", "0.3")):
         Path(folder).mkdir(exist_ok=True)
         text = CONTENT.replace("q1 = 0.3", f"q1 = {speed}")
         Path(folder, "x.toml").write_text(text, encoding="utf-8")
-        assert call(capsys, "run", f"{folder}/x.toml", "--report", "out")[0] == 0
+        assert console("run", f"{folder}/x.toml", "--report", "out")[0] == 0
     entries = {entry.name: entry.source for entry in read(Path("out"), "files")}
     assert entries == {
         "x": str(Path("a/x.toml").absolute()),
@@ -240,10 +221,10 @@ def test_files_of_one_name_have_pages_of_their_own(capsys: pytest.CaptureFixture
     assert sorted(starts) == ["0.3", "0.4"]
 
 
-def test_other_scenarios_stay_when_some_run_again(capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_scenarios_stay_when_some_run_again(console: Console) -> None:
     for name in ("late_start", "constant_effort_single_step"):
         arguments = (name, "--tolerance", "1e-8", "--report", "out")
-        assert call(capsys, "run", *arguments)[0] == 0
+        assert console("run", *arguments)[0] == 0
     page = Path("out/index.html").read_text(encoding="utf-8")
     for name in ("late_start", "constant_effort_single_step"):
         assert page.count(f'href="scenarios/{name}.html"') == 1
@@ -257,15 +238,13 @@ def test_a_long_table_is_summed_up() -> None:
     assert describe(Table(many)) == summed
 
 
-def test_the_page_of_a_file_is_opened(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_page_of_a_file_is_opened(console: Console, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
     monkeypatch.setattr(shown.webbrowser, "open_new_tab", lambda url: opened.append(url) or True)
     Path("x.toml").write_text(CONTENT, encoding="utf-8")
-    assert call(capsys, "run", "x.toml", "--open", "--report", "out")[0] == 0
+    assert console("run", "x.toml", "--open", "--report", "out")[0] == 0
     quick = ("constant_effort_single_step", "--tolerance", "1e-8")
-    assert call(capsys, "run", *quick, "--open", "--report", "out")[0] == 0
+    assert console("run", *quick, "--open", "--report", "out")[0] == 0
     pages = ("out/files/x.html", "out/index.html")
     assert opened == [Path(page).absolute().as_uri() for page in pages]
 

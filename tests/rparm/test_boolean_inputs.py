@@ -53,32 +53,26 @@ def test_rounding_of_times_does_not_delay_a_switch(write) -> None:
         assert values.tolist() == [False] * n + [True] * (11 - n)
 
 
-MISTAKES = {
-    "a number": ("constant = 1", "[inputs.brake] constant: expected true or false, got 1"),
-    "a text": ("constant = 'on'", "[inputs.brake] constant: expected true or false, got 'on'"),
-    "a number in a table": (
-        "table = [[0, true], [1, 0.5]]",
-        "[inputs.brake] table[1]: expected true or false, got 0.5",
-    ),
-    "a Boolean time": ("table = [[false, true]]", "table[0]: expected a number, got false"),
-    "unordered": (
+MISTAKES = [
+    ("constant = 1", "[inputs.brake] constant: expected true or false, got 1"),
+    ("constant = 'on'", "[inputs.brake] constant: expected true or false, got 'on'"),
+    ("table = [[0, true], [1, 0.5]]", "[inputs.brake] table[1]: expected true or false, got 0.5"),
+    ("table = [[false, true]]", "table[0]: expected a number, got false"),
+    (
         "table = [[1, true], [1, false]]",
         "[inputs.brake] table[1]: expected a time after 1.0 s, got [1, False]",
     ),
-    "no pair": ("table = [[1]]", "[inputs.brake] table[0]: expected [time, value], got [1]"),
-    "sines": (
-        "sines = []",
-        "[inputs.brake]: unknown key 'sines' (known: constant, table, file, column, ",
-    ),
-    "both": (
+    ("table = [[1]]", "[inputs.brake] table[0]: expected [time, value], got [1]"),
+    ("sines = []", "[inputs.brake]: unknown key 'sines' (known: constant, table, file, column, "),
+    (
         "constant = true\ntable = [[0, true]]",
         "[inputs.brake]: expected exactly one of constant, table, file, got 2",
     ),
-    "nothing": ("", "[inputs.brake]: expected exactly one of constant, table, file, got 0"),
-}
+    ("", "[inputs.brake]: expected exactly one of constant, table, file, got 0"),
+]
 
 
-@pytest.mark.parametrize(("text", "message"), MISTAKES.values(), ids=MISTAKES.keys())
+@pytest.mark.parametrize(("text", "message"), MISTAKES)
 def test_mistakes_are_explained(write, text: str, message: str) -> None:
     path = write(f"{HEAD}{TIME}[inputs.brake]\n{text}\n")
     with pytest.raises(UserError) as caught:
@@ -123,6 +117,7 @@ def test_a_boolean_input_and_parameter_reach_the_fmu(
     text = timed(0, 10, 1) + "[parameters]\nis_reversed = true\n" + INPUTS
     text += "table = [[0, false], [4, true], [7, false]]\n"
     loaded = scenario.load(write(text), wheel.model)
+    monkeypatch.setattr(simulation, "_steps_made", 0)  # else the compiled loop may step
     simulation.simulate(wheel, loaded)
     assert [time for time, _ in counted] == list(range(1, 11))
     for time, turns in counted:

@@ -14,24 +14,26 @@ import pytest
 
 from rparm import trajectory_csv
 from rparm.commands import run as run_command
-from rparm.runs import simulation
 from tests.support.paths import ROOT
 from tests.support.rparm_project import (
+    FMUS,
     LONG,
     NAMES,
     SHORT,
-    assert_one_line,
-    call,
+    Console,
     edit,
+    fmi3_fmu,
     load,
     reference_file,
     repacked,
 )
 
+ARM = FMUS["rp_manipulator"]
 
-def test_run_passes(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]) -> None:
+
+def test_run_passes(project: Path, fmu: Path, console: Console) -> None:
     folder = project / "report"
-    code, out, err = call(capsys, "run", "--fmu", fmu, "--report", folder)
+    code, out, err = console("run", "--fmu", fmu, "--report", folder)
     assert code == 0 and err == ""
     rows = [line.split() for line in out.splitlines() if line.endswith("passed")]
     assert [[*row[:2], row[4]] for row in rows] == [[LONG, "500", "1e-8"], [SHORT, "1", "1e-8"]]
@@ -43,28 +45,24 @@ def test_run_passes(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
         assert (folder / f"{page}.html").is_file()
 
 
-def test_run_of_one_scenario_at_one_tolerance(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_run_of_one_scenario_at_one_tolerance(project: Path, fmu: Path, console: Console) -> None:
     folder = project / "report"
     arguments = ("run", SHORT, SHORT, "--tolerance", "1e-6", "--fmu", fmu, "--report", folder)
-    code, out, _ = call(capsys, *arguments)
+    code, out, _ = console(*arguments)
     assert code == 0 and "passed: 1 scenario\n" in out
     assert out.count("1e-6") == 1 and "1e-11" not in out
     assert not (folder / "studies/accuracy.html").exists()
 
 
 def test_slow_scenarios_called_by_name_are_not_swept(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    project: Path, fmu: Path, console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(run_command, "QUICK", 0.0)
-    code, out, _ = call(capsys, "run", SHORT, "--fmu", fmu, "--report", project / "report")
+    code, out, _ = console("run", SHORT, "--fmu", fmu, "--report", project / "report")
     assert code == 0 and f"{SHORT}: no sweep" in out and "error at tolerance" not in out
 
 
-def test_run_with_a_worse_reference_fails(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_run_with_a_worse_reference_fails(project: Path, fmu: Path, console: Console) -> None:
     file = reference_file(project, LONG)
     lines = file.read_text().splitlines()
     header, row = lines[0].split(","), lines[250].split(",")
@@ -72,7 +70,7 @@ def test_run_with_a_worse_reference_fails(
     row[column] = repr(float(row[column]) + 1e-3)
     lines[250] = ",".join(row)
     file.write_text("\n".join(lines) + "\n")
-    code, out, err = call(capsys, "run", "--fmu", fmu, "--report", project / "report")
+    code, out, err = console("run", "--fmu", fmu, "--report", project / "report")
     assert code == 1 and err == ""
     assert len(re.findall("(?m)^  tolerance 1e-(8|11): error .* of ee_vy, above its", out)) == 2
     assert "  FAILED: error" in out and out.endswith(f"\nfailed: 1 scenario: {LONG}\n")
@@ -89,89 +87,54 @@ def test_run_with_a_worse_reference_fails(
         (["run", "--tolerance", "tight"], "between 0 and 1"),
         (["run", "--fmux", "a"], "--fmux"),
         (["simulate"], "no scenario or command 'simulate' (./run.sh --list names"),
+        (["run", "--fmi", "4"], "argument --fmi: expected 2 or 3, got '4'"),
+        (["system", "--fmi", "three"], "argument --fmi: expected 2 or 3, got 'three'"),
+        (["coupling", "--fmi", ""], "argument --fmi: expected 2 or 3, got ''"),
+        (["system", "--fmi", "3", "--ssp", "x.ssp"], "not allowed with argument --fmi"),
+        (["run", "--fmi", "2", "--fmu", fmi3_fmu(ARM)], "is an FMU of FMI 3.0, --fmi wants 2.0"),
+        (["run", "--fmi", "3", "--fmu", ARM], "is an FMU of FMI 2.0, --fmi wants 3.0"),
+        (["run", "--fmi", "3"], "build/fmi3: has no FMU of rp_manipulator: ./run.sh builds it, "),
     ],
 )
 def test_mistakes_of_the_user(
-    project: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], reason: str
+    project: Path, console: Console, arguments: list[object], reason: str
 ) -> None:
-    code, out, err = call(capsys, *arguments)
-    assert code == 2 and out == ""
-    assert reason in err
-    assert_one_line(err)
+    assert reason in console.refused(*arguments)
 
 
-def test_file_that_is_no_fmu_or_cut_off(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_file_that_is_no_fmu_or_cut_off(project: Path, fmu: Path, console: Console) -> None:
     content, file = fmu.read_bytes(), project / "cut.fmu"
     cuts = (content[:length] for length in (0, 100, len(content) // 2, len(content) - 10))
     for wrong in (b"not a zip archive", *cuts):
         file.write_bytes(wrong)
-        code, _, err = call(capsys, "run", "--fmu", file)
-        assert code == 2 and "cut.fmu: not an FMU" in err
-        assert_one_line(err)
+        assert "cut.fmu: not an FMU" in console.refused("run", "--fmu", file)
 
 
-def test_fmu_with_another_guid_on_the_command_line(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fmu_with_another_guid(project: Path, fmu: Path, console: Console) -> None:
     other = repacked(fmu, project / "guid.fmu", lambda xml: xml.replace('guid="', 'guid="x', 1))
-    code, _, err = call(capsys, "run", SHORT, "--fmu", other, "--report", project / "report")
-    assert code == 2 and "guid.fmu: fmi2Instantiate failed: " in err and "guid" in err.lower()
-    assert_one_line(err)
+    error = console.failed("run", SHORT, "--fmu", other, "--report", project / "report")
+    assert "guid.fmu: fmi2Instantiate failed: the GUID 'x" in error
 
 
-def test_report_that_cannot_be_written(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (project / "taken").write_text("")
-    for report in ("taken", "taken/out"):
-        arguments = (
-            "run",
-            SHORT,
-            "--tolerance",
-            "1e-8",
-            "--fmu",
-            fmu,
-            "--report",
-            project / report,
-        )
-        code, out, err = call(capsys, *arguments)
-        assert (code, out) == (2, "") and "cannot be written" in err  # nothing has run
-        assert_one_line(err)
+def test_report_in_the_place_of_a_file(project: Path, fmu: Path, console: Console) -> None:
+    (project / "taken").touch()
+    for report in (project / "taken", project / "taken/out"):
+        error = console.refused("run", SHORT, "--fmu", fmu, "--report", report)
+        assert "cannot be written" in error
 
 
 @pytest.mark.parametrize("command", [("run", SHORT), ("system", "nominal"), ("coupling",)])
 @pytest.mark.parametrize("folder", ["{}/new", "{}"], ids=["in it", "itself"])
 def test_report_in_a_folder_that_takes_no_files(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: tuple[str, ...], folder: str
+    tmp_path: Path, console: Console, command: tuple[str, ...], folder: str
 ) -> None:
     """Root may write everywhere but to /proc; systems without it have folders without rights."""
     closed = Path("/proc")
     if not closed.is_dir():
         closed = tmp_path / "closed"
         closed.mkdir(mode=0o500)
-    code, out, err = call(capsys, *command, "--report", folder.format(closed))
-    assert (code, out) == (2, "") and "cannot be written" in err  # nothing has run
-    assert_one_line(err)
-
-
-def test_interruption(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(simulation, "simulate", interrupt)
-    code, _, err = call(capsys, "run", SHORT, "--fmu", fmu)
-    assert code == 130 and err == "interrupted\n"
-
-
-def test_list(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = call(capsys, "list")
-    assert code == 0
-    assert [line.split()[0] for line in out.splitlines()] == [LONG, SHORT]
-    assert load(LONG).title in out
+    error = console.refused(*command, "--report", folder.format(closed))
+    assert "cannot be written" in error
 
 
 def test_runs_as_a_module_and_stops_at_once_on_ctrl_c(project: Path, fmu: Path) -> None:
@@ -206,4 +169,6 @@ def test_runs_from_anywhere(tmp_path: Path) -> None:
         text=True,
         check=True,
     )
-    assert [line.split()[0] for line in done.stdout.splitlines()] == NAMES
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == NAMES
+    assert all(load(name).title in line for name, line in zip(NAMES, lines, strict=True))

@@ -11,7 +11,7 @@ from rparm.command_line import COMMANDS
 from rparm.commands.completion import SCRIPT, SHELLS
 from rparm.system import study
 from tests.support.paths import ROOT
-from tests.support.rparm_project import SHORT, assert_one_line, call
+from tests.support.rparm_project import Console
 from tests.support.ssp_files import SSP, edited, replace
 
 # what each command cannot do without
@@ -48,47 +48,30 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return addresses
 
 
-def test_a_run_and_a_new_scenario_are_shown(
-    project: Path, fmu: Path, tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = project / "report"
-    arguments = (SHORT, "--tolerance", "1e-8", "--fmu", fmu, "--output", folder, "--open")
-    assert call(capsys, "run", *arguments)[0] == 0
-    assert len(shown) == 1 and Path(shown[0].removeprefix("file://")).is_relative_to(folder)
-
-
 def test_a_new_scenario_goes_into_a_folder_and_is_shown(
-    tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, shown: list[str], console: Console
 ) -> None:
     folder = tmp_path / "below" / "here"
-    assert call(capsys, "new", "mine", "--output", folder, "--open")[0] == 0
+    assert console("new", "mine", "--output", folder, "--open")[0] == 0
     assert (folder / "mine.toml").is_file() and shown == [(folder / "mine.toml").as_uri()]
     (tmp_path / "taken").touch()
-    code, _, err = call(capsys, "new", "mine", "--output", tmp_path / "taken")
-    assert code == 2 and "taken" in err
-    assert_one_line(err)
+    assert "taken" in console.refused("new", "mine", "--output", tmp_path / "taken")
 
 
 def test_the_playground_is_copied_and_shown(
-    tmp_path: Path,
-    shown: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, shown: list[str], monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
     page = tmp_path / "index.html"
     page.write_text("the page", encoding="utf-8")
     monkeypatch.setattr(project, "playground_page", lambda: page)
-    code, out, _ = call(capsys, "playground", "--output", tmp_path / "mine", "--open", "--json")
+    code, out, _ = console("playground", "--output", tmp_path / "mine", "--open", "--json")
     copy = tmp_path / "mine" / "playground.html"
     assert (code, copy.read_text(encoding="utf-8")) == (0, "the page")
     assert json.loads(out) == {"exit_code": 0, "page": str(copy)} and shown == [copy.as_uri()]
 
 
 def test_the_picture_of_the_coupling_is_shown(
-    tmp_path: Path,
-    shown: list[str],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, shown: list[str], monkeypatch: pytest.MonkeyPatch, console: Console
 ) -> None:
     _, module = study.of_coupling()
 
@@ -97,43 +80,40 @@ def test_the_picture_of_the_coupling_is_shown(
         return {"part": {"passed": True}}
 
     monkeypatch.setattr(module, "study_coupling", draw)
-    code, out, _ = call(capsys, "coupling", "--output", tmp_path, "--open", "--json")
+    code, out, _ = console("coupling", "--output", tmp_path, "--open", "--json")
     picture = Path(json.loads(out)["picture"])
     assert code == 0 and picture.is_file() and picture.parent == tmp_path
     assert shown == [picture.as_uri()]
 
 
 def test_a_command_without_a_page_writes_its_document_and_says_that_there_is_none(
-    tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, shown: list[str], console: Console
 ) -> None:
-    code, out, err = call(capsys, "list", "--json", "--quiet", "--output", tmp_path, "--open")
+    code, out, err = console("list", "--json", "--quiet", "--output", tmp_path, "--open")
     assert code == 0 and err == "--open: list has written no page\n" and shown == []
     assert (tmp_path / "list.json").read_text(encoding="utf-8") == out
     (tmp_path / "taken").touch()
-    code, _, err = call(capsys, "list", "--output", tmp_path / "taken")
-    assert code == 2 and "taken/list.json: cannot be written" in err
-    assert_one_line(err)
+    error = console.refused("list", "--output", tmp_path / "taken")
+    assert "taken/list.json: cannot be written" in error
 
 
-def test_an_fmu_is_copied(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_fmu_is_copied(tmp_path: Path, console: Console) -> None:
     for arguments, built in ((["RPPlant"], "build"), (["rp_plant", "--fmi", "3"], "build/fmi3")):
         folder = tmp_path / built
-        code, out, _ = call(capsys, "fmu", *arguments, "--output", folder)
+        code, out, _ = console("fmu", *arguments, "--output", folder)
         file = folder / "RPPlant.fmu"
         assert code == 0 and out.startswith(f"{file}: FMI ")
         assert file.read_bytes() == (ROOT / built / "RPPlant.fmu").read_bytes()
-    code, _, err = call(capsys, "fmu", "RPPlants")
-    assert code == 2 and "no model 'RPPlants'" in err
-    assert_one_line(err)
+    assert "no model 'RPPlants'" in console.refused("fmu", "RPPlants")
 
 
 def test_a_federation_writes_what_it_recorded(
-    tmp_path: Path, shown: list[str], capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, shown: list[str], console: Console
 ) -> None:
     short = {"SystemStructure.ssd": replace('stopTime="6"', 'stopTime="0.5"')}
     system = edited(SSP, tmp_path / "Short.ssp", short)
     arguments = ("nominal", "--ssp", system, "--output", tmp_path, "--json", "--quiet", "--open")
-    code, out, err = call(capsys, "federation", *arguments)
+    code, out, err = console("federation", *arguments)
     assert code == 0 and err == "--open: federation has written no page\n" and shown == []
     (row,) = json.loads(out)["variants"]
     names, values = trajectory_csv.read(tmp_path / "nominal.csv", lambda text, _: ValueError(text))
@@ -191,10 +171,8 @@ def test_bash_completes(script: Path, tmp_path: Path, words: list[str], wanted: 
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_every_shell_has_a_script(
-    shell: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    code, out, err = call(capsys, "completion", shell)
+def test_every_shell_has_a_script(shell: str, tmp_path: Path, console: Console) -> None:
+    code, out, err = console("completion", shell)
     assert (code, err) == (0, "") and SCRIPT in out and "hanging_swing" in out
-    assert call(capsys, "completion", shell, "--output", tmp_path)[0] == 0
+    assert console("completion", shell, "--output", tmp_path)[0] == 0
     assert (tmp_path / SHELLS[shell]).read_text(encoding="utf-8") == out

@@ -18,13 +18,14 @@ from rparm import command_line
 from rparm import project as project_folders
 from rparm.command_line import COMMANDS
 from rparm.fmi.fmu_file import Fmu
-from rparm.output import console, result_tables, streams
+from rparm.output import result_tables, streams
+from rparm.output.console import stage, verdict_line
 from rparm.output.result_tables import RunTable, SweepTable
 from rparm.runs.comparison import Run, Runs
 from rparm.runs.tolerance_sweep import TOLERANCES, Sweep
 from rparm.texts import seconds, short, shortened
 from tests.support.paths import ROOT
-from tests.support.rparm_project import FMUS, LONG, SHORT, assert_one_line, call, load
+from tests.support.rparm_project import FMUS, LONG, SHORT, Console, load
 from tests.support.ssp_files import SSP
 
 RANDOM = random.Random(5)
@@ -77,13 +78,13 @@ def test_no_table_is_wider_than_the_terminal(
             table = result_tables.FederationTable(known, 1e-12)
             table.row(known[0], 6000, RANDOM.choice(ERRORS), times, passed=False)
             assert widest(capsys) <= limit
-        assert len(console.verdict_line(known, known, "scenario")) <= limit or len(known[0]) > 40
+        assert len(verdict_line(known, known, "scenario")) <= limit or len(known[0]) > 40
 
 
 def test_the_verdict_is_first_on_the_last_line() -> None:
-    assert console.verdict_line([], ["a", "b"], "scenario") == "passed: 2 scenarios"
-    assert console.verdict_line(["b", "b"], ["a", "b"], "scenario") == "failed: 1 scenario: b"
-    line = console.verdict_line([f"scenario_{i}" for i in range(35)], range(35), "scenario")
+    assert verdict_line([], ["a", "b"], "scenario") == "passed: 2 scenarios"
+    assert verdict_line(["b", "b"], ["a", "b"], "scenario") == "failed: 1 scenario: b"
+    line = verdict_line([f"scenario_{i}" for i in range(35)], range(35), "scenario")
     assert line.startswith("failed: 35 scenarios: scenario_0, ") and len(line) <= 80
 
 
@@ -109,9 +110,9 @@ def document(out: str) -> dict:
     return json.loads(out, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
 
 
-def test_a_run_is_a_document(project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_is_a_document(project: Path, fmu: Path, console: Console) -> None:
     arguments = ("run", "--fmu", fmu, "--report", project / "report", "--json")
-    code, out, err = call(capsys, *arguments)
+    code, out, err = console(*arguments)
     found = document(out)
     assert code == found["exit_code"] == 0 and found["passed"]
     assert [s["name"] for s in found["scenarios"]] == [LONG, SHORT]
@@ -121,9 +122,9 @@ def test_a_run_is_a_document(project: Path, fmu: Path, capsys: pytest.CaptureFix
         assert len(scenario["sweep"]["errors"]) == len(TOLERANCES)
     assert Path(found["report"]).is_file()
     assert "passed: 2 scenarios\n" in err and f"{LONG}  " in err
-    code, out, err = call(capsys, *arguments, "--quiet")
+    code, out, err = console(*arguments, "--quiet")
     assert code == 0 and document(out)["passed"] and err == ""
-    assert call(capsys, *arguments[:-1], "--quiet") == (0, "passed: 2 scenarios\n", "")
+    assert console(*arguments[:-1], "--quiet") == (0, "passed: 2 scenarios\n", "")
 
 
 @pytest.mark.parametrize(
@@ -147,11 +148,9 @@ def test_a_run_is_a_document(project: Path, fmu: Path, capsys: pytest.CaptureFix
         (["federate"], "error"),
     ],
 )
-def test_every_command_prints_a_document(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], key: str
-) -> None:
+def test_every_command_prints_a_document(console: Console, arguments: list[str], key: str) -> None:
     """Also of a mistake, which is said on standard error as ever."""
-    code, out, err = call(capsys, *arguments, "--json")
+    code, out, err = console(*arguments, "--json")
     found = document(out)
     assert code == found["exit_code"] == (2 if key == "error" else 0) and found[key]
     if key == "error":
@@ -201,9 +200,9 @@ def test_what_libraries_and_children_print_is_no_result(option: str) -> None:
 # ---- Words that miss -----------------------------------------------------------------------------
 
 
-def test_help_fits_and_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_fits_and_names_every_command(console: Console) -> None:
     for arguments in (["help"], ["--help"], ["-h"], ["--quiet", "help"]):
-        assert call(capsys, *arguments) == (0, f"{command_line.overview()}\n", "")
+        assert console(*arguments) == (0, f"{command_line.overview()}\n", "")
     text = command_line.overview()
     assert all(f"  {command} " in text for command in COMMANDS)
     assert max(map(len, text.splitlines())) <= 80
@@ -211,31 +210,28 @@ def test_help_fits_and_names_every_command(capsys: pytest.CaptureFixture[str]) -
     assert modules == {command.replace("-", "_") for command in COMMANDS}
     for command in COMMANDS:
         for arguments in (["help", command], [command, "--help"]):
-            code, text, _ = call(capsys, *arguments)
+            code, text, _ = console(*arguments)
             assert code == 0 and text.startswith(f"usage: ./run.sh {command} ")
             for told in ("--json", "--quiet", "--output DIR", "--open", "130 Ctrl-C"):
                 assert told in text, (command, told)
             assert ("--tolerance" in text) == (command in ("run", "prove"))
 
 
-def test_the_version_is_that_of_the_build(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = call(capsys, "--version")
+def test_the_version_is_that_of_the_build(console: Console) -> None:
+    code, out, _ = console("--version")
     built = (ROOT / "CMakeLists.txt").read_text()
     assert code == 0 and f"project(RPManipulator VERSION {out.strip()} " in built
 
 
 def test_the_playground_is_where_it_is_said_to_be(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    console: Console, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rparm.project.ROOT", tmp_path)
     page = tmp_path / "build" / "playground" / "index.html"
-    code, out, err = call(capsys, "playground")
-    assert (code, out) == (2, "")
-    assert_one_line(err)
-    assert str(page) in err
+    assert str(page) in console.refused("playground")
     page.parent.mkdir(parents=True)
     page.touch()
-    assert call(capsys, "playground")[:2] == (0, f"{page}\n")
+    assert console("playground")[:2] == (0, f"{page}\n")
 
 
 def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]) -> None:
@@ -250,8 +246,8 @@ def test_the_folder_for_results_has_two_names(capsys: pytest.CaptureFixture[str]
         assert "--output DIR" in parser.format_help() and "--report" not in parser.format_help()
 
 
-def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, err = call(capsys)
+def test_without_a_command_there_is_help(console: Console) -> None:
+    code, out, err = console()
     assert (code, out) == (2, "") and err == f"{command_line.overview()}\n"
 
 
@@ -282,7 +278,7 @@ def test_without_a_command_there_is_help(capsys: pytest.CaptureFixture[str]) -> 
 def test_guesses(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    console: Console,
     arguments: list[str],
     guess: str,
 ) -> None:
@@ -291,9 +287,8 @@ def test_guesses(
     (tmp_path / "below").mkdir()
     for name in ("my_scenario", "below/other"):
         (tmp_path / f"{name}.toml").touch()
-    code, out, err = call(capsys, *arguments)
-    assert (code, out) == (2, "") and guess in err and "stick_slip" not in err
-    assert_one_line(err)
+    error = console.refused(*arguments)
+    assert guess in error and "stick_slip" not in error
 
 
 def test_stages_are_for_terminals(
@@ -301,21 +296,20 @@ def test_stages_are_for_terminals(
 ) -> None:
     for is_terminal in (False, True):
         monkeypatch.setattr(sys.stderr, "isatty", lambda known=is_terminal: known, raising=False)
-        console.stage("building")
+        stage("building")
         assert capsys.readouterr().err == ("building ...\n" if is_terminal else "")
         with streams.of_results(as_json=False, quiet=True):
-            console.stage("building")
+            stage("building")
         assert capsys.readouterr().err == ""
 
 
-def test_systems_fit_into_80_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = call(capsys, "system", "nominal", "--ssp", SSP, "--report", tmp_path / "r")
+def test_systems_fit_into_80_columns(tmp_path: Path, console: Console) -> None:
+    arguments = ("system", "nominal", "--ssp", SSP, "--report", tmp_path / "r")
+    code, out, _ = console(*arguments)
     table = out.split("report: ")[0]
     assert code == 0 and max(map(len, table.splitlines())) <= 80
     assert out.endswith("passed: 1 variant\n")
-    code, out, err = call(
-        capsys, "system", "nominal", "--ssp", SSP, "--report", tmp_path / "r", "--json"
-    )
+    code, out, err = console(*arguments, "--json")
     (variant,) = document(out)["variants"]
     assert code == 0 and variant["passed"] and 0 < variant["error"] <= variant["bound"]
     assert err.endswith("passed: 1 variant\n")

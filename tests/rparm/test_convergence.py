@@ -6,7 +6,6 @@ import json
 import shutil
 import subprocess
 import sys
-import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,6 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from rparm import __main__ as cli
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.output import result_tables
@@ -34,7 +32,7 @@ from rparm.runs.convergence import (
 )
 from rparm.scenarios.signals import Sines
 from tests.support.paths import ROOT
-from tests.support.rparm_project import declared, load
+from tests.support.rparm_project import Console, declared, load, repacked
 
 MODEL = ROOT / "models" / "rp_manipulator"
 SCRIPT = MODEL / "references" / "make_smooth_inputs.py"
@@ -243,15 +241,17 @@ def test_slopes_from_too_few_errors_fail(
 
 
 def test_wrong_slopes_fail(problem: Problem) -> None:
-    errors = np.array([problem.steps**1.3, *(problem.steps ** (i + 1) for i in (1, 2, 3))])
-    found = Convergence(problem, errors)
-    assert [text[:24] for text in found.violations] == ["inputs held: slope 1.30 "]
+    found = made_up(problem, 1.0, 10.0, 100.0, 100.0, 2.0, floor=0.0)
+    found.errors[0], found.errors[-1] = problem.steps**1.3, problem.steps**3.5
+    assert [text[:31] for text in found.violations] == [
+        "inputs held: slope 1.30 over 7 ", "intermediate update: slope 3.50",
+    ]  # fmt: skip
 
 
 def test_values_that_are_not_finite_fail(problem: Problem) -> None:
-    errors = np.array([problem.steps ** (i + 1) for i in ORDERS])
-    errors[1, 2] = np.nan
-    assert not Convergence(problem, errors).passed
+    found = made_up(problem, 1.0, 10.0, 100.0, 100.0, floor=0.0)
+    found.errors[1, 2] = np.nan
+    assert not found.passed
 
 
 def test_errors_that_cancel_are_no_estimate(problem: Problem) -> None:
@@ -261,12 +261,6 @@ def test_errors_that_cancel_are_no_estimate(problem: Problem) -> None:
     assert found.integration_error == found.errors[-1, -2]
     assert found.fitted[-1].tolist() == [True] * 4 + [False] * 3
     assert found.passed
-
-
-def test_a_wrong_slope_with_intermediate_update_fails(problem: Problem) -> None:
-    found = made_up(problem, 1.0, 10.0, 100.0, 100.0, 2.0, floor=0.0)
-    found.errors[-1] = problem.steps**3.5
-    assert [text[:31] for text in found.violations] == ["intermediate update: slope 3.50"]
 
 
 # ---- Files and report --------------------------------------------------------------------------
@@ -300,16 +294,6 @@ def test_damaged_exact_states_are_refused(tmp_path: Path, content: str | None, r
         convergence.load(path, declared(MODEL.name))
 
 
-def test_report_shows_the_order(study: Convergence, tmp_path: Path) -> None:
-    index = ReportWriter(tmp_path).write({}, studies=[study])
-    assert f'href="studies/{PATH.stem}.html"' in index.read_text(encoding="utf-8")
-    page = (tmp_path / "studies" / f"{PATH.stem}.html").read_text(encoding="utf-8")
-    assert "FAILED" not in page
-    for name, slope in zip(NAMES, study.slopes, strict=True):
-        assert f"<td>{name}</td>" in page and f">{slope:.2f}</td>" in page
-    assert "at four times of a step" in page
-
-
 def test_report_shows_a_failure(problem: Problem, tmp_path: Path) -> None:
     errors = np.array([problem.steps, problem.steps, problem.steps**3, problem.steps**4])
     broken = Convergence(problem, errors)
@@ -336,66 +320,58 @@ def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.parametrize("versions", ["2", "3", "23"])
 def test_run_of_all_measures_the_order(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+    project: Path, fmu: Path, updated: Fmu, console: Console, versions: str
 ) -> None:
-    folder = project / "report"
-    assert cli.main(["run", "--fmu", str(fmu), "--report", str(folder)]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    found = [line.split() for line in lines if line.startswith(convergence.NAMES)]
-    assert [row[-1] for row in found] == ["passed"] * 4
-    assert [round(float(row[-2])) for row in found] == [1, 2, 3, 4]
-    assert (folder / "studies" / f"{PATH.stem}.html").is_file()
-    assert f'href="studies/{PATH.stem}.html"' in (folder / "index.html").read_text()
-
-
-@pytest.mark.parametrize("arguments", [[], ["--fmi", "3"]])
-def test_intermediate_update_is_measured_with_fmi3(
-    project: Path, fmu: Path, updated: Fmu, capsys: pytest.CaptureFixture[str], arguments: list[str]
-) -> None:
-    """Beside the FMU of FMI 2.0, and with that of FMI 3.0 only."""
-    (project / "build/fmi3").mkdir(parents=True)
-    shutil.copy(updated.path, project / "build/fmi3")
-    if not arguments:
-        shutil.copy(fmu, project / "build")
+    """Intermediate update only with the FMU of FMI 3.0, by itself or beside that of FMI 2.0."""
+    build, report = project / "build", project / "report"
+    (build / "fmi3").mkdir(parents=True)
     shutil.copy(MODEL / "variables.toml", project / "models" / MODEL.name)
-    assert cli.main(["run", *arguments, "--report", str(project / "report")]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    found = [line.split() for line in lines if line.startswith(NAMES)]
-    assert [row[-1] for row in found] == ["passed"] * 5
-    assert [round(float(row[-2])) for row in found] == [1, 2, 3, 4, 4]
+    if "2" in versions:
+        shutil.copy(fmu, build)
+    if "3" in versions:
+        shutil.copy(updated.path, build / "fmi3")
+    one = () if versions == "23" else ("--fmi", versions)
+    code, out, _ = console("run", *one, "--report", report)
+    found = [line.split() for line in out.splitlines() if line.startswith(NAMES)]
+    slopes = [1, 2, 3, 4, 4] if "3" in versions else [1, 2, 3, 4]
+    assert code == 0 and [row[-1] for row in found] == ["passed"] * len(slopes)
+    assert [round(float(row[-2])) for row in found] == slopes
+    href = f'href="studies/{PATH.stem}.html"'
+    assert href in (report / "index.html").read_text(encoding="utf-8")
+    page = (report / "studies" / f"{PATH.stem}.html").read_text(encoding="utf-8")
+    for name, row in zip(NAMES, found, strict=False):
+        assert f"<td>{name}</td>" in page and f">{float(row[-2]):.2f}</td>" in page
+    assert "FAILED" not in page and ("at four times of a step" in page) == ("3" in versions)
 
 
 @pytest.mark.parametrize("arguments", [["constant_effort_single_step"], ["--tolerance", "1e-6"]])
 def test_other_runs_do_not(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str], arguments: list[str]
+    project: Path, fmu: Path, console: Console, arguments: list[str]
 ) -> None:
     folder = project / "report"
-    assert cli.main(["run", *arguments, "--fmu", str(fmu), "--report", str(folder)]) == 0
-    assert PATH.stem not in capsys.readouterr().out
+    code, out, _ = console("run", *arguments, "--fmu", fmu, "--report", folder)
+    assert code == 0 and PATH.stem not in out
     assert not (folder / "studies" / f"{PATH.stem}.html").exists()
 
 
-def test_run_with_another_exact_state_fails(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_run_with_another_exact_state_fails(project: Path, fmu: Path, console: Console) -> None:
     file = project / "models" / MODEL.name / "references" / PATH.stem / "exact.json"
     content = json.loads(file.read_text())
     content["final"]["q1"] += 1e-4
     file.write_text(json.dumps(content))
-    assert cli.main(["run", "--fmu", str(fmu), "--report", str(project / "report")]) == 1
-    out = capsys.readouterr().out
-    assert "smooth_inputs: 3rd derivatives: slope" in out
+    code, out, _ = console("run", "--fmu", fmu, "--report", project / "report")
+    assert code == 1 and "smooth_inputs: 3rd derivatives: slope" in out
     assert out.endswith("\nfailed: 1 scenario: smooth_inputs\n")
 
 
 def test_fmu_that_does_not_interpolate_is_left_out(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
+    project: Path, fmu: Path, console: Console
 ) -> None:
-    plain = project / "plain.fmu"
-    with zipfile.ZipFile(fmu) as old, zipfile.ZipFile(plain, "w") as new:
-        for name in old.namelist():
-            content = old.read(name).replace(b' canInterpolateInputs="true"', b"")
-            new.writestr(name, content if name.endswith(".xml") else old.read(name))
-    assert cli.main(["run", "--fmu", str(plain), "--report", str(project / "report")]) == 0
-    assert "smooth_inputs: left out" in capsys.readouterr().out
+    def change(xml: str) -> str:
+        return xml.replace(' canInterpolateInputs="true"', "")
+
+    plain = repacked(fmu, project / "plain.fmu", change)
+    code, out, _ = console("run", "--fmu", plain, "--report", project / "report")
+    assert code == 0 and "smooth_inputs: left out" in out

@@ -107,26 +107,6 @@ def test_fmu_with_another_token(fmu: Path, tmp_path: Path) -> None:
         simulation.simulate(other, load(SHORT))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "drop", "reason"),
-    [
-        ("", "", "binaries/", r"has no binary for [^ ]+ \(has: none\)"),
-        ('fmiVersion="3.0"', 'fmiVersion="3.1"', "-", "of FMI 2.0 or 3.0 .* found FMI 3.1"),
-        ("<CoSimulation", "<Cosimulation", "-", "wrong modelDescription.xml"),
-        ('valueReference="', 'valueReference="x', "-", "wrong modelDescription.xml"),
-    ],
-)
-def test_fmu_that_is_refused(
-    fmu: Path, tmp_path: Path, old: str, new: str, drop: str, reason: str
-) -> None:
-    wrong = repacked(
-        fmi3_fmu(fmu), tmp_path / "wrong.fmu", lambda xml: xml.replace(old, new, 1), drop
-    )
-    with pytest.raises(UserError, match=reason) as caught:
-        Fmu(wrong)
-    assert "\n" not in str(caught.value)
-
-
 def test_the_folder_of_binaries_of_fmi_2_is_not_looked_at(fmu: Path, tmp_path: Path) -> None:
     """fmpy loads an FMU of FMI 3.0 from the folder of FMI 3.0 only."""
     with zipfile.ZipFile(fmi3_fmu(fmu)) as old, zipfile.ZipFile(tmp_path / "x.fmu", "w") as new:

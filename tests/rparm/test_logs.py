@@ -13,7 +13,7 @@ from rparm.errors import UserError
 from rparm.scenarios import logs, scenario
 from rparm.scenarios.scenario import Scenario
 from tests.rparm.test_boolean_inputs import SWITCHED
-from tests.support.rparm_project import FMUS, call
+from tests.support.rparm_project import FMUS, Console
 from tests.support.toy_model import DESCRIPTION, HEAD, TIME, TOY, toy
 
 LOG = "time,force\n0.5,1\n1.5,3\n2.25,4.5\n"  # 2 t; the run is from 1 to 2
@@ -211,7 +211,7 @@ time = "time"
 
 
 def test_an_example_is_run_and_compared(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """m2 = 1 kg at f2 = 2 t, held over steps h: v_n = h^2 n (n - 1), and q2 its exact sum."""
     monkeypatch.chdir(tmp_path)
@@ -225,7 +225,7 @@ def test_an_example_is_run_and_compared(
     (tmp_path / "log.csv").write_text(f"time;force;encoder;speed\n{text}", encoding="utf-8")
     (tmp_path / "pushed.toml").write_text(EXAMPLE, encoding="utf-8")
     arguments = ("run", "pushed.toml", "--fmu", FMUS["rp_manipulator"], "--report", "out")
-    code, out, err = call(capsys, *arguments)
+    code, out, err = console(*arguments)
     assert (code, err) == (0, "")
     rms = math.sqrt((50 * 9 + 51 * 1) / 101) * 1e-3
     assert f"pushed: q2 is {rms:.3g} m RMS from log.csv, column encoder\n" in out
@@ -238,13 +238,13 @@ def test_an_example_is_run_and_compared(
 
 
 def test_an_angle_in_degrees_without_their_unit_is_asked_about(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     text = EXAMPLE[: EXAMPLE.index("[inputs")].replace('"90 deg"', "90")
     (tmp_path / "turns.toml").write_text(text, encoding="utf-8")
     arguments = ("run", "turns.toml", "--fmu", FMUS["rp_manipulator"], "--report", "out")
-    code, _, err = call(capsys, *arguments)
+    code, _, err = console(*arguments)
     question = '[initial] q1: 90 rad is 14.3 turns, is that meant? In degrees it is "90 deg".'
     assert (code, err) == (0, f"warning: turns.toml: {question}\n")
     page = (tmp_path / "out/files/turns.html").read_text(encoding="utf-8")

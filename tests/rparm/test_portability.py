@@ -28,8 +28,7 @@ from tests.support.rparm_project import (
     BUILD,
     FMUS,
     SHORT,
-    assert_one_line,
-    call,
+    Console,
     declared,
     load,
     names_of,
@@ -130,24 +129,6 @@ def test_what_not_every_system_has_is_noticed(line: str, found: str) -> None:
     assert list(not_portable(ast.parse(line))) == [found]
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "os.open(x, os.O_WRONLY)",
-        "x.open('rb')",
-        "open(x, 'wb')",
-        "x.open('w', encoding=y, newline=z)",
-        "read_text(x, 1)",
-        "signal.SIGINT",
-        "run(process_group=0 if os.name == 'posix' else None)",
-        "if hasattr(os, 'killpg'):\n    os.killpg(1, 2)",
-        "ctypes.CDLL('x' if sys.platform == 'win32' else None)",
-    ],
-)
-def test_what_every_system_has_is_not(line: str) -> None:
-    assert list(not_portable(ast.parse(line))) == []
-
-
 # ---- Names of files ------------------------------------------------------------------------------
 
 # characters and names that Windows keeps for itself
@@ -219,9 +200,7 @@ def test_files_with_the_line_ends_of_windows_are_read(project: Path, fmu: Path) 
     assert after.names == before.names and np.array_equal(after.values, before.values)
 
 
-def test_the_scenarios_are_those_of_the_given_fmus_model(
-    project: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_scenarios_are_those_of_the_given_fmus_model(project: Path, console: Console) -> None:
     """Though its file is somewhere and nothing is built."""
     other = load(names_of("rp_trajectory")[0])
     model = project / "models" / other.model
@@ -230,27 +209,24 @@ def test_the_scenarios_are_those_of_the_given_fmus_model(
     shutil.copytree(other.reference_folder, model / "references" / other.name)
     fmu = shutil.copy(FMUS[other.model], project / "downloaded.fmu")
     arguments = ("run", "--tolerance", "1e-8", "--fmu", fmu, "--report", project / "report")
-    code, out, err = call(capsys, *arguments)
+    code, out, err = console(*arguments)
     assert (code, err) == (0, "")
     rows = [line.split()[0] for line in out.splitlines() if line.endswith("passed")]
     assert rows == [other.name] and "passed: 1 scenario\n" in out
 
 
-def test_fmu_of_a_model_without_scenarios(
-    project: Path, fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    other = repacked(
-        fmu, project / "x.fmu", lambda xml: re.sub(r'modelName="\w+"', 'modelName="Other"', xml)
-    )
-    code, _, err = call(capsys, "run", "--fmu", other)
-    assert code == 2 and f"has no scenarios of Other, the model of {other}" in err
-    assert_one_line(err)
+def test_fmu_of_a_model_without_scenarios(project: Path, fmu: Path, console: Console) -> None:
+    def change(xml: str) -> str:
+        return re.sub(r'modelName="\w+"', 'modelName="Other"', xml)
+
+    other = repacked(fmu, project / "x.fmu", change)
+    words = f"has no scenarios of Other, the model of {other}"
+    assert words in console.refused("run", "--fmu", other)
 
 
-def test_what_is_not_built_can_be_given(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    _, _, err = call(capsys, "run", SHORT)
-    assert "has no FMU of rp_manipulator: ./run.sh builds it, --fmu PATH takes another one" in err
-    assert_one_line(err)
+def test_what_is_not_built_can_be_given(project: Path, console: Console) -> None:
+    words = "has no FMU of rp_manipulator: ./run.sh builds it, --fmu PATH takes another one"
+    assert words in console.refused("run", SHORT)
 
 
 # ---- Binaries ------------------------------------------------------------------------------------
@@ -274,21 +250,20 @@ def same(content: bytes) -> bytes:
     return content
 
 
-def test_on_arm_the_binary_has_the_folder_of_fmi_3(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    "binaries",
+    [
+        # linux64, in which fmpy looks there too, holds the binary for x86-64
+        {"aarch64-linux": same, "linux64": lambda _: b"for another machine"},
+        {"linux64": same},  # as fmpy compiles it
+    ],
+    ids=["shipped", "compiled"],
+)
+def test_on_arm_a_binary_is_in_the_folder_of_either_version(
+    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, binaries: dict
 ) -> None:
-    """linux64, in which fmpy looks there too, holds the binary for x86-64."""
     monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
-    binaries = {"aarch64-linux": same, "linux64": lambda _: b"for another machine"}
     with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", binaries)) as opened:
-        simulation.simulate(opened, load(SHORT))
-
-
-def test_compiled_on_arm_by_fmpy_it_has_that_of_fmi_2(
-    fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Fmi2Instance, "PLATFORMS", ("aarch64-linux", "linux64"))
-    with Fmu(with_binaries(fmu, tmp_path / "arm.fmu", {"linux64": same})) as opened:
         simulation.simulate(opened, load(SHORT))
 
 
@@ -326,15 +301,13 @@ def test_a_loaded_library_that_windows_keeps_hides_no_error(
 
 
 def test_a_broken_ecos_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, console: Console, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "ecospy.py").write_text("raise OSError('libecosc.so:\\nwrong machine')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     ssp = BUILD / "ClosedLoop.ssp"
-    code, _, err = call(capsys, "system", "nominal", "--ssp", ssp, "--report", tmp_path / "report")
-    assert code == 2
-    assert "ecospy cannot be loaded: libecosc.so: wrong machine" in err
-    assert_one_line(err)
+    error = console.failed("system", "nominal", "--ssp", ssp, "--report", tmp_path / "report")
+    assert "ecospy cannot be loaded: libecosc.so: wrong machine" in error
 
 
 KILLED = """

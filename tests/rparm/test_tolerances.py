@@ -13,7 +13,7 @@ from rparm.fmi.model import METHOD, SMALLEST_TOLERANCES, TOLERANCE
 from rparm.runs.comparison import Runs
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
-from tests.support.rparm_project import FMUS, SHORT, assert_one_line, call, declared, fmi3_fmu
+from tests.support.rparm_project import FMUS, SHORT, Console, declared, fmi3_fmu
 from tests.support.ssp_files import SSP, edited, replace
 
 CONTENT = """\
@@ -91,26 +91,22 @@ def test_errors_are_estimated_down_to_the_smallest_tolerance(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("tolerance", "code"), [("1e-30", 2), ("4.9999e-12", 2), ("5e-12", 0), ("1e-4", 0)]
 )
-def test_the_option_of_run(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], tolerance: str, code: int
-) -> None:
+def test_the_option_of_run(tmp_path: Path, console: Console, tolerance: str, code: int) -> None:
     arguments = ("run", SHORT, "--fmi", "2", "--tolerance", tolerance, "--report", tmp_path / "r")
-    found, out, err = call(capsys, *arguments)
-    assert found == code
-    if code:
-        assert out == "" and not (tmp_path / "r").exists()
-        assert f"--tolerance: {SHORT}: expected at least 5e-12, the smallest of cvode_adams" in err
-        assert_one_line(err)
+    if code == 0:
+        assert console(*arguments)[0] == 0
+        return
+    words = f"--tolerance: {SHORT}: expected at least 5e-12, the smallest of cvode_adams"
+    assert words in console.refused(*arguments) and not (tmp_path / "r").exists()
 
 
-def test_systems_and_campaigns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_systems_and_campaigns(tmp_path: Path, console: Console) -> None:
     place = "resources/arm_nominal.ssv"
     fine = edited(SSP, tmp_path / "fine.ssp", {place: replace('"1e-11"', '"5e-12"')})
-    assert call(capsys, "system", "--list", "--ssp", fine)[0] == 0
+    assert console("system", "--list", "--ssp", fine)[0] == 0
     path = edited(SSP, tmp_path / "bad.ssp", {place: replace('"1e-11"', '"4.9e-12"')})
-    code, out, err = call(capsys, "system", "--list", "--ssp", path)
-    assert (code, out) == (2, "") and "component 'arm': 'relative_tolerance': expected at" in err
-    assert_one_line(err)
+    error = console.refused("system", "--list", "--ssp", path)
+    assert "component 'arm': 'relative_tolerance': expected at" in error
 
 
 CAMPAIGN = """\

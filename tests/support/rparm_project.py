@@ -103,3 +103,25 @@ def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
 
 def assert_one_line(error: str) -> None:
     assert error.startswith("error: ") and error.count("\n") == 1 and "Traceback" not in error
+
+
+class Console:
+    """The command line, called in this process: what it ends with and prints."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self._capsys = capsys
+
+    def __call__(self, *arguments: object) -> tuple[int, str, str]:
+        """Exit code, standard output and standard error."""
+        return call(self._capsys, *arguments)
+
+    def refused(self, *arguments: object) -> str:
+        """The one line that a mistake gets; nothing else is printed."""
+        return self.failed(*arguments, printed="")
+
+    def failed(self, *arguments: object, printed: str | None = None) -> str:
+        """The one line in which a command says why it ends, whatever it has printed before."""
+        code, out, error = self(*arguments)
+        assert code == 2 and (printed is None or out == printed), error
+        assert_one_line(error)
+        return error

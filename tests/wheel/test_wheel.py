@@ -32,33 +32,14 @@ def test_fmpy_finds_no_problem(version: str) -> None:
     assert validate_fmu(str(FMUS[version])) == []
 
 
-def test_variables_in_fmi2() -> None:
-    root = described("fmi2")
-    assert root.get("numberOfEventIndicators") == "2"
-    found = {v.get("name"): v for v in root.iterfind("ModelVariables/ScalarVariable")}
+@both_versions
+def test_variables(version: str) -> None:
+    variables = {v.get("name"): v for v in described(version).find("ModelVariables")}
+    types = variables if version == "fmi3" else {name: v[0] for name, v in variables.items()}
     booleans = {
-        name: (v.get("causality"), v.get("variability"), v.get("initial"), v[0].attrib)
-        for name, v in found.items()
-        if v[0].tag == "Boolean"
-    }
-    assert booleans == {
-        "is_reversed": ("parameter", "tunable", "exact", {"start": "false"}),
-        "is_counting": ("input", "discrete", None, {"start": "true"}),
-        "is_turning": ("output", "discrete", "calculated", {}),
-        "is_caught": ("output", "discrete", "calculated", {}),
-    }
-    assert found["turns"][0].tag == "Integer"
-    assert found["lost_speed"].get("variability") == "discrete"
-    assert [name for name, v in found.items() if v[0].get("reinit") == "true"] == ["angle"]
-
-
-def test_variables_in_fmi3() -> None:
-    root = described("fmi3")
-    variables = {v.get("name"): v for v in root.find("ModelVariables")}
-    booleans = {
-        name: (v.get("causality"), v.get("variability"), v.get("initial"), v.get("start"))
+        name: (v.get("causality"), v.get("variability"), v.get("initial"), types[name].get("start"))
         for name, v in variables.items()
-        if v.tag == "Boolean"
+        if types[name].tag == "Boolean"
     }
     assert booleans == {
         "is_reversed": ("parameter", "tunable", "exact", "false"),
@@ -66,8 +47,15 @@ def test_variables_in_fmi3() -> None:
         "is_turning": ("output", "discrete", "calculated", None),
         "is_caught": ("output", "discrete", "calculated", None),
     }
-    assert [name for name, v in variables.items() if v.get("reinit") == "true"] == ["angle"]
-    updated = [name for name, v in variables.items() if v.get("intermediateUpdate")]
+    assert types["turns"].tag == {"fmi2": "Integer", "fmi3": "Int32"}[version]
+    assert variables["lost_speed"].get("variability") == "discrete"
+    assert [name for name, type_ in types.items() if type_.get("reinit") == "true"] == ["angle"]
+
+
+def test_what_only_one_version_has() -> None:
+    root = described("fmi3")
+    assert described("fmi2").get("numberOfEventIndicators") == "2"
+    updated = [v.get("name") for v in root.find("ModelVariables") if v.get("intermediateUpdate")]
     assert updated == ["angle", "rate", "speed"]
     indicators = [e.attrib for e in root.iterfind("ModelStructure/EventIndicator")]
     assert indicators == [

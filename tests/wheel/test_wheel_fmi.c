@@ -64,22 +64,6 @@ static fmi2Integer get_integer(fmi2ValueReference reference) {
     return value;
 }
 
-/* At 7 rad/s the wheel has made n whole turns of 2 pi after n seconds, for n < 8. */
-static void test_an_integer_counts_while_a_boolean_input_says_so(void) {
-    instantiate(fmi2CoSimulation);
-    set_real(WHEEL_speed, 7.0);
-    ASSERT_OK(fmu.ExitInitializationMode(c));
-    TEST_ASSERT_EQUAL_INT(fmi2True, get_boolean(WHEEL_is_turning));
-    for (int n = 1; n < 8; n++) {
-        ASSERT_OK(fmu.DoStep(c, n - 1, 1.0, fmi2True));
-        ASSERT_OK(set_boolean(WHEEL_is_counting, fmi2True));
-        TEST_ASSERT_EQUAL_INT(n, get_integer(WHEEL_turns));
-        ASSERT_OK(set_boolean(WHEEL_is_counting, fmi2False));
-        TEST_ASSERT_EQUAL_INT(fmi2False, get_boolean(WHEEL_is_counting));
-        TEST_ASSERT_EQUAL_INT(0, get_integer(WHEEL_turns));
-    }
-}
-
 static void test_a_value_that_is_no_boolean_is_discarded(void) {
     if (fmu_version == 3) {
         TEST_IGNORE_MESSAGE("FMI 3.0 has a type of two values: test_wheel_fmi3.c");

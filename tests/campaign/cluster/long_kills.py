@@ -1,4 +1,4 @@
-"""Kills workers, the scheduler and the campaign, loses links, fills the disk: the same table.
+"""Kills workers at random, fills the disk: the campaign has the same table.
 
     build/venv/bin/python -m tests.campaign.cluster.long_kills
 
@@ -19,18 +19,14 @@ from tempfile import TemporaryDirectory
 
 from tests.campaign.cluster.processes import (
     blocks,
-    cluster,
     completed,
     finish,
-    kill_group,
-    registered,
     start,
     table,
     wait_for,
     workers,
 )
 from tests.campaign.files import write
-from tests.support.hosts import LOOPBACK, Network, NotPermittedError, network
 
 RUNS, KILLS = 2400, 20
 PAUSE = 0.5  # s, between two kills
@@ -53,88 +49,6 @@ def kill_workers(file: Path, output: Path, undisturbed: str) -> None:
     assert killed == KILLS, f"only {killed} workers killed, the campaign is too short"
     assert code == 0, err
     assert table(out) == undisturbed
-
-
-def kill_campaign(file: Path, output: Path, undisturbed: str) -> None:
-    """Kill the campaign, its scheduler and its workers, again and again until it is done."""
-    killed = 0
-    while True:
-        process = start(file, output, "--workers", 2)
-        goal = blocks(output) + 50
-        wait_for(lambda goal=goal, process=process: process.poll() is not None
-                 or blocks(output) >= goal)  # fmt: skip
-        if process.poll() is not None:
-            break
-        kill_group(process)
-        process.communicate()
-        killed += 1
-    code, out, err = finish(process)
-    assert killed >= 3 and code == 0, err
-    assert table(out) == undisturbed
-
-
-def stop_by_signals(file: Path, output: Path, undisturbed: str) -> None:
-    """End it by the signals that end programs."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        process = start(file, output, "--workers", 2)
-        goal = blocks(output) + 5
-        wait_for(lambda goal=goal: blocks(output) >= goal)
-        os.kill(process.pid, number)
-        code, _, err = finish(process)
-        assert code == 128 + number and "stopped; the same command" in err, (code, err)
-    assert completed(file, output) == undisturbed
-
-
-def kill_scheduler(file: Path, output: Path, undisturbed: str) -> None:
-    """Kill a scheduler that runs elsewhere; another one takes over."""
-    with cluster(LOOPBACK, [LOOPBACK, LOOPBACK]) as (address, scheduler, _):
-        process = start(file, output, "--scheduler", address)
-        wait_for(lambda: blocks(output) >= 5)
-        os.kill(scheduler.pid, signal.SIGKILL)
-        code, _, err = finish(process)
-        assert code == 2 and "the scheduler is gone" in err, err
-    with cluster(LOOPBACK, [LOOPBACK]) as (address, *_):
-        assert completed(file, output, "--scheduler", address) == undisturbed
-    code, _, err = finish(start(file, output / "none", "--scheduler", "tcp://127.0.0.1:9"))
-    assert code == 2 and "the scheduler cannot be reached" in err, err
-
-
-def lose_links(file: Path, output: Path, undisturbed: str) -> None:
-    """Lose links to a worker, to all, to the scheduler, with the time-outs of Dask."""
-    try:
-        with network() as made:
-            _lose_links(file, output, undisturbed, made)
-    except (FileNotFoundError, NotPermittedError) as error:
-        print(f"  left out: {error}")
-
-
-def _lose_links(file: Path, output: Path, undisturbed: str, apart: Network) -> None:
-    here, there = apart.here, apart.there
-
-    def cut_in(folder: Path, address: str) -> tuple[int, str, str]:
-        """A campaign during which the link is lost."""
-        process = start(file, folder, "--scheduler", address, host=here)
-        wait_for(lambda: blocks(folder) >= 5)
-        apart.cut()
-        assert process.poll() is None
-        result = finish(process)
-        apart.mend()
-        return result
-
-    with cluster(here, [here, there]) as (address, _, arms):
-        registered(arms[1])
-        code, out, err = cut_in(output / "one", address)
-        assert code == 0, err
-        assert table(out) == undisturbed
-    with cluster(here, [there, there]) as (address, *_):
-        code, _, err = cut_in(output / "all", address)
-        assert code == 2 and "has no workers any more; the same command resumes" in err, err
-    with cluster(there, [there, there]) as (address, *_):
-        options = ("--scheduler", address)
-        assert completed(file, output / "all", *options, host=here) == undisturbed
-        code, _, err = cut_in(output / "scheduler", address)
-        assert code == 2 and "the scheduler is gone; the same command resumes" in err, err
-        assert completed(file, output / "scheduler", *options, host=here) == undisturbed
 
 
 def fill_disk(file: Path, output: Path, undisturbed: str) -> None:
@@ -166,10 +80,6 @@ def fill_disk(file: Path, output: Path, undisturbed: str) -> None:
 
 TRIALS: tuple[Callable[[Path, Path, str], None], ...] = (
     kill_workers,
-    kill_campaign,
-    stop_by_signals,
-    kill_scheduler,
-    lose_links,
     fill_disk,
 )
 

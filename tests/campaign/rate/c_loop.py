@@ -35,15 +35,8 @@ class CLoop:
         (folder / "work.h").write_text(_header(job, fmus, points), encoding="utf-8")
         headers = Path(fmpy.__file__).parent / "c-code"
         source = ROOT / "tests" / "campaign" / "rate" / "c_loop.c"
-        flags = [
-            "-std=c11",
-            "-O2",
-            "-Wall",
-            "-Wextra",
-            "-Wno-unused-parameter",
-            "-Werror",
-            f"-I{folder}",
-        ]
+        flags = ["-std=c11", "-O2", "-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"]
+        flags.append(f"-I{folder}")
         libraries = ["-lm", "-ldl", "-lpthread"]
         command = ["gcc", *flags, "-isystem", headers, source, "-o", self._program, *libraries]
         subprocess.run(list(map(str, command)), check=True)
