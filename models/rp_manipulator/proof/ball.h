@@ -20,6 +20,13 @@
 #endif
 _Static_assert(FLT_EVAL_METHOD == 0, "operations on doubles give doubles");
 
+/* no fused operations, whatever the options are */
+#ifdef __clang__
+#pragma clang fp contract(off)
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif
+
 struct ball {
     double hi, lo; /* midpoint */
     double radius; /* not negative */

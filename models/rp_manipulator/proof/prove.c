@@ -172,7 +172,7 @@ static double communication_step(struct run *run, double from, double to, FILE *
 static int enclose(struct run *run, FILE *certificate) {
     char word[WORD];
     if (!read_problem(&run->problem, word)) {
-        return wrong("expected start, states, parameters and sines in finite numbers");
+        return wrong("expected start, states, parameters and sines in numbers up to 1.2e30");
     }
     arm_start(&run->problem, &run->set);
     write_point(&run->set, run->problem.start);
@@ -184,7 +184,7 @@ static int enclose(struct run *run, FILE *certificate) {
             read = read && read_numbers(run->problem.cubic[i], 4);
         }
         if (!read) {
-            return wrong("expected 'to', a later time and finite efforts");
+            return wrong("expected 'to', a later time and efforts up to 1.2e30");
         }
         const double reached = communication_step(run, from, to, certificate);
         if (reached < to) {
@@ -212,9 +212,11 @@ int main(int count, char *arguments[]) {
     if (count == 2 && (certificate = fopen(arguments[1], "w")) == NULL) {
         return wrong("the certificate cannot be written");
     }
-    int result = enclose(&run, certificate);
-    if (certificate != NULL && fclose(certificate) != 0) {
-        result = wrong("the certificate cannot be written");
+    const int result = enclose(&run, certificate);
+    bool written = fflush(stdout) == 0 && ferror(stdout) == 0;
+    if (certificate != NULL) {
+        written = fflush(certificate) == 0 && ferror(certificate) == 0 && written;
+        written = fclose(certificate) == 0 && written;
     }
-    return result;
+    return written ? result : wrong("what is proven cannot be written");
 }
