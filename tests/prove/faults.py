@@ -133,7 +133,7 @@ MASKED = {
     "const double middle = x[0].hi + half.hi": "any box will do",
     "step->box[i] = ball_around(middle, reached[i] * (1.0 + ROOM) + ACCURATE)": "any box will do",
     "inside = inside && (reached[i] + size) * (1.0 + CONFIRMED) < step->box[i].radius":
-        "CONFIRMED is 2^-12; the bounds that it enlarges have OUTWARD for roundings",
+        "a remainder that is accurate fits into the room of every box, far above 2^-12 of it",
     "for (int d = 0; d < problem->directions; d++)": "one more, which nothing reads",
     "if (i < directions)": "one more, which nothing reads",
     "const double share = inverts ? deviation / ((1.0 - deviation) * INWARD) : (double)INFINITY":
