@@ -31,7 +31,7 @@ import sites  # noqa: E402
 
 COMPILE = ("cc", "-std=c17", "-O1", "-ffp-contract=off", "-w")
 UNCOMPILABLE = "does not compile"
-FILES = ("ball.h", "arm_series.c", "frame.c", "step.c")
+FILES = ("ball.h", "arm_series.h", "step.h")
 SAMPLE = Path(__file__).with_name("random_faults.json")
 WIDEST = 1e-26  # radius of free motion
 
@@ -55,8 +55,8 @@ class Fault:
 
 
 PLANTED = (
-    Fault("sum: one rounding of the midpoint", "ball.h", "(fabs(low) + fabs(rest))", "fabs(rest)"),
-    Fault("sum: the other one", "ball.h", "(fabs(low) + fabs(rest))", "fabs(low)"),
+    Fault("sum: one rounding", "ball.h", "(fabs(lower) + fabs(rest))", "fabs(rest)"),
+    Fault("sum: the other one", "ball.h", "(fabs(lower) + fabs(rest))", "fabs(lower)"),
     Fault("product: rounding of the lower parts", "ball.h", "+ 8.0 * HALF_ULP * products", ""),
     Fault("convolution: rounding of the lower sum", "ball.h", "(low_sizes + 8.0", "(8.0"),
     Fault("product: radius times radius", "ball.h", "(fabs(b.hi) + b.radius)", "fabs(b.hi)"),
@@ -76,47 +76,44 @@ PLANTED = (
     ),
     Fault("radius of the sine's angle", "ball.h", "*sine = ball_widened(s, x.radius)", "*sine = s"),
     Fault(
-        "inputs at the begin of the step only", "step.c",
-        "efforts_at(efforts, step, whole, inputs)",
-        "efforts_at(efforts, step, ball_exact(0.0), inputs)",
+        "inputs at the begin of the step only", "step.h",
+        "arm_efforts(problem, &step->times, whole, efforts)",
+        "arm_efforts(problem, &step->times, ball_exact(0.0), efforts)",
     ),
     # a remainder that is accurate fits into the room of every box: the check of the box is masked
     # by that bound, and seen without it
+    Fault("box not checked", "step.h", "return inside && accurate;", "return true;"),
+    Fault("box without the first order's range", "step.h", "reached[i] += ball_largest(half);", ""),
+    Fault("box without higher orders", "step.h", "reached[i] += ball_largest(x[k]);", ""),
     Fault(
-        "box not checked", "step.c", "return inside;", "return true;",
-        (("return accurate;", "return true;"),),
-    ),
-    Fault("box without the first order's range", "step.c", "sum += ball_largest(half);", ""),
-    Fault("box without higher orders", "step.c", "sum += ball_largest(x[k]);", ""),
-    Fault(
-        "remainder over the hull", "step.c", "begin(&series, problem, step->box,",
+        "remainder over the hull", "step.h", "begin(&series, problem, step->box,",
         "begin(&series, problem, step->hull,",
     ),
     Fault(
-        "no remainder at the end", "step.c", "ball_sum(step->endpoint[i], step->remainder[i])",
+        "no remainder at the end", "step.h", "ball_sum(step->endpoint[i], step->remainder[i])",
         "step->endpoint[i]",
     ),
-    Fault("inverse without its bound", "frame.c", "share * all * OUTWARD", "0.0"),
-    Fault("deviation of the frame", "frame.c", "return sum * OUTWARD;", "return 0x1p-60;"),
+    Fault("inverse without its bound", "step.h", "share * all * OUTWARD", "0.0"),
+    Fault("deviation of the frame", "step.h", "deviation *= OUTWARD;", "deviation = 0x1p-60;"),
     Fault(
-        "hull without the frame", "step.c", "fabs(set->side[j][i])",
+        "hull without the frame", "step.h", "fabs(set->side[j][i])",
         "(j < STATES ? 0.0 : fabs(set->side[j][i]))",
     ),
     Fault(
-        "derivatives at the centre", "step.c", "begin(&hull, problem, step->hull,",
+        "derivatives at the centre", "step.h", "begin(&hull, problem, step->hull,",
         "begin(&hull, problem, before->centre,",
     ),
     Fault(
-        "rounding of the spread", "step.c",
+        "rounding of the spread", "step.h",
         "rest[i] += ball_largest(difference) * before->radius[j];", "",
     ),
     Fault(
-        "radius of the endpoint", "step.c", "rest[i] = end.radius;",
+        "radius of the endpoint", "step.h", "rest[i] = end.radius;",
         "rest[i] = step->remainder[i].radius;",
     ),
-    Fault("time within the step", "step.c", "ball_sum(step->within, after)", "after"),
+    Fault("time within the step", "arm_series.h", "ball_sum(times->within, after)", "after"),
     Fault(
-        "parameters without radii", "step.c",
+        "parameters without radii", "step.h",
         "begin(&series, problem, step->box, false, 0)",
         "begin(&series, problem, step->box, true, 0)",
     ),
@@ -125,23 +122,24 @@ PLANTED = (
 
 # functions that choose a frame, an order or the length of a step: any choice is good
 CHOICES = {
-    "frame_along", "reflect", "expand_centre", "size_of_order", "is_accurate",
+    "frame_along", "reflect", "dot", "expand_centre",
 }  # fmt: skip
 # statements whose mutants change no bound, and why
 MASKED = {
-    "if (*factor < 1.0)": "a longer step has to pass the same checks",
-    "for (double size = fabs(x.hi); size >= HALVED_BELOW; size *= 0.5)": "any x below 1 will do",
+    "if (!expand_centre(problem, before, efforts, step))":
+        "a longer step has to pass the same checks",
+    "for (double size = fabs(x.hi); size >= 0x1p-4; size *= 0.5)": "any x below 1 will do",
     "rest[i] = (rest[i] + TINY) * OUTWARD": "TINY is far below OUTWARD's part of the rest",
-    "const double middle = hull->row[i][0][0].hi + 0.5 * hull->row[i][0][1].hi": "any box will do",
+    "const double middle = x[0].hi + half.hi": "any box will do",
     "step->box[i] = ball_around(middle, reached[i] * (1.0 + ROOM) + ACCURATE)": "any box will do",
-    "const double all = (reached[i] + ball_largest(step->remainder[i])) * (1.0 + CONFIRMED)":
-        "CONFIRMED is 2^-12; the bounds that it enlarges have OUTWARD for roundings",
+    "inside = inside && (reached[i] + size) * (1.0 + CONFIRMED) < step->box[i].radius":
+        "a remainder that is accurate fits into the room of every box, far above 2^-12 of it",
     "for (int d = 0; d < problem->directions; d++)": "one more, which nothing reads",
     "if (i < directions)": "one more, which nothing reads",
-    "const double share = e < 1.0 ? e / ((1.0 - e) * INWARD) : (double)INFINITY":
-        "e adds up all rows, and is far below 1, which check.py confirms",
+    "const double share = inverts ? deviation / ((1.0 - deviation) * INWARD) : (double)INFINITY":
+        "the deviation adds up all rows, and is far below 1, which check.py confirms",
     "coordinates[i] = (coordinates[i] + share * all * OUTWARD) * OUTWARD":
-        "e adds up all rows: OUTWARD of it is far below that room",
+        "the deviation adds up all rows: OUTWARD of it is far below that room",
     "coordinates[i] = (sum + TINY) * OUTWARD":
         "the OUTWARD that follows covers the sum's roundings, and TINY is far below them",
     "quotient.radius = divides ? (remainder / smallest + TINY) * OUTWARD : (double)INFINITY":
@@ -149,14 +147,11 @@ MASKED = {
     "const double shifted = 134217729.0 * a":
         "only products of the lower halves are rounded then, below 8 HALF_ULP^2 of the whole",
     "step->more_orders -= step->more_orders > 0 ? 1 : 0": "any order is good",
-    "const bool last = step->order >= LAST_ORDER - 1": "any order is good",
-    "finite = finite && ball_is_finite(after->centre[i]) && after->radius[i] <= DBL_MAX":
+    "const bool more = inside && !accurate && step->order < LAST_ORDER - 1": "any order is good",
+    "finite = finite && ball_largest(after->centre[i]) + after->radius[i] <= DBL_MAX":
         "a certificate with numbers that are not finite is refused",
     "for (int i = 0; i <= n; i += 16)": "OUTWARD is for 32 roundings, these are 17 and a few",
-    "struct ball quotient = {0.0, 0.0, 0.0}": "the values are all written",
     "for (int j = 3; j >= k; j--)": "a fourth derivative would be below 2^-1000",
-    "return fabs(x.hi) <= DBL_MAX && fabs(x.lo) <= DBL_MAX && x.radius <= DBL_MAX":
-        "a radius of DBL_MAX is as good as an infinite one",
 }  # fmt: skip
 
 

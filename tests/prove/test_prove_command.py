@@ -8,10 +8,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from flint import arb
 
 import rparm
 from rparm import project
 from rparm.__main__ import main
+from rparm.commands import prove
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.proof import proven, prover
@@ -79,6 +81,22 @@ def test_start_within_an_interval(own: Path, capsys: pytest.CaptureFixture[str])
     for name in STATES:
         assert 1e-5 < found["methods"]["taylor"][name]["radius"] < 1e-2 or name == "q2"
     assert found["methods"]["taylor"]["q1"]["error"] >= np.radians(0.01)
+
+
+@pytest.mark.parametrize(
+    ("typed", "exact"),
+    [
+        ("1deg", arb.pi() / 180),
+        ("0.3deg", arb.pi() / 600),
+        ("0.7mrad", arb("0.0007")),
+        ("1mrad", arb("0.001")),
+    ],
+)
+def test_no_start_is_lost_in_rounding(typed: str, exact: arb) -> None:
+    """The radius is not below what was typed, and hardly above."""
+    with Fmu(rparm.fmu("rp_manipulator")) as fmu:
+        radius = prove._within(typed, PROVER, fmu)["q1"]
+    assert exact < arb(radius) < exact * (1 + 2.0**-40)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import json
 import random
 import re
+import subprocess
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -240,3 +241,23 @@ def test_bad_numbers_are_refused(bad: str) -> None:
         answer = run(re.sub(rf"^{line} \S+", f"{line} {bad}", text, flags=re.MULTILINE))
         assert answer.returncode == 2
         assert len(answer.stderr.splitlines()) == 1
+
+
+FULL = Path("/dev/full")
+
+
+@pytest.mark.skipif(not FULL.exists(), reason="Linux has it")
+def test_points_that_are_lost_are_no_answer() -> None:
+    """As on a disk that is full."""
+    with FULL.open("w") as full:
+        answer = subprocess.run(
+            [PROGRAM], input=SMALL["held"].text, stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert answer.returncode == 2
+    assert answer.stderr == "what is proven cannot be written\n"
+
+
+def test_a_number_that_is_finite_but_too_large_is_called_so() -> None:
+    answer = run(re.sub(r"^states \S+", "states 1e200", SMALL["free"].text, flags=re.MULTILINE))
+    assert answer.returncode == 2
+    assert "numbers up to 1.2e30" in answer.stderr

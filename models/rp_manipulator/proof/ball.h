@@ -7,13 +7,25 @@
  *   - HALF_ULP times every rounded value, for its rounding,
  *   - TINY, where products may underflow,
  * and is enlarged by OUTWARD for the roundings of that sum itself, fewer than 30 of 2^-53 each.
- * What overflows has an infinite radius or parts that are no numbers: ask `ball_is_finite`. */
+ * What overflows has an infinite radius or parts that are no numbers: `ball_largest` tells. */
 #ifndef BALL_H
 #define BALL_H
 
 #include <float.h>
 #include <math.h>
 #include <stdbool.h>
+
+#ifdef __FAST_MATH__
+#error "without -ffast-math: errors of operations would be calculated as 0"
+#endif
+_Static_assert(FLT_EVAL_METHOD == 0, "operations on doubles give doubles");
+
+/* no fused operations, whatever the options are */
+#ifdef __clang__
+#pragma clang fp contract(off)
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif
 
 struct ball {
     double hi, lo; /* midpoint */
@@ -37,10 +49,6 @@ static inline struct ball ball_midpoint(struct ball x) {
     return (struct ball){x.hi, x.lo, 0.0};
 }
 
-static inline bool ball_is_finite(struct ball x) {
-    return fabs(x.hi) <= DBL_MAX && fabs(x.lo) <= DBL_MAX && x.radius <= DBL_MAX;
-}
-
 /* ---- Bounds, rounded to the safe side -------------------------------------------------------- */
 
 /* Not below any |x|. */
@@ -60,12 +68,11 @@ static inline struct ball ball_widened(struct ball x, double by) {
 
 /* ---- Exact transformations (Knuth; Dekker and Veltkamp) ------------------------------------- */
 
-/* a + b = sum + error */
-static inline double two_sum(double a, double b, double *error) {
+/* a + b */
+static inline struct ball ball_of_sum(double a, double b) {
     const double sum = a + b;
     const double b_part = sum - a;
-    *error = (a - (sum - b_part)) + (b - b_part);
-    return sum;
+    return (struct ball){sum, (a - (sum - b_part)) + (b - b_part), 0.0};
 }
 
 /* Half of the digits of a: a = high + (a - high). */
@@ -74,28 +81,19 @@ static inline double high_half(double a) {
     return shifted - (shifted - a);
 }
 
-/* a b = product + error, but for underflow */
-static inline double two_product(double a, double b, double *error) {
+/* a b, but for underflow */
+static inline struct ball ball_of_product(double a, double b) {
     const double product = a * b;
-    const double a_high = high_half(a);
-    const double b_high = high_half(b);
-    const double a_low = a - a_high;
-    const double b_low = b - b_high;
-    *error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
-    return product;
+    const double a_high = high_half(a), a_low = a - a_high;
+    const double b_high = high_half(b), b_low = b - b_high;
+    const double error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high);
+    return (struct ball){product, error + a_low * b_low, 0.0};
 }
 
 /* ---- Arithmetic ----------------------------------------------------------------------------- */
 
 static inline struct ball ball_negative(struct ball x) {
     return (struct ball){-x.hi, -x.lo, x.radius};
-}
-
-/* a - b of two numbers, exactly */
-static inline struct ball ball_between(double b, double a) {
-    double error;
-    const double difference = two_sum(a, -b, &error);
-    return (struct ball){difference, error, 0.0};
 }
 
 /* By a power of two: exact but for underflow. */
@@ -105,14 +103,14 @@ static inline struct ball ball_scaled(struct ball x, double power_of_two) {
 }
 
 static inline struct ball ball_sum(struct ball x, struct ball y) {
-    double high_error, low_error, error, lo;
-    const double high = two_sum(x.hi, y.hi, &high_error);
-    const double low = high_error + two_sum(x.lo, y.lo, &low_error);
-    const double sum = two_sum(high, low, &error);
-    const double rest = error + low_error;
-    const double hi = two_sum(sum, rest, &lo);
-    const double rounding = HALF_ULP * (fabs(low) + fabs(rest));
-    return (struct ball){hi, lo, (x.radius + y.radius + rounding) * OUTWARD};
+    const struct ball high = ball_of_sum(x.hi, y.hi), low = ball_of_sum(x.lo, y.lo);
+    const double lower = high.lo + low.hi;
+    const struct ball sum = ball_of_sum(high.hi, lower);
+    const double rest = sum.lo + low.lo;
+    const double rounding = HALF_ULP * (fabs(lower) + fabs(rest));
+    struct ball result = ball_of_sum(sum.hi, rest);
+    result.radius = (x.radius + y.radius + rounding) * OUTWARD;
+    return result;
 }
 
 static inline struct ball ball_difference(struct ball x, struct ball y) {
@@ -128,39 +126,33 @@ static inline struct ball ball_convolution(const struct ball *x, const struct ba
     double products = 0.0, low_sizes = 0.0, radius = 0.0;
     for (int i = 0; i <= n; i++) {
         const struct ball a = x[i], b = y[n - i];
-        double product_error, sum_error;
-        const double product = two_product(a.hi, b.hi, &product_error);
-        high = two_sum(high, product, &sum_error);
-        const double lower = product_error + (a.hi * b.lo + a.lo * b.hi);
-        const double term = sum_error + lower;
+        const struct ball product = ball_of_product(a.hi, b.hi);
+        const struct ball sum = ball_of_sum(high, product.hi);
+        const double term = sum.lo + (product.lo + (a.hi * b.lo + a.lo * b.hi));
+        high = sum.hi;
         low += term;
-        products += fabs(product);
+        products += fabs(product.hi);
         low_sizes += fabs(term) + fabs(low);
         radius += fabs(a.hi) * b.radius + a.radius * (fabs(b.hi) + b.radius);
     }
-    double lo;
-    const double hi = two_sum(high, low, &lo);
-    radius += HALF_ULP * (low_sizes + 8.0 * HALF_ULP * products) + TINY * (n + 1);
+    struct ball result = ball_of_sum(high, low);
+    result.radius = radius + HALF_ULP * (low_sizes + 8.0 * HALF_ULP * products) + TINY * (n + 1);
     // OUTWARD for every 16 terms: each adds a rounding
     for (int i = 0; i <= n; i += 16) {
-        radius *= OUTWARD;
+        result.radius *= OUTWARD;
     }
-    return (struct ball){hi, lo, radius};
+    return result;
 }
 
 static inline struct ball ball_product(struct ball x, struct ball y) {
     return ball_convolution(&x, &y, 0);
 }
 
-static inline struct ball ball_times(double factor, struct ball x) {
-    return ball_product(ball_exact(factor), x);
-}
-
 /* The sum of x_i y_i. */
 static inline struct ball ball_dot(const double x[], const struct ball y[], int count) {
     struct ball sum = ball_exact(0.0);
     for (int i = 0; i < count; i++) {
-        sum = ball_sum(sum, ball_times(x[i], y[i]));
+        sum = ball_sum(sum, ball_product(ball_exact(x[i]), y[i]));
     }
     return sum;
 }
@@ -169,10 +161,9 @@ static inline struct ball ball_dot(const double x[], const struct ball y[], int 
  * over the smallest |y| bounds the distance of every quotient. */
 static inline struct ball ball_quotient(struct ball x, struct ball y) {
     const double first = x.hi / y.hi;
-    const struct ball left = ball_difference(ball_midpoint(x), ball_times(first, ball_midpoint(y)));
-    struct ball quotient = {0.0, 0.0, 0.0};
-    quotient.hi = two_sum(first, left.hi / y.hi, &quotient.lo);
-
+    const struct ball product = ball_product(ball_exact(first), ball_midpoint(y));
+    const struct ball left = ball_difference(ball_midpoint(x), product);
+    struct ball quotient = ball_of_sum(first, left.hi / y.hi);
     const double remainder = ball_largest(ball_difference(x, ball_product(quotient, y)));
     const double smallest = ball_smallest(y);
     const bool divides = smallest > 0.0;
@@ -182,13 +173,10 @@ static inline struct ball ball_quotient(struct ball x, struct ball y) {
 
 /* ---- Sine and cosine ------------------------------------------------------------------------ */
 
-#define HALVED_BELOW 0x1p-4
-#define TAIL         0x1p-100 /* terms below this part of the first one are left out */
-
 /* first (1 - y / ((k + 1) (k + 2)) + y^2 / ((k + 1) ... (k + 4)) - ...) for 0 <= y < 1: terms
  * alternate and fall, so that the first one that is left out bounds the rest (Leibniz). */
 static inline struct ball ball_alternating(struct ball first, struct ball y, double k) {
-    const double small = TAIL * (fabs(first.hi) + 0x1p-700);
+    const double small = 0x1p-100 * (fabs(first.hi) + 0x1p-700);
     struct ball sum = first;
     struct ball term = first;
     for (;;) {
@@ -206,7 +194,7 @@ static inline struct ball ball_alternating(struct ball first, struct ball y, dou
 static inline void ball_sine_and_versine(struct ball x, struct ball *sine, struct ball *versine) {
     int doublings = 0;
     // NOLINTNEXTLINE(cert-flp30-c, clang-analyzer-security.FloatLoopCounter): halving is exact
-    for (double size = fabs(x.hi); size >= HALVED_BELOW; size *= 0.5) {
+    for (double size = fabs(x.hi); size >= 0x1p-4; size *= 0.5) {
         x = ball_scaled(x, 0.5);
         doublings++;
     }

@@ -12,6 +12,11 @@ Range = tuple[Fraction, Fraction]  # least and largest value
 LOOSE = Fraction(1, 2**40)  # relative: by which a radius may exceed the least one
 ROUNDING = Fraction(1, 2**97)  # of the largest operand or result
 SMALLEST = Fraction(1, 2**880)
+# the first ball of each operation's result in an answer, which has those of all operations
+PLACES = {
+    "sum": 0, "difference": 1, "product": 2, "quotient": 3, "convolution": 4, "widened": 5,
+    "scaled": 6, "between": 7, "bounds": 8, "sine": 9, "versine": 11,
+}  # fmt: skip
 
 
 class WrongAnswer(Exception):
@@ -24,10 +29,15 @@ class Question:
 
     Attributes
     ----------
+    name : str
+        Of the operation.
+    line : str
+        How many operands there are, and they.
     check : callable
-        Raises WrongAnswer; gets the numbers of the answer.
+        Raises WrongAnswer; gets the numbers of two balls, from the operation's result on.
     """
 
+    name: str
     line: str
     check: Callable[[Sequence[float]], None]
 
@@ -60,10 +70,11 @@ def range_of(x: Parts) -> Range:
     return middle - Fraction(x[2]), middle + Fraction(x[2])
 
 
-def ask(name: str, *operands: Parts) -> str:
-    """The line of a question."""
-    parts = (float(part).hex() for one in operands for part in one)
-    return " ".join((name, str(len(operands)), *parts))
+def ask(name: str, operands: Sequence[Parts], check: Callable[[Sequence[float]], None]) -> Question:
+    """A question about an operation on some operands."""
+    given = [*operands, (0.0, 0.0, 0.0)] if len(operands) == 1 else operands
+    parts = (float(part).hex() for one in given for part in one)
+    return Question(name, " ".join((str(len(given)), *parts)), check)
 
 
 # ---- What answers have to satisfy ----------------------------------------------------------------
