@@ -12,7 +12,6 @@ A module each; a module imports only from lines above its own:
     c_events      modes and events
     c_model       equations.h and equations.c: a struct model (src/model/model.h)
     declaration   variables.toml and the page
-    building      FMUs
 
 The C that all models share is in the files *.in.
 """

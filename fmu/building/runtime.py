@@ -15,9 +15,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from source_code import Library, Manifest, manifest
-
 from equations.model_file import ModelFileError
+from source_code import Library, Manifest, manifest
 
 SYSTEM_COMPILERS = ("gcc", "clang")
 
