@@ -14,7 +14,7 @@ from equations.c_events import FIELD, INDICATOR, MODE, Events
 from equations.file_tables import NUMBERS, ModelFile, Variable, placed
 from equations.graph import MOVING, Value
 from equations.lock import Key
-from rparm.expressions.units import BASE, shown
+from rparm.expressions.units import shown
 
 INSTANCE = UNITS.parents[2] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
@@ -69,13 +69,13 @@ def generated(file: ModelFile, references: dict[Key, int]) -> dict[str, str]:
 
 def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
     """Text of variables.toml."""
-    events, units, states = Events(file), _Units(file), file.of("states")
+    events, units, states = Events(file), _Units(), file.of("states")
     helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
     tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
     for state in states:
         tables[f"der_{state.name}"] = {
             **_local(c_model.RATE.format(state.name)),
-            "unit": units.of_rate(state),
+            "unit": units.named(_per_second(state) if file.has_units else {}),
             "derivative_of": state.name,
             **_dependencies(state.value, file),
             "description": f"Derivative of {state.name} by the time",
@@ -136,7 +136,7 @@ def _entries_of(variable: Variable, file: ModelFile, units: _Units) -> dict[str,
         entries |= {"initial": "exact", "dependencies": [variable.name]}
         entries["reinit"] = any(variable.name in event.reinit for event in file.events)
     with placed(f"[{variable.section}]", variable.name, "unit"):
-        entries["unit"] = units.of(variable)
+        entries["unit"] = units.named(variable.exponents, variable.unit)
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     if variable.section == "outputs":
@@ -160,33 +160,16 @@ def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
     }
 
 
+def _per_second(state: Variable) -> dict[str, int]:
+    return state.exponents | {"s": state.exponents.get("s", 0) - 1}
+
+
 class _Units:
     """Names of units; `new` are those that are declared beside units.toml."""
 
-    def __init__(self, file: ModelFile) -> None:
-        self.file = file
+    def __init__(self) -> None:
         self.known = {n: unit.exponents for n, unit in read_declaration(UNITS).units.items()}
         self.new: dict[str, dict[str, int]] = {}
-
-    def exponents(self, variable: Variable) -> dict[str, int]:
-        """Exponents of the base units; ValueError if FMI cannot say them."""
-        if not self.file.has_units:
-            return {}
-        if variable.section != "where":
-            return self.file.exponents(variable.unit or "1")
-        unit = self.file.found_units[variable.name]
-        if any(exponent.denominator > 1 for exponent in unit):
-            raise ValueError("its exponents are no whole numbers: use its square instead")
-        return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}
-
-    def of(self, variable: Variable) -> str:
-        """Name of a variable's unit: that of the file, if it has one."""
-        return self.named(self.exponents(variable), variable.unit)
-
-    def of_rate(self, state: Variable) -> str:
-        """Name of the unit of a state's derivative."""
-        exponents = self.exponents(state)
-        return self.named(exponents | {"s": exponents.get("s", 0) - self.file.has_units})
 
     def named(self, exponents: dict[str, int], name: str = "") -> str:
         """Name of a unit with these exponents."""

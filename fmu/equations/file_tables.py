@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +16,7 @@ from rparm.expressions.kinds import CONDITION, NUMBER
 from rparm.expressions.numbers import finite_number
 from rparm.expressions.parser import parse
 from rparm.expressions.tree import FUNCTIONS, NO_NAMES, RELATIONS, Node
-from rparm.expressions.units import ANGLE, BASE, Unit, exponents
+from rparm.expressions.units import ANGLE, BASE, exponents
 
 LARGEST = 10**6  # bytes
 MOST_VARIABLES = 1000
@@ -64,8 +64,9 @@ class Expression:
     place: tuple[str, ...]
     text: str
     kind: str = NUMBER
-    target: str = ""  # the variable that it is assigned to, if that has a unit of its own
+    target: str = ""  # the variable that it is assigned to
     is_rate: bool = False  # of the target
+    event: str = ""  # "when" one happens, or "then"
     tree: Node = field(init=False)
     value: Value = field(init=False)  # as a graph
 
@@ -79,7 +80,7 @@ class Expression:
                 raise ModelFileError(f"{error}{_instead(self.text)}") from None
 
 
-@dataclass
+@dataclass(eq=False)
 class Variable:
     """A variable of the file; numbers that it does not give are None."""
 
@@ -90,8 +91,10 @@ class Variable:
     max: float | None = None
     nominal: float | None = None
     unit: str = ""  # as the file has it
+    exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
+    arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
     @property
     def value(self) -> Value:
@@ -124,26 +127,26 @@ class ModelFile:
     description: str
     experiment: dict[str, float]
     text: str  # the file
-    units: dict[str, dict[str, int]]  # exponents of the base units and rad, of [units]
     modes: list[str] = field(default_factory=list)
     variables: dict[str, Variable] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
     checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
     graph: Graph = field(default_factory=Graph)
-    found_units: dict[str, Unit] = field(default_factory=dict)  # of all variables
 
     @property
     def has_units(self) -> bool:
         """Whether units are checked."""
         return any(variable.unit for variable in self.variables.values())
 
+    @property
+    def assigned(self) -> list[Expression]:
+        """All expressions but conditions on parameters."""
+        found = [variable.expression for variable in self.of("states", "where", "outputs")]
+        return found + [expression for event in self.events for expression in event.expressions]
+
     def of(self, *sections: str) -> list[Variable]:
         """Variables of these sections, in the order of the file."""
         return [v for section in sections for v in self.variables.values() if v.section == section]
-
-    def exponents(self, unit: str) -> dict[str, int]:
-        """Exponents of a unit; ValueError if there is none of that name."""
-        return self.units[unit] if unit in self.units else exponents(unit)
 
 
 @contextmanager
@@ -186,103 +189,130 @@ def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
         raise ModelFileError(f"is not valid TOML: {reason:.200}") from None
 
 
-def read_tables(text: str, tables: dict[str, Any], solver_names: Iterable[str]) -> ModelFile:
-    """What the tables say, without the meaning of the expressions."""
-    _check_keys(tables, HEAD, "section")
-    name = tables.get("name")
-    with placed("name"):
-        if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise ModelFileError(f"expected a letter, then letters, digits, _, got {shown(name)}")
-    units = {}
-    for symbol, given in _table(tables, "units").items():
-        with placed("[units]", shown(symbol)):
-            units[symbol] = _exponents(given)
-    description = _text(tables.get("description", ""), "description")
-    file = ModelFile(name, description, _experiment(_table(tables, "experiment")), text, units)
-    reserved = RESERVED | set(solver_names)
-    _read_variables(file, tables, reserved)
-    _read_events(file, tables, reserved)
-    for message, condition in _table(tables, "check").items():
-        place = ("[check]", shown(message))
-        with placed(place[0]):
-            message = _text(message, place[1])
-        file.checks[message] = Expression(place, condition, CONDITION)
-    return file
+def _expect(what: str, kind: type, fits: Callable[[Any], object] = bool) -> Callable[[Any], Any]:
+    """What refuses all values but those that are of a kind and fit."""
+
+    def read(value: Any) -> Any:
+        if type(value) is not kind or not fits(value):
+            raise ValueError(f"expected {what}")
+        return value
+
+    return read
 
 
-def _table(tables: dict[str, Any], key: str) -> dict[str, Any]:
-    table = tables.get(key, {})
+def _text(value: object) -> str:
+    TEXT(value)
+    if CONTROL.search(value):
+        raise ModelFileError("has a control character")
+    return " ".join(value.split())
+
+
+TEXT = _expect(
+    f"a text of at most {LONGEST_TEXT} characters", str, lambda text: len(text) <= LONGEST_TEXT
+)
+TABLES = ("experiment", "units", "events", "check", "reinit", "set", *SECTIONS)
+READ = {
+    **dict.fromkeys((*NUMBERS, *EXPERIMENT), finite_number),
+    **dict.fromkeys(("unit", "description"), _text),
+    **dict.fromkeys(TABLES, _expect("a table", dict, lambda _: True)),
+    **dict.fromkeys((*BASE, ANGLE), _expect("a whole exponent", int, lambda e: abs(e) < 100)),
+    "name": _expect("a letter, then letters, digits, _", str, NAME.fullmatch),
+    "modes": _expect("a list of names", list, lambda m: all(type(name) is str for name in m)),
+}  # how values of keys are read; others are expressions
+
+
+def _entries(
+    table: object, known: Collection[str], needed: str = "", what: str = "key"
+) -> dict[str, Any]:
+    """A table with these keys, and its values as they are used."""
     if not isinstance(table, dict):
-        raise ModelFileError(f"{key}: expected a table, got {shown(table)}")
-    return table
-
-
-def _check_keys(table: dict[str, Any], known: Collection[str], what: str = "key") -> None:
+        example = needed or next(iter(known))
+        raise ModelFileError(f"expected a table such as {{ {example} = ... }}, got {shown(table)}")
     for key in table:
         if key not in known:
             listed = f"unknown {what} {shown(key)}, expected one of {', '.join(known)}"
             raise ModelFileError(listed + _instead(key))
+    if needed and needed not in table:
+        raise ModelFileError(f"{needed} is missing")
+    return {key: _value(key, value) for key, value in table.items()}
 
 
-def _exponents(given: object) -> dict[str, int]:
-    if not isinstance(given, dict):
-        raise ModelFileError(f"expected a table of exponents, got {shown(given)}")
-    _check_keys(given, (*BASE, ANGLE), "base unit")
-    for symbol, exponent in given.items():
-        if type(exponent) is not int or abs(exponent) > 99:
-            raise ModelFileError(f"{symbol}: expected a whole exponent, got {shown(exponent)}")
-    return given
-
-
-def _text(value: object, key: str) -> str:
-    with placed(key):
-        if not isinstance(value, str) or len(value) > LONGEST_TEXT:
-            raise ModelFileError(
-                f"expected a text of at most {LONGEST_TEXT} characters, got {shown(value)}"
-            )
-        if CONTROL.search(value):
-            raise ModelFileError("has a control character")
-    return " ".join(value.split())
-
-
-def _number(value: object, key: str) -> float:
+def _value(key: str, value: object) -> Any:
     with placed(key):
         try:
-            return finite_number(value)
+            return READ[key](value) if key in READ else value
         except ValueError as error:
             instead = _instead("[") if isinstance(value, list) else ""
             raise ModelFileError(f"{error}, got {shown(value)}{instead}") from None
 
 
-def _experiment(table: dict[str, Any]) -> dict[str, float]:
+def read_tables(text: str, tables: dict[str, Any], solver_names: Iterable[str]) -> ModelFile:
+    """What the tables say, without the meaning of the expressions."""
+    head = _entries({"name": None} | tables, HEAD, what="section")
+    units, experiment = {}, head.get("experiment", {})
+    for symbol, given in head.get("units", {}).items():
+        with placed("[units]", shown(symbol)):
+            units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
     with placed("experiment"):
-        _check_keys(table, EXPERIMENT)
-        given = EXPERIMENT | {key: _number(value, key) for key, value in table.items()}
-        if "step" not in table:
-            given["step"] = min(given["step"], given["stop"] / 100)
-        if not 0 < given["step"] <= given["stop"]:
-            raise ModelFileError("expected 0 < step <= stop")
-        if not 0 < given["tolerance"] < 1:
-            raise ModelFileError("expected a tolerance between 0 and 1")
-    return given
-
-
-def _read_variables(file: ModelFile, tables: dict[str, Any], reserved: set[str]) -> None:
+        experiment = _experiment(_entries(experiment, EXPERIMENT))
+    file = ModelFile(head["name"], head.get("description", ""), experiment, text)
+    reserved = RESERVED | set(solver_names)
     for section in SECTIONS:
-        for name, entry in _table(tables, section).items():
-            place = (f"[{section}]", name if NAME.fullmatch(name) else shown(name))
-            with placed(*place):
-                _check_name(name, file, reserved)
-                variable = file.variables[name] = _variable(name, section, entry)
-            if section == "where":
-                variable.expression = Expression(place, entry)
-            elif section in ("states", "outputs"):
-                key = SECTIONS[section][1]
-                variable.expression = Expression(
-                    (*place, key), entry[key], NUMBER, name, section == "states"
-                )
+        for name, entry in head.get(section, {}).items():
+            _read_variable(file, section, name, entry, units, reserved)
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
+    for mode in head.get("modes", ()):
+        with placed("modes", shown(mode)):
+            _check_name(mode, file, reserved)
+        file.modes.append(mode)
+    for name, entry in head.get("events", {}).items():
+        _read_event(file, name, entry, reserved)
+    for message, condition in head.get("check", {}).items():
+        place = ("[check]", shown(message))
+        with placed(*place):
+            message = _text(message)
+        file.checks[message] = Expression(place, condition, CONDITION)
+    return file
+
+
+def _experiment(given: dict[str, float]) -> dict[str, float]:
+    found = EXPERIMENT | given
+    if "step" not in given:
+        found["step"] = min(found["step"], found["stop"] / 100)
+    if not 0 < found["step"] <= found["stop"]:
+        raise ModelFileError("expected 0 < step <= stop")
+    if not 0 < found["tolerance"] < 1:
+        raise ModelFileError("expected a tolerance between 0 and 1")
+    return found
+
+
+def _read_variable(
+    file: ModelFile,
+    section: str,
+    name: str,
+    entry: object,
+    units: dict[str, dict[str, int]],
+    reserved: set[str],
+) -> None:
+    place = (f"[{section}]", name if NAME.fullmatch(name) else shown(name))
+    with placed(*place):
+        _check_name(name, file, reserved)
+        given = {"start": 0.0} if section in ("inputs", "states") else {}
+        if section == "where":
+            texts = {"": entry}
+        else:
+            given |= _entries(entry, *SECTIONS[section])
+            texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
+        variable = Variable(name, section, **given)
+        with placed("unit"):
+            known = variable.unit in units
+            variable.exponents = units[variable.unit] if known else exponents(variable.unit or "1")
+        _check_range(variable)
+    for key, text in texts.items():
+        whole = (*place, key) if key else place
+        variable.expression = Expression(whole, text, NUMBER, name, key == "derivative")
+    file.variables[name] = variable
 
 
 def _check_name(name: str, file: ModelFile, reserved: set[str]) -> None:
@@ -298,25 +328,6 @@ def _check_name(name: str, file: ModelFile, reserved: set[str]) -> None:
         raise ModelFileError(f"has more than {MOST_VARIABLES} variables, modes and events")
 
 
-def _variable(name: str, section: str, entry: object) -> Variable:
-    keys, needed = SECTIONS[section]
-    if section == "where":
-        return Variable(name, section)
-    if not isinstance(entry, dict):
-        example = f"{{ {needed or 'unit'} = ... }}"
-        raise ModelFileError(f"expected a table such as {example}, got {shown(entry)}")
-    _check_keys(entry, keys)
-    if needed and needed not in entry:
-        raise ModelFileError(f"{needed} is missing")
-    numbers = {key: _number(entry[key], key) for key in NUMBERS if key in entry}
-    texts = {key: _text(entry.get(key, ""), key) for key in ("unit", "description")}
-    variable = Variable(name, section, **numbers, **texts)
-    if section in ("inputs", "states") and variable.start is None:
-        variable.start = 0.0
-    _check_range(variable)
-    return variable
-
-
 def _check_range(variable: Variable) -> None:
     low = -math.inf if variable.min is None else variable.min
     high = math.inf if variable.max is None else variable.max
@@ -326,45 +337,29 @@ def _check_range(variable: Variable) -> None:
         raise ModelFileError(f"nominal = {variable.nominal:g}: expected a number above 0")
 
 
-def _read_events(file: ModelFile, tables: dict[str, Any], reserved: set[str]) -> None:
-    modes = tables.get("modes", [])
-    if not isinstance(modes, list) or not all(isinstance(mode, str) for mode in modes):
-        raise ModelFileError(f"modes: expected a list of names, got {shown(modes)}")
-    for mode in modes:
-        with placed("modes", shown(mode)):
-            _check_name(mode, file, reserved)
-        file.modes.append(mode)
-    for name, entry in _table(tables, "events").items():
-        place = f"[events.{name if NAME.fullmatch(name) else shown(name)}]"
-        with placed(place):
-            _check_name(name, file, reserved)
-            _check_event(entry, file)
-        file.events.append(_event(name, entry, place))
-
-
-def _check_event(entry: object, file: ModelFile) -> None:
-    if not isinstance(entry, dict) or "when" not in entry:
-        raise ModelFileError(f"expected a table with when, got {shown(entry)}")
-    _check_keys(entry, EVENT)
-    for changed in _table(entry, "reinit"):
-        if changed not in (variable.name for variable in file.of("states")):
-            raise ModelFileError(f"reinit: expected a state, got {shown(changed)}")
-    for changed in _table(entry, "set"):
-        if changed not in file.modes:
-            raise ModelFileError(f"set: expected one of modes, got {shown(changed)}")
-
-
-def _event(name: str, entry: dict[str, Any], place: str) -> Event:
-    def listed(key: str, kind: str) -> dict[str, Expression]:
-        return {
-            changed: Expression(
-                (place, f"{key}: {changed}"), text, kind, changed * (kind == NUMBER)
-            )
-            for changed, text in entry.get(key, {}).items()
-        }
-
-    when = Expression((place, "when"), entry["when"], CONDITION)
+def _read_event(file: ModelFile, name: str, entry: object, reserved: set[str]) -> None:
+    place = f"[events.{name if NAME.fullmatch(name) else shown(name)}]"
+    with placed(place):
+        _check_name(name, file, reserved)
+        given = {"reinit": {}, "set": {}} | _entries(entry, EVENT, "when")
+        states = [variable.name for variable in file.of("states")]
+        for key, known, what in (
+            ("reinit", states, "a state"),
+            ("set", file.modes, "one of modes"),
+        ):
+            for changed in given[key]:
+                if changed not in known:
+                    raise ModelFileError(f"{key}: expected {what}, got {shown(changed)}")
+    when = Expression((place, "when"), given["when"], CONDITION, event="when")
     if when.tree.op not in RELATIONS:
         raise ModelFileError(f"{place}: when: expected one relation such as h < 0")
-    during = Expression((place, "while"), entry["while"], CONDITION) if "while" in entry else None
-    return Event(name, when, during, listed("reinit", NUMBER), listed("set", CONDITION))
+    during = Expression((place, "while"), given["while"], CONDITION) if "while" in given else None
+    reinit = {
+        state: Expression((place, f"reinit: {state}"), text, NUMBER, state, event="then")
+        for state, text in given["reinit"].items()
+    }
+    modes = {
+        mode: Expression((place, f"set: {mode}"), text, CONDITION, event="then")
+        for mode, text in given["set"].items()
+    }
+    file.events.append(Event(name, when, during, reinit, modes))

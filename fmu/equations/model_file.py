@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from equations.file_tables import (
-    Expression,
     ModelFile,
     ModelFileError,
     Variable,
@@ -22,8 +22,9 @@ from equations.file_tables import (
     tables_of,
 )
 from rparm.expressions.kinds import check_kinds
-from rparm.expressions.tree import names
-from rparm.expressions.units import ONE, times, unit_of, unit_of_exponents
+from rparm.expressions.tree import in_order, names
+from rparm.expressions.units import BASE, ONE, Unit, times, unit_of, unit_of_exponents
+from rparm.expressions.units import shown as unit_shown
 
 __all__ = ["ModelFile", "ModelFileError", "read"]
 LEAVES = {"parameters": "parameter", "inputs": "input", "states": "state"}
@@ -41,8 +42,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
         try:
             file = read_tables(text, tables, solver_names)
             _check_names(file)
-            _check_units(file)
-            _make_graph(file)
+            _find_meaning(file)
         except ModelFileError as error:
             raise ModelFileError(f"{_line(text, str(error))}{error}") from None
     return file
@@ -76,7 +76,7 @@ def _check_names(file: ModelFile) -> None:
     known = {*file.variables, *file.modes, "time"}
     parameters = {variable.name for variable in file.of("parameters")}
     for expressions, allowed, mistake in (
-        (_calculated(file), known, "unknown name {}"),
+        (file.assigned, known, "unknown name {}"),
         (file.checks.values(), parameters, "{} is no parameter"),
     ):
         for expression in expressions:
@@ -86,79 +86,59 @@ def _check_names(file: ModelFile) -> None:
                 check_kinds(expression.tree, expression.kind, file.modes)
 
 
-def _calculated(file: ModelFile) -> list[Expression]:
-    """All expressions but conditions on parameters."""
-    found = [variable.expression for variable in file.of("states", "where", "outputs")]
-    return found + [expression for event in file.events for expression in event.expressions]
-
-
-def _check_units(file: ModelFile) -> None:
-    """Check that units fit, and find those of [where]."""
-    units = {"time": SECOND}
-    for variable in file.variables.values():
-        with placed(f"[{variable.section}]", variable.name, "unit"):
-            units[variable.name] = unit_of_exponents(file.exponents(variable.unit or "1"))
-    file.found_units = dict.fromkeys(units, ONE)
-    if file.has_units:
-        order = [v.expression for v in in_order_of_use(file)]
-        names_of = {v.expression.place: v.name for v in file.of("where")}
-        for expression in [*order, *_calculated(file), *file.checks.values()]:
-            with placed(*expression.place):
-                expected = units.get(expression.target)
-                if expression.is_rate:
-                    expected = times(expected, SECOND, -1)
-                unit = unit_of(expression.tree, units, expected)
-                if expression.place in names_of:
-                    units[names_of[expression.place]] = unit
-        file.found_units = units
-
-
-def in_order_of_use(file: ModelFile) -> list[Variable]:
+def _in_order_of_use(file: ModelFile) -> list[Variable]:
     """Entries of [where] and [outputs], each after those that it names."""
     entries = {variable.name: variable for variable in file.of("where", "outputs")}
-    needed_by = {
-        name: sorted(names(v.expression.tree) & entries.keys()) for name, v in entries.items()
-    }
-    done: dict[str, Variable] = {}
-    for first in entries:
-        way = {first: None}  # a name and what it needs, down to one that needs nothing
-        while way:
-            name = next(reversed(way))
-            needed = next((other for other in needed_by[name] if other not in done), None)
-            if needed is None:
-                done[name] = entries[name]
-                way.popitem()
-            elif needed in way:
-                loop = " -> ".join([*list(way)[list(way).index(needed) :], needed])
-                raise ModelFileError(
-                    f"[{entries[name].section}]: {name}: algebraic loop {shown(loop)}: "
-                    "solve these equations for one of them first"
-                )
-            else:
-                way[needed] = None
-    return list(done.values())
+    for variable in entries.values():
+        used = names(variable.expression.tree) & entries.keys()
+        variable.arguments = tuple(entries[name] for name in sorted(used))
+    try:
+        TopologicalSorter({v: v.arguments for v in entries.values()}).prepare()
+    except CycleError as error:
+        loop = error.args[1][::-1]
+        way = shown(" -> ".join(variable.name for variable in loop))
+        raise ModelFileError(
+            f"[{loop[0].section}]: {loop[0].name}: algebraic loop {way}: "
+            "solve these equations for one of them first"
+        ) from None
+    return in_order(entries.values())
 
 
-def _make_graph(file: ModelFile) -> None:
-    """Give each expression its value."""
+def _find_meaning(file: ModelFile) -> None:
+    """Check that units fit, find those of [where], and give each expression its value."""
     graph = file.graph
     known = {v.name: graph.value(op, name=v.name) for s, op in LEAVES.items() for v in file.of(s)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
+    declared = [v for v in file.variables.values() if v.section != "where"]
+    units = {v.name: unit_of_exponents(v.exponents) for v in declared} | {"time": SECOND}
     # without states nothing is integrated: outputs follow at once
     graph.has_switches = bool(file.of("states") or file.events)
+    ordered = [variable.expression for variable in (*_in_order_of_use(file), *file.of("states"))]
+    happening = [expression for event in file.events for expression in event.expressions]
+    for expression in [*ordered, *happening, *file.checks.values()]:
+        tree, target = expression.tree, expression.target
+        with placed(*expression.place):
+            expected = units.get(target)
+            if expression.is_rate:
+                expected = times(expected, SECOND, -1)
+            unit = unit_of(tree, units, expected) if file.has_units else ONE
+        if expression.event == "when":
+            sides = [graph.of_tree(side, known) for side in tree.arguments]
+            expression.value = graph.switch(tree.op, *sides)
+        else:
+            expression.value = graph.of_tree(tree, known, expression.event == "then")
+        if target:
+            known.setdefault(target, expression.value)
+            units.setdefault(target, unit)
+    for variable in file.of("where"):
+        with placed("[where]", variable.name):
+            variable.exponents = _whole(units[variable.name])
 
-    def find(expressions: Collection[Expression], is_instant: bool = False) -> None:
-        for expression in expressions:
-            expression.value = graph.of_tree(expression.tree, known, is_instant)
 
-    for variable in in_order_of_use(file):
-        find([variable.expression])
-        known[variable.name] = variable.value
-    find([state.expression for state in file.of("states")])
-    for event in file.events:
-        sides = [graph.of_tree(side, known) for side in event.when.tree.arguments]
-        event.when.value = graph.switch(event.when.tree.op, *sides)
-        find([event.during] if event.during else [])
-        find([*event.reinit.values(), *event.set.values()], is_instant=True)
-    find(file.checks.values())
+def _whole(unit: Unit) -> dict[str, int]:
+    if any(exponent.denominator > 1 for exponent in unit):
+        raise ModelFileError(
+            f"has unit {unit_shown(unit)}, whose exponents are no whole numbers: use its square"
+        )
+    return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}

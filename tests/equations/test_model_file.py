@@ -65,7 +65,7 @@ MISTAKES = {
     "mode as number": (
         'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
     ),
-    "event": (STATE + "[events.e]\n", "[events.e]: expected a table with when"),
+    "event": (STATE + "[events.e]\n", "[events.e]: when is missing"),
     "event key": (STATE + '[events.e]\nwhen = "x < 0"\nthen = 1', "[events.e]: unknown key 'then'"),
     "no relation": (
         STATE + '[events.e]\nwhen = "x < 0 and x > 1"', "[events.e]: when: expected one relation",
