@@ -94,6 +94,7 @@ class Variable:
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
+    leaf: Value | None = None  # of a parameter, input or state
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
     @property

@@ -107,7 +107,9 @@ def _in_order_of_use(file: ModelFile) -> list[Variable]:
 def _find_meaning(file: ModelFile) -> None:
     """Check that units fit, find those of [where], and give each expression its value."""
     graph = file.graph
-    known = {v.name: graph.value(op, name=v.name) for s, op in LEAVES.items() for v in file.of(s)}
+    for variable in file.of(*LEAVES):
+        variable.leaf = graph.value(LEAVES[variable.section], name=variable.name)
+    known = {variable.name: variable.leaf for variable in file.of(*LEAVES)}
     known |= {mode: graph.value("mode", name=mode) for mode in file.modes}
     known |= {"time": graph.value("time"), "pi": graph.number(math.pi)}
     declared = [v for v in file.variables.values() if v.section != "where"]
