@@ -11,7 +11,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from equations import declaration, lock
+from building import lock
+from equations import declaration
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
 

@@ -12,11 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from building import lock
 from building.contents import PLACES, build
 from building.runtime import Runtime
 from declaration.load import DeclarationError
 from document import DocumentError
-from equations import declaration, lock
+from equations import declaration
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
 from package import pack

@@ -5,7 +5,6 @@ A module each; a module imports only from lines above its own:
     graph         operations on values and conditions, and their derivatives
     file_tables   what the file says, table by table
     model_file    reads the file and checks its expressions; what they mean as a graph
-    lock          value references that stay
     c_code        a graph as statements in C
     guards        when a relation matters
     c_series      the Taylor series of the states

@@ -5,8 +5,6 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
-from __future__ import annotations
-
 from equations.c_code import Code, Leaves, filled, indented, text
 from equations.file_tables import Event, ModelFile
 from equations.graph import MOVING, Relation, Value
@@ -48,7 +46,7 @@ class Events:
         used = guards(graph, read)
         # condition under which each matters; None: always
         self.used = {r.name: used.get(r.mode, graph.number(0.0)) for r in self.relations}
-        self.located = [relation for relation in self.relations if relation.time is None]
+        self.located = graph.located
 
     def __bool__(self) -> bool:
         return bool(self.relations)

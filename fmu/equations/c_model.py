@@ -1,7 +1,5 @@
 """The model in C: equations.h with its value structure, equations.c with its struct model."""
 
-from __future__ import annotations
-
 from itertools import chain
 
 from equations.c_code import Code, filled, text

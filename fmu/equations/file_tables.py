@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from declaration.files import shown
+
 from equations.graph import Graph, Value
 from rparm.expressions.kinds import CONDITION, NUMBER
 from rparm.expressions.numbers import finite_number
@@ -64,7 +66,7 @@ class Expression:
     place: tuple[str, ...]
     text: str
     kind: str = NUMBER
-    target: str = ""  # the variable that it is assigned to
+    target: str = ""  # the variable or mode that it is assigned to
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
     tree: Node = field(init=False)
@@ -127,7 +129,10 @@ class ModelFile:
     name: str
     description: str
     experiment: dict[str, float]
-    text: str  # the file
+    path: Path
+    text: str
+    reserved: set[str]  # names that it must not give
+    units: dict[str, dict[str, int]] = field(default_factory=dict)  # exponents, of [units]
     modes: list[str] = field(default_factory=list)
     variables: dict[str, Variable] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
@@ -157,15 +162,6 @@ def placed(*place: object) -> Iterator[None]:
         yield
     except (ModelFileError, ValueError) as error:
         raise ModelFileError(": ".join([*map(str, place), str(error)])) from None
-
-
-def shown(value: object) -> str:
-    """A value of the file in a message."""
-    try:
-        text = repr(value)
-    except ValueError:  # an integer of more digits than Python writes
-        text = "a very large number"
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _instead(text: str) -> str:
@@ -247,28 +243,29 @@ def _value(key: str, value: object) -> Any:
             raise ModelFileError(f"{error}, got {shown(value)}{instead}") from None
 
 
-def read_tables(text: str, tables: dict[str, Any], solver_names: Iterable[str]) -> ModelFile:
+def read_tables(
+    path: Path, text: str, tables: dict[str, Any], solver_names: Iterable[str]
+) -> ModelFile:
     """What the tables say, without the meaning of the expressions."""
     head = _entries({"name": None} | tables, HEAD, what="section")
-    units, experiment = {}, head.get("experiment", {})
+    with placed("experiment"):
+        experiment = _experiment(_entries(head.get("experiment", {}), EXPERIMENT))
+    reserved = RESERVED | set(solver_names)
+    file = ModelFile(head["name"], head.get("description", ""), experiment, path, text, reserved)
     for symbol, given in head.get("units", {}).items():
         with placed("[units]", shown(symbol)):
-            units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
-    with placed("experiment"):
-        experiment = _experiment(_entries(experiment, EXPERIMENT))
-    file = ModelFile(head["name"], head.get("description", ""), experiment, text)
-    reserved = RESERVED | set(solver_names)
+            file.units[symbol] = _entries(given, (*BASE, ANGLE), what="base unit")
     for section in SECTIONS:
         for name, entry in head.get(section, {}).items():
-            _read_variable(file, section, name, entry, units, reserved)
+            _read_variable(file, section, name, entry)
     if not file.variables:
         raise ModelFileError("has no variables, expected a section such as [states]")
     for mode in head.get("modes", ()):
         with placed("modes", shown(mode)):
-            _check_name(mode, file, reserved)
+            _check_name(mode, file)
         file.modes.append(mode)
     for name, entry in head.get("events", {}).items():
-        _read_event(file, name, entry, reserved)
+        _read_event(file, name, entry)
     for message, condition in head.get("check", {}).items():
         place = ("[check]", shown(message))
         with placed(*place):
@@ -288,17 +285,10 @@ def _experiment(given: dict[str, float]) -> dict[str, float]:
     return found
 
 
-def _read_variable(
-    file: ModelFile,
-    section: str,
-    name: str,
-    entry: object,
-    units: dict[str, dict[str, int]],
-    reserved: set[str],
-) -> None:
+def _read_variable(file: ModelFile, section: str, name: str, entry: object) -> None:
     place = (f"[{section}]", name if NAME.fullmatch(name) else shown(name))
     with placed(*place):
-        _check_name(name, file, reserved)
+        _check_name(name, file)
         given = {"start": 0.0} if section in ("inputs", "states") else {}
         if section == "where":
             texts = {"": entry}
@@ -307,8 +297,8 @@ def _read_variable(
             texts = {key: given.pop(key) for key in ("derivative", "value") if key in given}
         variable = Variable(name, section, **given)
         with placed("unit"):
-            known = variable.unit in units
-            variable.exponents = units[variable.unit] if known else exponents(variable.unit or "1")
+            unit = variable.unit or "1"
+            variable.exponents = file.units[unit] if unit in file.units else exponents(unit)
         _check_range(variable)
     for key, text in texts.items():
         whole = (*place, key) if key else place
@@ -316,10 +306,10 @@ def _read_variable(
     file.variables[name] = variable
 
 
-def _check_name(name: str, file: ModelFile, reserved: set[str]) -> None:
+def _check_name(name: str, file: ModelFile) -> None:
     if not NAME.fullmatch(name):
         raise ModelFileError("expected a name: a letter, then letters, digits, _")
-    if name in reserved or name.startswith("der_"):
+    if name in file.reserved or name.startswith("der_"):
         raise ModelFileError("this name is reserved, choose another one")
     if name in file.variables:
         raise ModelFileError(f"this name is in [{file.variables[name].section}] already")
@@ -338,29 +328,25 @@ def _check_range(variable: Variable) -> None:
         raise ModelFileError(f"nominal = {variable.nominal:g}: expected a number above 0")
 
 
-def _read_event(file: ModelFile, name: str, entry: object, reserved: set[str]) -> None:
+def _read_event(file: ModelFile, name: str, entry: object) -> None:
     place = f"[events.{name if NAME.fullmatch(name) else shown(name)}]"
     with placed(place):
-        _check_name(name, file, reserved)
-        given = {"reinit": {}, "set": {}} | _entries(entry, EVENT, "when")
-        states = [variable.name for variable in file.of("states")]
-        for key, known, what in (
-            ("reinit", states, "a state"),
-            ("set", file.modes, "one of modes"),
-        ):
-            for changed in given[key]:
-                if changed not in known:
-                    raise ModelFileError(f"{key}: expected {what}, got {shown(changed)}")
+        _check_name(name, file)
+        given = _entries(entry, EVENT, "when")
+
+    def changes(key: str, kind: str, known: Collection[str], what: str) -> dict[str, Expression]:
+        found = {}
+        for target, text in given.get(key, {}).items():
+            if target not in known:
+                raise ModelFileError(f"{place}: {key}: expected {what}, got {shown(target)}")
+            whole = (place, f"{key}: {target}")
+            found[target] = Expression(whole, text, kind, target, event="then")
+        return found
+
     when = Expression((place, "when"), given["when"], CONDITION, event="when")
     if when.tree.op not in RELATIONS:
         raise ModelFileError(f"{place}: when: expected one relation such as h < 0")
     during = Expression((place, "while"), given["while"], CONDITION) if "while" in given else None
-    reinit = {
-        state: Expression((place, f"reinit: {state}"), text, NUMBER, state, event="then")
-        for state, text in given["reinit"].items()
-    }
-    modes = {
-        mode: Expression((place, f"set: {mode}"), text, CONDITION, event="then")
-        for mode, text in given["set"].items()
-    }
+    reinit = changes("reinit", NUMBER, [state.name for state in file.of("states")], "a state")
+    modes = changes("set", CONDITION, file.modes, "one of modes")
     file.events.append(Event(name, when, during, reinit, modes))

@@ -93,6 +93,11 @@ class Graph:
     relations: dict[str, Relation] = field(default_factory=dict)
     has_switches: bool = True  # else relations are evaluated with the values
 
+    @property
+    def located(self) -> list[Relation]:
+        """Relations with an indicator: those whose time is not known before."""
+        return [relation for relation in self.relations.values() if relation.time is None]
+
     def value(self, op: str, *arguments: Value, name: str = "", number: float = 0.0) -> Value:
         """The operation as it is."""
         key = (op, tuple(map(id, arguments)), name, number.hex())

@@ -4,13 +4,13 @@ Every mistake is a ModelFileError: file, line, section, name, column and what wa
 line.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
+
+from declaration.files import shown
 
 from equations.file_tables import (
     ModelFile,
@@ -18,7 +18,6 @@ from equations.file_tables import (
     Variable,
     placed,
     read_tables,
-    shown,
     tables_of,
 )
 from rparm.expressions.kinds import check_kinds
@@ -40,7 +39,7 @@ def read(path: Path, solver_names: Iterable[str] = ()) -> ModelFile:
     with placed(path):
         text, tables = tables_of(path)
         try:
-            file = read_tables(text, tables, solver_names)
+            file = read_tables(path, text, tables, solver_names)
             _check_names(file)
             _find_meaning(file)
         except ModelFileError as error:

@@ -11,7 +11,8 @@ import numpy as np
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from equations import c_model, declaration, lock  # noqa: E402
+from building import lock  # noqa: E402
+from equations import c_model, declaration  # noqa: E402
 from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
 
 __all__ = ["Model", "ModelFileError", "c_model", "declaration", "declared", "lock", "read_text"]
