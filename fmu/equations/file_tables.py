@@ -179,11 +179,15 @@ def tables_of(path: Path) -> tuple[str, dict[str, Any]]:
     if len(content) > LARGEST:
         raise ModelFileError(f"has {len(content)} bytes, expected at most {LARGEST}")
     try:
-        text = content.decode("utf-8").replace("\r\n", "\n")
+        text = content.decode("utf-8-sig").replace("\r\n", "\n")
         return text, tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        reason = " ".join(str(error).split()) or "too many levels"
-        raise ModelFileError(f"is not valid TOML: {reason:.200}") from None
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise ModelFileError(f"line {line}: is not UTF-8: save it in this encoding") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ModelFileError(f"is not valid TOML: {' '.join(str(error).split()):.200}") from None
+    except (ValueError, RecursionError):
+        raise ModelFileError("has a number or a table that is too long") from None
 
 
 def _expect(what: str, kind: type, fits: Callable[[Any], object] = bool) -> Callable[[Any], Any]:
@@ -227,15 +231,16 @@ def _entries(
         raise ModelFileError(f"expected a table such as {{ {example} = ... }}, got {shown(table)}")
     for key in table:
         if key not in known:
+            place = f"[{key}]: " if what == "section" else ""
             listed = f"unknown {what} {shown(key)}, expected one of {', '.join(known)}"
-            raise ModelFileError(listed + _instead(key))
+            raise ModelFileError(place + listed + _instead(key))
     if needed and needed not in table:
         raise ModelFileError(f"{needed} is missing")
-    return {key: _value(key, value) for key, value in table.items()}
+    return {key: _value(key, value, what) for key, value in table.items()}
 
 
-def _value(key: str, value: object) -> Any:
-    with placed(key):
+def _value(key: str, value: object, what: str) -> Any:
+    with placed(f"[{key}]" if what == "section" and key in TABLES else key):
         try:
             return READ[key](value) if key in READ else value
         except ValueError as error:
@@ -247,8 +252,8 @@ def read_tables(
     path: Path, text: str, tables: dict[str, Any], solver_names: Iterable[str]
 ) -> ModelFile:
     """What the tables say, without the meaning of the expressions."""
-    head = _entries({"name": None} | tables, HEAD, what="section")
-    with placed("experiment"):
+    head = _entries(tables, HEAD, "name", "section")
+    with placed("[experiment]"):
         experiment = _experiment(_entries(head.get("experiment", {}), EXPERIMENT))
     reserved = RESERVED | set(solver_names)
     file = ModelFile(head["name"], head.get("description", ""), experiment, path, text, reserved)

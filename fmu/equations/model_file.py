@@ -7,6 +7,7 @@ line.
 import math
 import re
 from collections.abc import Iterable
+from difflib import get_close_matches
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from equations.file_tables import (
     tables_of,
 )
 from rparm.expressions.kinds import check_kinds
-from rparm.expressions.tree import in_order, names
+from rparm.expressions.tree import CONSTANTS, ExpressionError, in_order, names
 from rparm.expressions.units import BASE, ONE, Unit, times, unit_of, unit_of_exponents
 from rparm.expressions.units import shown as unit_shown
 
@@ -56,32 +57,36 @@ def _line(text: str, message: str) -> str:
         head = re.sub(QUOTES, "", place[1][1:-1])
         plain = [re.sub(QUOTES, "", line.partition("#")[0]) for line in lines]
         # the table itself, else one below it, else its line in the table above
-        heads = [i for i, line in enumerate(plain, 1) if line == f"[{head}]"]
+        heads = [i for i, line in enumerate(plain, 1) if line in (f"[{head}]", f"[[{head}]]")]
         heads = heads or [i for i, line in enumerate(plain, 1) if line.startswith(f"[{head}.")]
         if not heads:
             above, _, key = head.rpartition(".")
             heads = [i for i, line in enumerate(plain, 1) if line == f"[{above}]"]
-        begin = heads[0] if len(heads) == 1 else len(lines)
+            heads = heads if above else [0]
+        begin = heads[0] if len(heads) == 1 else len(lines) + 1
     for i, line in enumerate(lines[begin:], begin + 1):
         if line.lstrip().startswith("["):
             break
-        if key and re.match(rf"\s*[\"']?{key}\b.*=", line):
+        if key and re.match(rf"\s*[\"']?{re.escape(key)}\b.*=", line):
             return f"line {i}: "
-    return f"line {begin}: " if 0 < begin < len(lines) else ""
+    return f"line {begin}: " if 0 < begin <= len(lines) else ""
 
 
 def _check_names(file: ModelFile) -> None:
     """Check the names and kinds in all expressions."""
-    known = {*file.variables, *file.modes, "time"}
-    parameters = {variable.name for variable in file.of("parameters")}
+    known = {*file.variables, *file.modes, "time", *CONSTANTS}
+    parameters = {variable.name for variable in file.of("parameters")} | {*CONSTANTS}
     for expressions, allowed, mistake in (
         (file.assigned, known, "unknown name {}"),
         (file.checks.values(), parameters, "{} is no parameter"),
     ):
         for expression in expressions:
             with placed(*expression.place):
-                for name in sorted(names(expression.tree) - allowed):
-                    raise ModelFileError(mistake.format(shown(name)))
+                for node in in_order([expression.tree]):
+                    if node.name and node.name not in allowed:
+                        meant = get_close_matches(node.name, allowed, n=1)
+                        hint = f", did you mean {meant[0]!r}?" if meant else ""
+                        raise ExpressionError(node.column, mistake.format(shown(node.name)) + hint)
                 check_kinds(expression.tree, expression.kind, file.modes)
 
 
