@@ -11,8 +11,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from building import lock
-from equations import declaration
+from equations import declaration, lock
 from equations.model_file import ModelFileError, read
 from generate import write_if_changed
 

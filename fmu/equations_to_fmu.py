@@ -11,12 +11,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-from building import lock
 from building.contents import PLACES, build
 from building.runtime import Runtime
 from declaration.load import DeclarationError
 from document import DocumentError
-from equations import declaration
+from equations import declaration, lock
 from equations.model_file import ModelFileError, read
 from package import pack
 from source_code import SourceCodeError

@@ -2,7 +2,6 @@
 
 A module each; a module imports only from lines above its own:
 
-    lock        value references that stay, in a file beside the model
     runtime     what FMUs are linked with, and the compiler
     contents    what they consist of
 """

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from equations.model_file import ModelFileError
+from equations_file.tables import ModelFileError
 from source_code import Library, Manifest, manifest
 
 SYSTEM_COMPILERS = ("gcc", "clang")

@@ -2,10 +2,11 @@
 
 from itertools import chain
 
+from equations_file.tables import ModelFile
+
 from equations.c_code import Code, filled, text
 from equations.c_events import FIELD, Events, arrays, leaves
 from equations.c_series import Series
-from equations.file_tables import ModelFile
 
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"

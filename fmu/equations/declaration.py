@@ -6,10 +6,10 @@ import string
 
 from declaration.files import read as read_declaration
 from declaration.load import UNITS
+from equations_file.tables import NUMBERS, ModelFile, Variable, placed
 
 from equations import c_model
 from equations.c_events import FIELD, INDICATOR, MODE
-from equations.file_tables import NUMBERS, ModelFile, Variable, placed
 from equations.graph import MOVING, Relation, Value
 from rparm.expressions.units import shown
 

@@ -11,8 +11,8 @@ import numpy as np
 from tests.support.paths import ROOT
 
 sys.path.insert(0, str(ROOT / "fmu"))
-from building import lock, runtime  # noqa: E402
-from equations import c_model, declaration  # noqa: E402
+from building import runtime  # noqa: E402
+from equations import c_model, declaration, lock  # noqa: E402
 from equations.model_file import ModelFile, ModelFileError, read  # noqa: E402
 
 __all__ = [

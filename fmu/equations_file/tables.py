@@ -13,7 +13,6 @@ from typing import Any
 
 from declaration.files import shown
 
-from equations.graph import Graph, Value
 from rparm.expressions.kinds import CONDITION, NUMBER
 from rparm.expressions.numbers import finite_number
 from rparm.expressions.parser import parse
@@ -70,7 +69,7 @@ class Expression:
     is_rate: bool = False  # of the target
     event: str = ""  # "when" one happens, or "then"
     tree: Node = field(init=False)
-    value: Value = field(init=False)  # as a graph
+    value: Any = field(init=False)  # what a generator makes of it
 
     def __post_init__(self) -> None:
         with placed(*self.place):
@@ -96,11 +95,11 @@ class Variable:
     exponents: dict[str, int] = field(default_factory=dict)  # of the base units and rad
     description: str = ""
     expression: Expression | None = None  # derivative of a state, value of others
-    leaf: Value | None = None  # of a parameter, input or state
+    leaf: Any = None  # what a generator makes of a parameter, input or state
     arguments: tuple[Variable, ...] = ()  # those of [where] and [outputs] that it names
 
     @property
-    def value(self) -> Value:
+    def value(self) -> Any:
         """What the expression calculates."""
         return self.expression.value
 
@@ -137,7 +136,8 @@ class ModelFile:
     variables: dict[str, Variable] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
     checks: dict[str, Expression] = field(default_factory=dict)  # conditions by message
-    graph: Graph = field(default_factory=Graph)
+    order: list[Expression] = field(default_factory=list)  # each after those that it names
+    graph: Any = None  # what a generator makes of it
 
     @property
     def has_units(self) -> bool:

@@ -9,8 +9,9 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
+from equations_file.tables import NAME, ModelFileError
+
 from equations.declaration import Key
-from equations.file_tables import NAME, ModelFileError
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 9999
