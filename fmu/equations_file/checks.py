@@ -66,7 +66,7 @@ def _line(text: str, message: str) -> str:
     for i, line in enumerate(lines[begin:], begin + 1):
         if line.lstrip().startswith("["):
             break
-        if key and re.match(rf"\s*[\"']?{re.escape(key)}\b.*=", line):
+        if key and re.match(rf"\s*[\"']?{re.escape(key)}(?![\w-]).*=", line):
             return f"line {i}: "
     return f"line {begin}: " if 0 < begin <= len(lines) else ""
 

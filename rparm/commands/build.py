@@ -1,6 +1,8 @@
 """`build`: makes FMUs of a file with equations."""
 
 import argparse
+import errno
+import os
 import shutil
 import subprocess
 import sys
@@ -76,6 +78,10 @@ def _build(options: argparse.Namespace, runtimes: list[Path], work: Path) -> lis
 
 def _put(files: dict[Path, Path]) -> None:
     """Copy files to the places that are their keys: all, or none if one fails."""
+    for place in files:
+        with written(place):
+            if place.is_dir():  # else the others would be there when it fails
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
     with uninterrupted(), ExitStack() as stack:
         for place, file in files.items():
             with written(place):

@@ -34,6 +34,7 @@ MISTAKES = {
     "bad name": ('name = "a b"', "name: expected a letter"),
     "nothing": (HEAD, "has no variables"),
     "section": (HEAD + "[state]\n", "line 2: [state]: unknown section 'state'"),
+    "odd key at the top": ("de- = 'x'\n" + STATE, "line 1: [de-]: unknown section 'de-'"),
     "key at the top": ("title = 'x'\n" + STATE, "line 1: [title]: unknown section 'title'"),
     "tables of an array": (HEAD + "\n[[inputs]]\n", "line 3: [inputs]: expected a table, got"),
     "key": (HEAD + "[parameters]\np = { start = 1, units = 'm' }", "[parameters]: p: unknown key"),
@@ -247,7 +248,7 @@ def read_mutations(folder: Path, seed: int, count: int) -> int:
             message = str(error)
             assert "\n" not in message and len(message) < 1000
             # what is not in the file at all has no line
-            assert re.search(r"line [0-9]+|end of|has no|name is missing", message)
+            assert re.search(r"line [0-9]+|end of|unknown section|has no|name is missing", message)
         assert time.process_time() - began < 2, text
     return accepted
 
