@@ -14,6 +14,12 @@ from equations.guards import guards
 FIELD = "v_{}"
 MODE = "m_{}"
 INDICATOR = "z_{}"
+NEXT_TIME = [
+    "static double next_time(const void *values) {",
+    "    return relations_next_time(&relations, ROOM, values);",
+    "}",
+    "",
+]
 
 
 def leaves(file: ModelFile) -> Leaves:
@@ -105,7 +111,8 @@ class Events:
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
             modes=2 + len(self.relations) + len(file.events) + len(file.modes),
             located=len(self.located),
-            next_time="next_time" if timed else "NULL",
+            next_time=NEXT_TIME if timed else [],
+            timed=[".next_time = next_time,"] if timed else [],
             table=table,
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
             indicators=Code(arrays(file)).assign(indicators).lines,
