@@ -1,6 +1,7 @@
-"""Builds FMUs of one file with equations, for FMI 2.0 and 3.0; prints their paths.
+"""Builds FMUs of one file with equations, for FMI 2.0 and 3.0, and its lock file.
 
-Beside the file the lock file is written, which keeps the value references.
+Prints the names of the files in the folder of the output: first the lock file, which is to replace
+the one beside the file with equations.
 """
 
 from __future__ import annotations
@@ -8,17 +9,14 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
+from building.contents import PLACES, build
+from building.runtime import Runtime
 from declaration.load import DeclarationError
 from document import DocumentError
 from equations import declaration, lock
-from equations.building import PLACES, build
 from equations.model_file import ModelFileError, read
-from equations.runtime import Runtime
-from generate import write_if_changed
 from package import pack
 from source_code import SourceCodeError
 
@@ -29,7 +27,7 @@ def main() -> int:
     """Build; 2 with a line on standard error where something is wrong."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("file", type=Path, help="the file of the model")
-    parser.add_argument("--output", type=Path, required=True, help="folder for the FMUs")
+    parser.add_argument("--output", type=Path, required=True, help="folder for the files")
     parser.add_argument(
         "--runtime", type=Path, nargs="+", required=True, help="runtime.json of each platform"
     )
@@ -44,28 +42,18 @@ def main() -> int:
         runtimes = [Runtime.load(path, arguments.of_this_machine) for path in arguments.runtime]
         with tempfile.TemporaryDirectory() as work:
             built = build(file, references, runtimes, Path(work).resolve())
-            # all that can go wrong in the model has gone right: nothing is written before
-            with _written(lock_file):
-                write_if_changed(lock_file, lock.text(file.name, references))
-            paths = []
+            (arguments.output / lock_file.name).write_text(
+                lock.text(file.name, references), encoding="utf-8", newline="\n"
+            )
+            names = [lock_file.name]
             for version, entries in built.items():
-                paths.append(arguments.output / PLACES[version] / f"{file.name}.fmu")
-                with _written(paths[-1]):
-                    pack(paths[-1], entries)
+                names.append((Path(PLACES[version]) / f"{file.name}.fmu").as_posix())
+                pack(arguments.output / names[-1], entries)
     except MISTAKES as error:
         print(f"{error!s:.2000}", file=sys.stderr)
         return 2
-    print("\n".join(map(str, paths)))
+    print("\n".join(names))
     return 0
-
-
-@contextmanager
-def _written(path: Path) -> Iterator[None]:
-    """Say that this file cannot be written where something of the system's fails."""
-    try:
-        yield
-    except OSError as error:
-        raise ModelFileError(f"{path}: cannot be written: {error.strerror}") from None
 
 
 if __name__ == "__main__":

@@ -135,7 +135,8 @@ function(add_release)
 
   set(wheel ${RELEASE_FOLDER}/rparm-${PROJECT_VERSION}-py3-none-any.whl)
   file(GLOB_RECURSE packaged CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/rparm/* ${PROJECT_SOURCE_DIR}/models/*
-       ${PROJECT_SOURCE_DIR}/fmu/*.py ${PROJECT_SOURCE_DIR}/fmu/*.toml ${PROJECT_SOURCE_DIR}/fmu/*.css)
+       ${PROJECT_SOURCE_DIR}/fmu/*.py ${PROJECT_SOURCE_DIR}/fmu/*.toml ${PROJECT_SOURCE_DIR}/fmu/*.in ${PROJECT_SOURCE_DIR}/fmu/*.css
+       ${PROJECT_SOURCE_DIR}/src/instance/*.toml)
   list(FILTER packaged EXCLUDE REGEX __pycache__)
   add_custom_command(
     OUTPUT ${wheel}

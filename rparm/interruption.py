@@ -4,12 +4,14 @@ An exception of a signal comes between any two instructions: also between the ma
 or of a process, and the assignment that remembers it.
 """
 
+import os
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import NoReturn
+from typing import Any, NoReturn
 
 # Windows has no SIGHUP, SIGBREAK is its Ctrl-Break and closed console
 ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
@@ -72,3 +74,33 @@ def temporary_folder(within: Path | None = None) -> Iterator[Path]:
     finally:
         with uninterrupted():
             folder.cleanup()
+
+
+def run_group(command: Sequence[object], **options: Any) -> subprocess.CompletedProcess:
+    """Run a program to its end, as subprocess.run does; `options` are those of Popen.
+
+    If this is interrupted, it is killed, with the programs that it started where there are process
+    groups: they write files, too.
+    """
+    child = None
+    try:
+        with uninterrupted():
+            child = subprocess.Popen(
+                command, process_group=0 if os.name == "posix" else None, **options
+            )
+        output, errors = child.communicate()
+    except BaseException:
+        if child is not None:
+            with uninterrupted():
+                _kill(child)
+                child.communicate()
+        raise
+    return subprocess.CompletedProcess(command, child.returncode, output, errors)
+
+
+def _kill(child: subprocess.Popen) -> None:
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError):  # it has just ended
+            os.killpg(child.pid, signal.SIGKILL)
+    else:
+        child.kill()

@@ -23,6 +23,8 @@ from declaration.schema import (
     Variable,
 )
 
+LONGEST_SHOWN = 60  # characters of a value in a message
+
 
 class DeclarationError(Exception):
     """A variables.toml that cannot be used: file, place and reason in one line."""
@@ -150,6 +152,7 @@ def keys_of(table: type[Table]) -> list[str]:
 def shown(value: object) -> str:
     """Short form of a value; an integer may have more digits than Python writes."""
     try:
-        return f"{value!r:.40}"
+        text = repr(value)
     except ValueError:
         return "a very large number"
+    return text if len(text) <= LONGEST_SHOWN else text[: LONGEST_SHOWN - 3] + "..."

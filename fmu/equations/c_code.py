@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
-from string import Template
 
 from equations.graph import CONDITIONS, LEAVES, Value
 from rparm.expressions.tree import RELATIONS, in_order
@@ -86,19 +85,14 @@ def indented(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
-@cache
-def _template(name: str) -> list[str]:
-    return (Path(__file__).parent / name).read_text(encoding="utf-8").splitlines()
+def filled(template: str, **parts: object) -> str:
+    """Text of a file of this folder; a line that is only $NAME becomes those of that part."""
 
+    def filled_in(found: re.Match[str]) -> str:
+        indent, lines, within = found.groups()
+        if within:
+            return str(parts[within])
+        return "".join(f"{indent}{line}\n" for line in parts[lines])
 
-def filled(template: str, **parts: object) -> list[str]:
-    """Lines of a file of this folder; a line that is only $NAME becomes those of that part."""
-    lines = []
-    for line in _template(template):
-        before, _, name = line.partition("$")
-        part = parts.get(name)
-        if isinstance(part, list) and not before.strip():
-            lines += [before + inner for inner in part]
-        else:
-            lines.append(Template(line).substitute(parts) if name else line)
-    return lines
+    text = (Path(__file__).parent / template).read_text(encoding="utf-8")
+    return re.sub(r"^( *)\$(\w+)\n|\$(\w+)", filled_in, text, flags=re.MULTILINE)

@@ -5,25 +5,29 @@ mode, and 1 while no value that is needed reads it. An event of the file fires w
 comes to hold in its modes. What all models do with that is in src/model/relations.c.
 """
 
-from __future__ import annotations
+from equations_file.tables import Event, ModelFile
 
 from equations.c_code import Code, Leaves, filled, indented, text
-from equations.file_tables import Event, ModelFile
 from equations.graph import MOVING, Relation, Value
 from equations.guards import guards
 
 FIELD = "v_{}"
 MODE = "m_{}"
 INDICATOR = "z_{}"
+NEXT_TIME = [
+    "static double next_time(const void *values) {",
+    "    return relations_next_time(&relations, ROOM, values);",
+    "}",
+    "",
+]
 
 
 def leaves(file: ModelFile) -> Leaves:
     """Where functions of value structures have the leaves, and their derivatives along a curve."""
     found = {("time", ""): "t", ("first", ""): "dt"}
-    for section, op in (("parameters", "parameter"), ("inputs", "input"), ("states", "state")):
-        for field in (variable.name for variable in file.of(section)):
-            for kind, structure in ((op, "values"), ("first", "d"), ("second", "dd")):
-                found[kind, field] = f"{structure}->{FIELD.format(field)}"
+    for v in file.of("parameters", "inputs", "states"):
+        for op, structure in ((v.leaf.op, "values"), ("first", "d"), ("second", "dd")):
+            found[op, v.name] = f"{structure}->{FIELD.format(v.name)}"
     found |= {("mode", mode): f"values->{MODE.format(mode)}" for mode in file.modes}
     relations = enumerate(file.graph.relations)
     return found | {("mode", name): f"values->relations[{i}]" for i, name in relations}
@@ -48,20 +52,19 @@ class Events:
             read += [(event.when.value, during), *([(during, None)] if during else [])]
         used = guards(graph, read)
         # condition under which each matters; None: always
-        self.used = [used.get(relation.mode, graph.number(0.0)) for relation in self.relations]
-        self.located = [relation for relation in self.relations if relation.time is None]
+        self.used = {r.name: used.get(r.mode, graph.number(0.0)) for r in self.relations}
+        self.located = graph.located
 
     def __bool__(self) -> bool:
         return bool(self.relations)
 
     def indicators(self) -> dict[str, Value]:
         """Indicators by their fields: signed distances, or 1."""
-        found = {}
-        for relation, used in zip(self.relations, self.used, strict=True):
-            if relation.time is None:
-                z = self.signed(relation)
-                z = z if used is None else self.graph.value("if", used, z, self.graph.number(1.0))
-                found[INDICATOR.format(relation.name)] = z
+        one, found = self.graph.number(1.0), {}
+        for relation in self.located:
+            z, used = self.signed(relation), self.used[relation.name]
+            z = z if used is None else self.graph.value("if", used, z, one)
+            found[INDICATOR.format(relation.name)] = z
         return found
 
     def signed(self, relation: Relation) -> Value:
@@ -108,7 +111,8 @@ class Events:
             has_inputs=int(any(r.is_of_inputs for r in self.relations)),
             modes=2 + len(self.relations) + len(file.events) + len(file.modes),
             located=len(self.located),
-            next_time="next_time" if timed else "NULL",
+            next_time=NEXT_TIME if timed else [],
+            timed=[".next_time = next_time,"] if timed else [],
             table=table,
             nominal=", ".join(str(float(v.nominal or 1.0)) for v in states) or "1.0",
             indicators=Code(arrays(file)).assign(indicators).lines,
@@ -120,24 +124,22 @@ class Events:
             ],
             descriptions=self._describe(),
             names=", ".join([text(f"indicator {r.name}") for r in self.located] or ["NULL"]),
-        )
+        ).splitlines()
 
     def _compare(self) -> list[str]:
-        graph, code = self.graph, Code(leaves(self.file))
-        states = [graph.value("state", name=v.name) for v in self.file.of("states")]
-        one, time = graph.number(1.0), graph.value("time")
-        motion = {x: v.value for x, v in zip(states, self.file.of("states"), strict=True)}
-        lines = []
+        graph, code, lines = self.graph, Code(leaves(self.file)), []
+        time, states = graph.value("time"), self.file.of("states")
+        motion = {x.leaf: x.value for x in states} | {time: graph.number(1.0)}
+        errors = {x.leaf: f"fabs({{}}) * tolerance[{i}]" for i, x in enumerate(states)}
+        errors[time] = "1e-12 * fabs({}) * fmax(1.0, fabs(t))"
         for k, relation in enumerate(self.relations):
-            distance, used, noise = relation.distance, self.used[k], []
-            (slope,) = graph.derivatives([distance], {**motion, time: one})
-            for i, x in enumerate(states if relation.time is None else []):
-                if x.leaves <= distance.leaves:
-                    (factor,) = graph.derivatives([distance], {x: one})
-                    noise.append(f"fabs({code.of(factor)}) * tolerance[{i}]")
-            if relation.time is None and time.leaves <= distance.leaves:
-                (rate,) = graph.derivatives([distance], {time: one})
-                noise.append(f"1e-12 * fabs({code.of(rate)}) * fmax(1.0, fabs(t))")
+            distance, used = relation.distance, self.used[relation.name]
+            noise = [
+                error.format(code.of(graph.derivative(distance, x)))
+                for x, error in errors.items()
+                if relation.time is None and x.leaves <= distance.leaves
+            ]
+            (slope,) = graph.derivatives([distance], motion)
             lines += [
                 f"compared[{k}].distance = {code.of(distance)};",
                 f"compared[{k}].slope = {code.of(slope)};",
@@ -166,32 +168,29 @@ class Events:
         return [f"if (event == {index}) {{", *indented(code.lines + lines), "}"]
 
     def _describe(self) -> list[str]:
-        code, index = Code(leaves(self.file)), 0
-        for relation, used in zip(self.relations, self.used, strict=True):
-            if relation.time is None:
-                found = self._described(code, relation)
-                if used is not None:
-                    found = f"{code.of(used)} ? {found} : unused"
-                code.lines.append(f"indicator[{index}] = {found};")
-                index += 1
+        code = Code(leaves(self.file))
+        for i, relation in enumerate(self.located):
+            found, used = self._described(code, relation), self.used[relation.name]
+            if used is not None:
+                found = f"{code.of(used)} ? {found} : unused"
+            code.lines.append(f"indicator[{i}] = {found};")
         return code.lines
 
     def _described(self, code: Code, relation: Relation) -> str:
         """How an indicator follows from the states: from one by a factor, if it can be."""
-        graph, zero = self.graph, self.graph.number(0.0)
-        distance = relation.distance
+        distance, zero = relation.distance, self.graph.number(0.0)
         moving = [leaf for leaf in distance.leaves if leaf[0] in MOVING]
         if len(moving) == 1 and moving[0][0] == "state":
-            name = moving[0][1]
-            x, rate = graph.value("state", name=name), self.file.variables[name].value
-            (factor,) = graph.derivatives([distance], {x: graph.number(1.0)})
+            place, x = next(
+                (i, x) for i, x in enumerate(self.file.of("states")) if x.name == moving[0][1]
+            )
+            factor = self.graph.derivative(distance, x.leaf)
             if not factor.moves:
-                rate = zero if ("time", "") in rate.leaves else rate  # the time is unknown here
+                rate = zero if ("time", "") in x.value.leaves else x.value  # unknown here
                 at_zero = Code({**code.leaves, moving[0]: "0.0"}, f"o{len(code.lines)}_")
                 offset = at_zero.of(distance)
                 code.lines += at_zero.lines
-                place = [v.name for v in self.file.of("states")].index(name)
-                given = [code.of(v) for v in (relation.mode, factor, rate)]
-                return f"relations_of_state({place}, {given[0]}, {given[1]}, {offset}, {given[2]})"
+                holds, factor, rate = (code.of(v) for v in (relation.mode, factor, rate))
+                return f"relations_of_state({place}, {holds}, {factor}, {offset}, {rate})"
         limit = code.of(relation.limit or zero)
         return f"(struct indicator){{.kind = INDICATOR_OF_MODEL, .offset = fabs({limit})}}"

@@ -1,12 +1,12 @@
 """The model in C: equations.h with its value structure, equations.c with its struct model."""
 
-from __future__ import annotations
+from itertools import chain
 
-from equations.c_code import Code, filled, indented, text
+from equations_file.tables import ModelFile
+
+from equations.c_code import Code, filled, text
 from equations.c_events import FIELD, Events, arrays, leaves
 from equations.c_series import Series
-from equations.file_tables import ModelFile
-from equations.graph import Value
 
 RATE = "d_{}"  # fields have prefixes, so that any name of a variable will do
 STRUCTURE = "struct equations_values"
@@ -24,33 +24,27 @@ def header(file: ModelFile) -> str:
     fields = []
     for title, names in groups.items():
         fields += [f"/* {title} */", *(f"double {name};" for name in names)] if names else []
-    return _text(filled("equations.h.in", fields=fields + events.fields()))
+    return filled("equations.h.in", fields=fields + events.fields())
 
 
 def source(file: ModelFile) -> str:
     """Text of equations.c."""
     events = Events(file)
-    return _text(
-        filled(
-            "equations.c.in",
-            **_smooth(file),
-            **_series(file, events),
-            **_calculated(file, events),
-            events=events.functions(),
-            followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
-            checks=_checks(file),
-            ranges=[
-                f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"
-                for name, fields in _ranges(file).items()
-                if fields
-            ],
-            model_events=[".events = &events,"] if events else [],
-        )
+    return filled(
+        "equations.c.in",
+        **_smooth(file),
+        **_series(file, events),
+        **_calculated(file, events),
+        events=events.functions(),
+        followed=[f"{STRUCTURE} copy;", f"values = {FOLLOWED};"] if events else [],
+        checks=_checks(file),
+        ranges=[
+            f".{name} = {{offsetof({STRUCTURE}, {fields[0]}), {len(fields)} * sizeof(double)}},"
+            for name, fields in _ranges(file).items()
+            if fields
+        ],
+        model_events=[".events = &events,"] if events else [],
     )
-
-
-def _text(lines: list[str]) -> str:
-    return "\n".join(lines) + "\n"
 
 
 def _ranges(file: ModelFile) -> dict[str, list[str]]:
@@ -64,16 +58,10 @@ def _ranges(file: ModelFile) -> dict[str, list[str]]:
 
 def _smooth(file: ModelFile) -> dict[str, list[str]]:
     """What the methods of integration evaluate, a smooth function between events."""
-    graph, rates = file.graph, [state.value for state in file.of("states")]
-    one = graph.number(1.0)
-    columns = [
-        graph.derivatives(rates, {graph.value("state", name=state.name): one})
-        for state in file.of("states")
-    ]
-    parts = {
-        "right_hand_side": ("dx", rates),
-        "jacobian": ("J", [entry for column in columns for entry in column]),
-    }
+    one, states = file.graph.number(1.0), file.of("states")
+    rates = [state.value for state in states]
+    columns = [file.graph.derivatives(rates, {state.leaf: one}) for state in states]
+    parts = {"right_hand_side": ("dx", rates), "jacobian": ("J", chain(*columns))}
     return {
         part: Code(arrays(file)).assign({f"{name}[{i}]": v for i, v in enumerate(values)}).lines
         for part, (name, values) in parts.items()
@@ -81,7 +69,7 @@ def _smooth(file: ModelFile) -> dict[str, list[str]]:
 
 
 def _series(file: ModelFile, events: Events) -> dict[str, object]:
-    rates = {file.graph.value("state", name=v.name): v.value for v in file.of("states")}
+    rates = {state.leaf: state.value for state in file.of("states")}
     followed = [events.signed(relation) for relation in events.located]
     series = Series(file.graph, rates, followed, leaves(file))
     rows = [str(row) for row in series.row_of_followed]
@@ -98,12 +86,10 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
     fields = {RATE.format(state.name): state.value for state in file.of("states")}
     fields |= {FIELD.format(v.name): v.value for v in file.of("where", "outputs")}
     fields |= events.indicators()
-    seeds: dict[Value, Value] = {}
-    for op, name in leaves(file):
-        if op in ("parameter", "input", "state", "time"):
-            first = seeds[graph.value(op, name=name)] = graph.value("first", name=name)
-            if name:  # the time has no second derivative
-                seeds[first] = graph.value("second", name=name)
+    seeds = {graph.value("time"): graph.value("first")}  # it has no second derivative
+    for variable in file.of("parameters", "inputs", "states"):
+        first = seeds[variable.leaf] = graph.value("first", name=variable.name)
+        seeds[first] = graph.value("second", name=variable.name)
     firsts = graph.derivatives(fields.values(), seeds)
     seconds = graph.derivatives(firsts, seeds)
     curve = Code(leaves(file))
@@ -120,19 +106,19 @@ def _calculated(file: ModelFile, events: Events) -> dict[str, list[str]]:
 def _checks(file: ModelFile) -> list[str]:
     """Refuses parameters that are not finite or break a condition."""
     code = Code(leaves(file))
-    conditions = [
-        (f"isfinite(values->{FIELD.format(v.name)})", f"{v.name} is not finite")
+    conditions = {
+        f"isfinite(values->{FIELD.format(v.name)})": f"{v.name} is not finite"
         for v in file.of("parameters")
-    ]
-    conditions += [(code.of(e.value), message) for message, e in file.checks.items()]
-    refused = [
-        line
-        for condition, message in conditions
-        for line in (
+    }
+    lines = []
+    for condition, message in [
+        *conditions.items(),
+        *((code.of(check.value), message) for message, check in file.checks.items()),
+    ]:
+        lines += [
             f"if (!{condition}) {{",
-            *indented([f'(void)snprintf(text, size, "%s", {text(message)});']),
+            f'    (void)snprintf(text, size, "%s", {text(message)});',
             "    return STATUS_INVALID_PARAMETERS;",
             "}",
-        )
-    ]
-    return code.lines + refused
+        ]
+    return code.lines + lines

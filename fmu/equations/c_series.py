@@ -6,8 +6,6 @@ y' = g x' with g = dy/dx, so that k y_k is the sum over i = 1 .. k of i x_i g_(k
 move is taken out of the sums, so that more of them are the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial, reduce
 

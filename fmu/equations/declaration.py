@@ -1,26 +1,24 @@
 """variables.toml of a model (declaration/schema.py), and its page."""
 
-from __future__ import annotations
-
 import json
 import re
 import string
 
 from declaration.files import read as read_declaration
 from declaration.load import UNITS
+from equations_file.tables import NUMBERS, ModelFile, Variable, placed
 
 from equations import c_model
-from equations.c_events import FIELD, INDICATOR, MODE, Events
-from equations.file_tables import NUMBERS, ModelFile, Variable, placed
-from equations.graph import MOVING, Value
-from equations.lock import Key
-from rparm.expressions.units import BASE, shown
+from equations.c_events import FIELD, INDICATOR, MODE
+from equations.graph import MOVING, Relation, Value
+from rparm.expressions.units import shown
 
 INSTANCE = UNITS.parents[2] / "src" / "instance"
 TIME = INSTANCE / "time_variable.toml"
 SOLVER = INSTANCE / "solver_variables.toml"
 EVENTS = INSTANCE / "event_variables.toml"
 
+Key = tuple[str, str]  # name and kind of a variable
 CAUSALITIES = {
     "parameters": "parameter",
     "inputs": "input",
@@ -37,23 +35,22 @@ def solver_names() -> list[str]:
 
 def keys(file: ModelFile) -> list[Key]:
     """Name and kind of each variable, in the order in which they get value references."""
-    listed = [
-        (variable.name, CAUSALITIES[variable.section]) for variable in file.variables.values()
+    return [
+        *((variable.name, CAUSALITIES[variable.section]) for variable in file.variables.values()),
+        *((f"der_{state.name}", "local") for state in file.of("states")),
+        *((mode, "mode") for mode in file.modes),
+        *((name, "local") for name in _indicators(file)),
     ]
-    listed += [(f"der_{state.name}", "local") for state in file.of("states")]
-    listed += [(mode, "mode") for mode in file.modes]
-    return listed + [(name, "local") for name in indicator_names(file)]
 
 
-def indicator_names(file: ModelFile) -> list[str]:
-    """Names of the indicators in the FMU, other than those of the file."""
-    taken = {*file.variables, *file.modes}
-    found = []
-    for relation in Events(file).located:
+def _indicators(file: ModelFile) -> dict[str, Relation]:
+    """The relations that have an indicator, by its name, which no other variable has."""
+    taken, found = {*file.variables, *file.modes}, {}
+    for relation in file.graph.located:
         name = f"indicator_{relation.name}"
         while name in taken:
             name += "_"
-        found.append(name)
+        found[name] = relation
     return found
 
 
@@ -69,21 +66,23 @@ def generated(file: ModelFile, references: dict[Key, int]) -> dict[str, str]:
 
 def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
     """Text of variables.toml."""
-    events, units, states = Events(file), _Units(file), file.of("states")
-    helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
+    relations, indicators, states = file.graph.relations, _indicators(file), file.of("states")
+    standard = {name: unit.exponents for name, unit in read_declaration(UNITS).units.items()}
+    units = dict(standard)  # those that are declared here come to it
     tables = {v.name: _entries_of(v, file, units) for v in file.variables.values()}
     for state in states:
+        rate = state.exponents | {"s": state.exponents.get("s", 0) - file.has_units}
         tables[f"der_{state.name}"] = {
             **_local(c_model.RATE.format(state.name)),
-            "unit": units.of_rate(state),
+            "unit": _unit(units, rate),
             "derivative_of": state.name,
             **_dependencies(state.value, file),
             "description": f"Derivative of {state.name} by the time",
         }
-    for mode in file.modes if events else ():
+    for mode in file.modes if relations else ():
         own = {"type": "boolean", "variability": "discrete", "description": f"Mode {mode}"}
         tables[mode] = _local(MODE.format(mode)) | own
-    for name, relation in zip(indicator_names(file), events.located, strict=True):
+    for name, relation in indicators.items():
         tables[name] = {
             **_local(INDICATOR.format(relation.name)),
             "unit": "1",
@@ -96,12 +95,13 @@ def variables_toml(file: ModelFile, references: dict[Key, int]) -> str:
         "header": "equations.h",
         "values": c_model.STRUCTURE,
         "symbol": c_model.SYMBOL,
-        "event_indicators": indicator_names(file),
-        "time_events": len(events.located) < len(events.relations),
+        "event_indicators": [*indicators],
+        "time_events": len(indicators) < len(relations),
     }
-    includes = [TIME, *([SOLVER] if states else []), *([EVENTS] if events else [])]
+    includes = [TIME, *([SOLVER] if states else []), *([EVENTS] if relations else [])]
     sections = {"model": model, "experiment": {"start": 0.0} | file.experiment}
-    sections |= {f"units.{_toml(name)}": exponents for name, exponents in units.new.items()}
+    sections |= {f"units.{_toml(n)}": units[n] for n in units if n not in standard}
+    helpers = {variable.name for variable in file.of("where")}  # last, if shown at all
     sections |= {
         f"variables.{name}": {"reference": references[name, kind], **tables[name]}
         for name, kind in sorted(keys(file), key=lambda key: key[0] in helpers)
@@ -126,7 +126,9 @@ def _local(field: str) -> dict[str, object]:
     return {"field": field, "causality": "local", "variability": "continuous"}
 
 
-def _entries_of(variable: Variable, file: ModelFile, units: _Units) -> dict[str, object]:
+def _entries_of(
+    variable: Variable, file: ModelFile, units: dict[str, dict[str, int]]
+) -> dict[str, object]:
     """Table of a variable of the file."""
     causality = CAUSALITIES[variable.section]
     entries = _local(FIELD.format(variable.name)) | {"causality": causality}
@@ -135,13 +137,24 @@ def _entries_of(variable: Variable, file: ModelFile, units: _Units) -> dict[str,
     if variable.section == "states":
         entries |= {"initial": "exact", "dependencies": [variable.name]}
         entries["reinit"] = any(variable.name in event.reinit for event in file.events)
-    with placed(f"[{variable.section}]", variable.name, "unit"):
-        entries["unit"] = units.of(variable)
+    with placed(file.path, f"[{variable.section}]", variable.name, "unit"):
+        entries["unit"] = _unit(units, variable.exponents, variable.unit)
     numbers = {key: getattr(variable, key) for key in NUMBERS}
     entries |= {key: number for key, number in numbers.items() if number is not None}
     if variable.section == "outputs":
         entries |= _dependencies(variable.value, file)
     return entries | {"description": variable.description or variable.name}
+
+
+def _unit(units: dict[str, dict[str, int]], exponents: dict[str, int], name: str = "") -> str:
+    """Name of a unit with these exponents, which is in `units` then."""
+    exponents = {base: exponent for base, exponent in exponents.items() if exponent}
+    if not name:
+        same = [other for other, unit in units.items() if unit == exponents]
+        name = same[0] if same else shown(exponents)
+    if units.setdefault(name, exponents) != exponents:
+        raise ValueError(f"{name!r} is another unit already, give it another name")
+    return name
 
 
 def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
@@ -158,48 +171,6 @@ def _dependencies(value: Value, file: ModelFile) -> dict[str, list[str]]:
         "dependencies": [name or "time" for name in ("", *file.variables) if name in moving],
         "parameters": [name for name in file.variables if name in parameters],
     }
-
-
-class _Units:
-    """Names of units; `new` are those that are declared beside units.toml."""
-
-    def __init__(self, file: ModelFile) -> None:
-        self.file = file
-        self.known = {n: unit.exponents for n, unit in read_declaration(UNITS).units.items()}
-        self.new: dict[str, dict[str, int]] = {}
-
-    def exponents(self, variable: Variable) -> dict[str, int]:
-        """Exponents of the base units; ValueError if FMI cannot say them."""
-        if not self.file.has_units:
-            return {}
-        if variable.section != "where":
-            return self.file.exponents(variable.unit or "1")
-        unit = self.file.found_units[variable.name]
-        if any(exponent.denominator > 1 for exponent in unit):
-            raise ValueError("its exponents are no whole numbers: use its square instead")
-        return {base: int(exponent) for base, exponent in zip(BASE, unit, strict=True)}
-
-    def of(self, variable: Variable) -> str:
-        """Name of a variable's unit: that of the file, if it has one."""
-        return self.named(self.exponents(variable), variable.unit)
-
-    def of_rate(self, state: Variable) -> str:
-        """Name of the unit of a state's derivative."""
-        exponents = self.exponents(state)
-        return self.named(exponents | {"s": exponents.get("s", 0) - self.file.has_units})
-
-    def named(self, exponents: dict[str, int], name: str = "") -> str:
-        """Name of a unit with these exponents."""
-        exponents = {base: exponent for base, exponent in exponents.items() if exponent}
-        known = self.known | self.new
-        if not name:
-            same = [other for other, unit in known.items() if unit == exponents]
-            name = same[0] if same else shown(exponents)
-        if known.get(name, exponents) != exponents:
-            raise ValueError(f"{name!r} is another unit already, give it another name")
-        if name not in known:
-            self.new[name] = exponents
-        return name
 
 
 def _toml(value: object) -> str:

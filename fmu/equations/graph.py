@@ -7,7 +7,7 @@ have become others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from rparm.expressions.parser import parse
@@ -21,24 +21,22 @@ PRODUCTS_UP_TO = 8  # whole exponents that are repeated multiplication
 WHOLE_UP_TO = 64  # whole exponents whose derivatives are defined at 0
 # derivatives of y = f(x) or f(x, z) by each argument
 DERIVATIVES = {
-    function: [parse(rule) for rule in rules]
-    for function, *rules in (
-        ("sin", "cos(x)"),
-        ("cos", "-sin(x)"),
-        ("tan", "1 + y * y"),
-        ("asin", "1 / sqrt(1 - x * x)"),
-        ("acos", "-1 / sqrt(1 - x * x)"),
-        ("atan", "1 / (1 + x * x)"),
-        ("atan2", "z / (x * x + z * z)", "-(x / (x * x + z * z))"),
-        ("sinh", "cosh(x)"),
-        ("cosh", "sinh(x)"),
-        ("tanh", "1 - y * y"),
-        ("exp", "y"),
-        ("log", "1 / x"),
-        ("sqrt", "0.5 / y"),
-        ("pow", "z * (y / x)", "y * log(x)"),
-    )
+    "sin": ["cos(x)"],
+    "cos": ["-sin(x)"],
+    "tan": ["1 + y * y"],
+    "asin": ["1 / sqrt(1 - x * x)"],
+    "acos": ["-1 / sqrt(1 - x * x)"],
+    "atan": ["1 / (1 + x * x)"],
+    "atan2": ["z / (x * x + z * z)", "-(x / (x * x + z * z))"],
+    "sinh": ["cosh(x)"],
+    "cosh": ["sinh(x)"],
+    "tanh": ["1 - y * y"],
+    "exp": ["y"],
+    "log": ["1 / x"],
+    "sqrt": ["0.5 / y"],
+    "pow": ["z * (y / x)", "y * log(x)"],
 }
+RULES = {function: [parse(rule) for rule in rules] for function, rules in DERIVATIVES.items()}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -95,6 +93,11 @@ class Graph:
     relations: dict[str, Relation] = field(default_factory=dict)
     has_switches: bool = True  # else relations are evaluated with the values
 
+    @property
+    def located(self) -> list[Relation]:
+        """Relations with an indicator: those whose time is not known before."""
+        return [relation for relation in self.relations.values() if relation.time is None]
+
     def value(self, op: str, *arguments: Value, name: str = "", number: float = 0.0) -> Value:
         """The operation as it is."""
         key = (op, tuple(map(id, arguments)), name, number.hex())
@@ -116,30 +119,23 @@ class Graph:
         found: dict[Node, Value] = {}
         for node in in_order([root]):
             given = [found[argument] for argument in node.arguments]
-            found[node] = self._of_node(node, given, names, compare)
+            match node.op:
+                case "number":
+                    value = self.number(node.value)
+                case "name":
+                    value = names[node.name]
+                case "**":
+                    value = self._power(*given)
+                case "abs":
+                    is_negative = compare("<", given[0], self.number(0.0))
+                    value = self.value("if", is_negative, self.negative(given[0]), given[0])
+                case "min" | "max":
+                    is_first = compare("<" if node.op == "min" else ">", *given)
+                    value = self.value("if", is_first, *given)
+                case op:
+                    value = (compare if op in RELATIONS else self.value)(op, *given)
+            found[node] = value
         return found[root]
-
-    def _of_node(
-        self,
-        node: Node,
-        given: list[Value],
-        names: Mapping[str, Value],
-        compare: Callable[[str, Value, Value], Value],
-    ) -> Value:
-        if node.op == "number":
-            return self.number(node.value)
-        if node.op == "name":
-            return names[node.name]
-        if node.op == "**":
-            return self._power(*given)
-        if node.op == "abs":
-            is_negative = compare("<", given[0], self.number(0.0))
-            return self.value("if", is_negative, self.negative(given[0]), given[0])
-        if node.op in ("min", "max"):
-            return self.value("if", compare("<" if node.op == "min" else ">", *given), *given)
-        if node.op in RELATIONS:
-            return compare(node.op, *given)
-        return self.value(node.op, *given)
 
     def relation(self, op: str, left: Value, right: Value) -> Value:
         """A comparison: plain where nothing moves, else a switch."""
@@ -205,7 +201,7 @@ class Graph:
             by_base = self.simple("*", z, lower or self.value("/", y, x))
             return [by_base, self.number(0.0)]
         names = {"x": x, "y": y, "z": z}
-        return [self.of_tree(rule, names) for rule in DERIVATIVES[y.op]]
+        return [self.of_tree(rule, names) for rule in RULES[y.op]]
 
     def derivatives(self, roots: Iterable[Value], seeds: Mapping[Value, Value]) -> list[Value]:
         """Derivatives where each leaf has its own in `seeds`, or 0 if it is not there."""
@@ -220,6 +216,10 @@ class Graph:
             else:
                 found[y] = self._chain(y, [found[argument] for argument in y.arguments])
         return [found[root] for root in roots]
+
+    def derivative(self, y: Value, x: Value) -> Value:
+        """The partial derivative of y by a leaf."""
+        return self.derivatives([y], {x: self.number(1.0)})[0]
 
     def _chain(self, y: Value, d: list[Value]) -> Value:
         if y.op in ("+", "-"):

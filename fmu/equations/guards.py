@@ -1,7 +1,5 @@
 """When a relation matters: under which modes and parameters a value that is needed reads it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from equations.graph import Graph, Value

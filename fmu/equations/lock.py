@@ -9,13 +9,13 @@ from __future__ import annotations
 import tomllib
 from pathlib import Path
 
-from equations.file_tables import NAME, ModelFileError
+from equations_file.tables import NAME, ModelFileError
+
+from equations.declaration import Key
 
 RESERVED = (0, *range(80, 100))  # the time, the variables of the integrator
 LARGEST = 9999
 HEAD = "# Value references of {name}: written by the build. Keep it with the model.\n"
-
-Key = tuple[str, str]  # name and kind of a variable
 
 
 def path_of(model: Path) -> Path:

@@ -12,7 +12,6 @@ import platform
 import re
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -28,7 +27,7 @@ import numpy as np
 
 from rparm import project
 from rparm.errors import StoppedError, UserError, one_line
-from rparm.interruption import temporary_folder, uninterrupted
+from rparm.interruption import run_group, temporary_folder
 
 if TYPE_CHECKING:  # the child does not need these modules
     from rparm.system.ssp import Ssp
@@ -176,25 +175,14 @@ def _start(folder: Path) -> int:
     environment = project.child_environment() | temporary | {"PYTHONUNBUFFERED": "1"}
     if os.name == "posix" and shutil.which("unzip") is None:
         environment["PATH"] = f"{_unzip(folder)}:{environment.get('PATH', os.defpath)}"
-    child = None
-    try:
-        with (folder / LOG).open("wb") as log, uninterrupted():
-            child = subprocess.Popen(
-                [sys.executable, "-P", "-m", "rparm.system.ecos", str(folder)],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                env=environment,
-                # Ecos starts further programs, which write to the folder too
-                process_group=0 if os.name == "posix" else None,
-            )
-        return child.wait()
-    except BaseException:
-        if child is not None:
-            with uninterrupted():
-                _kill(child)
-                child.wait()
-        raise
+    with (folder / LOG).open("wb") as log:
+        return run_group(
+            [sys.executable, "-P", "-m", "rparm.system.ecos", str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+            env=environment,
+        ).returncode
 
 
 def _unzip(folder: Path) -> Path:
@@ -208,15 +196,6 @@ def _unzip(folder: Path) -> Path:
     )
     command.chmod(0o755)
     return command.parent
-
-
-def _kill(child: subprocess.Popen) -> None:
-    """Kill the child, with the programs that Ecos started where there are process groups."""
-    if hasattr(os, "killpg"):
-        with suppress(ProcessLookupError):  # it has just ended
-            os.killpg(child.pid, signal.SIGKILL)
-    else:
-        child.kill()
 
 
 def _sender(ssp: "Ssp", message: re.Match[str]) -> str:

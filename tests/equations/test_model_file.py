@@ -15,6 +15,7 @@ from tests.equations.compiled import (
     declaration,
     declared,
     lock,
+    read,
     read_text,
 )
 from tests.support.paths import ROOT
@@ -29,10 +30,13 @@ STATE = HEAD + '[states]\nx = { derivative = "-x" }\n'
 
 MISTAKES = {
     "no TOML": ("name = ", "is not valid TOML"),
-    "no name": ('[states]\nx = { derivative = "1" }', "name: expected a letter"),
+    "no name": ("[states]\nx = { derivative = \"1\" }", "name is missing"),
     "bad name": ('name = "a b"', "name: expected a letter"),
     "nothing": (HEAD, "has no variables"),
-    "section": (HEAD + "[state]\n", "unknown section 'state'"),
+    "section": (HEAD + "[state]\n", "line 2: [state]: unknown section 'state'"),
+    "odd key at the top": ("de- = 'x'\n" + STATE, "line 1: [de-]: unknown section 'de-'"),
+    "key at the top": ("title = 'x'\n" + STATE, "line 1: [title]: unknown section 'title'"),
+    "tables of an array": (HEAD + "\n[[inputs]]\n", "line 3: [inputs]: expected a table, got"),
     "key": (HEAD + "[parameters]\np = { start = 1, units = 'm' }", "[parameters]: p: unknown key"),
     "no start": (HEAD + "[parameters]\np = { unit = 'm' }", "[parameters]: p: start is missing"),
     "no derivative": (HEAD + "[states]\nx = {}", "[states]: x: derivative is missing"),
@@ -47,7 +51,13 @@ MISTAKES = {
     "solver": (HEAD + "[inputs]\nmax_step = {}", "[inputs]: max_step: this name is reserved"),
     "der": (HEAD + "[inputs]\nder_x = {}", "[inputs]: der_x: this name is reserved"),
     "name of it": (HEAD + '[inputs]\n"a b" = {}', "[inputs]: 'a b': expected a name"),
-    "unknown": (STATE + '[where]\na = "x + y"', "line 5: [where]: a: unknown name 'y'"),
+    "unknown": (STATE + '[where]\na = "x + y"', "line 5: [where]: a: column 5: unknown name 'y'"),
+    "misspelt": (STATE + '[where]\nspeed = "1"\na = "sped"', "name 'sped', did you mean 'speed'?"),
+    "a root as unit": (
+        HEAD + "[inputs]\nu = { unit = 'm' }\n[where]\na = 'sqrt(u)'",
+        "line 5: [where]: a: has unit m1/2, whose exponents are no whole numbers: use its square",
+    ),
+    "digits": (HEAD + f"[inputs]\nu = {{ start = {'9' * 5000} }}", "has a number or a table that"),
     "syntax": (STATE + '[where]\na = "x + "', "[where]: a: column 5: expected a number"),
     "syntax below": (
         HEAD + '[states]\nx = { derivative = "2 x" }',
@@ -65,7 +75,7 @@ MISTAKES = {
     "mode as number": (
         'modes = ["a"]\n' + STATE + '[where]\nb = "a"', "column 1: expected a number",
     ),
-    "event": (STATE + "[events.e]\n", "[events.e]: expected a table with when"),
+    "event": (STATE + "[events.e]\n", "[events.e]: when is missing"),
     "event key": (STATE + '[events.e]\nwhen = "x < 0"\nthen = 1', "[events.e]: unknown key 'then'"),
     "no relation": (
         STATE + '[events.e]\nwhen = "x < 0 and x > 1"', "[events.e]: when: expected one relation",
@@ -86,7 +96,9 @@ MISTAKES = {
         '[events.e]\nwhen = "x < 0"\nreinit = { x = "u" }',
         "[events.e]: reinit: x: column 1: expected unit m, got s",
     ),
-    "check": (STATE + '[check]\n"text" = "x > 0"', "[check]: 'text': 'x' is no parameter"),
+    "check": (
+        STATE + '[check]\n"text" = "x > 0"', "[check]: 'text': column 1: 'x' is no parameter",
+    ),
     "check of number": (
         HEAD + '[parameters]\np = { start = 1 }\n[check]\n"text" = "p"',
         "'text': column 1: expected",
@@ -104,7 +116,9 @@ MISTAKES = {
         HEAD + '[inputs]\nu = { unit = "m" }\n[outputs]\ny = { value = "u", unit = "s" }',
         "[outputs]: y: value: column 1: expected unit s, got m",
     ),
-    "experiment": (STATE.replace("[", "experiment = { stop = 0 }\n[", 1), "experiment: expected"),
+    "experiment": (
+        STATE.replace("[", "experiment = { stop = 0 }\n[", 1), "line 2: [experiment]: expected",
+    ),
     "control": (STATE.replace("[", 'description = "\\u0001"\n[', 1), "description: has a control"),
     "deep": (STATE + f'[where]\na = "{"(" * 200}"', "a: column 102: more than 100 levels"),
     "many": (
@@ -137,6 +151,28 @@ def test_a_mistake_is_one_line_with_its_place(name: str, tmp_path: Path) -> None
     message = str(refused.value)
     assert message.startswith(f"{tmp_path / 'model.toml'}: ")
     assert expected in message and "\n" not in message and len(message) < 500
+
+
+def test_a_file_of_an_editor_for_windows_is_read(tmp_path: Path) -> None:
+    plain = read_text(tmp_path, STATE)
+    other = read_text(tmp_path, "\ufeff" + STATE.replace("\n", "\r\n"))
+    assert other.text == plain.text and c_model.source(other) == c_model.source(plain)
+
+
+def test_another_encoding_is_named_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_bytes((HEAD + 'description = "Feder für alle"\n').encode("latin-1"))
+    with pytest.raises(ModelFileError, match="model.toml: line 2: is not UTF-8"):
+        read(path)
+
+
+def test_a_unit_of_another_meaning_is_refused_with_its_file(tmp_path: Path) -> None:
+    text = HEAD + "[units]\nN = { m = 1 }\n[inputs]\nu = { unit = 'N' }\n"
+    file = read_text(tmp_path, text)
+    with pytest.raises(
+        ModelFileError, match=r"model.toml: \[inputs\]: u: unit: 'N' is another unit"
+    ):
+        declared(file)
 
 
 def test_texts_with_any_characters_stay_texts(tmp_path: Path) -> None:
@@ -212,7 +248,7 @@ def read_mutations(folder: Path, seed: int, count: int) -> int:
             message = str(error)
             assert "\n" not in message and len(message) < 1000
             # what is not in the file at all has no line
-            assert re.search(r"line [0-9]+|end of|unknown section|has no|name: expected", message)
+            assert re.search(r"line [0-9]+|end of|unknown section|has no|name is missing", message)
         assert time.process_time() - began < 2, text
     return accepted
 

@@ -312,10 +312,10 @@ def test_a_broken_ecos_is_named(
 
 KILLED = """
 import os, signal, subprocess, sys
-from rparm.system import ecos
+from rparm import interruption
 del os.killpg
 child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
-ecos._kill(child)
+interruption._kill(child)
 assert child.wait(10) == -signal.SIGKILL
 """
 

@@ -15,11 +15,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from equations_file.tables import ModelFileError
 from source_code import Library, Manifest, manifest
 
-from equations.model_file import ModelFileError
-
 SYSTEM_COMPILERS = ("gcc", "clang")
+INSTALL = 'pip install "rparm[build]" installs zig'
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,16 @@ class Runtime:
                 check=False,
             )
         except OSError as error:
-            raise ModelFileError(f"{command[0]}: cannot be run: {error.strerror}") from None
+            raise ModelFileError(
+                f"{command[0]}: cannot be run: {error.strerror}; {INSTALL}"
+            ) from None
         if ended.returncode:
             lines = [line for line in ended.stderr.splitlines() if "error" in line]
             reason = (lines or ended.stderr.splitlines() or ["no message"])[0]
-            raise ModelFileError(f"{command[0]}: {reason:.300}")
+            # the C is right: what fails is the compiler
+            raise ModelFileError(
+                f"{command[0]}: {reason:.300}; gcc and clang need binutils, {INSTALL}"
+            )
 
     def sources(self, version: str, own: Library, root: Path) -> Manifest:
         """All that the shared object of a version consists of, with the model's own part."""
@@ -97,20 +102,21 @@ class Runtime:
 
 
 def _found(words: list[str], of_this_machine: bool) -> list[str]:
-    """A compiler as runtime.json names it, where it does not name its folder."""
-    if Path(words[0]).is_absolute():
+    """A compiler as runtime.json names it, or one of this machine, else zig."""
+    if Path(words[0]).is_absolute() and shutil.which(words[0]):
         return words
     if of_this_machine:
         for name in SYSTEM_COMPILERS:
             command = shutil.which(name)
             if command is not None:
                 return [command]
+    options = words[1:] if Path(words[0]).stem == "zig" else ["cc"]
     package = find_spec("ziglang")
     if package is not None and package.origin is not None:
         zig = Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")
-        return [str(zig), *words[1:]]
+        return [str(zig), *options]
     command = shutil.which("zig")
     if command is None:
         compilers = "gcc, clang or zig" if of_this_machine else "zig"
-        raise ModelFileError(f'{compilers}: not installed, pip install "rparm[build]" installs zig')
-    return [command, *words[1:]]
+        raise ModelFileError(f"{compilers}: not installed, {INSTALL}")
+    return [command, *options]

@@ -11,15 +11,15 @@ from declaration.c_tables import value_references, variable_table
 from declaration.load import Declaration
 from declaration.load import load as load_declaration
 from document import document
+from equations import declaration, lock
+from equations.model_file import ModelFile
 from fmi2.model_description import model_description as fmi2_description
 from fmi3.terminals import terminals_and_icons
 from generate import release_files
 from provenance import Provenance
 from source_code import Library, collect, write
 
-from equations import declaration, lock
-from equations.model_file import ModelFile
-from equations.runtime import Runtime
+from building.runtime import Runtime
 
 C_FILES = ("equations.c", "variables.c")
 PLACES = {"fmi2": "", "fmi3": "fmi3"}  # below the folder of the output

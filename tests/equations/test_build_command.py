@@ -1,0 +1,108 @@
+"""`rparm build` where it cannot end well: interrupted, without a compiler, in odd places."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.equations.compiled import ModelFileError, runtime
+from tests.equations.examples import FOLDER
+from tests.support.paths import ROOT
+
+COMMAND = [sys.executable, "-P", "-m", "rparm"]
+TEXT = (FOLDER / "dahlquist.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with a model, beside one for temporary files."""
+    folder = tmp_path / "my models"
+    folder.mkdir()
+    (folder / "-decay.toml").write_text(TEXT, encoding="utf-8")
+    (tmp_path / "temporary").mkdir()
+    return folder
+
+
+def started(folder: Path, *arguments: str) -> subprocess.Popen:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    environment |= {"TMPDIR": str(folder.parent / "temporary")}
+    return subprocess.Popen(
+        [*COMMAND, *arguments],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def left(folder: Path) -> list[str]:
+    """All files but the model."""
+    paths = (path for path in folder.parent.rglob("*") if path.is_file())
+    return sorted(path.name for path in paths if path.name != "-decay.toml")
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM], ids=str)
+def test_nothing_is_left_where_it_is_interrupted(folder: Path, ending: signal.Signals) -> None:
+    """When its temporary folder is there, and when there are objects in it."""
+    temporary = folder.parent / "temporary"
+    for waited in ("rparm-*", "rparm-*/*/*/*.o"):
+        with started(folder, "build", "--", "-decay.toml") as process:
+            limit = time.monotonic() + 60
+            while not any(temporary.glob(waited)):
+                assert process.poll() is None and time.monotonic() < limit
+                time.sleep(0.01)
+            process.send_signal(ending)
+            errors = process.communicate()[1]
+        assert process.returncode == 128 + ending and "Traceback" not in errors
+        assert left(folder) == [] and not any(temporary.iterdir())
+
+
+def refused(folder: Path, *arguments: str) -> str:
+    with started(folder, *arguments) as process:
+        output, errors = process.communicate()
+    assert process.returncode == 2 and output == "" and errors.count("\n") == 1
+    return errors
+
+
+@pytest.mark.parametrize("name", ["/nowhere/cc", "cc"])
+def test_what_to_install_is_said_where_no_compiler_is(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(runtime, "find_spec", lambda _: None)
+    (tmp_path / "runtime.json").write_text(json.dumps({"compiler": [name]}))
+    with pytest.raises(ModelFileError, match=r'^gcc, clang or zig: .* "rparm\[build\]" installs'):
+        runtime.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs scripts")
+def test_a_compiler_that_fails_is_named(tmp_path: Path) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text("#!/bin/sh\necho cc: error: no assembler >&2\nexit 1\n")
+    compiler.chmod(0o755)
+    (tmp_path / "runtime.json").write_text(json.dumps({"compiler": [str(compiler)]}))
+    found = runtime.Runtime.load(tmp_path / "runtime.json", of_this_machine=True)
+    with pytest.raises(ModelFileError, match=r"^.*/cc: cc: error: no assembler; [^\n]*install"):
+        found.run(tmp_path)
+
+
+def test_neither_fmu_nor_lock_file_is_there_if_one_fails(folder: Path) -> None:
+    (folder / "out").mkdir()
+    (folder / "out" / "fmi3").touch()
+    error = refused(folder, "build", "--output", "out", "--", "-decay.toml")
+    assert "out/fmi3/Dahlquist.fmu: cannot be written" in error
+    assert left(folder) == ["fmi3"]
+    error = refused(folder, "new-model", "Spring", "--output", "out/fmi3")
+    assert "out/fmi3/Spring.toml: cannot be written" in error
+
+
+def test_a_folder_with_a_space_is_quoted(folder: Path) -> None:
+    with started(folder, "new-model", "Spring", "--output", "and more") as process:
+        assert "build 'and more/Spring.toml'" in process.communicate()[0]
