@@ -29,9 +29,9 @@ STEPS = (
     "grows."
 )
 POINT = "Values about which the model is linear. Far from them it says less: compare it with a run."
-INTERVALS = (
-    "Dry friction holds all within these ends, the others staying as they are. The point is in the "
-    "middle."
+EQUILIBRIUM = (
+    "All derivatives are 0, but those that are given velocities. Dry friction or a stop holds all "
+    "from one end to the other, the others staying as they are. The value is in the middle."
 )
 PICTURES = (
     "Bode: by how much an output swings if an input does, and by how much later. "
@@ -59,8 +59,11 @@ def notes(found: Study) -> list[str]:
         f"{name}' = {rate:.6g}"
         for name, rate in zip(linear.states, linear.rates, strict=True)
         if abs(rate) > 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
+        and (not found.trimmed or rate in linear.x)  # else rounding
     ]
-    if moving:
+    if moving and found.trimmed:
+        texts.append(f"In steady motion: {_names(moving)}, as given.")
+    elif moving:
         texts.append(
             f"This is no equilibrium: {_names(moving)}. Deviations are those from the motion that "
             "begins here; trim leads to an equilibrium."
@@ -79,13 +82,14 @@ def point(found: Study) -> Table:
     return Table("The point", ["variable", "value", "unit"], rows)
 
 
-def intervals(found: Study) -> Table:
-    """Where friction leaves a trimmed variable."""
-    rows = [
-        [name, *(_short(x) for x in ends), found.units.get(name, "")]
-        for name, ends in found.linear.intervals.items()
-    ]
-    return Table("Intervals of equilibrium", ["variable", "from", "to", "unit"], rows)
+def equilibrium(found: Study) -> Table:
+    """What was trimmed, and where friction or a stop leaves it."""
+    rows = []
+    for name in found.trimmed:
+        ends = found.linear.intervals.get(name, (math.nan, math.nan))
+        numbers = _short(found.linear.at[name]), *map(_or_none, ends)
+        rows.append([name, *numbers, found.units.get(name, "")])
+    return Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
 
 
 def poles(found: Study) -> Table:

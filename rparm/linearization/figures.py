@@ -22,7 +22,7 @@ from rparm.report.style import DASHED, ERRORS, INK, MUTED, RUN, STYLE
 from rparm.texts import milliseconds
 
 TEXTS = STYLE | {"text.parse_math": False}
-MOST = 3  # inputs and outputs that are drawn
+MOST = 2  # inputs and outputs that are drawn: with more, curves would share a colour
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
 SETTLED = 6.0  # time constants of the slowest pole that a step shows
