@@ -30,8 +30,9 @@ STEPS = (
 )
 POINT = "Values about which the model is linear. Far from them it says less: compare it with a run."
 EQUILIBRIUM = (
-    "All derivatives are 0, but those that are given velocities. Dry friction or a stop holds all "
-    "from one end to the other, the others staying as they are. The value is in the middle."
+    "All derivatives are 0; in a steady motion, but those of positions. Dry friction or a stop "
+    "holds all from one end to the other, the others staying as they are. The value is in the "
+    "middle."
 )
 PICTURES = (
     "Bode: by how much an output swings if an input does, and by how much later. "
@@ -57,12 +58,14 @@ def notes(found: Study) -> list[str]:
         texts.append("The closed loop is unstable here: it has no margins.")
     moving = [
         f"{name}' = {rate:.6g}"
-        for name, rate in zip(linear.states, linear.rates, strict=True)
+        for name, rate, may_move in zip(
+            linear.states, linear.rates, linear.are_positions, strict=True
+        )
         if abs(rate) > 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
-        and (not found.trimmed or rate in linear.x)  # else rounding
+        and (may_move or not found.trimmed)  # else rounding
     ]
     if moving and found.trimmed:
-        texts.append(f"In steady motion: {_names(moving)}, as given.")
+        texts.append(f"In steady motion: {_names(moving)}.")
     elif moving:
         texts.append(
             f"This is no equilibrium: {_names(moving)}. Deviations are those from the motion that "

@@ -157,7 +157,7 @@ def test_a_given_velocity_is_a_steady_motion(
 ) -> None:
     at = ["--at", "q1=30deg", "dq1=0.02", "--output", str(tmp_path)]
     out = printed(["RPPlant", *at, "--trim", "tau1", "f2"], capsys)
-    assert "In steady motion: q1' = 0.02, as given." in out and "no equilibrium" not in out
+    assert "In steady motion: q1' = 0.02." in out and "no equilibrium" not in out
     assert "This is no equilibrium: q1' = 0.02, dq1'" in printed(["RPPlant", *at], capsys)
 
 
