@@ -136,6 +136,8 @@ def _fmu(given: str) -> Path:
     path = Path(given)
     if path.suffix.lower() == ".fmu":
         return path
+    if path.suffix:
+        raise UserError(f"{given}: expected an FMU (.fmu), or a model of the project")
     return project.built(project.model(given), ".fmu")
 
 
