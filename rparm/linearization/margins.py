@@ -4,8 +4,8 @@ The loop is broken at a signal: L is what comes back, with its sign changed, by 
 """
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,16 +68,7 @@ class Margins:
 
 def open_loop(broken: Linear) -> Linear:
     """L of a system that is broken: one input, and the output that fed it; minimal."""
-    return minimal(
-        Linear(
-            **{
-                name: getattr(broken, name)
-                for name in ("states", "inputs", "outputs", "A", "B", "x", "u", "y", "rates")
-            },
-            C=-broken.C,
-            D=-broken.D,
-        )
-    )
+    return minimal(replace(broken, C=-broken.C, D=-broken.D))
 
 
 def margins(loop: Linear) -> Margins:
@@ -137,11 +128,16 @@ def frequency_response(model: Linear) -> Response:
 
 def frequencies(loop: Linear) -> np.ndarray:
     """Frequencies in rad/s at which something may happen, ascending."""
-    rates = np.abs([*loop.poles, *closed_poles(loop)])
-    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
-    rates = rates if len(rates) else np.ones(1)
+    rates = sizes([*loop.poles, *closed_poles(loop)])
     low, high = math.log10(rates.min()) - DECADES, math.log10(rates.max()) + DECADES
     return np.logspace(low, high, 1 + int(PER_DECADE * (high - low)))
+
+
+def sizes(poles: Sequence[complex] | np.ndarray) -> np.ndarray:
+    """Sizes of poles that are not 0, in 1/s; 1 if there is none."""
+    rates = np.abs(poles)
+    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
+    return rates if len(rates) else np.ones(1)
 
 
 def _crossings(
