@@ -30,7 +30,7 @@ STEPS = (
 )
 POINT = "Values about which the model is linear. Far from them it says less: compare it with a run."
 EQUILIBRIUM = (
-    "All derivatives are 0; in a steady motion, but those of positions. Dry friction or a stop "
+    "All derivatives are 0, in a steady motion except those of positions. Dry friction or a stop "
     "holds all from one end to the other, the others staying as they are. The value is in the "
     "middle."
 )
