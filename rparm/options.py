@@ -116,6 +116,11 @@ def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
     return found
 
 
+def names(given: Sequence[str]) -> list[str]:
+    """Names between commas, or given one by one."""
+    return [name.strip() for text in given for name in text.split(",") if name.strip()]
+
+
 def relative_tolerance(text: str) -> float:
     """A relative tolerance."""
     with suppress(ValueError):

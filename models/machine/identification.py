@@ -1,7 +1,9 @@
 """What rparm asks of this folder: logs of the machine, to identify the plant's parameters from.
 
-rparm/identification/demo.py says what `demo` gives. The machine moves its end effector on circles.
-A log has the efforts of the motors, and what the encoders show: counts with noise, two ticks late.
+rparm/identification/demo.py says what `demo` gives. The machine lies flat, so that the efforts of a
+log lead an arm through the same motion again: under gravity it would run away. Its end effector
+moves on circles. A log has the efforts of the motors, and what the encoders show: counts with
+noise, two ticks late.
 """
 
 from pathlib import Path
@@ -35,6 +37,7 @@ START = {
     "coulomb_friction1": 0.3,
     "coulomb_friction2": 0.5,
 }
+FLAT = {"g": 0.0}
 CIRCLE = {
     "start_time": 0.2,
     "x_center": 0.4,
@@ -68,6 +71,7 @@ def demo(folder: Path) -> Demo:
         parameters=list(TRUE),
         inputs=["tau1", "f2"],
         measured=["q1", "q2"],
+        settings=FLAT,
         starts=START,
         with_delay=True,
         validation=second,
@@ -82,7 +86,8 @@ def _write(machine: Path, log: Path, circle: dict[str, float]) -> None:
             name: dict(given) for name, given in opened.system.parameter_sets[BASE].items()
         }
         values["trajectory"] = CIRCLE | circle
-        values["plant"] |= TRUE | {"breakaway_friction1": 0.0, "breakaway_friction2": 0.0}
+        values["controller"] |= FLAT
+        values["plant"] |= FLAT | TRUE | {"breakaway_friction1": 0.0, "breakaway_friction2": 0.0}
         changed = log.with_suffix(".ssp")
         write_system(opened, changed, values, STOP, STEP)
     try:

@@ -10,7 +10,7 @@ from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, placed
 from rparm.input_files import number_in
-from rparm.options import add_report, pairs
+from rparm.options import add_report, names, pairs
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
@@ -108,9 +108,9 @@ def _asked(options: argparse.Namespace) -> tuple[Path, "Request", dict[str, floa
         segment = typed_quantity(options.segment, SECONDS)
     request = Request(
         logs=options.logs,
-        parameters=_names(options.parameters),
-        inputs=_names(options.inputs),
-        measured=_names(options.measured),
+        parameters=names(options.parameters),
+        inputs=names(options.inputs),
+        measured=names(options.measured),
         settings=_values("--set", options.set),
         starts=_values("--start", options.start),
         columns=pairs("--columns", options.columns),
@@ -136,6 +136,8 @@ def _fmu(given: str) -> Path:
     path = Path(given)
     if path.suffix.lower() == ".fmu":
         return path
+    if path.suffix:
+        raise UserError(f"{given}: expected an FMU (.fmu), or a model of the project")
     return project.built(project.model(given), ".fmu")
 
 
@@ -152,11 +154,6 @@ def _again(options: argparse.Namespace) -> str:
     parts += ["--segment", options.segment] if options.segment != SEGMENT else []
     parts += [f"--{name}" for name in ("delay", "demo") if getattr(options, name)]
     return shlex.join(parts)
-
-
-def _names(given: Sequence[str]) -> list[str]:
-    """Names between commas, or given one by one."""
-    return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
 def _values(option: str, given: Sequence[str]) -> dict[str, Any]:

@@ -7,11 +7,12 @@ from pathlib import Path
 from rparm import project
 from rparm.commands import Ended
 from rparm.errors import WrongValueError
-from rparm.options import add_fmi, add_report, pairs
+from rparm.options import add_fmi, add_report, names, pairs
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity
 
+MOST_COLUMNS, MOST_ROWS = 6, 12  # of matrices in the terminal
 SHORTEST = 1e-9  # s, of samples: pictures of much shorter ones overflow
 DESCRIPTION = (
     "Finds an equilibrium, and A, B, C and D about it; of a system also the margins of a loop that "
@@ -59,15 +60,21 @@ def run(options: argparse.Namespace) -> Ended:
     check_writable(options.report)
     console.stage(f"linearizing {options.what}")
     request = Request(
-        options.what, pairs("--at", options.at), options.time, options.trim or (), options.inputs,
-        options.outputs, options.variant, options.cut, options.without or (), options.fmi,
+        options.what, pairs("--at", options.at), options.time, names(options.trim or ()),
+        options.inputs and names(options.inputs), options.outputs and names(options.outputs),
+        options.variant, options.cut, names(options.without or ()), options.fmi,
     )  # fmt: skip
     found = study(request)
     if options.step is not None:
         found.linear.sampled(options.step)  # a step that is too long is refused before the tables
-    tables = [(explained.poles(found), explained.POLES)]
-    if found.linear.intervals:
-        tables.insert(0, (explained.intervals(found), explained.INTERVALS))
+    n, m, p = (len(getattr(found.linear, key)) for key in ("states", "inputs", "outputs"))
+    tables = []
+    if found.trimmed:
+        tables.append((explained.equilibrium(found), explained.EQUILIBRIUM))
+    if is_small := n + m <= MOST_COLUMNS and n + p <= MOST_ROWS:
+        tables.append((explained.matrices(found), explained.MATRICES))
+    if n:
+        tables.append((explained.poles(found), explained.POLES))
     if found.margins is not None:
         tables.append((explained.margins(found.margins), explained.MARGINS))
     if found.largest:
@@ -75,7 +82,8 @@ def run(options: argparse.Namespace) -> Ended:
     for table, text in tables:
         console.plain_table(table.title, table.head, table.rows)
         console.remark(text)
-    for text in explained.notes(found):
+    hint = "Matrices: --json, --save and the page; --inputs and --outputs choose."
+    for text in [*explained.notes(found), *([] if is_small else [hint])]:
         console.remark(text)
     for path in options.save:
         saving.save(path, found, options.step)
@@ -84,7 +92,6 @@ def run(options: argparse.Namespace) -> Ended:
         index = page.write(options.report, found, options.step, _command(options))
     print(f"page: {from_here(index)}")
     document = saving.document(found, options.step) | {"page": index.absolute()}
-    n, m, p = (len(getattr(found.linear, key)) for key in ("states", "inputs", "outputs"))
     verdict = f"linear: {n} states, {m} inputs, {p} outputs"
     return Ended(0, verdict, document, page=index)
 

@@ -78,7 +78,7 @@ class Identification:
             texts.append(f"The fit has not converged in {self.steps} steps.")
         if len(self.segments) < FEWEST_SEGMENTS:
             texts.append(
-                f"{len(self.segments)} segments are too few for intervals by scatter: "
+                f"Too few segments for intervals by scatter ({len(self.segments)}): "
                 "a longer log, or a shorter segment, gives more."
             )
         if self.covariances.is_suspicious:

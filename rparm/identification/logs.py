@@ -11,7 +11,7 @@ from rparm.scenarios import logs
 
 LENGTH = 0.4  # s, of a segment
 FEWEST_ROWS = 20  # of a segment
-MISSING = 1.5  # steps: rows are missing in a longer one
+MISSING = 0.1  # steps: rows are missing in one that is a multiple, to this; others are irregular
 GAP = 0.05  # of a segment: in a longer one the inputs are unknown
 MOST_ROWS = 2_000_000
 
@@ -96,9 +96,10 @@ def _filled(
     """Put rows in where few are missing; inputs are linear there."""
     steps = np.diff(times)
     usual = float(np.median(steps))
-    counts = np.ones(len(steps), int)
-    short = (steps > MISSING * usual) & (steps <= max(GAP * LENGTH, 2 * usual))
-    counts[short] = np.rint(steps[short] / usual).astype(int)
+    counts = np.maximum(np.rint(steps / usual), 1).astype(int)
+    is_filled = steps <= max(GAP * LENGTH, (2 + MISSING) * usual)
+    is_filled &= np.abs(steps / usual - counts) <= MISSING
+    counts[~is_filled] = 1
     if (counts == 1).all():
         return Recording(path, times, inputs, switches.astype(np.int32), measured, usual)
     # place of each new row, in old rows
@@ -175,17 +176,29 @@ def segment_of(recording: Recording, start: int, first: int, last: int) -> Segme
 def noise(recordings: Sequence[Recording]) -> np.ndarray:
     """Standard deviation (outputs,) of the measured values' noise, whatever they follow.
 
-    The third differences of what is smooth are small, those of noise are its square root of 20
-    times. A log in counts has at least the noise of rounding.
+    The third differences of what is smooth are small, those of noise are as large as it is: divided
+    ones, as rows may be missing and times irregular. A log in counts has at least the noise of
+    rounding.
     """
-    measured = [r.measured[np.isfinite(r.measured).all(axis=1)] for r in recordings]
-    third = np.vstack([np.diff(values, 3, axis=0) for values in measured])
-    found = np.sqrt(np.median(third**2, axis=0) / (20 * 0.4549))  # median of chi-squared, 1 d.o.f.
+    there = [np.isfinite(r.measured).all(axis=1) for r in recordings]
+    measured = [r.measured[rows] for r, rows in zip(recordings, there, strict=True)]
+    times = [r.times[rows] for r, rows in zip(recordings, there, strict=True)]
+    third = np.vstack(list(map(_third_differences, times, measured)))
+    found = np.sqrt(np.median(third**2, axis=0) / 0.4549)  # median of chi-squared, 1 d.o.f.
     every = np.vstack(measured)
     for i, values in enumerate(every.T):
         differences = np.abs(np.diff(np.unique(values)))
         found[i] = max(found[i], _count(differences) / np.sqrt(12), 1e-9 * np.ptp(values))
     return found
+
+
+def _third_differences(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Of four rows each, (rows - 3, outputs), with the variance of the noise in `values`."""
+    four = np.stack([times[i : len(times) - 3 + i] for i in range(4)], axis=1)
+    apart = four[:, :, None] - four[:, None, :] + np.eye(4)
+    weights = 1 / apart.prod(axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    return sum(weights[:, i, None] * values[i : len(times) - 3 + i] for i in range(4))
 
 
 def _count(differences: np.ndarray) -> float:

@@ -1,7 +1,7 @@
 """A, B, C and D of one FMU at a point, by its directional derivatives."""
 
 from collections.abc import Mapping
-from types import TracebackType
+from contextlib import ExitStack
 
 import numpy as np
 
@@ -60,7 +60,7 @@ def require_derivatives(fmu: Fmu) -> None:
         raise UserError(f"{fmu.path}: gives no directional derivatives, which A, B, C, D are from")
 
 
-class FmuSubject:
+class FmuSubject(ExitStack):
     """One FMU to linearize; a context manager, which keeps one instance.
 
     Parameters
@@ -72,19 +72,11 @@ class FmuSubject:
     """
 
     def __init__(self, fmu: Fmu, time: float = 0.0) -> None:
+        super().__init__()
         require_derivatives(fmu)
         self.fmu, self.time = fmu, time
-        self._instance = fmu.instance(fmu.path.stem)
         self._is_new = True
-
-    def __enter__(self) -> "FmuSubject":
-        self._instance.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._instance.__exit__(kind, error, trace)
+        self._instance = self.enter_context(fmu.instance(fmu.path.stem))
 
     def variable(self, name: str) -> Variable:
         """What the FMU declares of a variable; UserError if it has none of that name."""

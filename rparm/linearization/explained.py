@@ -29,8 +29,9 @@ STEPS = (
     "grows."
 )
 POINT = "Values about which the model is linear. Far from them it says less: compare it with a run."
-INTERVALS = (
-    "Dry friction holds all within these ends, the others staying as they are. The point is in the "
+EQUILIBRIUM = (
+    "All derivatives are 0, in a steady motion except those of positions. Dry friction or a stop "
+    "holds all from one end to the other, the others staying as they are. The value is in the "
     "middle."
 )
 PICTURES = (
@@ -57,10 +58,15 @@ def notes(found: Study) -> list[str]:
         texts.append("The closed loop is unstable here: it has no margins.")
     moving = [
         f"{name}' = {rate:.6g}"
-        for name, rate in zip(linear.states, linear.rates, strict=True)
+        for name, rate, may_move in zip(
+            linear.states, linear.rates, linear.are_positions, strict=True
+        )
         if abs(rate) > 1e-8 * max(1.0, float(np.abs(linear.x).max(initial=0.0)))
+        and (may_move or not found.trimmed)  # else rounding
     ]
-    if moving:
+    if moving and found.trimmed:
+        texts.append(f"In steady motion: {_names(moving)}.")
+    elif moving:
         texts.append(
             f"This is no equilibrium: {_names(moving)}. Deviations are those from the motion that "
             "begins here; trim leads to an equilibrium."
@@ -79,13 +85,14 @@ def point(found: Study) -> Table:
     return Table("The point", ["variable", "value", "unit"], rows)
 
 
-def intervals(found: Study) -> Table:
-    """Where friction leaves a trimmed variable."""
-    rows = [
-        [name, *(_short(x) for x in ends), found.units.get(name, "")]
-        for name, ends in found.linear.intervals.items()
-    ]
-    return Table("Intervals of equilibrium", ["variable", "from", "to", "unit"], rows)
+def equilibrium(found: Study) -> Table:
+    """What was trimmed, and where friction or a stop leaves it."""
+    rows = []
+    for name in found.trimmed:
+        ends = found.linear.intervals.get(name, (math.nan, math.nan))
+        numbers = _short(found.linear.at[name]), *map(_or_none, ends)
+        rows.append([name, *numbers, found.units.get(name, "")])
+    return Table("Equilibrium", ["variable", "value", "from", "to", "unit"], rows)
 
 
 def poles(found: Study) -> Table:

@@ -11,18 +11,18 @@ from matplotlib.figure import Figure
 
 from rparm.linearization.linear import Linear, hold
 from rparm.linearization.margins import (
-    AT_ZERO,
     Margins,
     Response,
     closed_poles,
     frequencies,
     frequency_response,
+    sizes,
 )
 from rparm.report.style import DASHED, ERRORS, INK, MUTED, RUN, STYLE
 from rparm.texts import milliseconds
 
 TEXTS = STYLE | {"text.parse_math": False}
-MOST = 3  # inputs and outputs that are drawn
+MOST = 2  # inputs and outputs that are drawn: with more, curves would share a colour
 ROUNDING = 1e-12  # of the largest response: less is none
 AROUND = 2.0  # decades beyond the poles that a Bode diagram shows
 SETTLED = 6.0  # time constants of the slowest pole that a step shows
@@ -49,14 +49,12 @@ def bode(model: Linear, step: float | None, found: Margins | None = None) -> Fig
                 name = f"{label}, held for {milliseconds(step)}"
                 response = sampled_response(one, step)(below)
                 _bode(gain, phase, response, below, color, name, DASHED)
-        if step is not None:
-            for axes in (gain, phase):
+        for axes, level in ((gain, 0.0), (phase, -180.0)):
+            if step is not None:
                 axes.axvline(0.5 / step, color=MUTED, linewidth=0.8, linestyle=":")
-        for crossing in found.gain_crossings if found else ():
-            for axes in (gain, phase):
+            for crossing in found.gain_crossings if found else ():
                 axes.axvline(crossing.frequency / (2 * math.pi), color=INK, linewidth=0.8)
-            gain.axhline(0.0, color=INK, linewidth=0.8)
-            phase.axhline(-180.0, color=INK, linewidth=0.8)
+                axes.axhline(level, color=INK, linewidth=0.8)
         gain.set_ylabel("gain (dB)")
         phase.set_ylabel("phase (degrees)")
         phase.set_xlabel("frequency (Hz)")
@@ -154,14 +152,8 @@ def poles(model: Linear, step: float | None, closed: Linear | None = None) -> Fi
         plain.set_ylim(min(low, -height), max(high, height))
         if closed is not None:
             found = closed_poles(closed)
-            plain.plot(
-                found.real,
-                found.imag,
-                "+",
-                color=ERRORS[0],
-                label="when it is closed",
-                markersize=11,
-            )
+            style = {"color": ERRORS[0], "label": "when it is closed", "markersize": 11}
+            plain.plot(found.real, found.imag, "+", **style)
         plain.set_xlabel("real part (1/s): left of 0 dies out")
         plain.set_ylabel("imaginary part (rad/s)")
         plain.legend(fontsize=8)
@@ -205,8 +197,8 @@ def drawn(model: Linear) -> Linear:
     """What of a model pictures show: the first outputs that respond, and inputs they respond to."""
     s = 1j * _grid(model, np.empty(0))[:, None, None]
     states = np.linalg.solve(s * np.eye(len(model.A)) - model.A, model.B + 0 * s)
-    sizes = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
-    responds = sizes > ROUNDING * sizes.max(initial=0.0)
+    answers = np.abs(model.C @ states + model.D).max(axis=0)  # (outputs, inputs)
+    responds = answers > ROUNDING * answers.max(initial=0.0)
     outputs = np.flatnonzero(responds.any(axis=1))[:MOST]
     inputs = np.flatnonzero(responds[outputs].any(axis=0))[:MOST]
     return model.select([model.inputs[i] for i in inputs], [model.outputs[i] for i in outputs])
@@ -225,21 +217,14 @@ def _colors() -> Iterator[str]:
 
 def _grid(model: Linear, further: np.ndarray) -> np.ndarray:
     """Frequencies around the poles of a model and others, rad/s."""
-    rates = _rates(np.array([*model.poles, *further]))
+    rates = sizes([*model.poles, *further])
     low, high = math.log10(rates.min()) - AROUND, math.log10(rates.max()) + AROUND
     return np.logspace(low, high, POINTS)
 
 
-def _rates(found: np.ndarray) -> np.ndarray:
-    """Sizes of poles that are not 0, in 1/s."""
-    rates = np.abs(found)
-    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
-    return rates if len(rates) else np.ones(1)
-
-
 def _end(model: Linear, step: float | None) -> float:
     """How long a step is shown, s: until the slowest pole has settled."""
-    end = SETTLED / _rates(model.poles).min()
+    end = SETTLED / sizes(model.poles).min()
     fastest = model.poles.real.max(initial=0.0)
     end = min(end, GROWN / fastest) if fastest > 0 else end
     return max(end, 20 * step) if step is not None else end

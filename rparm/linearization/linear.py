@@ -61,6 +61,12 @@ class Linear:
         found = np.linalg.eigvals(self.A)
         return found[np.lexsort((found.imag, np.abs(found)))]
 
+    @property
+    def are_positions(self) -> np.ndarray:
+        """Which states (n,) have another state as their derivative, by a gear or not."""
+        one = (np.count_nonzero(self.A, axis=1) == 1) & ~self.B.any(axis=1)
+        return one & (np.diag(self.A) == 0) & np.isclose(self.rates, self.A @ self.x, atol=0.0)
+
     def ss(self) -> "StateSpace":
         """The same for python-control, which must be installed; in its names dots become _."""
         return _state_space(self.A, self.B, self.C, self.D, **self._labels)

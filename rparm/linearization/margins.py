@@ -4,8 +4,8 @@ The loop is broken at a signal: L is what comes back, with its sign changed, by 
 """
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from rparm.linearization.linear import Linear
 
 SAME = 1e-9  # of the largest direction: states that inputs do not reach, or outputs do not see
 AT_ZERO = 1e-5  # of the fastest pole: slower ones are multiple poles at 0, moved by rounding
+ROUNDING = 1e-12  # relative: of a real part, a gain or a phase that is 0
 MEANINGFUL = 1e6  # factors of the gain beyond it are those of rounding
 PER_DECADE = 400  # frequencies that are searched for crossings
 DECADES = 3  # below the slowest and above the fastest pole
@@ -44,7 +45,7 @@ class Margins:
     Attributes
     ----------
     stable : bool
-        Whether the closed loop is stable; if not, the others say nothing.
+        Whether the closed loop is stable; if not, it has no margins: they are nan.
     gain_up, gain_down : float
         Factors of the loop's gain, above and below 1, at which it loses stability; inf and 0 if
         none does.
@@ -67,16 +68,7 @@ class Margins:
 
 def open_loop(broken: Linear) -> Linear:
     """L of a system that is broken: one input, and the output that fed it; minimal."""
-    return minimal(
-        Linear(
-            **{
-                name: getattr(broken, name)
-                for name in ("states", "inputs", "outputs", "A", "B", "x", "u", "y", "rates")
-            },
-            C=-broken.C,
-            D=-broken.D,
-        )
-    )
+    return minimal(replace(broken, C=-broken.C, D=-broken.D))
 
 
 def margins(loop: Linear) -> Margins:
@@ -85,15 +77,22 @@ def margins(loop: Linear) -> Margins:
     grid = frequencies(loop)
     gains = tuple(_crossings(response, grid, lambda value: np.log(np.abs(value))))
     turns = tuple(
-        found for found in _crossings(response, grid, lambda value: value.imag)
+        found
+        for found in (
+            *_crossings(response, grid, lambda value: np.sin(np.angle(value))),
+            *_ends(loop),
+        )
         if found.value.real < 0
-    )  # fmt: skip
+    )
     factors = [1 / abs(found.value) for found in turns if abs(found.value) > 1 / MEANINGFUL]
     factors = [factor for factor in factors if factor > 1 / MEANINGFUL]
     lags = [(math.pi + float(np.angle(found.value))) % (2 * math.pi) for found in gains]
     delays = [lag / found.frequency for lag, found in zip(lags, gains, strict=True)]
+    closed = closed_poles(loop)
+    if not np.all(closed.real < -ROUNDING * np.abs(closed)):
+        return Margins(False, math.nan, math.nan, math.nan, math.nan, gains, turns)
     return Margins(
-        stable=bool(np.all(closed_poles(loop).real < 0)),
+        stable=True,
         gain_up=min((factor for factor in factors if factor > 1), default=math.inf),
         gain_down=max((factor for factor in factors if factor < 1), default=0.0),
         phase=math.degrees(min(lags, default=math.nan)),
@@ -101,6 +100,14 @@ def margins(loop: Linear) -> Margins:
         gain_crossings=gains,
         phase_crossings=turns,
     )
+
+
+def _ends(loop: Linear) -> Iterator[Crossing]:
+    """Where L is real at its ends: at 0, if it has no pole there, and at infinity."""
+    fastest = np.abs([*loop.poles, *closed_poles(loop)]).max(initial=0.0)
+    if np.all(np.abs(loop.poles) > AT_ZERO * fastest):
+        yield Crossing(0.0, complex(frequency_response(loop)(np.zeros(1))[0]))
+    yield Crossing(math.inf, complex(loop.D[0, 0]))
 
 
 def closed_poles(loop: Linear) -> np.ndarray:
@@ -121,20 +128,28 @@ def frequency_response(model: Linear) -> Response:
 
 def frequencies(loop: Linear) -> np.ndarray:
     """Frequencies in rad/s at which something may happen, ascending."""
-    rates = np.abs([*loop.poles, *closed_poles(loop)])
-    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
-    rates = rates if len(rates) else np.ones(1)
+    rates = sizes([*loop.poles, *closed_poles(loop)])
     low, high = math.log10(rates.min()) - DECADES, math.log10(rates.max()) + DECADES
     return np.logspace(low, high, 1 + int(PER_DECADE * (high - low)))
+
+
+def sizes(poles: Sequence[complex] | np.ndarray) -> np.ndarray:
+    """Sizes of poles that are not 0, in 1/s; 1 if there is none."""
+    rates = np.abs(poles)
+    rates = rates[rates > AT_ZERO * rates.max(initial=0.0)]
+    return rates if len(rates) else np.ones(1)
 
 
 def _crossings(
     response: Response, grid: np.ndarray, function: Callable[[np.ndarray], np.ndarray]
 ) -> Iterator[Crossing]:
-    """Where a function of L changes its sign."""
+    """Where a function of L changes its sign, also if it is 0 at a frequency of the grid."""
     values = function(response(grid))
-    for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0).tolist():
-        low, high = math.log(grid[i]), math.log(grid[i + 1])
+    clear = np.flatnonzero(np.abs(values) > ROUNDING)
+    for i, j in zip(clear[:-1].tolist(), clear[1:].tolist(), strict=True):
+        if np.sign(values[i]) == np.sign(values[j]):
+            continue
+        low, high = math.log(grid[i]), math.log(grid[j])
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
             same = np.sign(function(response(np.array([math.exp(middle)])))[0])

@@ -17,6 +17,8 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     assets.write(folder)
     linear = found.linear
     parts: list[Part] = []
+    if found.trimmed:
+        parts.append((explained.equilibrium(found), explained.EQUILIBRIUM, []))
     if found.margins is not None:
         parts.append((explained.margins(found.margins), explained.MARGINS, []))
     if found.largest:
@@ -28,8 +30,6 @@ def write(folder: Path, found: Study, step: float | None, again: str) -> Path:
     if pictures:
         shown = Table("Answers", [], [])
         parts.append((shown, explained.PICTURES, pictures))
-    if linear.intervals:
-        parts.append((explained.intervals(found), explained.INTERVALS, []))
     parts.append((explained.point(found), explained.POINT, []))
     parts.append((explained.matrices(found), explained.MATRICES, []))
     name = f"{found.path.stem}, {found.variant}" if found.variant else found.path.stem

@@ -28,7 +28,9 @@ def document(found: Study, step: float | None) -> Document:
         "held": list(linear.held),
         "poles": pairs(linear.poles),
         "left_out": list(linear.left_out),
-        "intervals": {name: list(ends) for name, ends in linear.intervals.items()},
+        "intervals": {
+            name: [finite(end) for end in ends] for name, ends in linear.intervals.items()
+        },
     }
     if step is not None:
         transition, forced = linear.sampled(step)

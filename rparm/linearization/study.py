@@ -75,6 +75,8 @@ class Study:
         Without held states.
     units : dict of str to str
         Of its variables that have one.
+    trimmed : sequence of str
+        What was moved until the point was an equilibrium.
     variant : str
         "" if it is an FMU.
     largest : list of LargestStep
@@ -88,6 +90,7 @@ class Study:
     path: Path
     linear: Linear
     units: Mapping[str, str]
+    trimmed: Sequence[str] = ()
     variant: str = ""
     largest: Sequence[LargestStep] = ()
     loop: Linear | None = None
@@ -111,7 +114,7 @@ def study(request: Request) -> Study:
         found = subject.at(trimmed.values)
         subject.check(found)
         found = _chosen(found.without(subject.held(found)), trimmed, request)
-        return Study(path, found, _units(subject, found))
+        return Study(path, found, _units(subject, found), request.free)
 
 
 def _of_system(path: Path, request: Request) -> Study:
@@ -130,9 +133,9 @@ def _of_system(path: Path, request: Request) -> Study:
         if subject.cut is not None:
             source = f"{subject.cut.start_component}.{subject.cut.start_connector}"
             loop = open_loop(whole.select([request.cut], [source]))
-            return Study(path, found, units, variant, (), loop, margins(loop))
+            return Study(path, found, units, request.free, variant, (), loop, margins(loop))
         largest = largest_steps(parts, subject.connections, subject.ways)
-        return Study(path, found, units, variant, largest)
+        return Study(path, found, units, request.free, variant, largest)
 
 
 def _path(request: Request) -> Path:
@@ -175,6 +178,6 @@ def _chosen(found: Linear, trimmed: Trimmed, request: Request) -> Linear:
 
 
 def _units(subject: FmuSubject | SystemSubject, found: Linear) -> dict[str, str]:
-    names = (*found.states, *found.inputs, *found.outputs, *found.held)
+    names = (*found.at, *found.outputs)  # all states and inputs
     known = {name: subject.variable(name).unit for name in names}
     return {name: unit for name, unit in known.items() if unit}

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from types import TracebackType
 
 from rparm.coupling.master import INPUTS, ORDERS, Master
 from rparm.errors import UserError, hint
@@ -24,7 +23,7 @@ from rparm.system.ssp import Ssp
 from rparm.system.structure import Connection
 
 
-class SystemSubject:
+class SystemSubject(ExitStack):
     """A variant of a system to linearize; a context manager, which keeps its FMUs unpacked.
 
     Names are "component.variable".
@@ -52,6 +51,7 @@ class SystemSubject:
         without: Sequence[str] = (),
         cut: str = "",
     ) -> None:
+        super().__init__()
         system = ssp.system
         if variant not in system.parameters:
             raise UserError(f"{ssp.path}: no variant {variant!r}{hint(variant, system.parameters)}")
@@ -67,22 +67,11 @@ class SystemSubject:
             self.connections = bypassed(ssp, self.connections, name)
         self.cut = self._found(cut) if cut else None
         self._parameters = system.parameter_sets[variant]
-        self._stack = ExitStack()
-
-    def __enter__(self) -> "SystemSubject":
-        with ExitStack() as stack:
-            self.fmus: dict[str, Fmu] = {
-                name: stack.enter_context(self.ssp.unpacked_fmu(name)) for name in self.names
-            }
+        with ExitStack() as stack:  # closes what is open if one of them is refused
+            self.fmus = {name: stack.enter_context(ssp.unpacked_fmu(name)) for name in self.names}
             for fmu in self.fmus.values():
                 require_derivatives(fmu)
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, trace)
+            self.push(stack.pop_all())
 
     def _found(self, name: str) -> Connection:
         """The connection to an input."""

@@ -1,7 +1,8 @@
 """Equilibria by Newton's method on directional derivatives, and the intervals of dry friction.
 
 An equilibrium is where all derivatives of states are 0, but those that are a velocity which is
-given, and outputs have the values that they are to have. Some states and inputs are free.
+given, and outputs have the values that they are to have. Some states and inputs are free. Where
+nothing rests and a velocity is free, it is a steady motion: that of a motor under a voltage.
 """
 
 import math
@@ -52,7 +53,12 @@ def trim(
     UserError if there is none, or the equations leave it open where it is.
     """
     problem = _Problem(subject, values, free, targets)
-    point = problem.solved()
+    try:
+        point = problem.solved()
+    except UserError:
+        if not problem.may_move():
+            raise
+        point = problem.solved()
     intervals: dict[str, tuple[float, float]] = {}
     for _ in free:  # the middle of one may matter to the next
         for i, name in enumerate(free):
@@ -84,10 +90,18 @@ class _Problem:
             if name in free[:i]:
                 raise UserError(f"--trim: {name} is given twice")
         self.columns = [known.index(name) for name in free]
+        self.is_moving = False
         self.rows = [first.outputs.index(name) for name in targets]
         self.equations = [*first.states, *targets]
         self.count = len(self.equations) - np.count_nonzero(self._is_given_velocity(first))
         self.start = np.array([*first.x, *first.u])[self.columns]
+
+    def may_move(self) -> bool:
+        """Let velocities that are free be what they will; whether there are any."""
+        found = self.subject.at(self.fixed)
+        before = np.count_nonzero(self._is_given_velocity(found))
+        self.is_moving = True
+        return np.count_nonzero(self._is_given_velocity(found)) > before
 
     def set_to(self, point: np.ndarray) -> dict[str, Value]:
         return self.fixed | dict(zip(self.free, map(float, point), strict=True))
@@ -105,19 +119,19 @@ class _Problem:
         found = self.subject.at(self.set_to(point))
         wanted = np.array([*self.targets.values()])
         left = np.concatenate([found.rates, found.y[self.rows] - wanted])
-        left[: len(found.states)][self._is_given_velocity(found)] = 0.0
         responses = np.block([[found.A, found.B], [found.C[self.rows], found.D[self.rows]]])
         whole = np.array([*found.x, *found.u])
         size = np.abs(responses) @ np.abs(whole) + np.concatenate([0 * found.x, np.abs(wanted)])
+        unbound = np.flatnonzero(self._is_given_velocity(found))
+        left[unbound] = responses[unbound] = 0.0
         return left, responses[:, self.columns], np.maximum(size, 1.0)
 
     def _is_given_velocity(self, found: Linear) -> np.ndarray:
-        """Which derivatives are states that are not free: the velocity is prescribed."""
+        """Which derivatives are a velocity that is given or may move: no equation binds them."""
         n = len(found.states)
-        one = (np.count_nonzero(found.A, axis=1) == 1) & ~found.B.any(axis=1)
         given = np.ones(n, bool)
-        given[[column for column in self.columns if column < n]] = False
-        return one & (found.A[:, given] == 1).any(axis=1)
+        given[[column for column in self.columns if column < n]] = self.is_moving
+        return found.are_positions & found.A[:, given].any(axis=1)
 
     def is_equilibrium(self, point: np.ndarray) -> bool:
         left, _, size = self.evaluated(point)

@@ -7,8 +7,19 @@ import numpy as np
 import pytest
 
 import rparm
+from rparm.identification import logs
 from tests.identification import ripple
-from tests.identification.synthetic import ARM, INPUTS, MEASURED, PLANT, Machine, identified, write
+from tests.identification.synthetic import (
+    ARM,
+    INPUTS,
+    MEASURED,
+    PLANT,
+    Machine,
+    efforts,
+    identified,
+    save,
+    write,
+)
 
 # ---- what is found -------------------------------------------------------------------------------
 
@@ -75,6 +86,45 @@ def test_missing_rows_and_irregular_times(tmp_path: Path) -> None:
     for name, true in ARM.true.items():
         estimate = found.estimates[name]
         assert abs(estimate.value - true) < estimate.high - estimate.low
+
+
+def test_times_that_are_never_the_same_step(tmp_path: Path) -> None:
+    """No row is missing where a step is 1.6 of the usual one: its input is held, as all are."""
+    fine, random = replace(ARM, duration=4.0), np.random.default_rng(8)
+    true = ARM.true | {"solver_method": "taylor"}
+    rows = 10 * np.arange(4001) + random.integers(-3, 4, 4001)
+    rows = np.clip(rows, 0, 40000)
+    held = rows[np.searchsorted(rows, np.arange(40001), side="right") - 1]
+    times = 1e-4 * np.arange(40001)
+    told = efforts(times[held], random)
+    table = rparm.simulate(
+        fine.fmu,
+        stop_time=4.0,
+        step=1e-4,
+        start_values={**true, "q1": -1.2, "q2": 0.1},
+        inputs=dict(zip(INPUTS, told.T, strict=True)),
+        outputs=MEASURED,
+    )
+    seen = np.column_stack([table[name][rows] for name in MEASURED])
+    seen += random.normal(size=seen.shape) * (1e-4, 1e-5)
+    log = tmp_path / "log.csv"
+    save(log, times[rows], told[rows], seen)
+    found = identified(ARM, log, 8)
+    assert found.warnings == [] and 0.9 < found.chi2 < 1.1
+    np.testing.assert_allclose(found.noise, (1e-4, 1e-5), rtol=0.1)
+
+
+def test_noise_is_the_same_whatever_rows_are_missing() -> None:
+    random = np.random.default_rng(11)
+    times = 1e-3 * np.arange(8001)
+    smooth = np.sin(5 * times)[:, None]
+    seen = smooth + 1e-5 * random.normal(size=smooth.shape)
+    kept = random.random(len(times)) > 0.1
+    found = [
+        logs.noise([logs.Recording(Path(), times[rows], seen[rows], seen[rows], seen[rows], 1e-3)])
+        for rows in (kept | True, kept)
+    ]
+    np.testing.assert_allclose(found, 1e-5, rtol=0.05)
 
 
 def test_joints_that_start_at_a_stop(tmp_path: Path) -> None:

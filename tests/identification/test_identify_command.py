@@ -226,5 +226,7 @@ def test_fmu_and_log_are_needed(capsys: pytest.CaptureFixture[str], log: Path) -
         code, _, error = call(capsys, "identify", *arguments)
         assert code == 2
         assert_one_line(error)
+    code, _, error = call(capsys, "identify", log, FMUS["rp_manipulator"])
+    assert code == 2 and f"{log}: expected an FMU (.fmu)" in error
     code, _, error = call(capsys, "identify", "rp_manipulatr", log)
     assert code == 2 and "did you mean 'rp_manipulator'?" in error

@@ -20,6 +20,13 @@ def test_the_demo_finds_its_machine(tmp_path: Path, capsys: pytest.CaptureFixtur
         estimate = found["parameters"][name]
         assert abs(estimate["value"] - true) < estimate["high"] - estimate["low"] < 0.01 * true
     assert 0.9 < found["validation"]["chi2"] < 1.1
+    # the result, run from the start in one go, is the motion that was logged, but for the delay
+    assert found["validation"]["follows"] == {"q1": 8.0, "q2": 8.0}
+    scenario = tmp_path / "scenario.toml"
+    code, out, _ = call(capsys, scenario, "--json", "--output", tmp_path / "report")
+    (ran,) = json.loads(out)["scenarios"]
+    assert code == 0
+    assert all(x["rms"] < 0.01 for x in ran["runs"][0]["measured"].values())
 
 
 def test_a_delay_is_found(tmp_path: Path) -> None:

@@ -115,6 +115,52 @@ def test_the_document_and_the_files_have_the_same(
     assert rows[0] == ["", *api.states, *api.inputs]
 
 
+def test_an_end_that_is_nowhere_is_null(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A rigid stop bears every effort: files and documents have no infinity."""
+    at = ["--at", "q1=2.5", "stops1=rigid", "--trim", "tau1", "f2"]
+    saved = tmp_path / "m.json"
+    found = document(
+        ["RPPlant", *at, "--save", str(saved), "--output", str(tmp_path / "page")], capsys
+    )
+    low, high = found["intervals"]["tau1"]
+    assert low < found["at"]["tau1"] and high is None
+    assert json.loads(saved.read_text())["intervals"] == found["intervals"]
+
+
+def printed(command: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """What a command prints that goes well."""
+    assert cli.main(["linearize", *command]) == 0
+    return capsys.readouterr().out
+
+
+def test_the_terminal_says_what_was_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = ["--output", str(tmp_path)]
+    out = printed([*COMMAND, "--inputs", "tau1,f2", "--outputs", "q2", *output], capsys)
+    rows = [line.split() for line in out.splitlines()]
+    tau1, f2 = ([row for row in rows if row[:1] == [name]][0] for name in ("tau1", "f2"))
+    gravity = 9.81 * (np.cos(np.pi / 6) - 0.1 * np.sin(np.pi / 6))
+    assert [float(x) for x in tau1[1:4]] == pytest.approx(
+        [gravity, gravity - 0.5, gravity + 0.5], abs=1e-4
+    )
+    assert f2[1:] == ["4.905", "–", "–", "N"]
+    assert ["dq2'", "0", "0", "0", "1"] in rows and ["q2", "1", "0", "0", "0"] in rows
+    out = printed([*COMMAND, *output], capsys)
+    assert "A, B, C and D" not in out and "Matrices: --json" in out  # too wide to be read
+    held = ["RPPlant", "--at", "coulomb_friction1=99", "coulomb_friction2=99", *output]
+    assert "Poles" not in printed(held, capsys)
+
+
+def test_a_given_velocity_is_a_steady_motion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    at = ["--at", "q1=30deg", "dq1=0.02", "--output", str(tmp_path)]
+    out = printed(["RPPlant", *at, "--trim", "tau1", "f2"], capsys)
+    assert "In steady motion: q1' = 0.02." in out and "no equilibrium" not in out
+    assert "This is no equilibrium: q1' = 0.02, dq1'" in printed(["RPPlant", *at], capsys)
+
+
 def test_a_page_with_pictures_explains_itself(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

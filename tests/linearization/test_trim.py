@@ -82,6 +82,27 @@ def test_slow_sliding_under_stribeck_friction_is_unstable(plant: FmuSubject) -> 
     assert fast > 5
 
 
+def test_a_velocity_that_is_free_is_that_of_a_steady_motion(plant: FmuSubject) -> None:
+    """Where an effort drives against damping; a joint that can rest rests."""
+    given = {"g": 0.0, "damping1": 0.5, "damping2": 1.0, "q2": -0.5}  # no arm to throw the slide
+    driven = trimmed(plant, ["dq1", "f2"], tau1=2.0, **given)
+    assert driven.values["dq1"] == pytest.approx(4.0)
+    assert driven.values["f2"] == pytest.approx(0.0, abs=1e-9)
+    rests = trimmed(plant, ["q1", "dq1"], q2=0.1, f2=0.0, g=0.0, damping1=0.5, ee_y=0.2)
+    assert rests.values["dq1"] == pytest.approx(0.0, abs=1e-9)
+    with pytest.raises(UserError, match="no equilibrium found by dq1, tau1"):
+        trimmed(plant, ["dq1", "tau1"], f2=3.0, **given)
+
+
+def test_a_motor_under_a_voltage_turns(fmu: Path) -> None:
+    """Its load's angle follows by a gear: steady where k i = d w and u = R i + k w."""
+    path = fmu.with_name("DcMotor.fmu")
+    with Fmu(path, kind=MODEL_EXCHANGE) as opened, FmuSubject(opened) as motor:
+        found = trimmed(motor, ["i", "speed"], voltage=12.0)
+    w = 12.0 / (1.2 * 1e-5 / 0.05 + 0.05)
+    assert (found.values["speed"], found.values["i"]) == pytest.approx((w, 2e-4 * w), rel=1e-9)
+
+
 def test_a_touched_compliant_stop_gives_its_pair(plant: FmuSubject) -> None:
     given = {"q2": 0.01, "stops2": "compliant", "upper2": 0.0, "stop_stiffness2": 400.0}
     given |= {"g": 0.0, "a": 0.0, "coulomb_friction1": 1e3}
