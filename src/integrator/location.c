@@ -147,7 +147,7 @@ static bool is_far_above(const struct step_polynomial *step, const struct indica
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
 }
 
-static double first_of_state(struct location *location, size_t i) {
+static double first_of_state(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct indicator *indicator = &location->indicators[i];
     double c[ROOTS_LENGTH];
@@ -169,7 +169,7 @@ static double first_of_state(struct location *location, size_t i) {
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return fall_first(&p, 0.0, &location->is_armed[i], &location->noise[i]);
+    return fall_first(&p, 0.0, latest, &location->is_armed[i], &location->noise[i]);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -178,14 +178,15 @@ static double first_of_state(struct location *location, size_t i) {
 static const double representation = 1e-12;
 
 /* One whose polynomial is given. */
-static double first_of_model(struct location *location, size_t i) {
+static double first_of_model(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
     double size = 0.0;
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return fall_first(&p, representation * size, &location->is_armed[i], &location->noise[i]);
+    return fall_first(&p, representation * size, latest, &location->is_armed[i],
+                      &location->noise[i]);
 }
 
 /* Writes all indicators at s, of the whole step, to column k of samples. */
@@ -266,7 +267,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
         return is_above;
     }
     const struct roots_polynomial p = {c, degree, -1.0};
-    const double s = fall_first(&p, noise, &location->is_armed[i], &location->noise[i]);
+    const double s = fall_first(&p, noise, INFINITY, &location->is_armed[i], &location->noise[i]);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -308,24 +309,24 @@ static const double same_time = 4.0 * 0x1p-52;
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
     bool needs_model = false;
+    double s = INFINITY; // of the first event so far: none behind it is located
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            location->first[i] = first_of_state(location, i);
+            location->first[i] = first_of_state(location, i, s + same_time);
         } else if (indicator->kind == INDICATOR_OF_MODEL && step->has_indicators) {
-            location->first[i] = first_of_model(location, i);
+            location->first[i] = first_of_model(location, i, s + same_time);
         }
+        s = location->first[i] < s ? location->first[i] : s;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !step->has_indicators;
     }
     const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;
     if (status != STATUS_OK) {
         return status;
     }
-
-    double s = INFINITY;
-    for (size_t k = 0; k < location->used_count; k++) {
+    for (size_t k = 0; needs_model && k < location->used_count; k++) {
         const double first = location->first[location->used[k]];
         s = first < s ? first : s;
     }
