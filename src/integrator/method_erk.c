@@ -62,8 +62,9 @@ static enum status search(struct erk *erk, double t, const double x[]) {
     return status;
 }
 
-/* As ERKStep calls it. At the begin of an internal step the search has evaluated it. */
-static int right_hand_side(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
+/* The right-hand side where events are looked for: at the begin of an internal step the search has
+ * evaluated it. */
+static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
     const struct erk *erk = user_data;
     const size_t size = erk->base.problem->ode.state_count * sizeof(double);
     if (t == erk->step_begin && memcmp(small_vector_data(x), erk->step_x, size) == 0) {
@@ -138,7 +139,7 @@ static void destroy(void *memory) {
 
 static bool create_solver(struct erk *erk) {
     struct sundials *base = &erk->base;
-    erk->solver = ERKStepCreate(right_hand_side, 0.0, base->x, base->context);
+    erk->solver = ERKStepCreate(sundials_rhs, 0.0, base->x, base->context);
     return erk->solver != NULL &&
            ERKStepSetErrHandlerFn(erk->solver, report_text, base) == ARK_SUCCESS &&
            ERKStepSetUserData(erk->solver, base) == ARK_SUCCESS &&
@@ -195,7 +196,9 @@ static enum status restart(void *memory, const double x[]) {
 
 /* From the state in base.x at the time begin; first_step: s, 0: ARKODE finds one. */
 static int start(struct erk *erk, double begin, double end, double first_step) {
-    int flag = ERKStepReInit(erk->solver, right_hand_side, begin, erk->base.x);
+    const bool is_searched = location_is_active(&erk->base.problem->location);
+    int flag =
+        ERKStepReInit(erk->solver, is_searched ? searched_rhs : sundials_rhs, begin, erk->base.x);
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetInitStep(erk->solver, first_step);
     }
