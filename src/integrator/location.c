@@ -92,11 +92,12 @@ enum status location_restart(struct location *location, const struct indicator *
         }
         location->used[location->used_count] = i;
         location->used_count++;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
-        location->is_armed[i] = false;
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
-        location->noise[i] = larger(2.0 * rounding, DBL_MIN);
-        if (indicator->kind == INDICATOR_OF_STATE) {
+        if (indicator->kind == INDICATOR_OF_MODEL) {
+            needs_model = true;
+            location->is_armed[i] = false;
+            location->noise[i] = larger(2.0 * rounding, DBL_MIN);
+        } else {
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
@@ -104,11 +105,9 @@ enum status location_restart(struct location *location, const struct indicator *
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
         }
     }
-    if (!needs_model) {
-        return STATUS_OK;
-    }
-    const enum status status = evaluate(location, 0.0, x);
-    for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
+    const enum status status = needs_model ? evaluate(location, 0.0, x) : STATUS_OK;
+    for (size_t i = 0; needs_model && status == STATUS_OK && i < location->ode->indicator_count;
+         i++) {
         location->is_armed[i] |= indicators[i].kind == INDICATOR_OF_MODEL && location->z[i] > 0.0;
     }
     return status;
