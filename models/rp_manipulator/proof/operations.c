@@ -40,7 +40,8 @@ bool operations_answer(FILE *questions, FILE *answers) {
     while (text_read_word(questions, name)) {
         struct ball operands[OPERANDS] = {{0}}, answer[2] = {{0}};
         double count;
-        if (!text_read_numbers(questions, &count, 1) || !(count >= 0.0 && count <= (double)OPERANDS) ||
+        if (!text_read_numbers(questions, &count, 1) ||
+            !(count >= 0.0 && count <= (double)OPERANDS) ||
             !text_read_balls(questions, operands, (int)count) ||
             !apply(name, operands, (int)count, answer)) {
             return false;
