@@ -79,8 +79,9 @@ static double first_fall_from_zero(const struct roots_polynomial *p, double nois
 /* p stays above 0 up to s, by the quick proof; from its start on, where it may be at a root. */
 static bool is_above_until(const struct roots_polynomial *p, double s, double noise) {
     double c[ROOTS_LENGTH];
-    double power = 1.0;
-    for (int k = 0; k <= p->degree; k++) {
+    double power = s;
+    c[0] = p->c[0];
+    for (int k = 1; k <= p->degree; k++) {
         c[k] = p->c[k] * power;
         power *= s;
     }
