@@ -291,9 +291,12 @@ void rp_plant_reach(const void *values_pointer, const double x[], double reach[]
     for (int i = 0; i < 2; i++) {
         const bool is_sliding = rp_plant_slides(values->modes.joint[i]);
         const double vs = p->stribeck_velocity[i];
+        const double above_fast = fabs(x[2 + i]) - fast * vs;
         reach[i] = INFINITY;
-        reach[2 + i] =
-            is_sliding && has_breakaway(p, i) ? fmax(vs, fabs(x[2 + i]) - fast * vs) : INFINITY;
+        reach[2 + i] = INFINITY;
+        if (is_sliding && has_breakaway(p, i)) {
+            reach[2 + i] = above_fast > vs ? above_fast : vs;
+        }
     }
 }
 

@@ -76,9 +76,25 @@ static double first_fall_from_zero(const struct roots_polynomial *p, double nois
     return below == INFINITY ? INFINITY : fmin(below, last_fall(p, below));
 }
 
+/* p stays above 0 up to s, by the quick proof; from its start on, where it may be at a root. */
+static bool is_above_until(const struct roots_polynomial *p, double s, double noise) {
+    double c[ROOTS_LENGTH];
+    double power = s;
+    c[0] = p->c[0];
+    for (int k = 1; k <= p->degree; k++) {
+        c[k] = p->c[k] * power;
+        power *= s;
+    }
+    return c[0] >= 0.0 && roots_is_above(&(struct roots_polynomial){c, p->degree, noise});
+}
+
 /* An indicator that is below 0 at a restart has not fallen: the modes have just been found valid,
  * and one event would come again and again. */
-double fall_first(const struct roots_polynomial *p, double error, bool *is_armed, double *noise) {
+double fall_first(const struct roots_polynomial *p, double error, double latest, bool *is_armed,
+                  double *noise) {
+    if (latest <= 1.0 && is_above_until(p, latest, *is_armed ? -1.0 : *noise)) {
+        return INFINITY;
+    }
     if (!*is_armed) {
         double within = fmax(error, *noise);
         if (p->c[0] <= -within) {

@@ -92,11 +92,12 @@ enum status location_restart(struct location *location, const struct indicator *
         }
         location->used[location->used_count] = i;
         location->used_count++;
-        needs_model |= indicator->kind == INDICATOR_OF_MODEL;
-        location->is_armed[i] = false;
         const double rounding = 2.0 * DBL_EPSILON * fabs(indicator->offset);
-        location->noise[i] = larger(2.0 * rounding, DBL_MIN);
-        if (indicator->kind == INDICATOR_OF_STATE) {
+        if (indicator->kind == INDICATOR_OF_MODEL) {
+            needs_model = true;
+            location->is_armed[i] = false;
+            location->noise[i] = larger(2.0 * rounding, DBL_MIN);
+        } else {
             const double z = at_state(indicator, x);
             const bool is_sure = indicator->rises || z > 0.0;
             location->is_armed[i] = is_sure && (z > rounding || rounding == 0.0);
@@ -104,11 +105,9 @@ enum status location_restart(struct location *location, const struct indicator *
             location->noise[i] = is_sure ? rounding : larger(rounding, miss);
         }
     }
-    if (!needs_model) {
-        return STATUS_OK;
-    }
-    const enum status status = evaluate(location, 0.0, x);
-    for (size_t i = 0; status == STATUS_OK && i < location->ode->indicator_count; i++) {
+    const enum status status = needs_model ? evaluate(location, 0.0, x) : STATUS_OK;
+    for (size_t i = 0; needs_model && status == STATUS_OK && i < location->ode->indicator_count;
+         i++) {
         location->is_armed[i] |= indicators[i].kind == INDICATOR_OF_MODEL && location->z[i] > 0.0;
     }
     return status;
@@ -147,7 +146,7 @@ static bool is_far_above(const struct step_polynomial *step, const struct indica
     return (1.0 - slack) * value > (1.0 + slack) * fabs(indicator->factor) * way + noise;
 }
 
-static double first_of_state(struct location *location, size_t i) {
+static double first_of_state(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct indicator *indicator = &location->indicators[i];
     double c[ROOTS_LENGTH];
@@ -169,7 +168,7 @@ static double first_of_state(struct location *location, size_t i) {
         shift(c, step->degree);
     }
     const struct roots_polynomial p = {c, step->degree, -1.0};
-    return fall_first(&p, 0.0, &location->is_armed[i], &location->noise[i]);
+    return fall_first(&p, 0.0, latest, &location->is_armed[i], &location->noise[i]);
 }
 
 /* ---- Indicators of the model ---------------------------------------------------------------- */
@@ -178,14 +177,15 @@ static double first_of_state(struct location *location, size_t i) {
 static const double representation = 1e-12;
 
 /* One whose polynomial is given. */
-static double first_of_model(struct location *location, size_t i) {
+static double first_of_model(struct location *location, size_t i, double latest) {
     const struct step_polynomial *step = &location->step;
     const struct roots_polynomial p = {step->indicator_row[i], step->degree, -1.0};
     double size = 0.0;
     for (int k = 0; k <= step->degree; k++) {
         size += fabs(p.c[k]);
     }
-    return fall_first(&p, representation * size, &location->is_armed[i], &location->noise[i]);
+    return fall_first(&p, representation * size, latest, &location->is_armed[i],
+                      &location->noise[i]);
 }
 
 /* Writes all indicators at s, of the whole step, to column k of samples. */
@@ -266,7 +266,7 @@ static bool search_piece(struct location *location, const struct piece *piece, s
         return is_above;
     }
     const struct roots_polynomial p = {c, degree, -1.0};
-    const double s = fall_first(&p, noise, &location->is_armed[i], &location->noise[i]);
+    const double s = fall_first(&p, noise, INFINITY, &location->is_armed[i], &location->noise[i]);
     location->first[i] = fmin(location->first[i], piece->begin + piece->length * s);
     return true;
 }
@@ -308,24 +308,24 @@ static const double same_time = 4.0 * 0x1p-52;
 enum status location_search(struct location *location) {
     const struct step_polynomial *step = &location->step;
     bool needs_model = false;
+    double s = INFINITY; // of the first event so far: none behind it is located
     for (size_t k = 0; k < location->used_count; k++) {
         const size_t i = location->used[k];
         const struct indicator *indicator = &location->indicators[i];
         location->first[i] = INFINITY;
         if (indicator->kind == INDICATOR_OF_STATE) {
-            location->first[i] = first_of_state(location, i);
+            location->first[i] = first_of_state(location, i, s + same_time);
         } else if (indicator->kind == INDICATOR_OF_MODEL && step->has_indicators) {
-            location->first[i] = first_of_model(location, i);
+            location->first[i] = first_of_model(location, i, s + same_time);
         }
+        s = location->first[i] < s ? location->first[i] : s;
         needs_model |= indicator->kind == INDICATOR_OF_MODEL && !step->has_indicators;
     }
     const enum status status = needs_model ? search_model_in(location, 0.0, 1.0, 0) : STATUS_OK;
     if (status != STATUS_OK) {
         return status;
     }
-
-    double s = INFINITY;
-    for (size_t k = 0; k < location->used_count; k++) {
+    for (size_t k = 0; needs_model && k < location->used_count; k++) {
         const double first = location->first[location->used[k]];
         s = first < s ? first : s;
     }

@@ -33,7 +33,7 @@ struct erk {
     double *cut_x;     /* the state there */
 
     /* where events are looked for: the begin of the running internal step */
-    double step_begin; /* s since the restart */
+    double step_begin; /* s since the restart; NaN: they are not */
     double *step_x;    /* the state there */
     double *step_dx;   /* and the right-hand side */
     double *dx;        /* that of the end */
@@ -60,6 +60,18 @@ static enum status search(struct erk *erk, double t, const double x[]) {
         memcpy(erk->step_dx, erk->dx, n * sizeof(double));
     }
     return status;
+}
+
+/* The right-hand side where events are looked for: at the begin of an internal step the search has
+ * evaluated it. */
+static int searched_rhs(sunrealtype t, N_Vector x, N_Vector dx, void *user_data) {
+    const struct erk *erk = user_data;
+    const size_t size = erk->base.problem->ode.state_count * sizeof(double);
+    if (t == erk->step_begin && memcmp(small_vector_data(x), erk->step_x, size) == 0) {
+        memcpy(small_vector_data(dx), erk->step_dx, size);
+        return 0;
+    }
+    return sundials_rhs(t, x, dx, user_data);
 }
 
 /* Called by ERKStep after each step that it accepts; ends the advance at an event or where the
@@ -93,12 +105,13 @@ static int begin_watching(struct erk *erk, double end, const double begin_x[], d
     erk->end = end;
     erk->watched = problem->reached;
     erk->search_status = STATUS_OK;
+    erk->step_begin = NAN;
     if (is_searched) {
-        erk->step_begin = problem->reached;
         memcpy(erk->step_x, begin_x, problem->ode.state_count * sizeof(double));
         if (problem_rhs(problem, problem->reached, begin_x, erk->step_dx) != STATUS_OK) {
             return ARK_RHSFUNC_FAIL;
         }
+        erk->step_begin = problem->reached;
     }
     const bool is_watched = is_searched || problem->observer != NULL;
     return ERKStepSetPostprocessStepFn(erk->solver, is_watched ? observe : NULL);
@@ -183,7 +196,9 @@ static enum status restart(void *memory, const double x[]) {
 
 /* From the state in base.x at the time begin; first_step: s, 0: ARKODE finds one. */
 static int start(struct erk *erk, double begin, double end, double first_step) {
-    int flag = ERKStepReInit(erk->solver, sundials_rhs, begin, erk->base.x);
+    const bool is_searched = location_is_active(&erk->base.problem->location);
+    int flag =
+        ERKStepReInit(erk->solver, is_searched ? searched_rhs : sundials_rhs, begin, erk->base.x);
     if (flag == ARK_SUCCESS) {
         flag = ERKStepSetInitStep(erk->solver, first_step);
     }

@@ -156,8 +156,11 @@ static double step_within_reach(struct taylor *taylor, const double x[], double 
     ode->reach(x, reach, ode->context);
     double within = step;
     for (size_t i = 0; i < ode->state_count; i++) {
+        if (reach[i] == INFINITY) {
+            continue;
+        }
         double way = 0.0;
-        for (int k = series->order; k >= 1 && reach[i] < INFINITY; k--) {
+        for (int k = series->order; k >= 1; k--) {
             way = (way + fabs(series->row[i][k])) * step;
         }
         if (way > reach[i]) {

@@ -13,7 +13,8 @@ static enum status rest(struct step *step, enum continuation continuation) {
                                           ? instance->memory.current_inputs
                                           : instance->memory.next_inputs;
     // constant inputs end no mode; the active values matter only after an event
-    const bool is_searched = polynomials_move(inputs, count_of(instance->model->inputs));
+    const bool is_searched =
+        !instance->inputs_are_held && polynomials_move(inputs, count_of(instance->model->inputs));
     if (is_searched || step->meets_time_event) {
         instance_activate_values(instance, step->end, inputs);
     } else {

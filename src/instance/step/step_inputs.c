@@ -5,6 +5,9 @@
 #include <math.h>
 
 void instance_begin_inputs(struct instance *instance) {
+    if (instance->inputs_are_held) {
+        return;
+    }
     struct instance_memory *memory = &instance->memory;
     double *u = doubles_of(memory->values, instance->model->inputs);
     for (size_t i = 0; i < count_of(instance->model->inputs); i++) {

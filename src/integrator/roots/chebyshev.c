@@ -5,34 +5,39 @@
 enum { LAST = CHEBYSHEV_LENGTH - 1 };
 
 /* cos(k pi / 16). */
-static double cosine(int k) {
-    static const double table[LAST / 2 + 1] = {1.0,
-                                               0.9807852804032304,
-                                               0.9238795325112867,
-                                               0.8314696123025452,
-                                               0.7071067811865476,
-                                               0.5555702330196022,
-                                               0.3826834323650898,
-                                               0.19509032201612828,
-                                               0.0};
-    k %= 2 * LAST;
-    k = k > LAST ? 2 * LAST - k : k;
-    return k > LAST / 2 ? -table[LAST - k] : table[k];
+static double cosine(unsigned k) {
+    // clang-format off
+    static const double table[2 * LAST] = {
+        1.0, 0.9807852804032304, 0.9238795325112867, 0.8314696123025452,
+        0.7071067811865476, 0.5555702330196022, 0.3826834323650898, 0.19509032201612828,
+        0.0, -0.19509032201612828, -0.3826834323650898, -0.5555702330196022,
+        -0.7071067811865476, -0.8314696123025452, -0.9238795325112867, -0.9807852804032304,
+        -1.0, -0.9807852804032304, -0.9238795325112867, -0.8314696123025452,
+        -0.7071067811865476, -0.5555702330196022, -0.3826834323650898, -0.19509032201612828,
+        0.0, 0.19509032201612828, 0.3826834323650898, 0.5555702330196022,
+        0.7071067811865476, 0.8314696123025452, 0.9238795325112867, 0.9807852804032304,
+    };
+    // clang-format on
+    return table[k % (2 * LAST)];
 }
 
 double chebyshev_point(int count, int k) {
-    return 0.5 - 0.5 * cosine(k * (LAST / (count - 1)));
+    return 0.5 - 0.5 * cosine((unsigned)(k * (LAST / (count - 1))));
 }
 
 /* Writes the coefficients of Chebyshev polynomials of 2 s - 1, for the values less the first one.
  */
 static void transform(int count, const double values[], double coefficients[]) {
     const int last = count - 1;
+    double weighted[CHEBYSHEV_LENGTH];
+    for (int k = 1; k <= last; k++) {
+        weighted[k] = (k == last ? 0.5 : 1.0) * (values[k] - values[0]);
+    }
     for (int i = 0; i <= last; i++) {
+        const unsigned step = (unsigned)(i * (LAST / last));
         double sum = 0.0;
         for (int k = last; k > 0; k--) {
-            const double weight = k == last ? 0.5 : 1.0;
-            sum += weight * (values[k] - values[0]) * cosine(i * (last - k) * (LAST / last));
+            sum += weighted[k] * cosine((unsigned)(last - k) * step);
         }
         coefficients[i] = (i == 0 || i == last ? 1.0 : 2.0) / last * sum;
     }

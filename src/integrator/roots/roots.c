@@ -107,9 +107,30 @@ static void bound(const struct rising *p, double bounds[ROOTS_LENGTH][BOUNDS]) {
     move_to_ends(bounds, p->degree);
 }
 
-/* Descartes' rule: 0 or 1 where p has as many roots on (0, 1] and is else beyond its rounding, to
- * which its value at 1 may be an exception; 2: it can be more. */
+/* p is monotone on (0, 1]: the first coefficient behind c[0] outweighs, in the derivative, those of
+ * the other sign. Writes the sign of the slope. False: that is not known. */
+static bool is_monotone(const struct rising *p, int *slope) {
+    int first = 1;
+    while (first < p->degree && p->c[first] == 0.0) {
+        first++;
+    }
+    *slope = first <= p->degree && p->c[first] < 0.0 ? -1 : 1;
+    double against = 0.0;
+    for (int k = first + 1; k <= p->degree; k++) {
+        const double term = -*slope * p->c[k];
+        against += term > 0.0 ? k * term : 0.0;
+    }
+    const double slack = 0x1p-40; // more than all rounding
+    return first <= p->degree && (1.0 - slack) * first * fabs(p->c[first]) > against;
+}
+
+/* The most roots that p can have on (0, 1], by Descartes' rule where it is not monotone. 0 or 1: it
+ * is else beyond its rounding, to which its value at 1 may be an exception; 2: two or more. */
 static int most_roots(const struct rising *p) {
+    int slope;
+    if (is_monotone(p, &slope)) {
+        return slope > 0 ? 0 : 1;
+    }
     double c[ROOTS_LENGTH][BOUNDS];
     bound(p, c);
     int positive = 0;
