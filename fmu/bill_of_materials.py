@@ -77,16 +77,9 @@ def bill_of_materials(
     parts: list[Component],
     required: Sequence[Component] = (),
 ) -> str:
-    """Text in JSON; it depends only on the arguments.
+    """Text in JSON, of checksums by file name; it depends only on the arguments.
 
-    Parameters
-    ----------
-    checksums : dict
-        Of the files, by their names.
-    parts : list of Component
-        What is compiled into the FMUs.
-    required : sequence of Component
-        What the wheel requires.
+    `parts` are compiled into the FMUs, the wheel requires `required`.
     """
     bom = Bom(components=[*parts, *required])
     for name, checksum in checksums.items():

@@ -98,13 +98,10 @@ def prepare_tables(tokens: Iterable[Token]) -> None:
 
 
 def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
-    """Convert README.md to the inside of an HTML body.
+    """README.md as the inside of an HTML body.
 
-    Returns
-    -------
-    tuple of str, list of Path and list of tuple of str and str
-        the HTML; the local images, which it refers to by their names; identifier and text (HTML)
-        of each heading of level 2.
+    Also its local images, which the HTML refers to by their names, and identifier and text (HTML)
+    of each heading of level 2.
     """
 
     def formula(latex: str, options: dict[str, bool]) -> str:

@@ -30,19 +30,10 @@ def write(
     outputs: tuple[Sequence[str], np.ndarray],
     inputs: tuple[Sequence[str], np.ndarray],
 ) -> None:
-    """Write the reference of one scenario.
+    """Write the reference of one scenario to a folder, which is made if it is missing.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    folder : Path
-        Made if it is missing.
-    model : str
-        Name of the model, which its FMU has too.
-    outputs : names and ndarray, shape (rows, names)
-        At the communication points of the reference.
-    inputs : names and ndarray, shape (n + 1, names)
-        At every communication point.
+    Names and values of outputs, (rows, names), are at the communication points of the reference,
+    those of inputs, (n + 1, names), at all.
     """
     folder.mkdir(parents=True, exist_ok=True)
     times = {"ref": scenario.times[scenario.reference_rows], "in": scenario.times}

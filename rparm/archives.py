@@ -31,19 +31,8 @@ CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines, o
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:
     """Unpack an archive, or one file of it, to an empty folder; nothing is written elsewhere.
 
-    UnreadableError for whatever is wrong with the archive.
-
-    Parameters
-    ----------
-    kind : str
-        What it should be, FMU or SSP.
-    only : str, optional
-        The one file to unpack, if it is there.
-
-    Returns
-    -------
-    dict
-        Bytes of all files in the archive, by their names: relative paths with "/".
+    Returns the bytes of all files in the archive, by their names: relative paths with "/".
+    UnreadableError for whatever is wrong with what should be an FMU or SSP (`kind`).
     """
     check_regular(path)
     if path.is_dir():

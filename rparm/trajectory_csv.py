@@ -25,20 +25,10 @@ def write(
     digits: int | None = 17,
     short_times: bool = False,
 ) -> None:
-    """Write trajectories; the file appears complete or not at all.
+    """Write trajectories, (rows, names), over times in s; the file appears complete or not at all.
 
-    Parameters
-    ----------
-    times : ndarray, shape (rows,)
-        s.
-    names : sequence of str
-        One name per column of `values`.
-    values : ndarray, shape (rows, len(names))
-        In the variables' units.
-    digits : int, optional
-        Significant ones; None: those that values need to be read back as they are.
-    short_times : bool, optional
-        Whether times have those that they need, too.
+    Values have so many significant `digits`, None: those that they need to be read back as they
+    are; and times, if `short_times`, those that they need.
     """
     form = _shortest if digits is None else f"{{:.{digits}g}}".format
     of_time = _shortest if short_times else form
@@ -57,12 +47,8 @@ def _shortest(value: float) -> str:
 def read(path: Path, failure: Failure) -> tuple[tuple[str, ...], np.ndarray]:
     """Read trajectories as `write` writes them; those of an installed package are compressed.
 
-    Returns
-    -------
-    names : tuple of str
-        Of all columns; the first is "time".
-    table : ndarray, shape (rows, len(names))
-        At least one row; finite.
+    Names of all columns, of which the first is "time", and the table (rows, names): at least one
+    row, all finite.
     """
     try:
         text = _text(path)

@@ -47,13 +47,7 @@ class Declaration:
 
 
 def load(path: Path) -> Declaration:
-    """Read variables.toml and the files that it includes.
-
-    Raises
-    ------
-    DeclarationError
-        where something in them is wrong.
-    """
+    """Read variables.toml and what it includes; DeclarationError if something in them is wrong."""
     units = dict(read(UNITS).units)
     variables: dict[str, Variable] = {}
     places: dict[str, str] = {}

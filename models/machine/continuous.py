@@ -113,15 +113,8 @@ def run(
 def limit(runs: Sequence[Columns], per_second: Sequence[int], power: int) -> tuple[Columns, float]:
     """Values for a step that goes to 0, and by which factor rounding of the runs grows at most.
 
-    Parameters
-    ----------
-    runs : sequence of dict
-        Columns of runs that differ by their step.
-    per_second : sequence of int
-        Steps of each run.
-    power : int
-        Errors are taken for a polynomial in the step that begins with this power and has as many
-        terms as there are runs but one.
+    The `runs` differ by their steps. Errors are taken for a polynomial in the step that begins with
+    `power` and has as many terms as there are runs but one.
     """
     steps = per_second[0] / np.array(per_second)
     terms = steps[:, None] ** np.array([0, *range(power, power + len(runs) - 1)])

@@ -50,19 +50,9 @@ def write_system(
     step: float,
     with_sensor: bool = True,
 ) -> None:
-    """Write an SSP of the machine with one variant, `VARIANT`.
+    """Write an SSP of the machine with one variant, `VARIANT`; times in s.
 
-    Parameters
-    ----------
-    opened : Ssp
-        The machine.
-    path : Path
-    parameters : mapping
-        Values by component and name.
-    stop, step : float
-        s.
-    with_sensor : bool
-        Without it, the controller reads the joints themselves.
+    Without the sensor, the controller reads the joints themselves.
     """
     tree = etree.parse(opened.folder / STRUCTURE)
     root = tree.getroot()

@@ -45,22 +45,11 @@ def opened(
     security: Security | None = None,
     dashboard: bool = False,
 ) -> Iterator[Client]:
-    """A cluster's client.
+    """A cluster's client; UserError if the scheduler cannot be reached.
 
-    UserError if the scheduler cannot be reached.
-
-    Parameters
-    ----------
-    scheduler : str, optional
-        Address of one that runs elsewhere; else the cluster is made on this machine.
-    workers : int, optional
-        Processes on this machine; default: one a core.
-    folder : Path
-        For their files.
-    security : Security, optional
-        Certificates for a scheduler elsewhere.
-    dashboard : bool
-        Whether Dask shows its pages, on this machine: to all its users, who can change nothing.
+    Without the address of a scheduler that runs elsewhere, and certificates for it, the cluster is
+    made on this machine: `workers` processes, by default one per core, with their files in
+    `folder`. There, Dask shows its pages (`dashboard`) to all users, who can change nothing.
     """
     logging.disable(logging.CRITICAL)  # what is wrong is said by the errors that are raised here
     try:

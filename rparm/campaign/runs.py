@@ -31,13 +31,7 @@ class Rows:
 
 
 class Runner:
-    """Instances of all components; a context manager that frees them.
-
-    Parameters
-    ----------
-    fmus : mapping of str to Fmu
-        By their hash.
-    """
+    """Instances of all components, of FMUs by their hash; a context manager that frees them."""
 
     def __init__(self, job: Job, fmus: Mapping[str, Fmu]) -> None:
         self._job, self._fmus = job, fmus

@@ -24,15 +24,7 @@ class Wiring:
 
 
 class ConnectedInstance:
-    """An instance, its place among the system's values, and the sources of its inputs.
-
-    Parameters
-    ----------
-    instance : Instance
-        Instantiated.
-    values, slopes : ctypes array of double, ndarray
-        The system's values, and their derivatives with respect to time.
-    """
+    """An instance, its place among the system's values, and the sources of its inputs."""
 
     def __init__(
         self, instance: Instance, wiring: Wiring, values: Array, slopes: np.ndarray

@@ -15,14 +15,9 @@ from rparm.system.ssp import Ssp
 def run(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
     """Run a system in Jacobi order with one of its parameter sets; read what Ecos would read.
 
-    That is the values at a communication point after the inputs of the next step have been set.
-
-    UserError if a component fails, or gives a value that is not finite.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Variables to read, ``component.variable``: Real, Integer or Boolean.
+    That is the values of the Real, Integer or Boolean variables ``component.variable`` at a
+    communication point after the inputs of the next step have been set. UserError if a component
+    fails, or gives a value that is not finite.
     """
     system = ssp.system
     times = system.start + system.step * np.arange(system.steps + 1)

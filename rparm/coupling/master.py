@@ -79,19 +79,9 @@ class Snapshot:
 class Master:
     """A system of connected components; a context manager that frees their instances.
 
-    UserError if names are unknown, a Real input is connected not once, or an FMU cannot do what is
-    asked.
-
-    Parameters
-    ----------
-    fmus : mapping of str to Fmu
-        By name of the component. Their order is that of stepping in Gauss-Seidel order.
-    order : str
-        One of ORDERS.
-    inputs : str
-        One of INPUTS.
-    also : sequence of (component, variable), optional
-        Real variables that are read besides all Real outputs.
+    In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
+    outputs are read, and the Real variables `also`, pairs of component and variable. UserError if
+    names are unknown, a Real input has no or several connections, or an FMU cannot do what is asked.
 
     Attributes
     ----------
@@ -193,12 +183,7 @@ class Master:
     ) -> None:
         """From instantiated to the first communication point, with consistent outputs there.
 
-        Parameters
-        ----------
-        start, stop : float
-            s.
-        parameters : mapping, optional
-            Parameters and start values of states by component and name.
+        `parameters` are also start values of states, by component and name.
         """
         parameters = parameters or {}
         for name in parameters:
@@ -300,10 +285,8 @@ class Master:
     ) -> np.ndarray:
         """Steps from the present time, times[0], to each of `times`.
 
-        Returns
-        -------
-        ndarray, shape (len(times), len(names))
-            Row i is what is read right after the step to times[i]; row 0 the present values.
+        Row i, of (times, names), is what is read right after the step to times[i]; row 0 the
+        present values.
         """
         rows = np.empty((len(times), len(self.names)))
         rows[0] = self.values

@@ -69,20 +69,14 @@ def run(
     control: Control,
     before: Callable[[float], object] = lambda _: None,
 ) -> Controlled:
-    """Step `master`, which is initialized, to the time `stop`.
+    """Step `master`, which is initialized, to end exactly at the time `stop`, s.
+
+    The order is 1 with zero-order hold of the inputs, with extrapolated ones 2. `before` is called
+    with the length of each accepted step while the system is back at the beginning of that step; it
+    may step the system.
 
     UserError if a signal is unknown, a step would have to be shorter than the shortest, or an FMU
     fails or has no state to go back to.
-
-    Parameters
-    ----------
-    master : Master
-        Its order is 1 with zero-order hold of the inputs, with extrapolated ones 2.
-    stop : float
-        s; the last step ends exactly there.
-    before : callable, optional
-        Called with the length of each accepted step while the system is back at the beginning of
-        that step; it may step the system.
     """
     steps = _Steps(master, control)
     times, rows, estimates, limited = [master.time], [master.values.copy()], [], []

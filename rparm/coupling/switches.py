@@ -9,15 +9,7 @@ from rparm.system.structure import Connection
 
 
 class Switches:
-    """The connections of a system that lead from a Boolean output to a Boolean input.
-
-    Parameters
-    ----------
-    instances : mapping of str to Instance
-        By name of the component.
-    connections : iterable of Connection
-        As `split` gives them.
-    """
+    """The connections of a system that lead from Boolean outputs to Boolean inputs."""
 
     def __init__(
         self, instances: Mapping[str, Instance], connections: Iterable[Connection]

@@ -61,15 +61,7 @@ def key() -> str:
 
 
 class Broker:
-    """What all processes of a federation are connected to.
-
-    Parameters
-    ----------
-    count : int
-        Of processes.
-    address : str
-        Where it listens.
-    """
+    """What all `count` processes of a federation are connected to, at `address`."""
 
     def __init__(self, count: int, address: str) -> None:
         h = self._h = helics()
@@ -176,19 +168,10 @@ class _Questions:
 
 
 class Federate:
-    """A process in a federation: publishes one vector, and reads those of others.
+    """A process in a federation: publishes one vector, under its name, reads those of `sources`.
 
     All federates make the same exchanges. The first number of a vector is the count of exchanges
     before it: what is read is of the present exchange, or an error.
-
-    Parameters
-    ----------
-    name : str
-        Also of what it publishes.
-    address : str
-        Of the broker.
-    sources : sequence of str
-        Names of federates whose values it reads.
     """
 
     def __init__(

@@ -97,15 +97,7 @@ class Fmi3Instance(Instance):
     def input_functions(
         self, names: Sequence[str], values: Callable[[float], Sequence[float] | np.ndarray]
     ) -> None:
-        """Let Real inputs be functions of time in all further steps.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Of inputs that are among `smooth_inputs`.
-        values : callable
-            Their values at a time (s), (inputs,).
-        """
+        """Let Real inputs, of `smooth_inputs`, be functions of time (s) in all further steps."""
         inputs = self.reals(names)
 
         def set_in_step(time: float) -> None:

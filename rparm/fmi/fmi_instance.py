@@ -101,14 +101,8 @@ class SavedState:
 class Instance(ABC):
     """One instance of an FMU: a context manager that instantiates, terminates and frees it.
 
-    Parameters
-    ----------
-    fmu : UnpackedFmu
-        Stays open as long as the instance.
-    name : str
-        Of the instance, for messages.
-    smooth_inputs : sequence of str, optional
-        All inputs that `input_polynomials` will be used for.
+    The FMU stays open as long as the instance, which has the `name` in messages;
+    `input_polynomials` is for `smooth_inputs`.
     """
 
     # of the version of FMI
@@ -251,13 +245,7 @@ class Instance(ABC):
             return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
-        """The Real variables `names`, to get or set at once, many times.
-
-        Parameters
-        ----------
-        memory : ctypes array of double, optional
-            Memory for their values; made if it is not given.
-        """
+        """The Real variables `names`, to get or set at once, many times, in `memory` if given."""
         values = (c_double * len(names))() if memory is None else memory
         calls = self._real_calls(self._references(names), values) if names else (no_call, no_call)
         return Reals(list(names), view(values), *calls)

@@ -46,18 +46,9 @@ def verdict_line(failed: Iterable[str], done: Sized, name: str) -> str:
 class Table:
     """Rows under a head, each printed when it is known.
 
-    Parameters
-    ----------
-    title : str
-        Of the column of names.
-    names : iterable of str
-        All names that rows will have; the column is cut where there is no room.
-    columns : mapping of str to int
-        Titles, of one or several words, with the width of the column.
-    gap : int, optional
-        Blanks in front of each column.
-    result : int, optional
-        Width of the last column, which is set to the left; 0: there is none.
+    `names` are those of all rows to come: they set the width of the first column, which is cut if
+    it has no room. `columns` are titles with the widths of their columns, `gap` blanks apart. The
+    last column is aligned to the left and `result` characters wide; 0: there is none.
     """
 
     def __init__(

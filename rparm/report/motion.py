@@ -50,13 +50,7 @@ class Animation:
 
 
 def of_run(run: Run, rows: Sequence[int] | np.ndarray | slice = slice(None)) -> dict | None:
-    """Data of the player for a scenario's run; None: nothing to animate.
-
-    Parameters
-    ----------
-    rows : sequence of int or slice, optional
-        Those of the recorded rows that the page holds.
-    """
+    """Data of the player for a scenario's run, at `rows` of it; None: nothing to animate."""
     references = {name: run.reference.column(name) for name in run.result.names}
     return of_result(run.scenario, run.result, references, rows)
 
@@ -81,15 +75,7 @@ def of_result(
 def of_outcome(
     system: str, ssp: Ssp, outcome: Outcome, rows: Sequence[int] | np.ndarray | slice = slice(None)
 ) -> dict | None:
-    """Data of the player for a run of a system's variant; None: nothing to animate.
-
-    Parameters
-    ----------
-    system : str
-        Name of the system's folder.
-    rows : sequence of int or slice, optional
-        Those of the recorded rows that the page holds.
-    """
+    """Data of the player for a run of a variant of `system`, a folder; None: nothing to animate."""
     given = ssp.system.parameter_sets[outcome.variant]
     values = {
         f"{component}.{name}": value

@@ -28,14 +28,9 @@ def write(
     errors: Mapping[str, np.ndarray],
     again: str,
 ) -> Path:
-    """Write the page of a scenario; return its path.
+    """Write the page of a scenario; return its path. The command `again` proves it again.
 
-    Parameters
-    ----------
-    errors : mapping of str to ndarray of shape (communication points, states)
-        Proven errors of a run, by what it is called: its method and tolerance.
-    again : str
-        Command that proves it again.
+    `errors` are the proven ones of runs, (communication points, states), by method and tolerance.
     """
     plots = [
         Plot(

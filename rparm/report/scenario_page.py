@@ -28,20 +28,10 @@ DIGITS = 12  # of values; the references of the project have more, users' files 
 def write(
     folder: Path, name: str, runs: Sequence[Run], again: str, failures: Sequence[Failure] = ()
 ) -> Entry:
-    """Write the page and the values of a scenario; its line in the overview.
+    """Write page and values, called `name`, of a scenario to a section; its line in the overview.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the section in the report.
-    name : str
-        Of the page and the file of values.
-    runs : sequence of Run
-        Of one scenario; the first one is drawn.
-    again : str
-        Command that runs it again.
-    failures : sequence of Failure, optional
-        Of other runs of the scenario.
+    The first of its runs is drawn; `failures` are others that did not end. The command `again` runs
+    it again.
     """
     folder.mkdir(parents=True, exist_ok=True)
     first, scenario = runs[0], runs[0].scenario

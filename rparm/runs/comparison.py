@@ -75,12 +75,7 @@ class Failure:
 class Runs:
     """Runs scenarios on the FMUs of their models, each at a tolerance only once.
 
-    Parameters
-    ----------
-    fmus : mapping of str to Fmu
-        By `Scenario.model`.
-    twins : mapping of str to Fmu, optional
-        FMUs of another version of FMI, which have to give the same bits.
+    FMUs are given by `Scenario.model`; `twins`, of another version of FMI, must give the same bits.
     """
 
     def __init__(self, fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu] | None = None) -> None:

@@ -37,13 +37,7 @@ def step_through(
 
 
 class _Steps:
-    """How far a run is.
-
-    Attributes
-    ----------
-    count, done : int
-        Steps of the whole run, and those made.
-    """
+    """How far a run is: `done` of `count` steps."""
 
     def __init__(self, instance: Instance, scenario: Scenario) -> None:
         variables = instance.fmu.model.variables

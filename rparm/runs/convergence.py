@@ -195,16 +195,10 @@ def study(
 ) -> Convergence:
     """Run `problem` in every case and with every communication step.
 
-    UserError if a function of an FMU fails.
+    `fmu` takes all orders of input derivatives, `updated` intermediate update; without it, this
+    case is left out. `progress` is called with the number of steps that each run has made.
 
-    Parameters
-    ----------
-    fmu : Fmu
-        For all orders of input derivatives.
-    progress : callable, optional
-        Called with the number of steps that each run has made.
-    updated : Fmu, optional
-        For intermediate update; without it, this case is left out.
+    UserError if a function of an FMU fails.
     """
     fmus = [fmu] * len(ORDERS) + ([] if updated is None else [updated])
     errors = np.empty((len(fmus), len(FACTORS)))
@@ -216,15 +210,10 @@ def study(
 
 
 def final_state(fmu: Fmu, problem: Problem, case: int, factor: int) -> dict[str, float]:
-    """States at the end of a run.
+    """States at the end of a run, whose step is `factor` shortest steps of the problem.
 
-    Parameters
-    ----------
-    case : int
-        Highest derivative of the inputs that is set, along with all lower ones, 0: none; or
-        INTERMEDIATE_UPDATE.
-    factor : int
-        Communication step, in shortest steps of the problem.
+    The case is the highest derivative of the inputs that is set, along with all lower ones, 0:
+    none; or INTERMEDIATE_UPDATE.
     """
     scenario = problem.scenario
     step_through = _with_updates if case == INTERMEDIATE_UPDATE else _with_derivatives

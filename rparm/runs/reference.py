@@ -66,15 +66,10 @@ class Reference:
 
 
 def load(scenario: Scenario, model: Model) -> Reference:
-    """Read and check the reference of `scenario`.
+    """Read and check the reference of `scenario`, which was checked against `model`.
 
     UserError if the file is missing, damaged, or not of this scenario; names the line and the
     command that makes references.
-
-    Parameters
-    ----------
-    model : Model
-        What the scenario was checked against.
     """
     path = project.reference_file(scenario.path, model.name)
     folder = project.model_folder(scenario.path)
@@ -113,12 +108,8 @@ def read_summed(folder: Path) -> Summed:
 def scale(columns: Mapping[str, np.ndarray], name: str, summed: Summed) -> float:
     """What an error of a variable is divided by, in its unit: its largest value, or that of a sum.
 
-    Parameters
-    ----------
-    columns : mapping of str to ndarray
-        Reference of all variables, (rows,) each.
-    summed : mapping
-        As `read_summed` gives it; a sum of which a term is missing does not count.
+    `columns` are the reference of all variables, (rows,) each; a sum of which a term is missing
+    does not count.
     """
     terms = summed.get(name, ())
     if not terms or not set(terms) <= set(columns):

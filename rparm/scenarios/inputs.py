@@ -21,15 +21,7 @@ BESIDE = {"offset": SINES, "column": FILE, "time": FILE, "scale": FILE, "hold": 
 
 
 class InputReader:
-    """Reads the sections [inputs] and [measured] of a scenario.
-
-    Parameters
-    ----------
-    reader : Reader
-        Of the scenario's file.
-    times : ndarray, shape (n + 1,)
-        Communication points in s.
-    """
+    """Reads the sections [inputs] and [measured]; `times` are communication points in s."""
 
     def __init__(self, reader: Reader, model: Model, times: np.ndarray) -> None:
         self._reader, self._model = reader, model

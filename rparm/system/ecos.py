@@ -77,15 +77,9 @@ def absent() -> str:
 def run(ssp: "Ssp", variant: str, names: Sequence[str]) -> Run:
     """Run a system from its start to its stop time with one of its parameter sets.
 
-    UserError if a component fails or gives a value that is not finite (the text names component,
-    variable and time), or if Ecos itself fails. After the start it is a `StoppedError`.
-
-    Parameters
-    ----------
-    variant : str
-        Name of a parameter set; must exist: for an unknown name Ecos sets nothing.
-    names : sequence of str
-        Variables to read, ``component.variable``: Real, Integer or Boolean.
+    Reads the Real, Integer or Boolean variables ``component.variable``. UserError if a component
+    fails or gives a value that is not finite (the text names component, variable and time), or if
+    Ecos itself fails. After the start it is a `StoppedError`.
     """
     system = ssp.system
     if variant not in system.parameters:

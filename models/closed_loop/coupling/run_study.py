@@ -21,12 +21,10 @@ from rparm.report.style import save
 
 
 def run(path: Path, ssp: Path) -> dict[str, dict[str, object]]:
-    """Make the study, print its tables, write its picture; the numbers of each part.
+    """Make the study, print its tables, draw its picture to `path`; the numbers of each part.
 
-    Raises
-    ------
-    UserError
-        If the system or a reference is missing, an FMU fails, or the picture cannot be written.
+    UserError if the system or a reference is missing, an FMU fails, or the picture cannot be
+    written.
     """
     with opened(ssp) as loop:
         with written(path):  # a place that cannot be written shows before anything has run

@@ -35,26 +35,15 @@ class Switch:
 
 
 class Loop:
-    """Equations of one kind of path and one mode of the controller.
+    """Equations of one of `equations.PATHS` and one of `equations.MODES`.
 
     All that changes from run to run or within one is a runtime value, named like the variable:
 
-    - the parameters of the components, in `numbers`;
+    - the parameters of the components that are `numbers`;
     - ``segment.*``, the trajectory between two of its corners;
     - ``held.*``, what a component reads during a step;
     - ``at_limit*``, 1 where an effort is at the limit ``level*``, else 0;
     - ``back*`` in 1/(kg.m2.s) and 1/(kg.s), how fast the integral part gives way there.
-
-    Parameters
-    ----------
-    path : str
-        One of `equations.PATHS`.
-    mode : str
-        One of `equations.MODES`.
-    numbers : iterable of str
-        Names of the parameters that are numbers.
-    real : type
-        Floating-point type, `numpy.longdouble` or `float`.
     """
 
     def __init__(self, path: str, mode: str, numbers: Iterable[str], real: type) -> None:

@@ -88,16 +88,7 @@ class Plant(Motion):
 
 
 class Machine:
-    """One run.
-
-    Parameters
-    ----------
-    solver : Solver
-    parameters : mapping
-        Values of parameters and initial states, ``component.name``.
-    times : sequence of float
-        Communication points in s, ascending from 0.
-    """
+    """One run, with `parameters` ``component.name`` and communication points in s, from 0."""
 
     def __init__(self, solver: Solver, parameters: Parameters, times: Sequence[float]) -> None:
         self._times = np.asarray(times, real)

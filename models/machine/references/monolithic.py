@@ -46,13 +46,9 @@ Columns = dict[str, np.ndarray]
 
 
 class Monolith:
-    """The compiled equations of one variant.
+    """The compiled equations of one variant, with `parameters` ``component.name``.
 
-    Parameters
-    ----------
-    parameters : mapping
-        Values of parameters and initial states, ``component.name``. Sample times, delay and the
-        sensor's parameters have no meaning here.
+    Sample times, delay and the sensor's parameters have no meaning here.
     """
 
     def __init__(self, parameters: Mapping[str, Value]) -> None:

@@ -44,16 +44,7 @@ def integrator(
 ) -> hy.taylor_adaptive:
     """The motion of `scenario` from time 0 on, driven by `inputs`.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Gives the parameters and the initial states.
-    inputs : dict
-        tau1 (N.m) and f2 (N) as functions of heyoka's time and its parameters.
-    real : type
-        Floating-point type.
-    pars : int
-        How many of heyoka's parameters `inputs` uses.
+    These are tau1 (N.m) and f2 (N) as functions of heyoka's time and of `pars` of its parameters.
     """
     start = scenario.start_values
     names = {sp.Symbol(name): hy.expression(real(start[name])) for name in PARAMETERS}

@@ -29,15 +29,8 @@ class Joints:
 class Plant:
     """State, modes and sums from t = 0.
 
-    Parameters
-    ----------
-    solver : Solver
-    values : mapping
-        Parameters, initial states and inputs by the FMU's names.
-    rates : mapping, optional
-        Of the inputs, per s.
-    rest_height : float, optional
-        Bouncing ends where the next bounce goes no higher (rad, m).
+    `values` are parameters, initial states and inputs by the FMU's names, `rates` those of the
+    inputs per s. Bouncing ends where the next bounce goes no higher than `rest_height` (rad, m).
     """
 
     def __init__(

@@ -54,13 +54,7 @@ def noise(seed: int, joint: int, tick: int) -> mp.mpf:
 
 
 class Encoder:
-    """What both joints of the sensor sample and show.
-
-    Parameters
-    ----------
-    value : mapping
-        Values of all parameters of the model by name.
-    """
+    """What both joints of the sensor sample and show, with the parameters `value` by name."""
 
     def __init__(self, value: Mapping[str, float]) -> None:
         self.seed = int(value["seed"])

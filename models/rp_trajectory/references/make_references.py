@@ -128,13 +128,7 @@ def joint_rates(
 
 
 class Motion:
-    """One motion; evaluates it at times that go forward, so that q1 stays continuous.
-
-    Parameters
-    ----------
-    value : dict
-        Values of all parameters of the model by name.
-    """
+    """One motion, with the parameters `value`; its times ascend, so that q1 stays continuous."""
 
     def __init__(self, value: dict[str, float | mp.mpf]) -> None:
         self.value = value
