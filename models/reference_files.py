@@ -23,23 +23,35 @@ from rparm.scenarios.scenario import Scenario
 Writer = Callable[[Scenario, Path], None]
 
 
+def input_table(scenario: Scenario, names: Sequence[str]) -> np.ndarray:
+    """Inputs at every communication point, (n + 1, names)."""
+    table = np.empty((len(scenario.times), len(names)))
+    for column, name in zip(table.T, names, strict=True):
+        column[:] = scenario.input(name)
+    return table
+
+
 def write(
     scenario: Scenario,
     folder: Path,
     model: str,
-    outputs: tuple[Sequence[str], np.ndarray],
-    inputs: tuple[Sequence[str], np.ndarray],
+    outputs: Sequence[str],
+    values: np.ndarray,
+    inputs: Sequence[str],
 ) -> None:
     """Write the reference of one scenario to a folder, which is made if it is missing.
 
-    Names and values of outputs, (rows, names), are at the communication points of the reference,
-    those of inputs, (n + 1, names), at all.
+    `values` of outputs are those of all communication points, (n + 1, outputs).
     """
     folder.mkdir(parents=True, exist_ok=True)
-    times = {"ref": scenario.times[scenario.reference_rows], "in": scenario.times}
-    for file, (names, values) in (("ref", outputs), ("in", inputs)):
-        rounded = values.astype(np.float64) + 0.0  # no negative zeros
-        trajectory_csv.write(folder / f"{model}_{file}.csv", times[file], names, rounded)
+    rows = scenario.reference_rows
+    tables = {
+        "ref": (scenario.times[rows], outputs, values[rows]),
+        "in": (scenario.times, inputs, input_table(scenario, inputs)),
+    }
+    for file, (times, names, table) in tables.items():
+        rounded = table.astype(np.float64) + 0.0  # no negative zeros
+        trajectory_csv.write(folder / f"{model}_{file}.csv", times, names, rounded)
     options = {
         "StartTime": scenario.start,
         "StopTime": scenario.stop,

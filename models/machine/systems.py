@@ -108,7 +108,6 @@ def _remove_sensor(root: etree._Element) -> None:
 
 
 def values_file(model: Model, values: Mapping[str, Value]) -> str:
-    """Text of a parameter set."""
     rows = "".join(
         f'<ssv:Parameter name="{name}"><ssv:{model.variables[name].type} value="{value!r}"/>'
         "</ssv:Parameter>"

@@ -117,12 +117,10 @@ class Loop:
         return action, limited, events
 
     def set(self, values: Mapping[str, float]) -> None:
-        """Set runtime values by name."""
         for name, value in values.items():
             self.values[self.place[name]] = value
 
     def get(self, *names: str) -> np.ndarray:
-        """Runtime values by name."""
         return np.array([self.values[self.place[name]] for name in names])
 
     def references(self, times: np.ndarray, coefficients: np.ndarray) -> np.ndarray:

@@ -16,8 +16,7 @@ import sympy as sp
 from mpmath import mp, mpf
 
 MODEL_FOLDER = Path(__file__).resolve().parents[1]
-ROOT = MODEL_FOLDER.parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(MODEL_FOLDER.parents[1]))
 
 from rparm.models import reference_files
 from rparm.scenarios.scenario import Scenario
@@ -170,19 +169,14 @@ class Law:
         return [*self.limited(w), *self.error, *self.derror]
 
 
-def input_table(scenario: Scenario) -> tuple[tuple[str, ...], np.ndarray]:
-    """Inputs at every communication point, (n + 1, inputs); that of the payload only if given."""
-    names = (*INPUTS, ATTACHED) if ATTACHED in scenario.inputs else INPUTS
-    return names, np.stack([scenario.input(name).astype(float) for name in names], 1)
-
-
 class Laws:
     """The law of a scenario with the inputs that are held after each communication point."""
 
     def __init__(self, scenario: Scenario, arm: Callable[..., tuple]) -> None:
         self.arm = arm
         self.start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
-        self.names, self.inputs = input_table(scenario)
+        self.names = (*INPUTS, ATTACHED) if ATTACHED in scenario.inputs else INPUTS
+        self.inputs = reference_files.input_table(scenario, self.names)
         # times of the communication points are exact, their differences need not be
         self.times = [mpf(float(t)) for t in scenario.times]
 
@@ -236,9 +230,7 @@ def prepare() -> Callable[[Scenario, Path], None]:
     def write(scenario: Scenario, folder: Path) -> None:
         laws = Laws(scenario, arm)
         outputs = simulate_samples(laws) if laws.start["sample_time"] > 0 else simulate(laws)
-        rows = outputs[scenario.reference_rows]
-        inputs = laws.names, laws.inputs
-        reference_files.write(scenario, folder, MODEL, (OUTPUTS, rows), inputs)
+        reference_files.write(scenario, folder, MODEL, OUTPUTS, outputs, laws.names)
 
     return write
 

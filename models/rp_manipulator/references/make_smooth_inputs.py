@@ -5,7 +5,6 @@ heyoka's Taylor method integrates in long double at its precision.
 """
 
 import argparse
-import functools
 import json
 import sys
 from pathlib import Path
@@ -23,8 +22,6 @@ from rparm.runs import convergence
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
 from rparm.scenarios.signals import Sines
-
-equations = functools.cache(derive)
 
 ON_THE_WAY = 1000  # points at which the largest values are looked for
 
@@ -50,7 +47,7 @@ def integrator(
     names = {sp.Symbol(name): hy.expression(real(start[name])) for name in PARAMETERS}
     names |= {sp.Symbol(name): inputs[name] for name in INPUTS}
     states = hy.make_vars(*STATES)
-    ddq1, ddq2 = (hy.from_sympy(e, names) for e in equations().accelerations)
+    ddq1, ddq2 = (hy.from_sympy(e, names) for e in derive().accelerations)
     return hy.taylor_adaptive(
         list(zip(states, (states[2], states[3], ddq1, ddq2), strict=True)),
         np.array([start[name] for name in STATES], real),
