@@ -148,7 +148,6 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
 
 
 def read_text(path: Path) -> str:
-    """Read a UTF-8 text file."""
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
@@ -158,7 +157,6 @@ def read_text(path: Path) -> str:
 
 
 def read_model_description(path: Path) -> ET.Element:
-    """Read modelDescription.xml of FMI 2.0."""
     try:
         root = ET.fromstring(read_text(path))
     except ET.ParseError as error:
@@ -182,7 +180,6 @@ def variable_row(variable: ET.Element) -> dict[str, str]:
 
 
 def variable_cell(row: dict[str, str], key: str) -> str:
-    """One cell of a table of variables."""
     text = html.escape(row.get(key, ""))
     if key == "name":
         text = f"<code>{text}</code>"

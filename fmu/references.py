@@ -56,7 +56,6 @@ class Scenario:
 
 
 def content_of(path: Path) -> bytes:
-    """Content of a file."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -184,7 +183,6 @@ def files(
 
 
 def write(output: Path, contents: Mapping[str, bytes]) -> None:
-    """Write the files below a folder."""
     for name, content in contents.items():
         (output / name).parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(output / name) as temporary:

@@ -212,7 +212,6 @@ def manifest(entries: list[dict[str, Any]], roots: dict[str, str], folder: Path)
 
 
 def collect(manifest: Manifest) -> SourceFolder:
-    """Read all files."""
     folder = SourceFolder(manifest.roots)
     elementary = [library for library in manifest.libraries if library.name == ELEMENTARY]
     if not elementary:

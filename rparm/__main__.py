@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import webbrowser
 from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import suppress
@@ -17,7 +18,6 @@ from rparm.errors import UserError, reason
 from rparm.interruption import handle_endings
 from rparm.output import streams
 from rparm.output_files import whole, written
-from rparm.report import browser
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
@@ -50,7 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _ended(arguments: Sequence[str]) -> Ended:
-    """Run a command to its end."""
     try:
         options = command_line.parsed(arguments)
         # imported here because it takes long: so Ctrl-C during the import leaves no traceback
@@ -82,13 +81,19 @@ def _keep_document(options: Namespace, ended: Ended) -> None:
 
 
 def _show_page(options: Namespace, ended: Ended) -> None:
-    """Show what a command has written."""
     if not options.open:
         return
-    if ended.page is not None:
-        browser.show(ended.page)
-    elif ended.error is None:
-        print(f"--open: {options.command} has written no page", file=sys.stderr)
+    if ended.page is None:
+        if ended.error is None:
+            print(f"--open: {options.command} has written no page", file=sys.stderr)
+        return
+    page = ended.page.absolute()
+    try:
+        opened = webbrowser.open_new_tab(page.as_uri())
+    except webbrowser.Error:
+        opened = False
+    if not opened:
+        print(f"no browser found, open this file in one: {page}", file=sys.stderr)
 
 
 def _document(ended: Ended) -> dict[str, object]:

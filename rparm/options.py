@@ -117,7 +117,6 @@ def pairs(option: str, given: Sequence[str]) -> dict[str, str]:
 
 
 def relative_tolerance(text: str) -> float:
-    """A relative tolerance."""
     with suppress(ValueError):
         if 0 < float(text) < 1:
             return float(text)

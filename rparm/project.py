@@ -53,7 +53,6 @@ VERSIONS = tuple(BUILD_FOLDERS)
 
 
 def models_folder() -> Path:
-    """Folder of all models and systems."""
     return ROOT / "models"
 
 
@@ -119,12 +118,10 @@ def model_folder(scenario: Path) -> Path:
 
 
 def references(folder: Path) -> Path:
-    """Folder of all references of a model or system."""
     return folder / "references"
 
 
 def reference_folder(scenario: Path) -> Path:
-    """Folder of the reference of a scenario or problem."""
     return references(model_folder(scenario)) / scenario.stem
 
 
@@ -290,7 +287,6 @@ def plotly_script() -> Path:
 
 
 def version() -> str:
-    """Version of the project."""
     if INSTALLED:
         return metadata.version("rparm")
     text = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")

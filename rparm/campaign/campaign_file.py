@@ -67,7 +67,6 @@ class Distribution(_Table):
 
     @property
     def kind(self) -> str:
-        """Name of the distribution that is given."""
         return next(name for name in KINDS if getattr(self, name) is not None)
 
     @property
@@ -158,8 +157,6 @@ class Time(_Table):
 
 
 class Campaign(_Table):
-    """A campaign file."""
-
     title: Title
     description: Text
     scenario: Name | None = None  # or a file FILE.toml, beside this one
@@ -180,7 +177,6 @@ class Campaign(_Table):
 
     @property
     def count(self) -> int:
-        """Number of runs."""
         if self.sampling == "grid":
             return math.prod(d.size for d in self.parameters.values())
         if self.sampling == "indices":

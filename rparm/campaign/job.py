@@ -68,5 +68,4 @@ class Job:
 
     @property
     def steps(self) -> int:
-        """Communication steps of a run."""
         return len(self.times) - 1

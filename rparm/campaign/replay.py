@@ -47,12 +47,10 @@ class Replay:
 
     @property
     def page(self) -> Path | None:
-        """Its page, if it ended."""
         return self.files[-1] if self.files else None
 
     @property
     def document(self) -> dict[str, object]:
-        """It for programs."""
         return dataclasses.asdict(self)
 
 

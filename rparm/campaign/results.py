@@ -158,7 +158,6 @@ class Results:
     # ---- Blocks ----------------------------------------------------------------------------------
 
     def block_path(self, block: int) -> Path:
-        """File of a block."""
         return self.folder / BLOCKS / f"block_{block:0{DIGITS}d}.parquet"
 
     def missing(self) -> list[int]:
@@ -284,7 +283,6 @@ def _as_text(manifest: dict[str, object]) -> bytes:
 
 
 def _sha256(table: pa.Table) -> str:
-    """SHA-256 of all values of a table."""
     total = hashlib.sha256()
     for column in table.columns:
         is_text = column.type == pa.string()
@@ -293,5 +291,4 @@ def _sha256(table: pa.Table) -> str:
 
 
 def _size(count: float) -> str:
-    """Bytes as text."""
     return f"{count / 1e9:.3g} GB" if count >= 1e9 else f"{count / 1e6:.3g} MB"

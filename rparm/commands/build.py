@@ -21,7 +21,6 @@ NEEDED = ("latex2mathml", "markdown_it", "mdit_py_plugins", "pydantic")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which file, and where to."""
     parser.add_argument("file", metavar="FILE.toml", type=Path, help="the file with the equations")
     parser.add_argument(
         "--platforms", action="store_true", help="for all platforms, by zig, not for this machine"
@@ -30,7 +29,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Build."""
     missing = [name for name in NEEDED if find_spec(name) is None]
     if missing:
         way_out = project.how_to_install("build")

@@ -31,7 +31,6 @@ NEEDED = ("SALib", "cryptography", "distributed", "numba", "pyarrow", "scipy")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which campaign, and where it runs."""
     parser.add_argument("file", type=Path, metavar="FILE.toml", help="the campaign")
     parser.add_argument(
         "--fmu", type=Path, metavar="PATH", help="the FMU or SSP (default: that in build/)"

@@ -24,7 +24,6 @@ SHELLS = {"bash": SCRIPT, "zsh": f"_{SCRIPT}", "tcsh": f"{SCRIPT}.tcsh"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which shell, and where the script goes."""
     parser.add_argument("shell", choices=list(SHELLS), help="the shell that reads the script")
     add_output(parser, "write the script into this folder, by the name that the shell looks for")
 

@@ -18,13 +18,11 @@ DESCRIPTION = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which system, and where the picture goes."""
     add_system(parser)
     add_report(parser, "system")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Make the study."""
     folder, known = study.of_coupling()
     path = options.ssp or project.built(folder, ".ssp", "--ssp", options.fmi)
     check_writable(options.report)

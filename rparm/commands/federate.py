@@ -16,7 +16,6 @@ DESCRIPTION = "Steps one component of a system until the federation has come to 
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which component, and where the federation is."""
     parser.add_argument("ssp", type=Path, metavar="SSP", help="the system")
     parser.add_argument("variant", metavar="VARIANT")
     parser.add_argument("component", metavar="COMPONENT")
@@ -31,7 +30,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Step the component to the end."""
     screen.apart()
     addresses.check_form(options.broker)
     if KEY not in os.environ:

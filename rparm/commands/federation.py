@@ -34,7 +34,6 @@ BOUND = 1e-12  # on the largest difference to the master, relative to the variab
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which variants, and where their processes are."""
     parser.add_argument("names", nargs="*", metavar="NAME", help="variants (default: all)")
     add_system(
         parser,
@@ -105,7 +104,6 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _write(path: Path, record: Record) -> None:
-    """Write what was recorded of a variant."""
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         trajectory_csv.write(path, record.times, record.names, record.values)

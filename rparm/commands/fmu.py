@@ -13,7 +13,6 @@ DESCRIPTION = "Copies the FMU of a model, for another tool."
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which FMU, and where it goes."""
     parser.add_argument("name", metavar="NAME", help="name of the FMU, or of its model")
     add_fmi(parser, VERSIONS[0], "its version of FMI (default: 2)")
     add_output(parser, "copy it into this folder (default: the current one)")

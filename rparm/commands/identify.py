@@ -30,7 +30,6 @@ GIVEN = *SEVERAL, "delay", "validate"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which FMU and logs, what is estimated, what is known."""
     parser.add_argument("fmu", nargs="?", metavar="FMU", help="a file, or a model of the project")
     parser.add_argument(
         "logs", nargs="*", type=Path, metavar="LOG.csv", help="with a column of times in s"

@@ -20,7 +20,6 @@ DESCRIPTION = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """What to linearize, at which point, and where results go."""
     parser.add_argument("what", metavar="FMU|SSP", help="a file, or a name of the project")
     add_fmi(parser, project.VERSIONS[0], "version of FMI where a name is given (default: 2)")
     parser.add_argument("--variant", default="", metavar="NAME", help="parameter set of a system")

@@ -20,7 +20,6 @@ RESERVED = {"CON", "PRN", "AUX", "NUL"} | {f"{x}{i}" for x in ("COM", "LPT") for
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which scenario."""
     parser.add_argument("name", metavar="NAME", help="name of the scenario, or path of its file")
     parser.add_argument(
         "--model",
@@ -31,7 +30,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Write the file."""
     path = _path(options.name)
     if options.output:
         path = options.output / path

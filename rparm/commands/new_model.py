@@ -44,13 +44,11 @@ energy = {{ value = "(mass * v**2 + spring * x) / 2", unit = "J" }}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which name."""
     parser.add_argument("name", metavar="NAME", help="of the FMU: letters, digits and _")
     add_output(parser, "folder for the file (default: the current one)")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Write the file."""
     if not NAME.fullmatch(options.name):
         raise UserError(
             f"{options.name!r} is no name for a model: a letter, then letters, digits, _"

@@ -11,12 +11,10 @@ DESCRIPTION = "Says where the page with the plant is; --open shows it."
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Where a copy goes."""
     add_output(parser, "copy the page into this folder")
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Name the page, and show it."""
     page = project.playground_page()
     if options.output:
         page = copied(page, options.output / "playground.html")

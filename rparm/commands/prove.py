@@ -34,7 +34,6 @@ COLUMNS = {"values": 8, "nearest doubles": 8, "error beyond": 9, "interval": 9}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which scenario, and how it runs."""
     parser.add_argument(
         "name", nargs="?", metavar="SCENARIO", help="a scenario, or a file FILE.toml of your own"
     )

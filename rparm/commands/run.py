@@ -46,7 +46,6 @@ QUICK = 20.0  # s, longest sweep that runs by default for a named scenario
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which scenarios, on which FMUs, and where the report goes."""
     parser.add_argument(
         "names",
         nargs="*",

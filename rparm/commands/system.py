@@ -27,7 +27,6 @@ DESCRIPTION = (
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Which variants, and where the report goes."""
     add_system(parser)
     parser.add_argument(
         "names",
@@ -70,7 +69,6 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _listed(chosen: Sequence[tuple[Section, Sequence[str]]]) -> Ended:
-    """The names of systems and variants."""
     found = {system.name: names for system, names in chosen}
     lines = [line for name, names in found.items() for line in (name, *(f"  {n}" for n in names))]
     return Ended(0, "\n".join(lines), {"systems": found})
@@ -122,7 +120,6 @@ def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Sect
 
 
 def _references(section: Section, names: Sequence[str]) -> dict[str, Reference]:
-    """References by variant."""
     return {
         name: comparison.load_reference(section.ssp, name, section.folder, section.study.EXPERIMENT)
         for name in names
@@ -176,7 +173,6 @@ def _run(
 
 
 def _row(section: Section, outcome: Outcome) -> dict[str, object]:
-    """A variant for programs."""
     return {
         "system": section.name,
         "name": outcome.variant,

@@ -198,7 +198,6 @@ class Federate:
             self.waits, self.calls = False, self.calls + 1
 
     def join(self) -> None:
-        """Connect to the broker."""
         h = self._h
         for left in reversed(range(JOINS)):
             try:
@@ -247,7 +246,6 @@ class Federate:
                 time.sleep(PAUSE)
 
     def has_broker(self) -> bool:
-        """Whether the broker answers."""
         ask = partial(self._ask, about="federates")
         return self._federate is None or bool(_Questions().answers(ask, ["root"]))
 
@@ -307,7 +305,6 @@ class Federate:
         self.exchanges += 1
 
     def leave(self) -> None:
-        """Leave at the end."""
         self._h.helicsFederateDisconnect(self._federate)
 
     def fail(self, text: str) -> None:

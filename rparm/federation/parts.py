@@ -88,7 +88,6 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
 
 
 def real_connections(ssp: Ssp) -> Sequence[Connection]:
-    """Connections of Real variables."""
     return [
         c
         for c in ssp.system.connections

@@ -221,7 +221,6 @@ class Instance(ABC):
     # ---- Values ----------------------------------------------------------------------------------
 
     def set(self, name: str, value: Value) -> None:
-        """Set one variable."""
         variable = self.fmu.model.variables[name]
         try:
             getattr(self.fmi, self.SETTERS[variable.type])([variable.reference], [value])
@@ -240,7 +239,6 @@ class Instance(ABC):
     def _integer(self, reference: int) -> int: ...
 
     def boolean(self, name: str) -> bool:
-        """Value of a Boolean variable."""
         with self.explained(f"({name})"):
             return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
 

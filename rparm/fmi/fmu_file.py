@@ -74,7 +74,6 @@ class Fmu:
         self.close()
 
     def close(self) -> None:
-        """Remove the unpacked copy."""
         self._unpacked.close()
 
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:

@@ -31,8 +31,6 @@ SMALLEST_TOLERANCES = {"cvode_adams": 5e-12, "cvode_bdf": 5e-12, "erk": 1e-12, "
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of a model."""
-
     name: str
     reference: int  # value reference
     type: str  # Real, Integer, Boolean, String, Enumeration, or one that is neither read nor set
@@ -110,8 +108,6 @@ class Variable:
 
 @dataclass(frozen=True)
 class Model:
-    """What an FMU declares."""
-
     name: str
     fmi_version: str  # one of `project.VERSIONS`
     variables: Mapping[str, Variable]  # by name, in the order of the model description
@@ -132,13 +128,11 @@ class Model:
 
     @property
     def real_outputs(self) -> list[str]:
-        """Names of all outputs of type Real."""
         found = (v for v in self.variables.values() if v.causality == "output")
         return [variable.name for variable in found if variable.type == "Real"]
 
     @property
     def start_values(self) -> dict[str, Value]:
-        """Start values of all variables that have one."""
         return {v.name: v.start for v in self.variables.values() if v.start is not None}
 
     def method(self, values: Mapping[str, Value]) -> str:

@@ -15,7 +15,6 @@ NAMED = 5  # failed things in the last line
 
 
 def width() -> int:
-    """Columns of a line."""
     return min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
 
 
@@ -79,13 +78,7 @@ class Table:
         return f"{name:<{self._width}}{numbers}{INDENT}{result}".rstrip()
 
     def row(self, name: str, cells: Sequence[str], result: str = "") -> None:
-        """Print a row."""
         print(self._line(name, cells, result), flush=True)
-
-    @staticmethod
-    def remark(text: str) -> None:
-        """Print what is to be said of the row above."""
-        remark(text)
 
 
 def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]]) -> None:

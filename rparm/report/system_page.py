@@ -43,12 +43,10 @@ class Section:
 
     @property
     def variants(self) -> list[str]:
-        """Names of its variants."""
         return list(self.ssp.system.parameters)
 
     @property
     def name(self) -> str:
-        """Name of the system."""
         return self.folder.name
 
     @property

@@ -83,7 +83,6 @@ class Convergence:
 
     @property
     def scenario(self) -> Scenario:
-        """Scenario of the problem."""
         return self.problem.scenario
 
     @property
@@ -136,7 +135,6 @@ class Convergence:
 
     @property
     def passed(self) -> bool:
-        """Whether every slope is the one expected."""
         return not self.violations
 
 

@@ -41,7 +41,6 @@ class Outcome(Compared):
 
     @property
     def passed(self) -> bool:
-        """Whether all errors are within the bound."""
         return self.error <= BOUND
 
     def column(self, name: str) -> np.ndarray:

@@ -25,7 +25,6 @@ class Ssp:
     models: Mapping[str, Model]  # what the FMU of each component declares
 
     def fmu(self, component: str) -> Path:
-        """FMU of a component, as a file."""
         return self.folder / self.system.component(component).source
 
     def unpacked_fmu(self, component: str) -> Fmu:

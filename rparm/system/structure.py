@@ -77,9 +77,7 @@ class System:
 
     @property
     def steps(self) -> int:
-        """Number of communication steps from start to stop."""
         return round((self.stop - self.start) / self.step)
 
     def component(self, name: str) -> Component:
-        """Component called `name`."""
         return next(component for component in self.components if component.name == name)
