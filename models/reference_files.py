@@ -15,7 +15,7 @@ import numpy as np
 from rparm import project, trajectory_csv
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
 
@@ -58,9 +58,8 @@ def write(
         "StepSize": scenario.steps[0] if len(scenario.steps) == 1 else 0.0,  # 0: variable
         "RelTol": scenario.tolerance,
     }
-    with whole(folder / f"{model}_ref.opt") as path:
-        text = "".join(f"{key},{value!r}\n" for key, value in options.items())
-        path.write_text(text, encoding="utf-8", newline="\n")
+    text = "".join(f"{key},{value!r}\n" for key, value in options.items())
+    write_text(folder / f"{model}_ref.opt", text)
 
 
 def main(model_folder: Path, prepare: Callable[[], Writer]) -> None:

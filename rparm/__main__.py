@@ -17,7 +17,7 @@ from rparm.commands import Ended
 from rparm.errors import UserError, reason
 from rparm.interruption import handle_endings
 from rparm.output import streams
-from rparm.output_files import whole, written
+from rparm.output_files import write_text, written
 
 LONGEST_MESSAGE = 2000  # characters; some quote what a file says
 
@@ -64,8 +64,8 @@ def _ended(arguments: Sequence[str]) -> Ended:
     except ModuleNotFoundError as error:
         if (error.name or "").startswith("rparm"):
             raise
-        way_out = project.how_to_install(command_line.NEEDS.get(options.command, "all"))
-        return Ended(2, "", error=UserError(f"{error.name}: not installed, {way_out} does it"))
+        extra = command_line.NEEDS.get(options.command, "all")
+        return Ended(2, "", error=project.not_installed(str(error.name), extra))
 
 
 def _keep_document(options: Namespace, ended: Ended) -> None:
@@ -74,10 +74,7 @@ def _keep_document(options: Namespace, ended: Ended) -> None:
     if folder is not None:
         path = folder / f"{options.command}.json"
         with written(path):
-            folder.mkdir(parents=True, exist_ok=True)
-            text = f"{streams.document(_document(ended))}\n"
-            with whole(path) as temporary:
-                temporary.write_text(text, encoding="utf-8", newline="\n")
+            write_text(path, f"{streams.document(_document(ended))}\n")
 
 
 def _show_page(options: Namespace, ended: Ended) -> None:

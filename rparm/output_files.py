@@ -33,6 +33,29 @@ def written(path: Path) -> Iterator[None]:
         raise UserError(f"{path}: cannot be written: {reason(error)}") from error
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text; its folder is made, and the file appears complete or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def create(path: Path, text: str) -> None:
+    """Write a file that must not exist yet, in a folder that does; UserError if that fails."""
+    try:
+        path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
+    except FileExistsError:
+        raise UserError(f"{path}: exists already, choose another name") from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    try:
+        with written(path):
+            write_text(path, text)
+    except UserError:
+        path.unlink(missing_ok=True)
+        raise
+
+
 def copied(file: Path, path: Path) -> Path:
     """Copy a file to `path`, whose folder is made; return it. UserError if that fails."""
     with written(path):

@@ -27,6 +27,7 @@ says, and writes to rparm-output/ in the current folder.
 import os
 import platform
 import re
+from collections.abc import Iterable
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
@@ -50,6 +51,11 @@ PROOF = "proof"  # folder of a model with the program that encloses its motions
 SCENARIO_FOLDERS = ("scenarios", "convergence")
 BUILD_FOLDERS = {"2.0": "build", "3.0": "build/fmi3"}  # by version of FMI
 VERSIONS = tuple(BUILD_FOLDERS)
+
+
+def fmi_version(given: object) -> str | None:
+    """Version of FMI by its first digit or in full; None if it is none of `VERSIONS`."""
+    return next((x for x in VERSIONS if str(given) in (x, x[0])), None)
 
 
 def models_folder() -> Path:
@@ -299,9 +305,20 @@ def how_to_install(extra: str) -> str:
     """The command that installs what an extra of the distribution needs."""
     if INSTALLED:
         return f'pip install "rparm[{extra}]"'
-    return (
-        f"./setup.sh --{extra}" if extra in ("campaign", "control", "federation") else "./setup.sh"
-    )
+    of_setup = extra in ("campaign", "control", "federation")
+    return f"./setup.sh --{extra}" if of_setup else "./setup.sh"
+
+
+def not_installed(packages: str, extra: str) -> UserError:
+    """What to say of missing packages that an extra of the distribution needs."""
+    return UserError(f"{packages}: not installed, {how_to_install(extra)} does it")
+
+
+def check_installed(packages: Iterable[str], extra: str) -> None:
+    """UserError if some of the packages are missing."""
+    missing = [name for name in packages if find_spec(name) is None]
+    if missing:
+        raise not_installed(", ".join(missing), extra)
 
 
 def cache_folder(part: str) -> Path:

@@ -299,10 +299,10 @@ def _by_helics(opened: Ssp, variant: str, _: Sequence[str]) -> Record:
 
 def version(fmi: int) -> str:
     """Version of FMI by its first digit; UserError if it is none of `project.VERSIONS`."""
-    for version in project.VERSIONS:
-        if str(fmi) in (version, version[0]):
-            return version
-    raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
+    found = project.fmi_version(fmi)
+    if found is None:
+        raise UserError(f"fmi: expected 2 or 3, got {fmi!r}")
+    return found
 
 
 def _units(model: Model) -> dict[str, str | None]:

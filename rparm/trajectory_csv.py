@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rparm.errors import UserError
 from rparm.input_files import UnreadableError, decoded, is_file, number_in, read_bytes, read_text
 from rparm.output_files import whole
 
@@ -15,6 +16,16 @@ LARGEST = 50_000_000  # bytes; references of the project stay below 1 MB
 
 # Makes the exception to raise, from the mistake and the line number, if known.
 Failure = Callable[[str, int | None], Exception]
+
+
+def failure(path: Path, way_out: str = "") -> Failure:
+    """Makes the user's errors of a file; they may end with a way out."""
+
+    def wrong(message: str, line: int | None = None) -> UserError:
+        where = f"{path}, line {line}" if line else f"{path}"
+        return UserError(f"{where}: {message}{way_out}")
+
+    return wrong
 
 
 def write(

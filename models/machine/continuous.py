@@ -22,7 +22,6 @@ from rparm.models.machine.systems import SENSOR, direct, fmus_of, run_in_ecos
 
 from rparm import project, trajectory_csv
 from rparm.coupling.master import Master
-from rparm.errors import UserError
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
 from rparm.report.style import ERRORS, RUN, STYLE, save
@@ -81,11 +80,7 @@ def parameters(opened: Ssp, variant: str) -> dict[str, dict[str, Value]]:
 def reference(variant: str) -> Columns:
     """Columns of the solution in continuous time, by name."""
     path = project.references(FOLDER) / variant / "monolithic.csv"
-
-    def failure(message: str, line: int | None) -> UserError:
-        return UserError(f"{path}, line {line}: {message}")
-
-    names, table = trajectory_csv.read(path, failure)
+    names, table = trajectory_csv.read(path, trajectory_csv.failure(path))
     return dict(zip(names, table.T, strict=True))
 
 

@@ -3,7 +3,6 @@
 import argparse
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 
 from rparm import project
@@ -29,10 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
-        way_out = project.how_to_install("build")
-        raise UserError(f"{', '.join(missing)}: not installed, {way_out} does it")
+    project.check_installed(NEEDED, "build")
     tool = project.model_builder()
     command = [sys.executable, tool, options.file, "--output", options.output or Path()]
     command += ["--runtime", *project.runtimes(options.platforms)]

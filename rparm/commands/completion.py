@@ -10,7 +10,7 @@ import shtab
 from rparm import command_line, project
 from rparm.commands import Ended
 from rparm.options import add_output
-from rparm.output_files import written
+from rparm.output_files import write_text, written
 from rparm.system import comparison
 
 SCRIPT = Path(project.PROGRAM).name
@@ -35,8 +35,7 @@ def run(options: argparse.Namespace) -> Ended:
         return Ended(0, script, {"script": script})
     file = options.output / SHELLS[options.shell]
     with written(file):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(f"{script}\n", encoding="utf-8", newline="\n")
+        write_text(file, f"{script}\n")
     return Ended(0, f"{file}: written", {"script": script, "file": file.absolute()})
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from rparm import project
 from rparm.commands import Ended
-from rparm.errors import UserError, reason
+from rparm.errors import UserError
 from rparm.options import add_output
+from rparm.output_files import create, written
 
 DESCRIPTION = (
     f"Writes NAME.toml, a model of one's own with comments: {project.PROGRAM} build NAME.toml "
@@ -54,13 +55,8 @@ def run(options: argparse.Namespace) -> Ended:
             f"{options.name!r} is no name for a model: a letter, then letters, digits, _"
         )
     path = (options.output or Path()) / f"{options.name}.toml"
-    try:
+    with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("x", encoding="utf-8", newline="\n") as file:
-            file.write(TEXT.format(name=options.name))
-    except FileExistsError:
-        raise UserError(f"{path}: exists already, choose another name") from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be written: {reason(error)}") from error
+    create(path, TEXT.format(name=options.name))
     verdict = f"{path}: written; {project.PROGRAM} build {path} makes FMUs of it"
     return Ended(0, verdict, {"file": path.absolute()}, page=path.absolute())

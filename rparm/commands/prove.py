@@ -1,7 +1,6 @@
 """`prove`: how far runs and references are from the exact motion at most, by theorem."""
 
 import argparse
-import shlex
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,7 +11,7 @@ from rparm import project
 from rparm.commands import Ended
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.fmi.fmu_file import Fmu
-from rparm.options import add_report, add_tolerance
+from rparm.options import add_report, add_tolerance, retyped
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import check_writable, from_here, written
@@ -96,11 +95,9 @@ def run(options: argparse.Namespace) -> Ended:
 
 def _command(options: argparse.Namespace) -> str:
     """What to type for the same again."""
-    parts = [project.PROGRAM, "prove", *([options.name] if options.name else [])]
-    for option in ("method", "tolerance", "within"):
-        given = getattr(options, option)
-        parts += [] if given is None else [f"--{option}", str(given)]
-    return shlex.join(parts)
+    names = [options.name] if options.name else []
+    given = {name: getattr(options, name) for name in ("method", "tolerance", "within")}
+    return retyped("prove", names, given)
 
 
 def _within(given: str | None, program: Prover, fmu: Fmu) -> dict[str, float]:

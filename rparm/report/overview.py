@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.report import assets, pages
 from rparm.report.pages import RunPage
 from rparm.report.sparkline import HEIGHT, WIDTH, scale_of
@@ -71,11 +71,8 @@ def record(report: Path, section: str, entries: Sequence[Entry]) -> Path:
 
 
 def _keep(report: Path, section: str, entries: Sequence[Entry]) -> None:
-    folder = report / section
-    folder.mkdir(parents=True, exist_ok=True)
-    with whole(folder / ENTRIES) as path:
-        text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
-        path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    text = json.dumps([asdict(entry) for entry in entries], ensure_ascii=False, indent=1)
+    write_text(report / section / ENTRIES, text + "\n")
 
 
 def forget(report: Path, section: str, names: Collection[str] | None = None) -> None:

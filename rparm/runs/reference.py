@@ -82,12 +82,7 @@ def load(scenario: Scenario, model: Model) -> Reference:
 
 def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
     """What makes errors of the reference `name` of a model or system, which say how to make it."""
-
-    def wrong(message: str, line: int | None = None) -> UserError:
-        where = f"{path}, line {line}" if line else f"{path}"
-        return UserError(f"{where}: {message}; {project.making_references(folder, name)}")
-
-    return wrong
+    return trajectory_csv.failure(path, f"; {project.making_references(folder, name)}")
 
 
 def read_summed(folder: Path) -> Summed:

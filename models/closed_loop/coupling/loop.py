@@ -174,12 +174,8 @@ def grid(stop: float, step: float) -> np.ndarray:
 
 def read_reference(path: Path) -> Columns:
     """Columns of a reference by name, with "time"."""
-
-    def failure(message: str, line: int | None) -> UserError:
-        place = f"{path}, line {line}" if line else f"{path}"
-        return UserError(f"{place}: {message}")
-
-    names, table = trajectory_csv.read(path, failure)
+    wrong = trajectory_csv.failure(path)
+    names, table = trajectory_csv.read(path, wrong)
     if not set(STATES) <= set(names):
-        raise failure("not a reference of the closed loop", 1)
+        raise wrong("not a reference of the closed loop", 1)
     return dict(zip(names, table.T, strict=True))

@@ -17,7 +17,7 @@ from make_references import INPUTS, MODEL_FOLDER, PARAMETERS, STATES, derive
 from rparm import project
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.output_files import whole
+from rparm.output_files import write_text
 from rparm.runs import convergence
 from rparm.scenarios import scenario as scenarios
 from rparm.scenarios.scenario import Scenario
@@ -77,11 +77,10 @@ def final_state(
 
 def write(scenario: Scenario, folder: Path) -> None:
     """Write the exact final state of `scenario` to `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
     final, largest = final_state(scenario)
     content = {"time": scenario.stop, "final": final, "largest": largest}
-    with whole(folder / project.exact_state_file(scenario.path).name) as path:
-        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8", newline="\n")
+    file = project.exact_state_file(scenario.path).name
+    write_text(folder / file, json.dumps(content, indent=2) + "\n")
 
 
 def main() -> None:
