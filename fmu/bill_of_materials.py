@@ -77,10 +77,7 @@ def bill_of_materials(
     parts: list[Component],
     required: Sequence[Component] = (),
 ) -> str:
-    """Text in JSON, of checksums by file name; it depends only on the arguments.
-
-    `parts` are compiled into the FMUs, the wheel requires `required`.
-    """
+    """Text in JSON of files by checksum, of parts in the FMUs, and of what the wheel requires."""
     bom = Bom(components=[*parts, *required])
     for name, checksum in checksums.items():
         component = Component(

@@ -25,10 +25,7 @@ class Provenance:
 
 
 def license_texts(path: Path) -> dict[str, str]:
-    """Author, license and copyright, from the project's LICENSE.
-
-    Its first line is "NAME License", another one "Copyright (c) YEAR, AUTHOR".
-    """
+    """Author, license and copyright of a LICENSE: "NAME License", "Copyright (c) YEAR, AUTHOR"."""
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

@@ -39,10 +39,7 @@ def write(
     values: np.ndarray,
     inputs: Sequence[str],
 ) -> None:
-    """Write the reference of one scenario to a folder, which is made if it is missing.
-
-    `values` of outputs are those of all communication points, (n + 1, outputs).
-    """
+    """Write the reference of a scenario; `values` are at all points, (n + 1, outputs)."""
     folder.mkdir(parents=True, exist_ok=True)
     rows = scenario.reference_rows
     tables = {
@@ -63,10 +60,7 @@ def write(
 
 
 def main(model_folder: Path, prepare: Callable[[], Writer]) -> None:
-    """Command line: make the references of the scenarios named, or of all of the model's.
-
-    `prepare` is called once, after the names have been checked, for what writes them.
-    """
+    """Command line: make the references of the scenarios named, or of all of the model's."""
     parser = argparse.ArgumentParser(description="Makes the reference trajectories.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="scenarios (default: all)")
     parser.add_argument("--output", type=Path, metavar="DIR", help="write to DIR/NAME instead")

@@ -58,11 +58,7 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
 
 
 def read_xml(path: Path) -> etree._ElementTree:
-    """Parse an XML file of an archive that was unpacked, without its comments.
-
-    UnreadableError if it is none, too large, or has a DOCTYPE: entities could grow, or read other
-    files.
-    """
+    """Parse an unpacked XML file; UnreadableError if it is none, too large, or has a DOCTYPE."""
     size = path.stat().st_size
     if size > LARGEST_XML:
         raise UnreadableError(
@@ -93,10 +89,7 @@ def wrong_name(name: str) -> str:
 
 
 def check_library(path: Path) -> None:
-    """Refuse a shared object (ELF, 64 bit) that is cut off: using it would kill the process.
-
-    Raises UnreadableError.
-    """
+    """Refuse a shared object (ELF, 64 bit) that is cut off: it would kill the process."""
     with path.open("rb") as file:
         header = file.read(64)
         if header[:6] != b"\x7fELF\x02\x01" or len(header) < 64:

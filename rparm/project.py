@@ -113,10 +113,7 @@ def convergence_files() -> list[Path]:
 
 
 def model_folder(scenario: Path) -> Path:
-    """Folder of the model that a scenario or problem belongs to.
-
-    UserError if the file is in no such folder.
-    """
+    """Folder of the model of a scenario or problem; UserError if the file is in none."""
     folder = scenario.absolute().parent
     if folder.name not in SCENARIO_FOLDERS:
         raise UserError(f"{scenario}: expected in models/MODEL/scenarios/")
@@ -243,10 +240,7 @@ def model_builder() -> Path:
 
 
 def runtimes(all_platforms: bool) -> list[Path]:
-    """What FMUs of own equations are linked with: for this machine, or for each platform.
-
-    UserError if it is not there.
-    """
+    """What models are linked with, here or on all platforms; UserError if it is not there."""
     if all_platforms:
         return sorted(built_for_all().glob("*.json"))
     if INSTALLED:

@@ -29,10 +29,7 @@ class DeclarationError(Exception):
 
 
 def files_of(path: Path, including: tuple[Path, ...] = ()) -> Iterator[tuple[Path, File]]:
-    """What a file includes, as it changes it, and the file itself at the end.
-
-    `including`: the files on the way.
-    """
+    """What a file, included by others, includes and changes, and the file itself at the end."""
     file = read(path)
     if path.resolve() in including:
         raise DeclarationError(f"{path}: includes itself")

@@ -153,10 +153,7 @@ def growth(contact: Contact, step: float, order: str = "jacobi", inputs: str = "
 def exact_least_damping(
     contact: Contact, step: float, order: str = "jacobi", inputs: str = "held"
 ) -> float:
-    """Damping above which the contact is stable, from the eigenvalues, N.s/m.
-
-    Its own damping is not used. ValueError if no damping makes it stable: the step is too long.
-    """
+    """Least damping (N.s/m) from the eigenvalues; ValueError if the step is too long for any."""
 
     def is_stable(damping: float) -> bool:
         return growth(replace(contact, damping=damping), step, order, inputs) < 1.0

@@ -1,7 +1,4 @@
-"""What rparm asks of this folder: measures and picture of a run.
-
-rparm/system/study.py says what each name means.
-"""
+"""What rparm asks of this folder, by the names of rparm/system/study.py: measures, picture."""
 
 import numpy as np
 from rparm.models.machine.experiment import START, STEPS_PER_SECOND, STOP

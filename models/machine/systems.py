@@ -50,10 +50,7 @@ def write_system(
     step: float,
     with_sensor: bool = True,
 ) -> None:
-    """Write an SSP of the machine with one variant, `VARIANT`; times in s.
-
-    Without the sensor, the controller reads the joints themselves.
-    """
+    """Write an SSP of the machine with one variant, `VARIANT`, with its sensor or `direct`."""
     tree = etree.parse(opened.folder / STRUCTURE)
     root = tree.getroot()
     spaces = root.nsmap

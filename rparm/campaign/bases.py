@@ -258,10 +258,7 @@ def _sha256(content: bytes) -> str:
 def opened(
     campaign: Campaign, given: Path | None, where: Path = Path("campaign")
 ) -> Iterator[Base]:
-    """The scenario or system of a campaign, with the FMU or SSP `given`, or that of its model.
-
-    UserError if it cannot be opened; beginning with `where`, the campaign's file, if that is wrong.
-    """
+    """The scenario or system of a campaign, on its own FMU or SSP, or on that which is `given`."""
     times = campaign.time.model_dump(exclude_none=True)
     if campaign.scenario is not None:
         with _said_of(where):

@@ -261,10 +261,7 @@ def grid_value(distribution: Distribution, index: int) -> float:
 
 
 def read(path: Path) -> Campaign:
-    """Read and check the campaign at `path`.
-
-    UserError if it cannot be read or anything in it is wrong: the first mistake, with its place.
-    """
+    """Read and check a campaign; UserError for the first mistake, with its place."""
     return checked(read_toml(path), path)
 
 

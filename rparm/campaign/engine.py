@@ -97,10 +97,7 @@ class Engine:
         await self._client.scheduler.unregister_worker_plugin(name=self._plugin)
 
     def run(self, blocks: Sequence[int], done: Callable[[int], object]) -> None:
-        """Run blocks and keep their results; `done` is called with the number of runs of each.
-
-        UserError if the cluster is lost or the results cannot be written.
-        """
+        """Run blocks and keep results; `done` gets the runs of each. UserError if that fails."""
         watch = PeriodicCallback(self._watch, COUNT_EVERY)
         try:
             self._seen = time.monotonic()

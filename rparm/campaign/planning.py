@@ -28,10 +28,7 @@ MAX_RECORDED = 100_000_000  # numbers that a run records
 
 
 def plan(campaign: Campaign, base: Base, where: object, also: Sequence[str] = ()) -> Job:
-    """The job of a campaign, which records the variables `also`, too.
-
-    UserError for the first mistake, beginning with `where`.
-    """
+    """The job of a campaign, which records `also`, too; UserError, at `where`, for a mistake."""
     return _Planner(campaign, base, where).job(also)
 
 
@@ -157,10 +154,7 @@ class _Planner:
     def check_tolerances(
         self, components: Sequence[Component], targets: Mapping[str, Target]
     ) -> None:
-        """Refuse tolerances that the methods of integration cannot reach.
-
-        Derived values and normal distributions are not known before the runs.
-        """
+        """Refuse tolerances that methods cannot reach, as far as they are known before the runs."""
         varied = {
             (target.component, target.variable): name
             for name, target in targets.items()

@@ -10,11 +10,7 @@ from rparm.units import quantity
 
 
 def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
-    """The campaign with numbers for all values that have a unit.
-
-    UserError if one is in no unit of its variable, or the campaign is wrong then; beginning with
-    `where`.
-    """
+    """The campaign with numbers for values with units; UserError, at `where`, if one is wrong."""
     converter = _Converter(base, where)
     content = campaign.model_dump(exclude_unset=True)
     for name, distribution in content["parameters"].items():

@@ -57,10 +57,7 @@ class Replay:
 def replay(
     campaign: Campaign, base: Base, points: Points, run: int, folder: Path, command: str
 ) -> Replay:
-    """Run again. The page shows `command`, which does it again.
-
-    UserError if there is no such run.
-    """
+    """Make a run again by `command`, which its page shows; UserError if there is no such run."""
     if run >= campaign.count:
         raise UserError(f"no run {run}: the campaign has runs 0 to {campaign.count - 1}")
     job = plan(campaign, base, "replay", base.real_outputs())

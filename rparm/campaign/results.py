@@ -63,10 +63,7 @@ class Results:
         self._check_blocks()
 
     def begin(self) -> None:
-        """Make the folder, or check that it holds results of the same campaign.
-
-        UserError if it holds those of another one, or has no room for these.
-        """
+        """Make the folder; UserError if it has another campaign, or no room for this one."""
         check_writable(self.folder)
         path = self.folder / MANIFEST
         self.check()
@@ -200,10 +197,7 @@ class Results:
         return table.replace_schema_metadata(marks)
 
     def write(self, block: int, points: np.ndarray, rows: Rows) -> None:
-        """Keep a block: parameters and derived values (rows, columns), and its runs.
-
-        UserError if the disk does not take it.
-        """
+        """Keep a block, with its points (rows, columns); UserError if the disk does not take it."""
         numbers = np.column_stack([points, rows.measures])
         columns = [pa.array(rows.runs), *(pa.array(column) for column in numbers.T)]
         columns.append(pa.array(rows.failures, pa.string()))

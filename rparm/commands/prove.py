@@ -134,10 +134,7 @@ def _runs(
     methods: list[str],
     tolerance: float | None,
 ) -> tuple[dict[str, dict[str, proven.ProvenError]], dict[str, np.ndarray]]:
-    """Run with each method; prints the largest errors, and where they are.
-
-    Returns the largest errors by method, and all of them by what the table calls the run.
-    """
+    """Print the largest errors of runs by each method; return these, and all errors by run."""
     units = [fmu.model.variables[name].unit for name in enclosure.states]
     heads = {f"{n} {u or ''}".strip(): 10 for n, u in zip(enclosure.states, units, strict=True)}
     print(f"{scenario.name}: largest distance from the exact motion at communication points")

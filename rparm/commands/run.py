@@ -1,7 +1,4 @@
-"""`run`: simulate scenarios, compare them with their references, write a report.
-
-Files of users are run in the same way; they have no references.
-"""
+"""`run`: simulate scenarios, compare those of the project with references, write a report."""
 
 import argparse
 import os
@@ -245,10 +242,7 @@ def _runs(
     failures: list[Failure],
     *tolerances: float | None,
 ) -> list[Run]:
-    """Run `chosen` at `tolerances`; None: at the tolerance of the scenario.
-
-    A run that an FMU does not finish is added to `failures`.
-    """
+    """Run `chosen` at `tolerances`, None: their own; what an FMU does not finish is a failure."""
     if not chosen:
         return []
     console.stage(f"simulating {counted(chosen, 'scenario')}")
@@ -304,10 +298,7 @@ def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[S
 def _estimated(
     runs: Runs, own: Sequence[Scenario], failures: list[Failure], tolerance: float | None
 ) -> list[Run]:
-    """Run scenarios of users, which have no references; None: at their own tolerances.
-
-    A run that an FMU does not finish is added to `failures`.
-    """
+    """Run users' scenarios, without references; what an FMU does not finish is a failure."""
     if not own:
         return []
     console.stage(f"simulating {counted(own, 'scenario')} of your own")
@@ -360,10 +351,7 @@ def _sweeps(runs: Runs, chosen: Sequence[Scenario], in_full: bool) -> list[Sweep
 
 
 def _convergence(fmus: Mapping[str, Fmu], twins: Mapping[str, Fmu]) -> list[Convergence]:
-    """Study the order of convergence of the models whose FMUs are open.
-
-    An FMU that asks for inputs within a step, or else its twin, shows that of intermediate update.
-    """
+    """Study the order of convergence; also by intermediate update, of an FMU or its twin."""
     studies = []
     for file in project.convergence_files():
         folder = project.model_folder(file).name

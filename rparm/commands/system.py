@@ -94,10 +94,7 @@ def _opened(path: Path, stack: ExitStack) -> Section:
 
 
 def _choose(systems: Sequence[Section], names: Sequence[str]) -> list[tuple[Section, list[str]]]:
-    """Variants to run of each system: those named, all of a system that is named, or all.
-
-    UserError if a name is unknown, or stands for two things.
-    """
+    """Variants to run of each system, all without names; UserError if a name is not clear."""
     owners: dict[str, str] = {system.name: "a system" for system in systems}
     for system in systems:
         for variant in system.variants:

@@ -84,10 +84,7 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 
 
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
-    """Value to set before initialization: an Enumeration's item may be given by its name.
-
-    UserError if it is not a parameter, the start value of a state or a Boolean input.
-    """
+    """Value to set before initialization, an item as its number; UserError if it cannot be set."""
     variable = fmu.model.variables.get(name)
     if variable is None or not _can_start(variable):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")

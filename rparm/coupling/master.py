@@ -181,10 +181,7 @@ class Master:
         stop: float | None = None,
         parameters: Mapping[str, Mapping[str, Value]] | None = None,
     ) -> None:
-        """From instantiated to the first communication point, with consistent outputs there.
-
-        `parameters` are also start values of states, by component and name.
-        """
+        """To the first communication point, with consistent outputs there; times in s."""
         parameters = parameters or {}
         for name in parameters:
             if name not in self.components:
@@ -295,11 +292,7 @@ class Master:
     def run(
         self, times: Sequence[float], progress: Callable[[int], object] = lambda _: None
     ) -> np.ndarray:
-        """Steps from the present time, times[0], to each of `times`.
-
-        Row i, of (times, names), is what is read right after the step to times[i]; row 0 the
-        present values.
-        """
+        """Steps from the present time, times[0]; rows (times, names) of what is read after each."""
         rows = np.empty((len(times), len(self.names)))
         rows[0] = self.values
         for i, end in enumerate(np.asarray(times)[1:].tolist(), start=1):

@@ -32,11 +32,7 @@ SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 2.5  # from one step to the next
 
 @dataclass(frozen=True)
 class Control:
-    """What the steps have to keep.
-
-    The norm of a difference is the largest over the signals of `scales`, each divided by its
-    scale.
-    """
+    """What steps have to keep; the norm is the largest of `scales`, each signal by its own."""
 
     tolerance: float  # of the error that one accepted step makes, in the norm
     scales: Mapping[str, float]  # "component.variable": what counts as 1, in its unit

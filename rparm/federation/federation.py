@@ -164,10 +164,7 @@ def _recorded(
 def _processes(
     commands: Mapping[str, list[str]], folder: Path
 ) -> Iterator[dict[str, subprocess.Popen]]:
-    """Processes by component. None is left: they end when their standard input is closed.
-
-    Their texts and temporary files are in `folder`.
-    """
+    """Processes by component, with texts in `folder`, that end as their standard input closes."""
     places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))
     environment = project.child_environment() | places
     processes: dict[str, subprocess.Popen] = {}

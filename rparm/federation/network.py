@@ -50,10 +50,7 @@ def helics() -> Any:
 
 
 def key() -> str:
-    """What processes must know to join the federation; made if this one does not know any.
-
-    UserError if it could be guessed, or HELICS would not take it.
-    """
+    """The secret that lets processes join, made if there is none; UserError if it is too weak."""
     found = os.environ.setdefault(KEY, secrets.token_hex(16))
     if not re.fullmatch(r"[0-9A-Za-z]{16,128}", found):
         raise UserError(f"{KEY}: expected 16 to 128 letters and digits in the environment")
@@ -98,11 +95,7 @@ class Broker:
 
     @contextmanager
     def shielded(self) -> Iterator[None]:
-        """Where the first process joins; then those that are refused end nothing.
-
-        They take leave without a number, which HELICS 3.6 reads as that of the first that joined:
-        so that is one which has left.
-        """
+        """Keep a first process, the one that HELICS 3.6 ends in place of those that are refused."""
         h = self._h
         options = f"--federates=1 --brokerkey={key()} --broker_address={self._address} {QUIET}"
         try:
@@ -124,10 +117,7 @@ class Broker:
         self._h.helicsBrokerGlobalError(self._broker, 1, text.encode())  # takes no str
 
     def silent(self, names: Sequence[str], to_come: Collection[str]) -> list[str]:
-        """Processes that do not answer; if all do, those that are unknown and not `to_come`.
-
-        HELICS forgets a process that has not answered for some time, and one that has left.
-        """
+        """Processes that do not answer, or else those that HELICS forgot and not `to_come`."""
 
         def ask(name: str) -> object:
             query = self._h.helicsCreateQuery(name, "current_time")
@@ -259,10 +249,7 @@ class Federate:
         self._h.helicsPublicationPublishVector(self._publication, vector)
 
     def read(self) -> Mapping[str, Sequence[float]]:
-        """What the sources published before the last exchange.
-
-        UserError if HELICS has not passed it on.
-        """
+        """What sources published before the last exchange; UserError if it has not arrived."""
         values = {}
         for source, place in self._subscriptions.items():
             count, *values[source] = self._h.helicsInputGetVector(place)

@@ -50,12 +50,7 @@ class Part:
 
 
 def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
-    """The parts of a variant, by component.
-
-    Only Real values are exchanged in the steps.
-
-    UserError if the variant is unknown.
-    """
+    """The parts of a variant, by component; UserError if it is unknown."""
     system = ssp.system
     if variant not in system.parameters:
         known = hint(variant, system.parameters, "there are")

@@ -1,7 +1,4 @@
-"""Work that waits in HELICS, watched: HELICS neither returns for a signal nor limits its waiting.
-
-The work runs in a thread, so the main thread can end it at any time.
-"""
+"""Work in a thread of its own that waits in HELICS, which has no limit and ignores signals."""
 
 import os
 import signal
@@ -49,10 +46,7 @@ def run(
 
 
 class Silence:
-    """Says when a federate has neither begun nor ended a call of HELICS for too long.
-
-    It counts looks: the time in which the process is suspended is no silence.
-    """
+    """Whether a federate waits too long in HELICS, in looks: suspension is no silence."""
 
     def __init__(self, federate: Federate, limit: float) -> None:
         self._federate, self._limit = federate, limit

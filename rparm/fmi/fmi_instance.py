@@ -41,10 +41,7 @@ class UnpackedFmu(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Reals:
-    """Some Real variables of an instance; `get` and `set` move their values from and to `view`.
-
-    Both raise FMICallException if that fails.
-    """
+    """Real variables of an instance, moved to and from `view`; FMICallException if that fails."""
 
     names: list[str]
     view: np.ndarray  # (len(names),) in the variables' units
@@ -62,10 +59,7 @@ class OutputDerivatives:
 
 @dataclass(frozen=True, eq=False)
 class InputPolynomials:
-    """Polynomials in time for some Real inputs over the next step.
-
-    `set` gives them to the instance; FMICallException if that fails.
-    """
+    """Polynomials of Real inputs over the next step, for `set`; FMICallException if it fails."""
 
     view: np.ndarray  # (order + 1, inputs): values at the beginning of the step, then derivatives
     set: Call
@@ -264,10 +258,7 @@ class Instance(ABC):
         """Call that gets derivatives of Real outputs."""
 
     def partials(self, unknowns: Sequence[str], knowns: Sequence[str]) -> np.ndarray:
-        """Partial derivatives of Real variables by directional derivatives, (unknowns, knowns).
-
-        `knowns` are continuous states and inputs.
-        """
+        """Partial derivatives of variables by states and inputs, (unknowns, knowns)."""
         variables = self.fmu.model.variables
         rows = [variables[name].reference for name in unknowns]
         found = np.zeros((len(unknowns), len(knowns)))
@@ -290,10 +281,7 @@ class Instance(ABC):
 
     @abstractmethod
     def do_step(self, start: float, length: float, goes_back: bool = False) -> None:
-        """Make a step from `start` (s); `goes_back`: it may be undone by a saved state.
-
-        Raises FMICallException.
-        """
+        """Step from `start` (s), for good unless it `goes_back`; FMICallException if that fails."""
 
     @abstractmethod
     def saved_state(self) -> SavedState:

@@ -77,10 +77,7 @@ class Fmu:
         self._unpacked.close()
 
     def instance(self, name: str, smooth_inputs: Sequence[str] = ()) -> Instance:
-        """A new instance, of the class for the FMU's kind and version; `name` is in its messages.
-
-        What `smooth_inputs` are: `Instance`.
-        """
+        """A new `Instance`, of the class for the FMU's kind and version."""
         return INSTANCES[self.model.fmi_version, self.kind](self, name, smooth_inputs)
 
 
@@ -99,10 +96,7 @@ class Described:
 
 
 def describe(path: Path, kind: str = CO_SIMULATION) -> Described:
-    """Read what an FMU of a known version of FMI, of a kind, declares.
-
-    Raises UnreadableError.
-    """
+    """Read what an FMU of a known version and this kind declares; UnreadableError if it is none."""
     with temporary_folder() as folder:
         sizes = unpack(path, folder, "FMU", DESCRIPTION)
         if DESCRIPTION not in sizes:

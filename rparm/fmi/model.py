@@ -147,10 +147,7 @@ class Model:
         return SMALLEST_TOLERANCES.get(self.method(values), 0.0)
 
     def check_tolerance(self, tolerance: float, values: Mapping[str, Value]) -> None:
-        """Check a relative tolerance to run at, with `values` for start values.
-
-        WrongValueError if the method that integrates cannot be so exact.
-        """
+        """WrongValueError if the method of these values, or of start values, cannot be so exact."""
         smallest = self.smallest_tolerance(values)
         if tolerance < smallest:
             method = self.method(values)
@@ -159,10 +156,7 @@ class Model:
             )
 
     def find(self, name: str, kind: str) -> Variable:
-        """Variable called `name`.
-
-        WrongValueError if it is not of the kind, one of `KINDS`; lists those that are.
-        """
+        """A variable of one of `KINDS`; WrongValueError, with all of these, if it is none."""
         variable = self.variables.get(name)
         if variable is not None and variable.is_a(kind):
             return variable

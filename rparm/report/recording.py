@@ -167,10 +167,7 @@ def _chromium() -> "Iterator[Chrome]":
 
 
 def write(file: Path, drawn: "Sequence[Image]", duration: float) -> int:
-    """Write frames of `duration` s as an animated PNG, complete or not at all; its size in bytes.
-
-    UserError if it would be larger than `LARGEST`.
-    """
+    """Write frames of `duration` s as an animated PNG of at most `LARGEST` bytes; its size."""
     first, *others = _with_few_colours(drawn)
     times = [round(1000 * duration)] * len(others) + [round(1000 * REST)]
     buffer = io.BytesIO()

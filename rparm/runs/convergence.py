@@ -144,10 +144,7 @@ def slope(steps: np.ndarray, errors: np.ndarray) -> float:
 
 
 def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
-    """Inputs of `scenario` as smooth functions of time.
-
-    UserError if one of them is no sum of sines.
-    """
+    """Inputs of `scenario` as smooth functions; UserError if one of them is no sum of sines."""
     for name, signal in scenario.signals.items():
         if not isinstance(signal, Sines):
             raise UserError(f"{scenario.path}: [inputs.{name}]: expected sines, which are smooth")
@@ -155,10 +152,7 @@ def smooth_inputs(scenario: Scenario) -> dict[str, Sines]:
 
 
 def load(path: Path, model: Model) -> Problem:
-    """Read the problem at `path` and its exact final state.
-
-    UserError if one of the two files is missing or wrong.
-    """
+    """A problem and its exact final state; UserError if one of the files is missing or wrong."""
     scenario = scenarios.load(path, model)
     if len(scenario.steps) != 1 or (len(scenario.times) - 1) % FACTORS[0]:
         raise UserError(f"{path}: [time] step: {FACTORS[0]} of it do not divide the duration")

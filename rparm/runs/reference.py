@@ -86,10 +86,7 @@ def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
 
 
 def read_summed(folder: Path) -> Summed:
-    """Which errors of a model or system, by its folder, have the scale of a sum; maybe none.
-
-    UserError if the file is wrong.
-    """
+    """Errors of a model or system, by folder, that a sum scales; UserError if the file is wrong."""
     path = project.scales_file(folder)
     if not is_file(path):
         return {}

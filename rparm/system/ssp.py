@@ -39,11 +39,7 @@ class Ssp:
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Ssp]:
-    """Unpack an SSP to a temporary folder, which is removed at the end, and read it.
-
-    UserError if it is damaged, or no system that can be run (what that is:
-    `rparm.system.ssp_checks`).
-    """
+    """Unpack and read an SSP until the end; UserError if it is damaged, or `ssp_checks` refuses."""
     path = Path(path)
     with temporary_folder() as folder:
         with placed(path):

@@ -89,10 +89,7 @@ class Sample:
 
 
 class Sensor:
-    """Encoders: counts at ticks, shown `latency` ticks later; velocities from their differences.
-
-    `samples` are those of all ticks, the start included.
-    """
+    """Encoders: counts at ticks (`samples`), shown `latency` ticks later; velocities from them."""
 
     INPUTS = ("q1", "q2")
 

@@ -64,10 +64,7 @@ Parameters = Mapping[str, Value]
 
 
 class Plant(Motion):
-    """The plant with held inputs, in the shape of the other components.
-
-    What a new input changes at once, the modes and the payload, changes as the next step begins.
-    """
+    """The plant as a component; a new input changes modes and payload as the next step begins."""
 
     def step(self, inputs: dict[str, real], begin: real, end: real) -> None:
         """The motion until `end`, from event to event."""

@@ -46,10 +46,7 @@ Columns = dict[str, np.ndarray]
 
 
 class Monolith:
-    """The compiled equations of one variant, with `parameters` ``component.name``.
-
-    Sample times, delay and the sensor's parameters have no meaning here.
-    """
+    """The compiled equations of one variant; sample times, delay and sensor mean nothing here."""
 
     def __init__(self, parameters: Mapping[str, Value]) -> None:
         values = completed(parameters)

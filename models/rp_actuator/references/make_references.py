@@ -61,10 +61,7 @@ class Drive:
 
 
 def simulate(scenario: Scenario) -> np.ndarray:
-    """Outputs at every communication point, (n + 1, outputs).
-
-    The inputs of row i are those of the step that ends there; row 0 has those of the start.
-    """
+    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
     start = {name: mpf(float(value)) for name, value in scenario.start_values.items()}
     inputs = reference_files.input_table(scenario, INPUTS)
     times = [mpf(float(t)) for t in scenario.times]

@@ -186,10 +186,7 @@ class Laws:
 
 
 def simulate(laws: Laws) -> np.ndarray:
-    """Outputs at every communication point, (n + 1, outputs).
-
-    The inputs of row i are those of the step that ends there; row 0 has those of the start.
-    """
+    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
     times = laws.times
     w = [mpf(0), mpf(0)]
     rows = []

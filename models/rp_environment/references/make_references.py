@@ -40,10 +40,7 @@ def outputs(value: Mapping[str, float]) -> list[mpf]:
 
 
 def simulate(scenario: Scenario) -> np.ndarray:
-    """Outputs at every communication point, (n + 1, outputs).
-
-    The inputs of row i are those of the step that ends there; row 0 has those of the start.
-    """
+    """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
     inputs = reference_files.input_table(scenario, INPUTS)
     rows = []
     with mp.workdps(DIGITS):

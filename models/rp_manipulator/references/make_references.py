@@ -119,10 +119,7 @@ class Reference:
         )
 
     def simulate(self, scenario: Scenario) -> np.ndarray:
-        """Real outputs at every communication point, (n + 1, outputs).
-
-        The inputs of row i are those of the step that ends there; row 0 has those of the start.
-        """
+        """Outputs (n + 1, outputs); row i has the inputs of the step before it, row 0 the first."""
         value = scenario.start_values
         # time counts from the start; the differences of the communication points are exact
         elapsed = scenario.times.astype(self.real) - self.real(scenario.start)

@@ -39,10 +39,7 @@ def signal(sines: Sines, real: type) -> hy.expression:
 def integrator(
     scenario: Scenario, inputs: dict[str, hy.expression], real: type = np.longdouble, pars: int = 0
 ) -> hy.taylor_adaptive:
-    """The motion of `scenario` from time 0 on, driven by `inputs`.
-
-    These are tau1 (N.m) and f2 (N) as functions of heyoka's time and of `pars` of its parameters.
-    """
+    """The motion from time 0, with tau1 (N.m) and f2 (N) of heyoka's time and `pars` parameters."""
     start = scenario.start_values
     names = {sp.Symbol(name): hy.expression(real(start[name])) for name in PARAMETERS}
     names |= {sp.Symbol(name): inputs[name] for name in INPUTS}

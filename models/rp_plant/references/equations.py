@@ -99,10 +99,7 @@ def derive() -> Equations:
 
 
 def _dry_friction(s: dict[str, sp.Symbol], joint: int, rate: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Friction at a rate in its direction, and at rest at most.
-
-    `prepared` gives breakaway friction and Stribeck velocity that are never 0 in place of others.
-    """
+    """Friction at a rate in its direction, and at rest at most, of values that are `prepared`."""
     coulomb = s[f"coulomb_friction{joint}"]
     breakaway = s[f"breakaway_friction{joint}"]
     fall = sp.exp(-((rate / s[f"stribeck_velocity{joint}"]) ** 2))
