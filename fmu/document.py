@@ -14,12 +14,13 @@ import html
 import shutil
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain, pairwise
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from atomic_write import atomic_write
+from jinja2 import Environment, FileSystemLoader
 from latex_to_mathml import FormulaError, mathml
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
@@ -27,6 +28,7 @@ from mdit_py_plugins.anchors import anchors_plugin
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 STYLE_SHEET = Path(__file__).with_suffix(".css")
+TEMPLATE = Path(__file__).with_suffix(".html")
 
 # headings of the tables of variables by causality, in the order of the page
 GROUPS = {
@@ -38,14 +40,12 @@ GROUPS = {
     "independent": "Independent variable",
 }
 
-# their columns, attributes of a ScalarVariable and of its type element
+# their columns, attributes of a ScalarVariable and of its type element, with their headings
 COLUMNS = ("valueReference", "name", "type", "causality", "variability", "initial", "unit")
 COLUMNS += ("start", "min", "max", "description")
+HEADINGS = {key: key.capitalize() for key in COLUMNS} | {"valueReference": "VR"}
 NUMBERS = ("valueReference", "start", "min", "max")
-
-
-# identifier and text of their heading
-VARIABLES = ("variables", "Variables of the FMU")
+SECONDS = ("startTime", "stopTime", "stepSize")  # of the default experiment
 
 
 class DocumentError(Exception):
@@ -179,66 +179,41 @@ def variable_row(variable: ET.Element) -> dict[str, str]:
     return row
 
 
-def variable_cell(row: dict[str, str], key: str) -> str:
-    text = html.escape(row.get(key, ""))
-    if key == "name":
-        text = f"<code>{text}</code>"
-    return f'<td class="number">{text}</td>' if key in NUMBERS else f"<td>{text}</td>"
-
-
-def variable_tables(root: ET.Element) -> str:
-    """Describe the default experiment and list the variables, one table per causality."""
-    lines = ['<section class="variables">', f'<h2 id="{VARIABLES[0]}">{VARIABLES[1]}</h2>']
-    experiment = root.find("DefaultExperiment")
-    if experiment is not None:
-        units = {"startTime": " s", "stopTime": " s", "stepSize": " s"}
-        values = (f"{k} {html.escape(v)}{units.get(k, '')}" for k, v in experiment.items())
-        lines.append(f"<p>Default experiment: {', '.join(values)}.</p>")
+def variable_groups(root: ET.Element) -> Iterator[tuple[str, list[dict[str, str]]]]:
+    """Heading and rows of a table per causality."""
     rows = [variable_row(v) for v in root.iterfind("ModelVariables/ScalarVariable")]
-    titles = {"valueReference": "VR"}
-    head = "".join(f'<th scope="col">{titles.get(key, key.capitalize())}</th>' for key in COLUMNS)
     for causality, heading in GROUPS.items():
         group = [row for row in rows if row["causality"] == causality]
         if group:
-            box = scroller("table", f"Variables: {heading}")
-            lines += [f"<h3>{heading}</h3>", f"{box}<table>"]
-            lines += [f"<thead><tr>{head}</tr></thead>", "<tbody>"]
-            lines += [f"<tr>{''.join(variable_cell(row, key) for key in COLUMNS)}</tr>"
-                      for row in group]  # fmt: skip
-            lines += ["</tbody>", "</table></div>"]
-    return "\n".join([*lines, "</section>"])
+            yield heading, group
 
 
 def document(pages: list[Path], model_description: Path, output: Path) -> None:
     """Write output/index.html and copy the images of the pages next to it."""
-    contents, all_images, all_headings = zip(*map(readme_page, pages), strict=True)
-    images, headings = chain(*all_images), chain(*all_headings, [VARIABLES])
-    entries = "\n".join(f'<li><a href="#{name}">{text}</a></li>' for name, text in headings)
+    contents, images, headings = zip(*map(readme_page, pages), strict=True)
     root = read_model_description(model_description)
-    title = ": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib)
-    page = f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{html.escape(title)}</title>
-<style>
-{read_text(STYLE_SHEET)}</style>
-</head>
-<body>
-<nav aria-label="Contents">
-<ul>
-{entries}
-</ul>
-</nav>
-<main>
-{"".join(contents)}{variable_tables(root)}
-</main>
-</body>
-</html>
-"""
+    experiment = root.find("DefaultExperiment")
+    values = {} if experiment is None else experiment.attrib
+    templates = Environment(
+        loader=FileSystemLoader(TEMPLATE.parent),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    templates.filters["text"] = html.escape
+    page = templates.get_template(TEMPLATE.name).render(
+        title=": ".join(root.attrib[k] for k in ("modelName", "description") if k in root.attrib),
+        style=read_text(STYLE_SHEET),
+        headings=chain(*headings, [("variables", "Variables of the FMU")]),
+        contents="".join(contents),
+        experiment=", ".join(f"{k} {v}{' s' if k in SECONDS else ''}" for k, v in values.items()),
+        groups=variable_groups(root),
+        columns=HEADINGS,
+        numbers=NUMBERS,
+        scroller=scroller,
+    )
     output.mkdir(parents=True, exist_ok=True)
-    for image in images:
+    for image in chain(*images):
         with atomic_write(output / image.name) as temporary:
             shutil.copyfile(image, temporary)
     with atomic_write(output / "index.html") as temporary:

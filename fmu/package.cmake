@@ -144,7 +144,7 @@ function(add_fmu name)
     COMMAND ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/document.py
             --readme ${readme} ${derivation} --model-description ${out}/modelDescription.xml
             --output ${out}/documentation
-    DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css
+    DEPENDS ${FMU_SOURCE_DIR}/document.py ${FMU_SOURCE_DIR}/document.css ${FMU_SOURCE_DIR}/document.html
             ${FMU_SOURCE_DIR}/latex_to_mathml.py ${FMU_SOURCE_DIR}/atomic_write.py
             ${readme} ${derivation} ${pictures} ${out}/modelDescription.xml
     COMMENT "Writing the documentation of ${name}"
