@@ -32,7 +32,6 @@ def collect(build: Path) -> dict[str, bytes]:
     names = {folder: name for name, folder in roots.items()} | {roots["generated"]: platform}
 
     def named(path: str | Path) -> str:
-        """Name of a file, of which the path begins with a root."""
         return re.sub(f"({found})(?=/)", lambda root: names[root[1]], str(path), count=1)
 
     # of a folder and one inside it, the inner one comes first

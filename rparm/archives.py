@@ -45,7 +45,10 @@ def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict
             for entry in entries:
                 if only in (None, entry.filename):
                     where = f"{_shown(entry.filename)} "
-                    _extract(archive, entry, folder)
+                    file = Path(archive.extract(entry, folder))
+                    size = file.stat().st_size if is_file(file) else entry.file_size
+                    if size != entry.file_size:
+                        raise zipfile.BadZipFile(f"{size} bytes, expected {entry.file_size}")
     except (UnreadableError, MemoryError):
         raise
     except Exception as error:  # zipfile and its decoders raise many
@@ -163,12 +166,6 @@ def _place(name: str) -> tuple[str, ...]:
     """
     parts = unicodedata.normalize("NFC", name).casefold().split("/")
     return tuple(part.rstrip(" .") for part in parts if part not in ("", "."))
-
-
-def _extract(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
-    file = Path(archive.extract(entry, folder))
-    if is_file(file) and file.stat().st_size != entry.file_size:
-        raise zipfile.BadZipFile(f"{file.stat().st_size} bytes, expected {entry.file_size}")
 
 
 def _shown(name: str) -> str:

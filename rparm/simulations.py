@@ -12,7 +12,6 @@ from rparm import project, trajectory_csv
 from rparm.coupling import in_process
 from rparm.errors import UserError, hint
 from rparm.federation import addresses, federation
-from rparm.federation.federation import Record
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
 from rparm.proof import proven, prover
@@ -20,7 +19,6 @@ from rparm.runs import given, reference, simulation
 from rparm.runs.given import Input
 from rparm.scenarios import scenario as scenarios
 from rparm.system import comparison, ecos, ssp, study
-from rparm.system.ssp import Ssp
 
 
 class Table(Mapping[str, np.ndarray]):
@@ -265,7 +263,11 @@ class System:
             raise UserError(
                 f"{self.path}: has no variant {variant!r}{hint(variant, self.variants)}"
             )
-        engines = {"master": in_process.run, "ecos": ecos.run, "helics": _by_helics}
+        engines = {
+            "master": in_process.run,
+            "ecos": ecos.run,
+            "helics": lambda ssp, variant, _: federation.run(ssp, variant, addresses.free()),
+        }
         if engine not in engines:
             raise UserError(f"engine: expected one of {', '.join(engines)}, got {engine!r}")
         with ssp.unpacked(self.path) as opened:
@@ -290,11 +292,6 @@ class System:
         if not project.is_built_from(self.path.stem, folder):
             raise UserError(f"{self.path}: has no study of its coupling, {folder.name} has one")
         return known.study_coupling(self.path, Path(output))
-
-
-def _by_helics(opened: Ssp, variant: str, _: Sequence[str]) -> Record:
-    """Each FMU in its own process."""
-    return federation.run(opened, variant, addresses.free())
 
 
 def version(fmi: int) -> str:

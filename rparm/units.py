@@ -130,7 +130,6 @@ def typed_quantity(text: str, known: Units) -> float:
 
 
 def _parts(text: str, known: Units) -> tuple[str, str]:
-    """Number and unit of a text."""
     found = QUANTITY.fullmatch(text.strip()) if len(text) <= LONGEST else None
     if not found:
         form = f"a number, or a number and its unit{_known(known)}" if known else "a number"

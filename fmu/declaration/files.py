@@ -140,7 +140,6 @@ def reason(mistake: Any, table: type[Table], key: str) -> str:
 
 
 def keys_of(table: type[Table]) -> list[str]:
-    """Keys that a table of the file may have."""
     return [field.alias or name for name, field in table.model_fields.items()]
 
 

@@ -109,8 +109,6 @@ class Table(BaseModel):
 
 
 class Model(Table):
-    """The model that the variables belong to."""
-
     name: Identifier
     description: str
     header: str

@@ -18,7 +18,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from rparm.models.machine.experiment import STOP
-from rparm.models.machine.systems import SENSOR, direct, fmus_of, run_in_ecos
+from rparm.models.machine.systems import SENSOR, SEQUENCE, direct, run_in_ecos
 
 from rparm import project, trajectory_csv
 from rparm.coupling.master import Master
@@ -175,7 +175,10 @@ def draw(measured: Mapping[tuple[str, str], tuple[list[float], float]]) -> Figur
 
 def main() -> None:
     measured: dict[tuple[str, str], tuple[list[float], float]] = {}
-    with ssp.unpacked(project.built(FOLDER, ".ssp")) as opened, fmus_of(opened) as fmus:
+    with (
+        ssp.unpacked(project.built(FOLDER, ".ssp")) as opened,
+        opened.unpacked_fmus(SEQUENCE) as fmus,
+    ):
         for variant in VARIANTS:
             expected = reference(variant)
             print(f"{variant}: tracking error {1e3 * tracking_error(expected):.4g} mm")

@@ -113,7 +113,6 @@ class Page:
     # ---- Sobol' indices --------------------------------------------------------------------------
 
     def indices(self) -> dict[str, list[Index]]:
-        """Of each column that has them."""
         if self.campaign.sampling != "indices":
             return {}
         found = {name: analysis.indices(self.campaign, x) for name, x in self.kept.items()}

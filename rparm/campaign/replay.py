@@ -32,8 +32,6 @@ DIED = "the run takes its process down"
 
 @dataclass(frozen=True)
 class Replay:
-    """What came out of a run."""
-
     parameters: dict[str, float]
     kept: dict[str, float]
     files: list[Path]  # values and page, if it ended

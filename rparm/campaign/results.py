@@ -203,18 +203,15 @@ class Results:
         columns.append(pa.array(rows.failures, pa.string()))
         try:
             for run, record in rows.trajectories.items():
-                self._write_trajectory(run, record)
+                columns_of_run = [pa.array(column) for column in (self._job.times, *record.T)]
+                table = pa.table(columns_of_run, schema=self._recorded)
+                self._write(self.trajectory_path(run), table, f"run {run}")
             table = pa.table(columns, schema=self._schema)
             self._write(self.block_path(block), table, f"block {block}")
         except (OSError, pa.ArrowException) as error:
             raise UserError(
                 f"{self.folder}: the results cannot be written: {reason(error)}; {RESUMES}"
             ) from error
-
-    def _write_trajectory(self, run: int, record: np.ndarray) -> None:
-        columns = [pa.array(column) for column in (self._job.times, *record.T)]
-        table = pa.table(columns, schema=self._recorded)
-        self._write(self.trajectory_path(run), table, f"run {run}")
 
     def trajectory_path(self, run: int) -> Path:
         """File of a run of which everything is kept."""
@@ -243,7 +240,6 @@ class Results:
         return {name: whole_table[name].to_numpy() for name in columns}
 
     def failed(self) -> int:
-        """Number of runs that failed."""
         reasons = (self.block(block)[FAILURE] for block in range(self._campaign.blocks))
         return sum(pc.sum(pc.not_equal(texts, "")).as_py() for texts in reasons)
 

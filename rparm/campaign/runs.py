@@ -22,8 +22,6 @@ LONGEST_REASON = 500  # characters
 
 @dataclass(frozen=True)
 class Rows:
-    """Results of some runs."""
-
     runs: np.ndarray  # (rows,) their numbers
     measures: np.ndarray  # (rows, measures); NaN in a run that failed
     failures: list[str]  # why each run failed, "" if it did not
@@ -90,14 +88,10 @@ class Runner:
             self._integers = [self._instances[c].integer(v) for c, v in self._job.integers.values()]
             return ""
         except UserError as error:
-            self._drop_instances()
+            with suppress(UserError):  # the run has failed already: instances are not used again
+                self._stack.close()
+            self._instances = []
             return one_line(error)[:LONGEST_REASON]
-
-    def _drop_instances(self) -> None:
-        """Free the instances of a failed run, which are not used again."""
-        with suppress(UserError):  # the run has failed already
-            self._stack.close()
-        self._instances = []
 
     # ---- Initialization --------------------------------------------------------------------------
 

@@ -129,12 +129,10 @@ def _security(options: argparse.Namespace) -> "Security | None":
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the campaign, in the project's folder."""
     return retyped("campaign", [options.file], {"fmu": options.fmu, "output": options.output})
 
 
 def _run_missing(options: argparse.Namespace, security: "Security | None", made: "Work") -> None:
-    """Run the blocks whose results are not there."""
     blocks = made.begin()
     if not blocks:
         return

@@ -3,7 +3,6 @@
 import argparse
 import shlex
 import time
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, federation, screen
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
-from rparm.federation.parts import parts, real_connections
+from rparm.federation.parts import real_connections
 from rparm.options import add_output, add_silence, add_system
 from rparm.output import console
 from rparm.output.progress import Progress
@@ -131,13 +130,8 @@ def _check_names(system: Ssp, options: argparse.Namespace) -> None:
 
 def _master(system: Ssp, variant: str, record: Record) -> tuple[float, float]:
     """Largest relative difference to the Jacobi master, and its time for all steps, s."""
-    with ExitStack() as stack:
-        fmus = {
-            c.name: stack.enter_context(system.unpacked_fmu(c.name))
-            for c in system.system.components
-        }
-        master = stack.enter_context(Master(fmus, real_connections(system)))
-        times = next(iter(parts(system, variant).values())).times
+    with system.unpacked_fmus() as fmus, Master(fmus, real_connections(system)) as master:
+        times = system.system.times
         master.initialize(times[0], times[-1], system.system.parameter_sets[variant])
         begin = time.perf_counter()
         rows = master.run(times)

@@ -138,7 +138,6 @@ def _fmu(given: str) -> Path:
 
 
 def _again(options: argparse.Namespace) -> str:
-    """What to type for it, in the project's folder."""
     files = map(Path, [options.fmu, *options.logs] if options.fmu else [])
     given = {name: getattr(options, name) for name in (*SEVERAL, "validate")}
     given["segment"] = options.segment if options.segment != SEGMENT else None

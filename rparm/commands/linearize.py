@@ -88,7 +88,6 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the same again."""
     given = {"fmi": options.fmi if options.fmi != project.VERSIONS[0] else None}
     for name in ("variant", "at", "time", "trim", "inputs", "outputs", "without", "cut", "step"):
         given["break" if name == "cut" else name] = getattr(options, name)

@@ -94,7 +94,6 @@ def run(options: argparse.Namespace) -> Ended:
 
 
 def _command(options: argparse.Namespace) -> str:
-    """What to type for the same again."""
     names = [options.name] if options.name else []
     given = {name: getattr(options, name) for name in ("method", "tolerance", "within")}
     return retyped("prove", names, given)

@@ -86,7 +86,9 @@ def run(options: argparse.Namespace) -> Ended:
         else:
             done.runs = _runs(runs, chosen, bool(twins), done.failures, None, TIGHTEST)
             swept = _quick(done.runs) if options.names else chosen
-            done.sweeps = _sweeps(runs, _finished(swept, done.failures), bool(options.names))
+            failed = {failure.scenario.path for failure in done.failures}
+            swept = [scenario for scenario in swept if scenario.path not in failed]
+            done.sweeps = _sweeps(runs, swept, bool(options.names))
             done.studies = [] if options.names else _convergence(fmus, twins)
         done.runs += _estimated(runs, own, done.failures, options.tolerance)
         console.stage("writing the report")
@@ -287,12 +289,6 @@ def _one(
         return []
     console.messages(f"{label}: the FMU says", found.result.messages)
     return [found]
-
-
-def _finished(chosen: Sequence[Scenario], failures: Sequence[Failure]) -> list[Scenario]:
-    """Those of `chosen` that did not fail."""
-    failed = {failure.scenario.path for failure in failures}
-    return [scenario for scenario in chosen if scenario.path not in failed]
 
 
 def _estimated(

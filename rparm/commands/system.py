@@ -59,19 +59,15 @@ def run(options: argparse.Namespace) -> Ended:
             raise
         chosen = _choose(systems, options.names)
         if options.list:
-            return _listed(chosen)
+            found = {system.name: names for system, names in chosen}
+            blocks = ("\n  ".join([name, *names]) for name, names in found.items())
+            return Ended(0, "\n".join(blocks), {"systems": found})
         check_writable(options.report)
         with written(options.report):
             for system, names in chosen:
                 system_page.remove(options.report, system.name, names)
         plans = [(system, _references(system, names)) for system, names in chosen]
         return _run(plans, options)
-
-
-def _listed(chosen: Sequence[tuple[Section, Sequence[str]]]) -> Ended:
-    found = {system.name: names for system, names in chosen}
-    lines = [line for name, names in found.items() for line in (name, *(f"  {n}" for n in names))]
-    return Ended(0, "\n".join(lines), {"systems": found})
 
 
 def _paths(options: argparse.Namespace) -> list[Path]:
@@ -154,8 +150,13 @@ def _run(
             with written(options.report):
                 entries.append(system_page.write_variant(options.report, section, outcome))
             if options.pictures:
+                from rparm.report.style import save  # matplotlib takes long to import
+
                 with written(options.pictures):
-                    _draw(options.pictures, section, outcome)
+                    options.pictures.mkdir(parents=True, exist_ok=True)
+                    save(
+                        section.study.figure(section.ssp, outcome), options.pictures / f"{name}.png"
+                    )
             outcomes.append(outcome)
         print()
     with written(options.report):
@@ -183,11 +184,3 @@ def _row(section: Section, outcome: Outcome) -> dict[str, object]:
         "seconds": outcome.run.wall_time,
         "passed": outcome.passed,
     }
-
-
-def _draw(folder: Path, section: Section, outcome: Outcome) -> None:
-    """Write the picture of a run, as READMEs have it."""
-    from rparm.report.style import save  # matplotlib takes long to import
-
-    folder.mkdir(parents=True, exist_ok=True)
-    save(section.study.figure(section.ssp, outcome), folder / f"{outcome.variant}.png")

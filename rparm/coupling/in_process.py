@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 
 import numpy as np
 
@@ -20,11 +19,9 @@ def run(ssp: Ssp, variant: str, names: Sequence[str]) -> Run:
     fails, or gives a value that is not finite.
     """
     system = ssp.system
-    times = system.start + system.step * np.arange(system.steps + 1)
+    times = system.times
     rows = np.empty((len(times), len(names)))
-    with ExitStack() as stack:
-        fmus = {c.name: stack.enter_context(ssp.unpacked_fmu(c.name)) for c in system.components}
-        master = stack.enter_context(Master(fmus, system.connections))
+    with ssp.unpacked_fmus() as fmus, Master(fmus, system.connections) as master:
         master.initialize(times[0], times[-1], system.parameter_sets[variant])
         readers = [_Reader(ssp, c, names) for c in master.components.values()]
         begin = time.perf_counter()

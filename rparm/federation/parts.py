@@ -56,7 +56,6 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
         known = hint(variant, system.parameters, "there are")
         raise UserError(f"{ssp.path}: has no variant {variant!r}{known}")
     published = {name: model.real_outputs for name, model in ssp.models.items()}
-    times = system.start + system.step * np.arange(system.steps + 1)
     whole = f"{variant} {hashlib.sha256(ssp.path.read_bytes()).hexdigest()}"
     made = {}
     for component in system.components:
@@ -76,7 +75,7 @@ def parts(ssp: Ssp, variant: str) -> dict[str, Part]:
                 dict.fromkeys(c.start_connector for c in others if c.start_component == name)
             ),
             rounds=len(system.components) + 1,
-            times=times,
+            times=system.times,
             system=whole,
         )
     return made

@@ -90,7 +90,6 @@ class Variable:
         return next((name for name, item in self.items.items() if item == value), value)
 
     def item(self, name: Any) -> int:
-        """Number of an Enumeration's item."""
         if not isinstance(name, str) or name not in self.items:
             guess = did_you_mean(name, self.items) if isinstance(name, str) else ""
             known = ", ".join(f'"{item}"' for item in self.items)

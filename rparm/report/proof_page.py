@@ -36,7 +36,8 @@ def write(
         Plot(
             f"proven error of {name}",
             unit(model.variables[name].unit),
-            [Curve(run, _drawn(course[:, i])) for run, course in errors.items()],
+            # 0 where a run is exact but for what stands for underflows, as at the start
+            [Curve(x, np.where(e[:, i] < SMALLEST, 0.0, e[:, i])) for x, e in errors.items()],
             log=True,
             note=f"The exact {name} is no farther than this from the run.",
         )
@@ -86,11 +87,6 @@ def _write(report: Path, name: str, page: RunPage) -> Path:
     (report / FOLDER).mkdir(parents=True, exist_ok=True)
     with_overview = (report / INDEX).exists()
     return write_run(report / FOLDER / f"{name}.html", replace(page, overview=with_overview))
-
-
-def _drawn(course: np.ndarray) -> np.ndarray:
-    """0 where a run is exact but for what stands for underflows, as at the start."""
-    return np.where(course < SMALLEST, 0.0, course)
 
 
 def _largest(model: Model, enclosure: Enclosure, errors: Mapping[str, np.ndarray]) -> Table:

@@ -73,6 +73,8 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
     """Write the page and the values of a run, complete or not at all; its line in the overview."""
     run, folder = outcome.run, _folder(report, section)
     rows, data = _data(section, outcome)
+    error = f"{outcome.error:.1e}"
+    above = f"the error of {outcome.worst}, {error}, is above its bound {short(BOUND)}"
     page = RunPage(
         status=PASSED if outcome.passed else FAILED,
         facts=_facts(section, outcome),
@@ -86,7 +88,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
             *(f"{m.name.capitalize()}: {m.meaning}." for m in section.study.MEASURES),
             "These numbers are of all steps, also of those that the file leaves out.",
         ],
-        failures=[*_failures(outcome), *run.messages],
+        failures=[*([] if outcome.passed else [above]), *run.messages],
         **_values(folder, outcome, rows),
         **_texts(section, outcome.variant),
     )
@@ -196,12 +198,6 @@ def _facts(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
 
 def _measures(section: Section, outcome: Outcome) -> list[tuple[str, str]]:
     return [(m.name, f"{m.value(outcome):.3g} {m.unit}") for m in section.study.MEASURES]
-
-
-def _failures(outcome: Outcome) -> list[str]:
-    if outcome.passed:
-        return []
-    return [f"the error of {outcome.worst}, {outcome.error:.1e}, is above its bound {short(BOUND)}"]
 
 
 def _description(system: System, variant: str) -> str:

@@ -41,8 +41,6 @@ class Compared:
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Reference trajectory of one scenario."""
-
     path: Path
     times: np.ndarray  # (rows,) s
     names: tuple[str, ...]

@@ -1,7 +1,7 @@
 """SSP archives: unpacked, read and checked, once."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +30,13 @@ class Ssp:
     def unpacked_fmu(self, component: str) -> Fmu:
         """FMU of a component, unpacked; messages name the SSP."""
         return Fmu(self.fmu(component), shown=self.path / self.system.component(component).source)
+
+    @contextmanager
+    def unpacked_fmus(self, names: Iterable[str] | None = None) -> Iterator[dict[str, Fmu]]:
+        """FMUs of all components, or of those named, in this order."""
+        with ExitStack() as stack:
+            wanted = self.models if names is None else names
+            yield {name: stack.enter_context(self.unpacked_fmu(name)) for name in wanted}
 
     def variable(self, name: str) -> Variable:
         """What the FMU declares of ``component.variable``."""

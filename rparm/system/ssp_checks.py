@@ -60,7 +60,6 @@ class _Checker:
                 self.tolerance(variant, component, values)
 
     def read(self, folder: Path, component: Component) -> Model:
-        """What the component's FMU declares."""
         path = folder / component.source
         where = f"component {component.name!r}: {component.source}"
         if not is_file(path):
@@ -109,7 +108,6 @@ class _Checker:
             fed[target] = str(connection)
 
     def end(self, where: str, component: str, connector: str) -> Connector:
-        """Connector at one end of a connection."""
         names = [known.name for known in self.system.components]
         if component not in names:
             hint = did_you_mean(component, names)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rparm.fmi.model import Value
 
 
@@ -78,6 +80,11 @@ class System:
     @property
     def steps(self) -> int:
         return round((self.stop - self.start) / self.step)
+
+    @property
+    def times(self) -> np.ndarray:
+        """Communication points, (steps + 1,) s."""
+        return self.start + self.step * np.arange(self.steps + 1)
 
     def component(self, name: str) -> Component:
         return next(component for component in self.components if component.name == name)

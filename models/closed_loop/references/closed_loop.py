@@ -164,7 +164,7 @@ def prepare(parameters: Parameters, real: type) -> tuple[Loop, np.ndarray, np.nd
     loop.set({"segment.sign": -1 if values["trajectory.branch"] == "backward" else 1})
     if motion != "point_to_point":  # whose first angle is a parameter
         first = loop.references(segments[:1, 0], segments[:1])[0, 0]
-        turn = 2 * _pi(real)
+        turn = 8 * np.arctan(real(1))
         loop.set({"segment.whole_turns": -np.ceil((first - turn / 2) / turn)})
     return loop, segments, np.array([number[name] for name in STATE])
 
@@ -236,10 +236,6 @@ def _ascending(times: Sequence[float], real: type) -> np.ndarray:
     if times.ndim != 1 or len(times) == 0 or np.any(np.diff(times) <= 0):
         raise UserError("times must ascend")
     return times
-
-
-def _pi(real: type) -> np.floating:
-    return 4 * np.arctan(real(1))
 
 
 def _held_controller(

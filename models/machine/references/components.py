@@ -31,7 +31,6 @@ class Ticks:
         self.next = 1
 
     def time(self, k: int) -> real:
-        """Time of tick k in s."""
         return self._start + k * self._period
 
     def until(self, end: real) -> Iterator[int]:

@@ -156,7 +156,6 @@ class Machine:
 
 @cache
 def declared() -> dict[str, Model]:
-    """What the FMUs of the components declare."""
     return {
         component: read_model(project.built(MODELS / folder, ".fmu"))
         for component, folder in COMPONENTS.items()

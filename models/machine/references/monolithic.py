@@ -115,7 +115,6 @@ class Monolith:
         )
 
     def _reference(self) -> dict[str, hy.expression]:
-        """The reference motion as a function of time."""
         known = {
             sp.Symbol(name): self._par(name)
             for name in self._place

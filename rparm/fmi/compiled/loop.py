@@ -87,7 +87,6 @@ class Tangent:
 
     @property
     def fields(self) -> tuple[np.ndarray, ...]:
-        """As the loop takes it."""
         return self.derivatives, self.states, self.reals, self.integers, self.deviation
 
     @staticmethod
