@@ -1,4 +1,4 @@
-"""Writes what a release consists of: checksums, and a bill of materials in CycloneDX."""
+"""Writes checksums of a release, and its bill of materials in CycloneDX."""
 
 from __future__ import annotations
 

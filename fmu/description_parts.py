@@ -19,7 +19,7 @@ LOG_CATEGORIES = {
 
 
 def texts_of(declaration: Declaration, provenance: Provenance) -> dict[str, str]:
-    """Attributes of the root that say what the model is and where it comes from."""
+    """Attributes of the root: what the model is and where it comes from."""
     model = declaration.model
     texts = {
         "author": provenance.author,

@@ -74,7 +74,7 @@ def without_local_links(tokens: Iterable[Token]) -> list[Token]:
 
 
 def scroller(kind: str, name: str) -> str:
-    """Start of a box for what may be wider than the page: keys scroll it, so it takes the focus."""
+    """Opening tag of a box that scrolls, also by keys, what is wider than the page."""
     return f'<div class="{kind}" tabindex="0" role="group" aria-label="{html.escape(name)}">'
 
 

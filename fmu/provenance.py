@@ -1,4 +1,4 @@
-"""What an FMU says of where it comes from: version, author, license, copyright and date."""
+"""The origin of an FMU: version, author, license, copyright and date."""
 
 from __future__ import annotations
 

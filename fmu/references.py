@@ -107,7 +107,7 @@ def parameter_set(scenario: Scenario, declaration: Declaration) -> str:
 
 
 def typed(variable: Variable, value: Any, place: str) -> tuple[str, dict[str, str]]:
-    """Element of a value and its attributes."""
+    """Element for a value, with its attributes."""
     if isinstance(variable, Enumeration):
         if not isinstance(value, str) or value not in variable.items:
             raise CarriedScenarioError(

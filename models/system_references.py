@@ -17,7 +17,7 @@ from rparm.errors import UserError
 from rparm.fmi.model import Value
 
 NAMESPACE = {"ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues"}
-KEPT = 20  # every so many communication points go into the files
+KEPT = 20  # every 20th communication point goes into the files
 
 Columns = Mapping[str, np.ndarray]
 # Times (rows,) and columns (rows,) by name of each file of a variant, by the name of the file.

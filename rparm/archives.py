@@ -25,7 +25,7 @@ LONGEST_NAME = 400  # characters of a path in an archive, each other of which ma
 # those of FMI and SSP; zipfile unpacks others without a limit of memory
 METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
 ENCRYPTED = 0x1 | 0x40 | 0x2000  # flags: encrypted, strongly, with a hidden directory
-CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines, or are none
+CONTROL = ("Cc", "Cs", "Zl", "Zp")  # categories of characters that end lines or control a terminal
 
 
 def unpack(path: Path, folder: Path, kind: str, only: str | None = None) -> dict[str, int]:

@@ -38,7 +38,7 @@ def placed(where: object) -> Iterator[None]:
 
 
 def together(errors: Sequence[UserError]) -> UserError:
-    """One error for all of a command's."""
+    """All errors of a command as one."""
     return UserError("; ".join(dict.fromkeys(map(str, errors))))
 
 

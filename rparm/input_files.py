@@ -100,7 +100,7 @@ def show(value: Any, longest: int = 40) -> str:
 
 
 def number_in(text: str) -> float:
-    """The number in a text of a file; ValueError if it is none, as 1_000, which Python reads."""
+    """The number in a text; ValueError for others, and for 1_000, which only Python reads."""
     if "_" in text:
         raise ValueError(f"could not convert string to float: {text!r}")
     return float(text)

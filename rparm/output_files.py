@@ -43,7 +43,7 @@ def write_text(path: Path, text: str) -> None:
 def create(path: Path, text: str) -> None:
     """Write a file that must not exist yet, in a folder that does; UserError if that fails."""
     try:
-        path.touch(exist_ok=False)  # so that nobody's file is overwritten, at no time
+        path.touch(exist_ok=False)  # so that no file is ever overwritten
     except FileExistsError:
         raise UserError(f"{path}: exists already, choose another name") from None
     except (OSError, ValueError) as error:
@@ -74,7 +74,7 @@ def check_writable(folder: Path) -> None:
 
 
 def from_here(path: Path) -> Path:
-    """`path` as short as it can be given from the current folder."""
+    """`path` relative to the current folder if it is inside."""
     try:
         here = Path.cwd()
     except OSError:  # it has been removed
@@ -83,7 +83,7 @@ def from_here(path: Path) -> Path:
 
 
 def from_folder(path: Path, folder: Path) -> str:
-    """A path as it is from a folder; in full where there is no way, on another drive."""
+    """A path relative to a folder; absolute if it is on another drive."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:

@@ -17,7 +17,7 @@ build/*.fmu, build/*.ssp                built from the folder of the same name, 
 build/fmi3/                             the same of FMI 3.0
 build/runtime/runtime.json              what FMUs of own equations are linked with
 build/release/built.tar.xz              the same for all platforms, that program, and the playground
-fmu/equations_to_fmu.py                 makes these FMUs, in a process of its own
+fmu/equations_to_fmu.py                 makes these FMUs, in a separate process
 build/report/                           what the commands write: index.html, folders of its parts
 
 An installed package has fmu/ and models/ in its folder share/, what is built as `rparm.shipped`
@@ -254,7 +254,7 @@ def runtimes(all_platforms: bool) -> list[Path]:
 
 
 def from_root(path: Path) -> Path:
-    """`path` as it is given in commands that run in the project's folder, if it has one."""
+    """`path` as commands in the project's folder write it, in a checkout."""
     path = path.absolute()
     return path.relative_to(ROOT) if path.is_relative_to(ROOT) and not INSTALLED else path
 

@@ -1,4 +1,4 @@
-"""What an installed package has that is built, put together or unpacked when it is first used.
+"""The built files of an installed package, assembled or unpacked on first use.
 
 It has the bytes of FMUs and systems in pieces, each once: FMUs share most of their sources, and
 systems contain FMUs. The files keep every byte of those of the release.

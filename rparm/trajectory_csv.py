@@ -38,8 +38,8 @@ def write(
 ) -> None:
     """Write trajectories, (rows, names), over times in s; the file appears complete or not at all.
 
-    Values have so many significant `digits`, None: those that they need to be read back as they
-    are; and times, if `short_times`, those that they need.
+    `digits` are the significant ones; None, and for times `short_times`: as many as are needed to
+    read the same number back.
     """
     form = _shortest if digits is None else f"{{:.{digits}g}}".format
     of_time = _shortest if short_times else form

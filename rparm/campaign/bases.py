@@ -66,7 +66,7 @@ class Base(ABC):
     @property
     @abstractmethod
     def hashes(self) -> dict[str, str]:
-        """SHA-256 of the files that runs follow from: scenario or SSP, and FMUs."""
+        """SHA-256 of the files that determine the runs: scenario or SSP, and FMUs."""
 
     @property
     def held(self) -> tuple[HeldInputs, HeldInputs]:

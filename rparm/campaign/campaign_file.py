@@ -27,7 +27,7 @@ from rparm.input_files import read_toml, show
 from rparm.units import SECONDS, quantity
 
 MAX_RUNS = 10**9
-WHOLE = ("latin", "indices")  # samplings whose points are made at once
+WHOLE = ("latin", "indices")  # samplings that make all points together
 MAX_WHOLE = 10**7  # runs of those
 BEYOND = 10**99  # no greater number of runs is written out
 MAX_PARAMETERS = 1000

@@ -154,7 +154,7 @@ class Engine:
         return future
 
     def _rows(self, future: Future, block: _Block) -> Rows:
-        """Results of a task; run by run if workers died over it again and again."""
+        """Results of a task; run by run if it has killed too many workers."""
         if future.status == "finished":
             return future.result()
         error = self._error(future)
@@ -164,7 +164,7 @@ class Engine:
         return _joined([self._alone(run, point[None]) for run, point in pairs])
 
     def _alone(self, run: int, point: np.ndarray) -> Rows:
-        """One run as a task; a failed row if workers die over it."""
+        """One run as a task; a failed row if it kills workers."""
         try:
             return self._submit([run], point).result()
         except KilledWorker:

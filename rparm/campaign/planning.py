@@ -1,4 +1,4 @@
-"""Checks what a campaign says of its scenario or system, and makes the job of it."""
+"""Checks a campaign against its scenario or system, and turns it into a job."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -122,7 +122,7 @@ class _Planner:
             self.fail(place, f"has no value: {one_line(error)}")
 
     def settable(self, name: str, place: str, used: bool) -> tuple[int, Variable] | None:
-        """The variable; None if it is none but `used` by an expression."""
+        """The variable; None for a name that is no variable, but `used` by an expression."""
         try:
             self.base.variable(name)
         except WrongValueError as error:
@@ -241,7 +241,7 @@ class _Planner:
         return tuple(np.array(references, np.uint32) for references in found)
 
     def check_columns(self, measures: Sequence[Measure]) -> None:
-        """Columns that the page asks for are there, and no name stands for two."""
+        """Refuse columns that the page needs and does not find, and names of two columns."""
         places = {name: f"[parameters.{name}]" for name in self.campaign.parameters}
         places |= {name: f"[derived] {name}" for name in self.campaign.derived}
         for name in (RUN, FAILURE):
@@ -265,7 +265,7 @@ def columns_of(campaign: Campaign, measures: Sequence[Measure]) -> list[str]:
 
 
 def units(campaign: Campaign, base: Base, measures: Iterable[Measure]) -> dict[str, str]:
-    """Units of the columns of numbers; empty texts where there is none, or it is not known."""
+    """Units of the columns of numbers; empty if a column has none, or it is unknown."""
 
     def of(name: str) -> str:
         try:

@@ -37,7 +37,7 @@ def in_si(campaign: Campaign, base: Base, where: object) -> Campaign:
 
 
 def questions(campaign: Campaign, base: Base) -> Iterator[str]:
-    """What to ask about start values: angles without a unit that are beyond a turn."""
+    """Questions about start values: angles without a unit beyond one turn."""
     given = {name: (f"[set] {name}", [value]) for name, value in campaign.set.items()}
     for name, distribution in campaign.parameters.items():
         values = distribution.numbers[: 1 if distribution.kind == "normal" else None]

@@ -1,8 +1,8 @@
 """Results of a campaign as files: a Parquet file per block, trajectories, and a manifest.
 
 Each file is written to a temporary name and renamed: a file that is there is complete, unless the
-disk has lost something. In its schema's metadata, each Parquet file says of which campaign and
-which part of it is, and has the hash of its values: what does not fit is found by each reading.
+disk has lost something. The metadata of each Parquet file name its campaign and its part, and
+have the hash of its values, which every reading checks.
 """
 
 import hashlib

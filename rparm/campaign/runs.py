@@ -178,7 +178,7 @@ def open_fmus(archives: Mapping[str, bytes], folder: Path) -> Iterator[dict[str,
 
 
 def check(job: Job, archives: Mapping[str, bytes], path: Path) -> None:
-    """Load the FMUs of a job and make an instance of each; UserError of `path` if that fails."""
+    """Load the FMUs of a job and instantiate each; the UserError names `path` if that fails."""
     with TemporaryDirectory(prefix="rparm-") as name:
         folder = Path(name)
         try:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Work:
-    """What there is to do, and the folder where it is kept."""
+    """A campaign, its job, and the folder of its results."""
 
     campaign: Campaign
     base: Base

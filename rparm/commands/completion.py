@@ -29,7 +29,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Ended:
-    """Print the script, with the names of the scenarios and systems that there are."""
+    """Print the script, with the names of all scenarios and systems."""
     script = shtab.complete(_all_commands(), options.shell)
     if options.output is None:
         return Ended(0, script, {"script": script})

@@ -1,6 +1,6 @@
 """Step-size control by step doubling, for any master of rparm.coupling.master.
 
-A step H is made at once and, rolled back by the FMU states, again as two steps H/2. A coupling of
+A step H is made whole and, after a rollback by FMU states, again as two steps H/2. A coupling of
 order p makes an error of C H^(p+1) in a step. Then the two results are C H^(p+1) (1 - 2^-p) apart,
 and the second one, which is kept, is off by 1/(2^p - 1) of that. The step is accepted if this
 estimate is within the tolerance; the next one aims at a little less.
@@ -108,7 +108,7 @@ def run(
 
 
 class _Steps:
-    """Makes steps, each at once and in two halves, and chooses the length of the next one."""
+    """Makes each step whole and in two halves, and chooses the length of the next one."""
 
     def __init__(self, master: Master, control: Control) -> None:
         self._master, self._control = master, control
@@ -118,7 +118,7 @@ class _Steps:
         self.rejected, self.do_steps = 0, 0
 
     def attempt(self, begin: Snapshot, start: float, target: float) -> float:
-        """Make a step at once, then in two halves, which are kept; the estimate of its error."""
+        """Make a step whole, then in two halves, which are kept; the estimate of its error."""
         master, calls = self._master, self._master.do_steps
         master.advance(target)
         coarse = master.values[self._columns]

@@ -40,7 +40,7 @@ def wait_for(address: str, seconds: float, say: Callable[[], object]) -> None:
 
     HELICS would wait too, but print that it does, several times a second.
 
-    UserError if nothing listens there for `seconds`, or the host is unknown.
+    UserError if nothing has listened there after `seconds`, or the host is unknown.
     """
     place = check_form(address)
     latest = time.monotonic() + seconds

@@ -197,7 +197,7 @@ def _wait(processes: Mapping[str, subprocess.Popen]) -> None:
 
 
 def _failure(processes: Mapping[str, subprocess.Popen], folder: Path) -> UserError | None:
-    """What a process here says that has failed: others only say that the federation ended."""
+    """The error of a local process, but not that the federation has ended."""
     texts = _texts(processes, folder)
     causes = (text for text in texts if ENDED not in text and ABSENT not in text)
     return next(map(UserError, causes), None)

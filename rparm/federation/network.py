@@ -109,7 +109,7 @@ class Broker:
             h.helicsCoreDisconnect(first)
 
     def announce(self, system: str) -> None:
-        """Say what all must step."""
+        """Publish the system that all must step."""
         self._h.helicsBrokerSetGlobal(self._broker, SYSTEM, system)
 
     def end(self, text: str) -> None:
@@ -136,7 +136,7 @@ class _Questions:
         self._threads: list[Thread] = []
 
     def answers(self, ask: Callable[[str], object], names: Sequence[str]) -> dict[str, object]:
-        """What `ask` returns in time, by name."""
+        """Answers of `ask` that arrive in time, by name."""
         answers: dict[str, object] = {}
 
         def put(name: str) -> None:
@@ -225,7 +225,7 @@ class Federate:
         return info
 
     def system(self) -> str:
-        """What all must step, as soon as the broker has announced it."""
+        """The system that all must step, once the broker has announced it."""
         with self._waiting(f"at the start {ENDED}"):
             while True:
                 answer = self._ask("global_value", SYSTEM)

@@ -30,7 +30,7 @@ class Part:
     inputs: tuple[str, ...]  # connected Real inputs
     sources: tuple[Source, ...]  # of each of `inputs`
     constant: tuple[str, ...]  # outputs that feed an input which is no Real: they must not change
-    rounds: int  # after so many exchanges of outputs in initialization none changes any more
+    rounds: int  # exchanges in initialization after which no output changes any more
     times: np.ndarray  # s, communication points
     system: str  # variant and SHA-256 of the SSP: those of all processes must be the same
 

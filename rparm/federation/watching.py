@@ -1,4 +1,4 @@
-"""Work in a thread of its own that waits in HELICS, which has no limit and ignores signals."""
+"""Runs work that waits in HELICS in a thread: HELICS has no time limit and ignores signals."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ LEAVE = 2.0  # s, for work and processes to end after a failure
 def run(
     work: Callable[[], Result], look: Callable[[], None], end: Callable[[BaseException], None]
 ) -> Result:
-    """Do `work`, and `look` now and then; where one of them fails, or a signal comes, `end` it."""
+    """Do `work`, and `look` now and then; `end` both if one fails or a signal arrives."""
     outcome: Future[Result] = Future()
 
     def do() -> None:
@@ -46,7 +46,7 @@ def run(
 
 
 class Silence:
-    """Whether a federate waits too long in HELICS, in looks: suspension is no silence."""
+    """Detects calls of HELICS that take too long; counts polls, so suspension does not count."""
 
     def __init__(self, federate: Federate, limit: float) -> None:
         self._federate, self._limit = federate, limit

@@ -237,7 +237,7 @@ class Instance(ABC):
             return bool(self.fmi.getBoolean([self.fmu.model.variables[name].reference])[0])
 
     def reals(self, names: Sequence[str], memory: Array | None = None) -> Reals:
-        """The Real variables `names`, to get or set at once, many times, in `memory` if given."""
+        """The Real variables `names`, to get or set together, many times, in `memory` if given."""
         values = (c_double * len(names))() if memory is None else memory
         calls = self._real_calls(self._references(names), values) if names else (no_call, no_call)
         return Reals(list(names), view(values), *calls)
@@ -247,7 +247,7 @@ class Instance(ABC):
         """Calls that get and set Real variables."""
 
     def output_derivatives(self, names: Sequence[str], order: int) -> OutputDerivatives:
-        """The derivatives of one order of the Real outputs `names`, to get at once, many times."""
+        """Derivatives of one order of the Real outputs `names`, to get together, many times."""
         values, numbers = doubles(len(names))
         references, orders = self._references(names), (c_int * len(names))(*[order] * len(names))
         call = self._derivative_call(references, orders, values) if names else no_call
@@ -271,7 +271,7 @@ class Instance(ABC):
 
     @abstractmethod
     def input_polynomials(self, names: Sequence[str], order: int) -> InputPolynomials:
-        """Polynomials up to `order` for the Real inputs `names`, to set at once, many times."""
+        """Polynomials up to `order` for the Real inputs `names`, to set together, many times."""
 
     def _references(self, names: Sequence[str]) -> Array:
         variables = self.fmu.model.variables

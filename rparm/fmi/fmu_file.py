@@ -108,7 +108,9 @@ def describe(path: Path, kind: str = CO_SIMULATION) -> Described:
             raise
         except (UnreadableError, ValidationError, ValueError) as error:
             raise UnreadableError(f"wrong {DESCRIPTION}: {one_line(error)}") from error
-        except Exception as error:  # fmpy raises bare exceptions, and others where it is surprised
+        except (
+            Exception
+        ) as error:  # fmpy raises bare exceptions, and others for input it does not expect
             kind = "" if type(error) is Exception else f"fmpy fails with {type(error).__name__}: "
             raise UnreadableError(f"wrong {DESCRIPTION}: {kind}{one_line(error)}") from error
 

@@ -19,7 +19,7 @@ def width() -> int:
 
 
 def stage(text: str) -> None:
-    """Say what begins, on a terminal."""
+    """Name the stage that begins, on a terminal."""
     if sys.stderr is not None and sys.stderr.isatty() and not streams.is_quiet():
         print(f"{text} ...", file=sys.stderr, flush=True)
 
@@ -92,7 +92,7 @@ def plain_table(title: str, head: Sequence[str], rows: Sequence[Sequence[object]
 
 
 def remark(text: str) -> None:
-    """Print a text in lines that are set in."""
+    """Print a text, wrapped and indented."""
     wrapped = textwrap.wrap(
         text, width(), initial_indent=INDENT, subsequent_indent=2 * INDENT, break_on_hyphens=False
     )

@@ -1,4 +1,4 @@
-"""How far an activity is, on standard error."""
+"""Progress bars on standard error."""
 
 import sys
 

@@ -51,7 +51,7 @@ def _apart(real: TextIO, elsewhere: TextIO) -> Iterator[TextIO]:
     try:
         yield out
     finally:
-        with suppress(OSError):  # full, or nobody reads it: it has been said
+        with suppress(OSError):  # full, or nobody reads it: already reported
             out.close()
         os.dup2(kept, number)
         os.close(kept)

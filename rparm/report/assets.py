@@ -34,7 +34,7 @@ def write(report: Path) -> None:
     except OSError:
         for target in made:
             target.unlink(missing_ok=True)
-        with suppress(OSError):  # there is something in it
+        with suppress(OSError):  # not empty
             folder.rmdir()
         raise
 

@@ -61,7 +61,7 @@ def of_result(
     references: Mapping[str, np.ndarray],
     rows: Sequence[int] | np.ndarray | slice = slice(None),
 ) -> dict | None:
-    """The same of a run that may have stopped early, with the references that there are."""
+    """The same of a run that may have stopped early, and may have no references."""
     # a row holds the outputs at the end of a step, so the inputs too are those of this step
     steps = scenario.input_rows[: len(result.times)]
     inputs = {name: values[steps] for name, values in scenario.inputs.items()}

@@ -38,9 +38,9 @@ class Entry:
     group: str  # model or system, with its version of FMI
     page: str  # file name in the section's folder
     status: str  # PASSED, FAILED or RAN
-    error: float | None = None  # the worst one; None: not a number, or there is none
+    error: float | None = None  # the worst one; None if it is NaN or unknown
     bound: float | None = None
-    detail: str = ""  # what the error is of, or why there is none
+    detail: str = ""  # which output is worst, or why the run failed
     line: str = ""  # path of the sparkline
     line_text: str = ""  # what it shows
     line_of: str = ""  # the variable of the sparkline

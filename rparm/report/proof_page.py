@@ -36,7 +36,7 @@ def write(
         Plot(
             f"proven error of {name}",
             unit(model.variables[name].unit),
-            # 0 where a run is exact but for what stands for underflows, as at the start
+            # 0 where only the allowance for underflow is left, as at the start
             [Curve(x, np.where(e[:, i] < SMALLEST, 0.0, e[:, i])) for x, e in errors.items()],
             log=True,
             note=f"The exact {name} is no farther than this from the run.",

@@ -44,7 +44,7 @@ OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disab
 
 LARGEST = 1_000_000  # bytes
 COLOURS = 64  # in all frames together
-PLAYS = 3  # then it comes to rest, which readers who do not want it to move can wait for
+PLAYS = 3  # then it stops: readers who dislike motion need not wait for long
 REST = 1.5  # s, of the last frame
 
 PAGE = """<!DOCTYPE html>

@@ -41,7 +41,7 @@ class Plot:
     curves: Sequence[Curve]
     log: bool = False
     levels: Sequence[tuple[str, float]] = ()  # dashed lines: name and value
-    note: str = ""  # what its numbers stand for
+    note: str = ""  # what its values mean
 
     @property
     def gaps(self) -> bool:

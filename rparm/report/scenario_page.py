@@ -69,7 +69,7 @@ def write(
 
 
 def write_failed(folder: Path, name: str, failure: Failure, again: str) -> Entry:
-    """Write the page of a scenario that did not run to its end: what there is of it."""
+    """Write the page of a scenario that stopped early: what was recorded until then."""
     folder.mkdir(parents=True, exist_ok=True)
     scenario, model, result = failure.scenario, failure.fmu.model, failure.result
     csv, data = "", None
@@ -195,7 +195,7 @@ def _value_plots(
 
 
 def meanings(variables: Iterable[Variable]) -> str:
-    """What the numbers of Integers stand for, as their descriptions say."""
+    """What the values of Integers mean, from their descriptions."""
     texts = [v.description for v in variables if v.type == "Integer" and v.description]
     return ". ".join(texts) + "." if texts else ""
 

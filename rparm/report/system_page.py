@@ -105,7 +105,7 @@ def write_variant(report: Path, section: Section, outcome: Outcome) -> Entry:
 
 
 def write_failed(report: Path, section: Section, variant: str, error: UserError) -> Entry:
-    """Write the page of a variant that did not run to its end: what there is of it."""
+    """Write the page of a variant that stopped early: what was recorded until then."""
     folder, system = _folder(report, section), section.ssp.system
     run = error.result if isinstance(error, StoppedError) else None
     facts = [("system", section.title), ("time", f"{system.start:g} to {system.stop:g} s")]

@@ -79,7 +79,7 @@ class _Steps:
         return None
 
     def advance(self, count: int) -> UserError | None:
-        """Make so many steps, or the last ones; what failed, if one did."""
+        """Make `count` steps, or those that are left; the error of one that failed."""
         first = self.done
         last = min(first + count, self.count)
         here = slice(first, last + 1)

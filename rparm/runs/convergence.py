@@ -1,9 +1,9 @@
 """Order of convergence in the communication step, with inputs that are smooth functions of time.
 
-A master knows its inputs at the communication points. With zero-order hold of them, an FMU is off
-by the first power of the step; with their derivatives up to order k it is off by power
-k + 1. An FMU of FMI 3.0 that asks for the inputs at four times of a step (intermediate update) is
-off by power 4. The problems are models/<model>/convergence/<name>.toml, in the format of a
+A master knows its inputs at the communication points. With zero-order hold, the error of an FMU
+falls with the first power of the step, with derivatives up to order k with power k + 1. If an FMU
+of FMI 3.0 asks for the inputs at four times of a step (intermediate update), it falls with power 4.
+The problems are models/<model>/convergence/<name>.toml, in the format of a
 scenario; the exact final state of each is models/<model>/references/<name>/exact.json.
 """
 

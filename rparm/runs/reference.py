@@ -79,7 +79,7 @@ def load(scenario: Scenario, model: Model) -> Reference:
 
 
 def failure(path: Path, folder: Path, name: str) -> trajectory_csv.Failure:
-    """What makes errors of the reference `name` of a model or system, which say how to make it."""
+    """Makes errors of the reference `name` of a model or system, with how to make it again."""
     return trajectory_csv.failure(path, f"; {project.making_references(folder, name)}")
 
 

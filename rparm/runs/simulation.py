@@ -105,7 +105,7 @@ def initialize(instance: Instance, scenario: Scenario, tolerance: float) -> None
 
 
 def _compiled_loop(wanted: bool, steps: int) -> Callable[..., Steps] | None:
-    """What steps through a run faster; None if it does not pay or cannot be had."""
+    """The compiled stepping loop; None if it does not pay or cannot be loaded."""
     global _steps_made
     _steps_made += steps
     if wanted or _steps_made > WORTH_COMPILING:

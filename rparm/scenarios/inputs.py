@@ -177,7 +177,7 @@ class InputReader:
         return self._logs[file]
 
     def _check_covers(self, times: np.ndarray, where: str) -> None:
-        """A log has values for each point where a step begins; its end may be one step short."""
+        """Check that a log covers each point where a step begins: it may end one step early."""
         begin, end = float(self._times[0]), float(self._times[-2])
         if times[0] > begin + EARLY:
             found = f"begins at {float(times[0])!r} s"

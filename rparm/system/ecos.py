@@ -60,7 +60,7 @@ class Run:
     values: np.ndarray  # (rows, len(names)) in the variables' units; Booleans are 0 or 1
     wall_time: float  # s, of the steps with the reading
     messages: tuple[str, ...]  # warnings of the components
-    # by component.variable, of those in STATISTICS that there are
+    # those of STATISTICS that components have, by component.variable
     statistics: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -235,7 +235,7 @@ def _check_values(
         return
     row = bad_rows[0]
     bad = [name for name, value in zip(names, values[row], strict=True) if not np.isfinite(value)]
-    # a component that was given one passes it on at once
+    # a component passes on a bad input in the same step
     victims = {
         connection.end_component
         for connection in ssp.system.connections

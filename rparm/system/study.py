@@ -88,7 +88,7 @@ def of_coupling() -> tuple[Path, CouplingStudy]:
 
 
 def rests() -> dict[Path, Rest]:
-    """Where systems rest, by folder, of those that say it: as ``REST``."""
+    """Where systems rest, by folder, of those that define ``REST``."""
     return {folder: cast(Rest, known.REST) for folder, known in _having("REST").items()}
 
 

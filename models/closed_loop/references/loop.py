@@ -31,7 +31,7 @@ class Switch:
     def __call__(self, integrator: hy.taylor_adaptive, direction: int) -> bool:
         integrator.pars[self.at_limit] = 1 if direction * self.side > 0 else 0
         integrator.pars[self.level] = self.side * integrator.pars[self.bound]
-        return True  # go on
+        return True  # continue
 
 
 class Loop:

@@ -34,7 +34,7 @@ class Ticks:
         return self._start + k * self._period
 
     def until(self, end: real) -> Iterator[int]:
-        """Ticks that come until `end`, which is none itself: then the order would be open."""
+        """Ticks before `end`; none may be at `end`, where the order would be undefined."""
         while self.time(self.next) < end:
             yield self.next
             self.next += 1

@@ -174,7 +174,7 @@ def completed(parameters: Parameters) -> dict[str, dict[str, Value]]:
 
 
 def columns() -> list[str]:
-    """Real outputs of all components, then states that are none, as `system` compares them."""
+    """All Real outputs, then the states that are not outputs, as `system` compares them."""
     outputs, states = [], []
     for component, model in declared().items():
         outputs += [f"{component}.{name}" for name in model.real_outputs]

@@ -215,7 +215,7 @@ class Monolith:
                 raise UserError(f"{name} reaches its limit {float(self._numbers[limit])!r}")
 
     def _check_wall(self, columns: Columns) -> None:
-        """The wall has no place in the equations either."""
+        """The equations hold without contact with the wall only."""
         sources = (*EFFECTOR, "q1", "dq1")
         for row in zip(*(columns[f"plant.{name}"] for name in sources), strict=True):
             found = self._wall.outputs(dict(zip(Environment.INPUTS, row, strict=True)))
