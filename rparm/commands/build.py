@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError, one_line
-from rparm.options import add_output
 
 DESCRIPTION = (
     "Makes FMUs of the equations in FILE.toml, for FMI 2.0 and 3.0: NAME.fmu and fmi3/NAME.fmu. "

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rparm import project
+from rparm.command_line.options import add_output, count, number, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, one_line
 from rparm.interruption import arrived
-from rparm.options import add_output, count, number, retyped
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import from_here, written

@@ -8,8 +8,8 @@ from typing import Any
 import shtab
 
 from rparm import command_line, project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
-from rparm.options import add_output
 from rparm.output_files import write_text, written
 from rparm.system import comparison
 

@@ -3,9 +3,9 @@
 import argparse
 
 from rparm import project
+from rparm.command_line.options import add_report, add_system
 from rparm.commands import Ended
 from rparm.linearization import stable_steps
-from rparm.options import add_report, add_system
 from rparm.output import console
 from rparm.output_files import check_writable
 from rparm.system import study

@@ -4,12 +4,12 @@ import argparse
 import os
 from pathlib import Path
 
+from rparm.command_line.options import add_document, add_silence
 from rparm.commands import Ended
 from rparm.errors import UserError, hint
 from rparm.federation import SILENCE, addresses, component, screen, watching
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import parts
-from rparm.options import add_document, add_silence
 from rparm.system import ssp
 
 DESCRIPTION = "Steps one component of a system until the federation has come to the end."

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from rparm import project, trajectory_csv
+from rparm.command_line.options import add_output, add_silence, add_system
 from rparm.commands import Ended
 from rparm.coupling.master import Master
 from rparm.errors import UserError, hint
@@ -15,7 +16,6 @@ from rparm.federation import SILENCE, addresses, federation, screen
 from rparm.federation.federation import Record
 from rparm.federation.network import KEY, key
 from rparm.federation.parts import real_connections
-from rparm.options import add_output, add_silence, add_system
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output.result_tables import FederationTable

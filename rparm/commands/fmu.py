@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_fmi, add_output
 from rparm.commands import Ended
-from rparm.options import add_fmi, add_output
 from rparm.output_files import copied
 from rparm.project import VERSIONS
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rparm import project
+from rparm.command_line.options import add_report, pairs, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, placed
 from rparm.input_files import number_in
-from rparm.options import add_report, pairs, retyped
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity

@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_fmi, add_report, pairs, retyped
 from rparm.commands import Ended
 from rparm.errors import WrongValueError
-from rparm.options import add_fmi, add_report, pairs, retyped
 from rparm.output import console
 from rparm.output_files import check_writable, from_here, written
 from rparm.units import SECONDS, typed_quantity

@@ -4,8 +4,8 @@ import argparse
 import textwrap
 
 from rparm import project
+from rparm.command_line.options import add_document
 from rparm.commands import Ended
-from rparm.options import add_document
 from rparm.output import console
 from rparm.scenarios import scenario
 from rparm.texts import shortened

@@ -4,10 +4,10 @@ import argparse
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError
 from rparm.fmi.fmu_file import read_model
-from rparm.options import add_output
 from rparm.output_files import create, from_folder, written
 from rparm.scenarios import template
 

@@ -5,9 +5,9 @@ import re
 from pathlib import Path
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
 from rparm.errors import UserError
-from rparm.options import add_output
 from rparm.output_files import create, written
 
 DESCRIPTION = (

@@ -3,8 +3,8 @@
 import argparse
 
 from rparm import project
+from rparm.command_line.options import add_output
 from rparm.commands import Ended
-from rparm.options import add_output
 from rparm.output_files import copied, from_here
 
 DESCRIPTION = "Says where the page with the plant is; --open shows it."

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from rparm import project
+from rparm.command_line.options import add_report, add_tolerance, retyped
 from rparm.commands import Ended
 from rparm.errors import UserError, WrongValueError, placed
 from rparm.fmi.fmu_file import Fmu
-from rparm.options import add_report, add_tolerance, retyped
 from rparm.output import console
 from rparm.output.progress import Progress
 from rparm.output_files import check_writable, from_here, written

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from rparm import project
 from rparm.command_line import COMMANDS, PROGRAM
+from rparm.command_line.options import add_fmi, add_report, add_tolerance
 from rparm.commands import Ended
 from rparm.commands import list as scenario_list
 from rparm.errors import UserError, did_you_mean, placed, together
 from rparm.fmi.fmu_file import Fmu
 from rparm.input_files import missing
-from rparm.options import add_fmi, add_report, add_tolerance
 from rparm.output import console, results
 from rparm.output.progress import Progress
 from rparm.output.result_tables import RunTable, SweepTable, measured

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rparm import project
 from rparm.command_line import PROGRAM
+from rparm.command_line.options import add_report, add_system
 from rparm.commands import Ended
 from rparm.coupling import in_process
 from rparm.errors import UserError, did_you_mean, hint, together
-from rparm.options import add_report, add_system
 from rparm.output import console
 from rparm.output.result_tables import VariantTable
 from rparm.output_files import check_writable, from_here, written

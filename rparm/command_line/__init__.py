@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import NoReturn
 
 from rparm import project
+from rparm.command_line.options import add_common
 from rparm.errors import UserError, did_you_mean
-from rparm.options import add_common
 from rparm.project import PROGRAM
 
 DEFAULT = "run"  # what names and options without a command are for

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rparm import project
+from rparm.api.simulations import version
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Value
-from rparm.simulations import version
 
 if TYPE_CHECKING:
     from rparm.identification.identify import Identification
