@@ -26,6 +26,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 from mdit_py_plugins.anchors import anchors_plugin
 from mdit_py_plugins.dollarmath import dollarmath_plugin
+from program import WrongInputError, program, read_text
 
 STYLE_SHEET = Path(__file__).with_suffix(".css")
 TEMPLATE = Path(__file__).with_suffix(".html")
@@ -46,10 +47,6 @@ COLUMNS += ("start", "min", "max", "description")
 HEADINGS = {key: key.capitalize() for key in COLUMNS} | {"valueReference": "VR"}
 NUMBERS = ("valueReference", "start", "min", "max")
 SECONDS = ("startTime", "stopTime", "stepSize")  # of the default experiment
-
-
-class DocumentError(Exception):
-    """A page that cannot be made: file and reason in one line."""
 
 
 def is_remote(address: str) -> bool:
@@ -109,7 +106,7 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
             return mathml(latex, "block" if options["display_mode"] else "inline")
         except FormulaError as error:
             line = " ".join(latex.split())
-            raise DocumentError(f"{readme}: formula ${line}$ does not convert: {error}") from None
+            raise WrongInputError(f"{readme}: formula ${line}$ does not convert: {error}") from None
 
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     markdown.use(dollarmath_plugin, allow_space=False, allow_labels=False, renderer=formula)
@@ -136,7 +133,7 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
                 continue
             image = readme.parent / unquote(address)
             if not image.is_file():
-                raise DocumentError(f"{readme}: the image {address} does not exist")
+                raise WrongInputError(f"{readme}: the image {address} does not exist")
             token.attrs["src"] = image.name
             images.append(image)
     headings = [
@@ -147,26 +144,17 @@ def readme_page(readme: Path) -> tuple[str, list[Path], list[tuple[str, str]]]:
     return markdown.renderer.render(tokens, markdown.options, {}), images, headings
 
 
-def read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DocumentError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise DocumentError(f"{path}: is not UTF-8: {error}") from None
-
-
 def read_model_description(path: Path) -> ET.Element:
     try:
         root = ET.fromstring(read_text(path))
     except ET.ParseError as error:
-        raise DocumentError(f"{path}: is not valid XML: {error}") from None
+        raise WrongInputError(f"{path}: is not valid XML: {error}") from None
     if root.tag != "fmiModelDescription" or root.get("fmiVersion") != "2.0":
-        raise DocumentError(f"{path}: is not a model description of FMI 2.0")
+        raise WrongInputError(f"{path}: is not a model description of FMI 2.0")
     for variable in root.iterfind("ModelVariables/ScalarVariable"):
         for key in ("name", "valueReference"):
             if key not in variable.attrib:
-                raise DocumentError(f"{path}: a ScalarVariable lacks {key}")
+                raise WrongInputError(f"{path}: a ScalarVariable lacks {key}")
     return root
 
 
@@ -220,19 +208,14 @@ def document(pages: list[Path], model_description: Path, output: Path) -> None:
         temporary.write_text(page, encoding="utf-8", newline="\n")
 
 
-def main() -> int:
-    """Make the page; 2 with a line on standard error where that is not possible."""
+@program()
+def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--readme", type=Path, nargs="+", required=True, help="pages of the model")
     parser.add_argument("--model-description", type=Path, required=True)
     parser.add_argument("--output", type=Path, required=True, help="folder for the page")
     arguments = parser.parse_args()
-    try:
-        document(arguments.readme, arguments.model_description, arguments.output)
-    except (DocumentError, OSError) as error:
-        print(f"document.py: {error}", file=sys.stderr)
-        return 2
-    return 0
+    document(arguments.readme, arguments.model_description, arguments.output)
 
 
 if __name__ == "__main__":

@@ -12,17 +12,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from declaration.load import DeclarationError
-from document import DocumentError
 from equations import declaration, lock
 from equations.building import PLACES, build
 from equations.model_file import ModelFileError, read
 from equations.runtime import Runtime
 from generate import write_if_changed
 from package import pack
-from source_code import SourceCodeError
+from program import WrongInputError
 
-MISTAKES = (ModelFileError, DeclarationError, DocumentError, SourceCodeError, OSError)
+MISTAKES = (ModelFileError, WrongInputError, OSError)
 
 
 def main() -> int:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from program import WrongInputError
 from pydantic import ValidationError
 
 from declaration.schema import (
@@ -24,7 +25,7 @@ from declaration.schema import (
 )
 
 
-class DeclarationError(Exception):
+class DeclarationError(WrongInputError):
     """A variables.toml that cannot be used: file, place and reason in one line."""
 
 
