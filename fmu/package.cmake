@@ -68,7 +68,7 @@ function(add_equations name file terminals folder)
     OUTPUT ${folder}/equations.c ${folder}/equations.h ${folder}/variables.toml ${folder}/README.md
     COMMAND ${CMAKE_COMMAND} -E env PYTHONPATH=${PROJECT_SOURCE_DIR}
             ${Python3_EXECUTABLE} ${FMU_SOURCE_DIR}/equations_to_c.py ${file} ${option} --output ${folder}
-    DEPENDS ${file} ${lock} ${terminals} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py
+    DEPENDS ${file} ${lock} ${terminals} ${generator} ${FMU_SOURCE_DIR}/equations_to_c.py ${FMU_SOURCE_DIR}/generate.py ${FMU_SOURCE_DIR}/program.py
     COMMENT "Generating the equations of ${name}"
     VERBATIM)
   add_library(${name}_equations STATIC ${folder}/equations.c)

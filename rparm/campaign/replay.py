@@ -23,7 +23,7 @@ from rparm.report import assets, motion, pages
 from rparm.report.motion import Recorded
 from rparm.report.overview import RAN
 from rparm.report.pages import INDEX, RunPage, Table
-from rparm.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.texts import unit
 
 FOLDER = "replays"
@@ -131,7 +131,7 @@ def _serve(connection: Connection) -> None:
 def _data(base: Base, job: Job, given: dict[str, float], record: np.ndarray) -> RunData:
     """Plots of the states, and the motion; record: (n + 1, watched)."""
     outputs = dict(zip(job.watched, record.T, strict=True))
-    curves = [Curve(x, without_rounding(outputs[x])) for x in base.states() or list(outputs)]
+    curves = [result_curve(x, outputs[x]) for x in base.states() or list(outputs)]
     rows = thinned([curve.values for curve in curves])
     plots = [
         Plot(curve.name, unit(base.variable(curve.name)[1].unit), [curve.at(rows)])

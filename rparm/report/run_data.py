@@ -132,6 +132,14 @@ def without_rounding(values: np.ndarray) -> np.ndarray:
     return np.where(np.abs(values) < ROUNDING * scale, 0.0, values)
 
 
+def result_curve(
+    name: str, values: np.ndarray, reference: np.ndarray | None = None, steps: bool = False
+) -> Curve:
+    """Values of a variable over those of its reference, without rounding."""
+    below = None if reference is None else without_rounding(reference)
+    return Curve(name, without_rounding(values), below, steps)
+
+
 def thinned(columns: Sequence[np.ndarray], most: int = MOST_ROWS) -> np.ndarray:
     """Rows to show of columns (rows,): at most `most`, unless the columns have more extremes.
 

@@ -14,7 +14,7 @@ from rparm.report import motion, overview
 from rparm.report.measured_data import measured_tables, with_measured
 from rparm.report.overview import FAILED, PASSED, RAN, Entry
 from rparm.report.pages import RunPage, Table
-from rparm.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from rparm.report.run_data import Curve, Plot, RunData, result_curve, thinned
 from rparm.report.signal_texts import describe
 from rparm.runs.comparison import Failure, Run, estimated_from
 from rparm.runs.measured import comparisons
@@ -174,13 +174,8 @@ def _value_plots(
     panels += [*map(tuple, units.values()), *scenario.panels]
 
     def curve(name: str) -> Curve:
-        wanted = references.get(name)
-        return Curve(
-            name,
-            without_rounding(columns[name].astype(float)),
-            None if wanted is None else without_rounding(wanted),
-            steps=name not in model.real_outputs,
-        )
+        steps = name not in model.real_outputs
+        return result_curve(name, columns[name].astype(float), references.get(name), steps)
 
     plots = [
         Plot(

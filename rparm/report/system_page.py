@@ -16,7 +16,7 @@ from rparm.output_files import whole
 from rparm.report import assets, motion, overview
 from rparm.report.overview import FAILED, PASSED, SYSTEM, Entry
 from rparm.report.pages import RunPage, Table
-from rparm.report.run_data import Curve, Plot, RunData, thinned, without_rounding
+from rparm.report.run_data import Plot, RunData, result_curve, thinned
 from rparm.report.scenario_page import cells, meanings
 from rparm.system import ecos
 from rparm.system.comparison import BOUND, Outcome
@@ -171,14 +171,9 @@ def _plot(ssp: Ssp, outcome: Outcome, diagram: Diagram) -> Plot:
     curves = []
     for name in diagram.curves:
         wanted = diagram.references.get(name)
-        curves.append(
-            Curve(
-                name,
-                without_rounding(outcome.column(name)),
-                None if wanted is None else without_rounding(outcome.column(wanted)),
-                steps=ssp.variable(name).type != "Real",
-            )
-        )
+        reference = None if wanted is None else outcome.column(wanted)
+        steps = ssp.variable(name).type != "Real"
+        curves.append(result_curve(name, outcome.column(name), reference, steps))
     variables = [ssp.variable(name) for name in diagram.curves]
     meaning = meanings(variables)
     return Plot(diagram.title, unit(variables[0].unit), curves, note=meaning)

@@ -57,8 +57,10 @@ WIRES: dict[str, dict[str, str]] = {
     "sensor": {"q1": "plant.q1", "q2": "plant.q2"},
     "environment": {name: f"plant.{name}" for name in Environment.INPUTS},
 }
-DISCRETE = ("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2")
-DISCRETE = (*DISCRETE, "trajectory.payload_attached")
+DISCRETE = (
+    *("plant.mode1", "plant.mode2", "sensor.counts1", "sensor.counts2"),
+    "trajectory.payload_attached",
+)
 
 Parameters = Mapping[str, Value]
 
