@@ -25,7 +25,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def written(path: Path) -> Iterator[None]:
+def written(path: str | Path) -> Iterator[None]:
     """Turn a failure of the system inside into the user's error: `path` cannot be written."""
     try:
         yield

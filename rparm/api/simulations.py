@@ -14,6 +14,7 @@ from rparm.errors import UserError, hint
 from rparm.federation import addresses, federation
 from rparm.fmi.fmu_file import Fmu
 from rparm.fmi.model import Model, Value
+from rparm.output_files import written
 from rparm.proof import proven, prover
 from rparm.runs import given, reference, simulation
 from rparm.runs.given import Input
@@ -59,10 +60,8 @@ class Table(Mapping[str, np.ndarray]):
 
     def to_csv(self, path: str | Path) -> None:
         """Write all columns to a file, with 17 significant digits."""
-        try:
+        with written(path):
             trajectory_csv.write(Path(path), self._times, self._names, self._values)
-        except OSError as error:
-            raise UserError(f"{path}: cannot be written: {error.strerror}") from error
 
     def to_pandas(self) -> Any:
         """The columns as a pandas.DataFrame; pandas must be installed."""

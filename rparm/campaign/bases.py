@@ -19,7 +19,7 @@ from rparm.coupling.connected_instance import start_value
 from rparm.errors import UserError, WrongValueError, did_you_mean, hint
 from rparm.fmi.compiled.loop import Part
 from rparm.fmi.fmu_file import describe, read_model
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Model, Value, Variable
+from rparm.fmi.model import INPUTS, Model, Value, Variable
 from rparm.scenarios import scenario
 from rparm.scenarios.scenario import MAX_STEPS, Scenario
 from rparm.system import ssp
@@ -85,8 +85,7 @@ class Base(ABC):
     def settable(self, name: str) -> tuple[int, Variable]:
         """A variable that a run may start from; WrongValueError if there is none of that name."""
         component, variable = self.variable(name)
-        local_state = variable.causality == "local" and variable.initial == "exact"
-        if not (variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state):
+        if not variable.can_start:
             raise WrongValueError(f"{name!r} is not a parameter or the start value of a state")
         return component, variable
 

@@ -26,7 +26,7 @@ from rparm.campaign.job import Job
 from rparm.campaign.planning import FAILURE, RUN, columns_of
 from rparm.campaign.runs import Rows
 from rparm.errors import UserError, reason
-from rparm.output_files import check_writable, whole
+from rparm.output_files import check_writable, whole, written
 
 MANIFEST, BLOCKS, TRAJECTORIES = "manifest.json", "blocks", "trajectories"
 PACKAGES = ("dask", "distributed", "fmpy", "numba", "numpy", "pyarrow", "SALib", "scipy")
@@ -68,13 +68,11 @@ class Results:
         path = self.folder / MANIFEST
         self.check()
         self._check_room()
-        try:
+        with written(self.folder):
             for name in (BLOCKS, TRAJECTORIES):
                 (self.folder / name).mkdir(parents=True, exist_ok=True)
             self._remove_left()
             self._write_manifest(path)
-        except OSError as error:
-            raise UserError(f"{self.folder}: cannot be written: {reason(error)}") from error
         self._check_manifest(path)
 
     @contextmanager

@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,7 +28,7 @@ class Rows:
     trajectories: dict[int, np.ndarray]  # (n + 1, watched) by number of the run
 
 
-class Runner:
+class Runner(AbstractContextManager["Runner"]):
     """Instances of all components, of FMUs by their hash; a context manager that frees them."""
 
     def __init__(self, job: Job, fmus: Mapping[str, Fmu]) -> None:
@@ -49,9 +49,6 @@ class Runner:
         self._integers: list[int] = []  # at the end of the last run
         column = {name: i for names in (job.watched, job.integers) for i, name in enumerate(names)}
         self._columns = [[column[name] for name in m.variables] for m in job.measures]
-
-    def __enter__(self) -> "Runner":
-        return self
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)

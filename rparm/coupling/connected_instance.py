@@ -7,7 +7,7 @@ import numpy as np
 
 from rparm.errors import UserError, placed
 from rparm.fmi.fmi_instance import Instance, Reals, UnpackedFmu
-from rparm.fmi.model import INITIAL, INPUTS, PARAMETERS, Value, Variable
+from rparm.fmi.model import INPUTS, Value
 
 
 class ConnectedInstance:
@@ -86,16 +86,11 @@ def check_finite(component: str, outputs: Reals, when: str) -> None:
 def start_value(fmu: UnpackedFmu, component: str, name: str, value: Value) -> Value:
     """Value to set before initialization, an item as its number; UserError if it cannot be set."""
     variable = fmu.model.variables.get(name)
-    if variable is None or not _can_start(variable):
+    is_switch = variable is not None and variable.is_a(INPUTS) and variable.type == "Boolean"
+    if variable is None or not (variable.can_start or is_switch):
         raise UserError(f"{component}: {fmu.path} has no parameter {name!r}")
     is_item = variable.type == "Enumeration" and isinstance(value, str)
     if not is_item and variable.type != "Boolean":
         return value
     with placed(f"{component}.{name}"):
         return variable.checked(value)
-
-
-def _can_start(variable: Variable) -> bool:
-    local_state = variable.causality == "local" and variable.initial == "exact"
-    switch = variable.is_a(INPUTS) and variable.type == "Boolean"
-    return variable.is_a(PARAMETERS) or variable.is_a(INITIAL) or local_state or switch

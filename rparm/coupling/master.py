@@ -18,7 +18,7 @@ values jump to what follows from it at this time, as at the start.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from ctypes import c_double
 
 import numpy as np
@@ -35,7 +35,7 @@ ORDERS = ("jacobi", "gauss_seidel")
 INPUTS = ("held", "extrapolated")
 
 
-class Snapshot:
+class Snapshot(AbstractContextManager["Snapshot"]):
     """The state of a whole system at a communication point; a context manager that frees it."""
 
     def __init__(self, master: "Master") -> None:
@@ -47,9 +47,6 @@ class Snapshot:
         self._states = [
             component.instance.saved_state() for component in master.components.values()
         ]
-
-    def __enter__(self) -> "Snapshot":
-        return self
 
     def __exit__(self, *_: object) -> None:
         for state in self._states:
@@ -75,7 +72,7 @@ class Snapshot:
         return f"at the communication point t = {self._master.time!r} s"
 
 
-class Master:
+class Master(AbstractContextManager["Master"]):
     """A system of connected components; a context manager that frees their instances.
 
     In Gauss-Seidel order the components step in the order of `fmus`. After each step all Real
@@ -126,9 +123,6 @@ class Master:
             self._stack.close()
             raise
         self._connect(instances, real, also)
-
-    def __enter__(self) -> "Master":
-        return self
 
     def __exit__(self, *error: object) -> None:
         self._stack.__exit__(*error)

@@ -10,7 +10,7 @@ import secrets
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 from threading import Thread
 from typing import Any
@@ -57,7 +57,7 @@ def key() -> str:
     return found
 
 
-class Broker:
+class Broker(AbstractContextManager["Broker"]):
     """What all `count` processes of a federation are connected to, at `address`."""
 
     def __init__(self, count: int, address: str) -> None:
@@ -75,9 +75,6 @@ class Broker:
         if not h.helicsBrokerIsConnected(self._broker):
             self._close()
             raise UserError(f"no broker at {address}: nothing can listen there any more")
-
-    def __enter__(self) -> "Broker":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._close()

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,7 +34,7 @@ INSTANCES: dict[tuple[str, str], type[Instance]] = {
 BINARY, SOURCE = re.compile(r"binaries/[^/]+/[^/]+"), re.compile(r"sources/.+\.c")
 
 
-class Fmu:
+class Fmu(AbstractContextManager["Fmu"]):
     """An FMU that is unpacked; a context manager that removes the unpacked copy.
 
     Raises UserError if the file is no FMU of the `kind`, co-simulation or model exchange, of a
@@ -66,9 +66,6 @@ class Fmu:
             except (OSError, UnreadableError) as error:
                 raise UserError(f"{self.path}: {library}: {reason(error)}") from error
             self._unpacked = unpacked.pop_all()
-
-    def __enter__(self) -> "Fmu":
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -51,6 +51,12 @@ class Variable:
             return self.causality == "output" and self.initial == "exact"
         return self.causality == {PARAMETERS: "parameter", INPUTS: "input"}[kind]
 
+    @property
+    def can_start(self) -> bool:
+        """Whether it is a parameter or the start value of a state, which need not be an output."""
+        is_state = self.causality in ("output", "local") and self.initial == "exact"
+        return self.causality == "parameter" or is_state
+
     def checked(self, given: Any) -> Value:
         """Value to set, from what a user gives.
 
